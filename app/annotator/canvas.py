@@ -24,7 +24,7 @@ from app.annotator.editing import AnnotationEditor, Drawing, Edit, Measure, Tool
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.theme import ON_PICTURE
-from app.widgets.image_canvas import PictureCanvas, PictureView, render
+from app.widgets.image_canvas import ImageCanvas, Viewport, render
 from app.widgets.scene_overlay import foot
 from app.widgets.scene_painter import ScenePainter
 from core.annotation.model import ROBOT, VESSEL, Annotation, Line, MaskTarget, Readout, Touch, line_of
@@ -181,7 +181,7 @@ class AnnotationLoupe:
         self,
         painter: QPainter,
         levels: tuple[Image, ...],
-        view: PictureView,
+        view: Viewport,
         drawing: Drawing,
         focus: Point,
         light: tuple[float, float],
@@ -192,7 +192,7 @@ class AnnotationLoupe:
         keep_clear = [focus, *drawing.annotation.robot, *drawing.annotation.vessel]
         frame = self._place(side, view.room, [view.to_screen(point) for point in keep_clear])
         zoom = min(max(_LOUPE_ZOOM * view.zoom, _LOUPE_ZOOM_RANGE[0]), _LOUPE_ZOOM_RANGE[1])
-        inner = PictureView(view.size, (side, side), zoom, focus)
+        inner = Viewport(view.size, (side, side), zoom, focus)
         glass = QPainterPath()
         glass.addRoundedRect(frame, theme.RADIUS, theme.RADIUS)
         painter.save()
@@ -256,7 +256,7 @@ CANVAS_KEYS = (
 """The keys that the picture handles itself; all others are in the menus."""
 
 
-class AnnotationCanvas(PictureCanvas):
+class AnnotationCanvas(ImageCanvas):
     """Shows an image with its annotation; all places are pixels of the image as it is shown.
 
     ``edited`` carries what was done, in words, and the new annotation. ``previewed`` carries the annotation and its readout while a
@@ -519,7 +519,7 @@ class AnnotationCanvas(PictureCanvas):
             if event.key() in (Qt.Key.Key_Tab, Qt.Key.Key_Backtab):
                 place = self.editor.select_next(-1 if event.key() == Qt.Key.Key_Backtab else 1)
                 if place is not None:
-                    self.see(place)
+                    self.scroll_to(place)
                     self._cursor = None
                     self._emit_preview()
                     self.update()
@@ -532,13 +532,13 @@ class AnnotationCanvas(PictureCanvas):
         edit = self.editor.nudge(dx, dy)
         if edit is not None and selected is not None:
             self._cursor = None  # the loupe shows the point
-            self.see(line_of(edit[1], selected.line)[selected.place])
+            self.scroll_to(line_of(edit[1], selected.line)[selected.place])
             self._emit_edit(edit)
             return
         (x, y), (width, height) = self._cursor or self.view.center, self.view.size
         self._cursor = min(max(x + dx, 0.0), width - 1.0), min(max(y + dy, 0.0), height - 1.0)
         self._cross_by_key = True
-        self.see(self._cursor)
+        self.scroll_to(self._cursor)
         if self.editor.stretch(self._cursor, 0.0):
             self._emit_preview()
         self.update()

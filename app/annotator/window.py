@@ -20,10 +20,9 @@ from app.ui.actions import KeyTable, MenuEntry, add_help_menu, add_menu, menu_ta
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import refusal_text
 from app.ui.window_base import WindowFrame
-from app.widgets.basics import Card, Columns
+from app.widgets.basics import Card, Columns, column, holder, set_window_margins, side
 from app.widgets.image_canvas import LightSliders
 from app.widgets.messages import Toast
-from app.widgets.scene_panels import column, holder, set_window_margins, side
 from app.widgets.shortcut_page import KeyPage
 from core.annotation.model import Annotation, Readout
 from core.annotation.store import TAKES_LINES

@@ -21,7 +21,6 @@ import cv2
 import numpy as np
 
 from app.commands.progress import LineOutput, check_apart, check_no_input, is_same
-from app.widgets.overlay_image import draw_overlay
 from core.config.models import choose_model, load_config
 from core.control.policies import table_policy
 from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream, UserError
@@ -322,6 +321,8 @@ def _write_pictures(outputs: Outputs, stem: str, image: np.ndarray, scene: Scene
             mask = getattr(scene.masks, name) if scene.masks is not None else blank
             write_mask(outputs.masks / f"{stem}_{name}.png", _source_sized(mask, size))
     if outputs.overlay is not None:
+        from app.widgets.overlay_image import draw_overlay
+
         write_png(outputs.overlay / f"{stem}_overlay.png", draw_overlay(image, scene, table_policy(scene, advice_config)))
 
 

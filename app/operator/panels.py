@@ -15,7 +15,7 @@ from app.ui.i18n import tr, tr_text
 from app.ui.texts import Undriven
 from app.ui.workers import Pace
 from app.widgets.alerts import AlertStrip
-from app.widgets.basics import Card
+from app.widgets.basics import Card, card_note, column, holder, row
 from app.widgets.command_panel import CommandPanel
 from app.widgets.event_log import EventLog, LogKind
 from app.widgets.jog_panel import JogPanel
@@ -24,7 +24,7 @@ from app.widgets.mode_bar import ModeBar
 from app.widgets.performance_panel import PerformancePanel
 from app.widgets.phantom_picker import PhantomPicker
 from app.widgets.record_bar import RecordBar
-from app.widgets.scene_panels import ScenePanels, card_note, column, holder, row
+from app.widgets.scene_panels import ScenePanels
 from app.widgets.servo_table import ServoTable, known_joints, status_by_servos
 from app.widgets.shortcut_page import operator_help
 from app.widgets.sim_banner import SimBanner
@@ -91,7 +91,7 @@ class OperatorPanels(ScenePanels):
         self.gauge.set_allowed(limits.theta_allow_deg)
         self.bars.set_allowed(limits.d_allow_px)
         self.trends.set_limits(limits)
-        self._tell_allowed(limits)
+        self._show_allowed(limits)
 
     def set_config(self, config: Config) -> None:
         """What the panels know of the configuration, for a rig that is being opened with another one."""

@@ -27,7 +27,7 @@ from PySide6.QtCore import QObject, QTimer, Signal, Slot
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import refusal_text, signed_degrees
-from app.widgets.servo_table import number
+from app.widgets.painting import number
 from core.devices import UserError
 from core.evaluation.replay import Change, event_target, seen
 from core.session.codec import InvalidRecord, PerceivedLine, RecordedRow, read_json, scene_from_json

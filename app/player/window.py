@@ -41,12 +41,12 @@ from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import pictures_folder
 from app.ui.theme import ON_PICTURE
 from app.ui.window_base import WindowFrame
-from app.widgets.basics import Card
+from app.widgets.basics import Card, card_note, column, holder
 from app.widgets.command_panel import Provenance, ProvenanceTable
 from app.widgets.live_view import HeadLoupe, LiveView
 from app.widgets.messages import Notice, NoticeKind, Toast
 from app.widgets.scene_overlay import Layer
-from app.widgets.scene_panels import ScenePanels, add_scene_view_menu, card_note, column, holder
+from app.widgets.scene_panels import ScenePanels, add_scene_view_menu
 from app.widgets.shortcut_page import KeyPage
 from app.widgets.sim_banner import SimBanner
 from core.config.models import Config

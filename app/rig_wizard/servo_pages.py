@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QHeaderVie
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, button, fit, note, put, table, tell
 from app.ui.i18n import mark, tr, tr_text
-from app.widgets.servo_table import NONE
+from app.widgets.painting import NONE
 from core.calibration.servos import Assignment
 from core.config.safety import JOINT_NAMES, TENDONS, JointName, ServosConfig
 from core.devices import UserError

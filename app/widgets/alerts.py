@@ -1,9 +1,4 @@
-"""Alerts over the upper edge of the live picture, most urgent first; they go away by themselves.
-
-One alert over the live picture: how urgent it is, what is the matter and what to do.
-
-Alert sounds by whatever player the system has; without one, its beep.
-"""
+"""Alerts over the upper edge of the live picture, most urgent first, which go away by themselves; and their sounds."""
 
 from __future__ import annotations
 
@@ -14,25 +9,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPointF, QProcess, QRectF, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import (
-    QAccessible,
-    QAccessibleAnnouncementEvent,
-    QColor,
-    QFont,
-    QFontMetrics,
-    QMouseEvent,
-    QPainter,
-    QPainterPath,
-    QPaintEvent,
-    QPen,
-)
+from PySide6.QtCore import QCoreApplication, QObject, QPointF, QProcess, QRectF, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QColor, QFont, QMouseEvent, QPainter, QPainterPath
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import sentence
-from app.widgets.basics import Sign, paint_sign
+from app.widgets.basics import OnResize
+from app.widgets.painting import FieldLook, PaintedWidget, Sign, draw_text, paint_sign, set_colours, text_width
 from core.config.models import RESOURCES
 from core.control.alerts import Alert, AlertKey, Priority
 from core.control.faults import Cause
@@ -40,29 +25,14 @@ from core.control.pilot import DriveView
 
 FULL, COMPACT = 44, 26
 """Heights of a row with two lines and with one, px."""
-_PLATE, _ROW_GAP, _CROSS = 44, 12, 9
-
-
-@dataclass(frozen=True, slots=True)
-class PriorityLook:
-    """How urgent, by colour and sign; ``filled`` colours all of the row."""
-
-    role: str
-    sign: Sign
-    filled: bool = False
-
-    @property
-    def colour(self) -> str:
-        """In the scheme in use."""
-        return theme.of(self.role)
-
+_PLATE, _BETWEEN, _CROSS = 44, 12, 9
 
 LOOK = {
-    Priority.HINT: PriorityLook("SKY", Sign.INFO),
-    Priority.WARNING: PriorityLook("ORANGE", Sign.WARNING),
-    Priority.HOLD: PriorityLook("YELLOW", Sign.PAUSE),
-    Priority.DISARM: PriorityLook("VERMILLION", Sign.BARRED),
-    Priority.STOP: PriorityLook("VERMILLION", Sign.STOP, filled=True),
+    Priority.HINT: FieldLook("SKY", Sign.INFO),
+    Priority.WARNING: FieldLook("ORANGE", Sign.WARNING),
+    Priority.HOLD: FieldLook("YELLOW", Sign.PAUSE),
+    Priority.DISARM: FieldLook("VERMILLION", Sign.BARRED),
+    Priority.STOP: FieldLook("VERMILLION", Sign.STOP, filled=True),
 }
 
 
@@ -81,14 +51,27 @@ class ShownAlert:
         times = f" \N{MULTIPLICATION SIGN}{self.times}" if self.times > 1 else ""
         return f"{sentence(f'{tr(self.alert.spec.text)}{detail}{times}')} {sentence(self.alert.spec.what_to_do)}"
 
+    def lines(self, *, full: bool) -> tuple[tuple[tuple[str, QFont], ...], ...]:
+        """The texts of each line with their fonts; the first one is the alert's name."""
+        name, what_to_do = tr(self.alert.spec.text), sentence(self.alert.spec.what_to_do)
+        if not full:
+            return (((name, theme.bold(15)), (what_to_do, theme.font(13))),)
+        return ((name, theme.bold(16)), (tr_text(self.alert.detail), theme.font(13))), ((what_to_do, theme.font(14)),)
 
-class AlertRow(QWidget):
+    def needed_width(self, *, full: bool) -> int:
+        """Of a row that shows all of it, with room for its counts."""
+        words = max(sum(text_width(font, text) + _BETWEEN for text, font in line) for line in self.lines(full=full))
+        notes = text_width(theme.semi_bold(14), "\N{MULTIPLICATION SIGN}99")
+        return _PLATE + _BETWEEN + words + notes + 14 + _CROSS + _BETWEEN + 4
+
+
+class AlertRow(PaintedWidget):
     """One alert; two lines where it is high enough. ``dismissed`` carries its key."""
 
     dismissed = Signal(object)
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(parent=parent)
         self.entry: ShownAlert | None = None
         self._hidden = 0
         self._is_pressed = False
@@ -110,7 +93,7 @@ class AlertRow(QWidget):
         event.accept()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        """Its second half is not for the alert that has taken the place of the dismissed one: nobody has read that yet."""
+        """The second half of a double click does not dismiss the alert that has taken the place of the first."""
         event.accept()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -118,97 +101,60 @@ class AlertRow(QWidget):
         if was_pressed and self.entry is not None and self.rect().contains(event.position().toPoint()):
             self.dismissed.emit(self.entry.alert.key)
 
-    def needed_width(self, entry: ShownAlert, *, full: bool) -> int:
-        """Of a row that shows all of `entry`, with room for its counts."""
-        words = max(sum(QFontMetrics(f).horizontalAdvance(t) + _ROW_GAP for t, f in line) for line in _lines(entry, full=full))
-        notes = QFontMetrics(theme.semi_bold(14)).horizontalAdvance("\N{MULTIPLICATION SIGN}99")
-        return _PLATE + _ROW_GAP + words + notes + 14 + _CROSS + _ROW_GAP + 4
-
-    # ---- the look
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        entry = self.entry
-        if entry is None:
+    def paint(self, painter: QPainter) -> None:
+        if self.entry is None:
             return
-        look = LOOK[entry.alert.spec.priority]
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        look = LOOK[self.entry.alert.spec.priority]
         frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        colour = QColor(look.colour)
         outline = QPainterPath()
         outline.addRoundedRect(frame, 7, 7)
-        painter.fillPath(outline, colour if look.filled else QColor(theme.PANEL))
+        painter.fillPath(outline, QColor(look.colour if look.filled else theme.PANEL))
         plate = QRectF(frame.left(), frame.top(), _PLATE, frame.height())
         painter.save()
         painter.setClipPath(outline)
-        painter.fillRect(plate, colour)
+        painter.fillRect(plate, QColor(look.colour))
         painter.restore()
-        painter.setPen(QPen(colour, 1.5))
+        set_colours(painter, None, look.colour, 1.5)
         painter.drawPath(outline)
-        ink = QColor(theme.INK)
-        side = 24.0 if self.height() >= FULL else 18.0
-        middle = plate.center()
-        paint_sign(painter, QRectF(middle.x() - side / 2, middle.y() - side / 2, side, side), look.sign, ink)
-        room = frame.adjusted(_PLATE + _ROW_GAP, 0, -_ROW_GAP, 0)
-        room.setRight(self._paint_right(painter, room, QColor(ink if look.filled else theme.TEXT_DIM)))
-        self._paint_words(painter, room, entry, *((ink, ink) if look.filled else (QColor(theme.TEXT), QColor(theme.TEXT_DIM))))
-        painter.end()
-
-    def _paint_right(self, painter: QPainter, room: QRectF, ink: QColor) -> float:
-        """A cross and the counts; returns where the room for words ends."""
-        arm = _CROSS / 2
-        middle = QPointF(room.right() - arm, room.center().y())
-        painter.setPen(QPen(ink, 1.6))
-        for corner in (QPointF(arm, arm), QPointF(arm, -arm)):
-            painter.drawLine(middle - corner, middle + corner)
-        text, note_font = self._note(), theme.semi_bold(14)
-        painter.setFont(note_font)
-        width = QFontMetrics(note_font).horizontalAdvance(text)
-        left = room.right() - _CROSS - 14 - width
-        painter.drawText(QRectF(left, room.top(), width + 2, room.height()), Qt.AlignmentFlag.AlignVCenter, text)
-        return left - _ROW_GAP
-
-    def _note(self) -> str:
-        """How often it came, and how many more there are."""
-        notes = []
-        if self.entry is not None and self.entry.times > 1:
-            notes.append(f"\N{MULTIPLICATION SIGN}{self.entry.times}")
-        if self._hidden:
-            notes.append(tr("+{count} more", count=self._hidden))
-        return "   ".join(notes)
-
-    def _paint_words(self, painter: QPainter, room: QRectF, entry: ShownAlert, ink: QColor, dim: QColor) -> None:
-        lines = _lines(entry, full=self.height() >= FULL)
+        is_full = self.height() >= FULL
+        sign = QRectF(0, 0, 24, 24) if is_full else QRectF(0, 0, 18, 18)
+        sign.moveCenter(plate.center())
+        paint_sign(painter, sign, look.sign, QColor(theme.INK))
+        ink, dim = (theme.INK, theme.INK) if look.filled else (theme.TEXT, theme.TEXT_DIM)
+        room = frame.adjusted(_PLATE + _BETWEEN, 0, -_BETWEEN, 0)
+        room.setRight(self._paint_right(painter, room, dim))
+        lines = self.entry.lines(full=is_full)
         height = (room.height() - 4) / len(lines)
         for k, parts in enumerate(lines):
             line = QRectF(room.left(), room.top() + 2 + k * height, room.width(), height)
-            inks = (ink, dim) if k == 0 else (dim,)
-            self._paint_line(
-                painter, line, *((text, text_font, tint) for (text, text_font), tint in zip(parts, inks, strict=False))
-            )
+            _paint_line(painter, line, parts, (ink, dim) if k == 0 else (dim,))
 
-    @staticmethod
-    def _paint_line(painter: QPainter, room: QRectF, *parts: tuple[str, QFont, QColor]) -> None:
-        """Texts after each other, each with its font and ink; the last one is cut where there is no more room."""
-        left = room.left()
-        for text, text_font, ink in parts:
-            width = room.right() - left
-            if width < 24 or not text:
-                break
-            smaller = theme.fitted(text_font, text, int(width), text_font.pixelSize() - 2)
-            painter.setFont(smaller)
-            painter.setPen(ink)
-            shown = theme.elide(smaller, text, int(width))
-            painter.drawText(QRectF(left, room.top(), width, room.height()), Qt.AlignmentFlag.AlignVCenter, shown)
-            left += QFontMetrics(smaller).horizontalAdvance(shown) + _ROW_GAP
+    def _paint_right(self, painter: QPainter, room: QRectF, ink: str) -> float:
+        """A cross, how often it came and how many more there are; returns where the room for words ends."""
+        arm = _CROSS / 2
+        middle = QPointF(room.right() - arm, room.center().y())
+        set_colours(painter, None, ink, 1.6)
+        for corner in (QPointF(arm, arm), QPointF(arm, -arm)):
+            painter.drawLine(middle - corner, middle + corner)
+        notes = [f"\N{MULTIPLICATION SIGN}{self.entry.times}"] if self.entry is not None and self.entry.times > 1 else []
+        if self._hidden:
+            notes.append(tr("+{count} more", count=self._hidden))
+        text, font = "   ".join(notes), theme.semi_bold(14)
+        width = text_width(font, text)
+        left = room.right() - _CROSS - 14 - width
+        draw_text(painter, QRectF(left, room.top(), width + 2, room.height()), text, font, ink)
+        return left - _BETWEEN
 
 
-def _lines(entry: ShownAlert, *, full: bool) -> tuple[tuple[tuple[str, QFont], ...], ...]:
-    """The texts of each line with their fonts; the first one is the alert's name."""
-    spec, what_to_do = entry.alert.spec, sentence(entry.alert.spec.what_to_do)
-    if not full:
-        return (((tr(spec.text), theme.bold(15)), (what_to_do, theme.font(13))),)
-    return ((tr(spec.text), theme.bold(16)), (tr_text(entry.alert.detail), theme.font(13))), ((what_to_do, theme.font(14)),)
+def _paint_line(painter: QPainter, room: QRectF, parts: Sequence[tuple[str, QFont]], inks: Sequence[str]) -> None:
+    """Texts after each other; the last one is cut where there is no more room."""
+    room = QRectF(room)
+    for (text, font), ink in zip(parts, inks, strict=False):
+        if room.width() < 24 or not text:
+            break
+        draw_text(painter, room, text, font, ink, smallest_px=font.pixelSize() - 2, elided=True)
+        shown = theme.elide(painter.font(), text, int(room.width()))
+        room.setLeft(room.left() + text_width(painter.font(), shown) + _BETWEEN)
 
 
 MOST_ROWS = 3
@@ -236,10 +182,9 @@ class AlertStrip(QWidget):
         self._rows = [AlertRow(self) for _ in range(MOST_ROWS)]
         for row in self._rows:
             row.dismissed.connect(self._dismiss)
-        self._timer = QTimer(self)
-        self._timer.setInterval(_CHECK_EVERY_MS)
+        self._timer = QTimer(self, interval=_CHECK_EVERY_MS)
         self._timer.timeout.connect(self._expire)
-        parent.installEventFilter(self)
+        OnResize(parent, self, self._on_resize)
         self.hide()
 
     @property
@@ -262,7 +207,7 @@ class AlertStrip(QWidget):
         self._show()
 
     def show_view(self, view: DriveView | None) -> None:
-        """Keep what is still true, drop what the operator acknowledged."""
+        """Keep what is still active, drop what the operator acknowledged."""
         latched = view.latched.cause if view is not None and view.latched is not None else None
         before, self._latched = self._latched, latched
         if not self._entries:
@@ -284,21 +229,15 @@ class AlertStrip(QWidget):
         self._entries.clear()
         self._show()
 
-    # ---- what is shown
-
     @Slot()
     def _expire(self) -> None:
         now = self._clock()
-        over = [
-            key for key, entry in self._entries.items() if now - entry.last_s >= BRIEF_S.get(entry.alert.spec.priority, LINGER_S)
-        ]
+        over = [k for k, entry in self._entries.items() if now - entry.last_s >= BRIEF_S.get(entry.alert.spec.priority, LINGER_S)]
         for key in over:
             del self._entries[key]
-        if over or self._shown_keys() != [row.entry.alert.key for row in self._rows if row.entry is not None]:
+        wanted = [entry.alert.key for entry in self._in_order()[: len(self._heights())]]
+        if over or wanted != [row.entry.alert.key for row in self._rows if row.entry is not None]:
             self._show()
-
-    def _shown_keys(self) -> list[AlertKey]:
-        return [entry.alert.key for entry in self._in_order()[: len(self._heights())]]
 
     def _in_order(self) -> list[ShownAlert]:
         return sorted(self._entries.values(), key=lambda entry: (-entry.alert.spec.priority, -entry.turn))
@@ -319,7 +258,7 @@ class AlertStrip(QWidget):
         """As wide as the longest row needs, if there is room."""
         least, most = _WIDTHS
         shown = zip(entries, heights, strict=False)
-        needed = max((self._rows[0].needed_width(entry, full=height == FULL) for entry, height in shown), default=0)
+        needed = max((entry.needed_width(full=height == FULL) for entry, height in shown), default=0)
         return min(max(least, needed), most, self._parent.width() - 2 * _MARGIN)
 
     def _show(self) -> None:
@@ -359,10 +298,9 @@ class AlertStrip(QWidget):
             event.setPoliteness(QAccessible.AnnouncementPoliteness.Assertive)
         QAccessible.updateAccessibility(event)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize and self._entries:
+    def _on_resize(self) -> None:
+        if self._entries:
             self._show()
-        return False
 
 
 SOUNDS = ("hold", "disarm", "stop")
@@ -375,23 +313,17 @@ _log = logging.getLogger(__name__)
 
 
 class AlertSounds(QObject):
-    """Plays one sound at a time and never waits for it.
+    """Plays one sound of `folder` at a time, by a player that the system has, and never waits for it; without a player it beeps.
 
-    While a sound is heard, only a more urgent one is played, instead of it. A player that fails (it is installed, but there is no
+    A more urgent sound replaces the one being played, others are dropped. A player that fails (it is installed, but there is no
     sound server) is given up with one line in the log, and the sound goes to the next one.
-
-    Parameters
-    ----------
-    parent : owner.
-    folder : where ``<name>.wav`` are.
     """
 
     def __init__(self, parent: QObject | None = None, folder: Path = RESOURCES / "sounds") -> None:
         super().__init__(parent)
         self._folder = folder
         self._players = [(path, *rest) for name, *rest in _PLAYERS if (path := shutil.which(name)) is not None]
-        self._muted = False
-        self._playing: str | None = None
+        self.playing: str | None = None  # the sound that is heard now
         self._next: str | None = None
         self._cut_short = False
         self._is_logged = False
@@ -400,9 +332,7 @@ class AlertSounds(QObject):
         self._process.setStandardInputFile(QProcess.nullDevice())
         self._process.finished.connect(self._on_finished)
         self._process.errorOccurred.connect(self._on_error)
-        self._guard = QTimer(self)
-        self._guard.setSingleShot(True)
-        self._guard.setInterval(_LONGEST_MS)
+        self._guard = QTimer(self, singleShot=True, interval=_LONGEST_MS)
         self._guard.timeout.connect(self._process.kill)  # a player that hangs is a player that fails
         application = QCoreApplication.instance()
         if application is not None:
@@ -410,33 +340,14 @@ class AlertSounds(QObject):
         if parent is not None:
             parent.destroyed.connect(self.close)  # comes before its children go, and Qt warns of a process that goes while it runs
 
-    @property
-    def muted(self) -> bool:
-        """Nothing is heard."""
-        return self._muted
-
-    @muted.setter
-    def muted(self, muted: bool) -> None:
-        self._muted = muted
-        if muted:
-            self._next = None
-            self._cut()
-
-    @property
-    def playing(self) -> str | None:
-        """The sound that is heard now."""
-        return self._playing
-
     def play(self, name: str) -> None:
         """Play the sound `name` (one of ``SOUNDS``), unless an equally or more urgent one is being heard. Returns at once."""
-        if self._muted:
-            return
         if name not in SOUNDS or not (self._folder / f"{name}.wav").is_file():
             self._log_once("there is no sound %r in %s; put resources/sounds back", name, self._folder)
             QApplication.beep()
-        elif self._playing is None:
+        elif self.playing is None:
             self._start(name)
-        elif SOUNDS.index(name) > SOUNDS.index(self._next or self._playing):
+        elif SOUNDS.index(name) > SOUNDS.index(self._next or self.playing):
             self._next = name
             self._cut()
 
@@ -454,7 +365,7 @@ class AlertSounds(QObject):
             QApplication.beep()
             return
         program, *options = self._players[0]
-        self._playing = name
+        self.playing = name
         self._cut_short = False
         self._guard.start()
         self._process.start(program, [*options, str(self._folder / f"{name}.wav")])
@@ -479,13 +390,13 @@ class AlertSounds(QObject):
     def _go_on(self, failure: str | None, why: str) -> None:
         """The process has ended: play what waits, or the same once more by another player when this one failed."""
         self._guard.stop()
-        name, self._playing = self._playing, None
+        name, self.playing = self.playing, None
         following, self._next = self._next, None
         if failure is not None:
             player = self._players.pop(0)
             _log.warning("the player %s %s: %s", player[0], failure, why)
             following = following or name
-        if following is not None and not self._muted:
+        if following is not None:
             self._start(following)
 
     def _log_once(self, message: str, *values: object) -> None:

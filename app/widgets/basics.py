@@ -1,37 +1,11 @@
-"""A titled panel, so that every panel of a window looks the same.
-
-Two columns with a handle between them; their shares of the width stay when the window grows.
-
-Enter presses the button that has the focus, and opens the list: Space, which does it elsewhere, stops the robot.
-
-A list that opens only on purpose: the keys of an operator window belong to the robot.
-
-Lists of the operator window that Tab reaches: the arrows scroll there, and everywhere else they are the robot's.
-
-Lists and numbers that the wheel does not turn: what it changes by the way nobody has chosen, and nobody has seen.
-
-Small signs that tell modes and priorities apart without colour, and key caps.
-"""
+"""Parts that several windows are composed of: cards, columns, layouts, combo boxes and lists that leave the keys to the robot."""
 
 from __future__ import annotations
 
-import math
-from enum import Enum
-from functools import cache
+from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, Qt
-from PySide6.QtGui import (
-    QColor,
-    QFontMetrics,
-    QKeyEvent,
-    QPainter,
-    QPainterPath,
-    QPainterPathStroker,
-    QPen,
-    QPolygonF,
-    QResizeEvent,
-    QWheelEvent,
-)
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
@@ -44,12 +18,76 @@ from PySide6.QtWidgets import (
     QListView,
     QSplitter,
     QTableView,
+    QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
 from app.ui import theme
 from app.ui.i18n import tr
+
+_SHARE_RANGE = 0.2, 0.9  # of the width, for the left one of two columns
+_TOP_PX = 4  # margin above the panels of a window
+
+
+# ---- layouts
+
+
+def column(*parts: tuple[QWidget, int], spacing: int = theme.GAP) -> QVBoxLayout:
+    """Widgets below each other, each with its stretch."""
+    layout = QVBoxLayout()
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(spacing)
+    for widget, stretch in parts:
+        layout.addWidget(widget, stretch)
+    return layout
+
+
+def row(*widgets: QWidget) -> QWidget:
+    """Widgets side by side, equally wide."""
+    layout = QHBoxLayout()
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(theme.GAP)
+    for widget in widgets:
+        layout.addWidget(widget, 1)
+    return holder(layout)
+
+
+def holder(layout: QLayout) -> QWidget:
+    """A widget that is nothing but the place of a layout."""
+    widget = QWidget()
+    widget.setLayout(layout)
+    return widget
+
+
+def side(layout: QLayout, narrowest: int, widest: int) -> QWidget:
+    """The right one of two columns: beyond a width its dials gain nothing, and the picture everything. Pixels."""
+    widget = holder(layout)
+    widget.setMinimumWidth(narrowest)
+    widget.setMaximumWidth(widest)
+    return widget
+
+
+def set_window_margins(layout: QLayout) -> None:
+    """Those of the panels to the window's edges."""
+    layout.setContentsMargins(theme.GAP, _TOP_PX, theme.GAP, theme.GAP)
+
+
+def card_note(text: str) -> QLabel:
+    """The small text at the right of a card's title, for a text that changes."""
+    label = QLabel(text)
+    label.setObjectName("card_note")
+    return label
+
+
+def page_tabs() -> QTabWidget:
+    """Pages that share a place."""
+    pages = QTabWidget()
+    pages.setDocumentMode(True)
+    pages.setAccessibleName(tr("Pages"))
+    pages.tabBar().setAccessibleName(tr("Pages"))
+    pages.tabBar().setDrawBase(False)
+    return pages
 
 
 class Card(QFrame):
@@ -58,37 +96,26 @@ class Card(QFrame):
     def __init__(self, title: str, content: QWidget | QLayout, note: QWidget | str = "") -> None:
         super().__init__()
         self.setObjectName("card")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(12, 7, 12, 9)
-        column.setSpacing(4)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(12, 7, 12, 9)
+        rows.setSpacing(4)
         if title:
-            column.addLayout(_head(title, note))
+            head = QHBoxLayout()
+            head.setSpacing(8)
+            label = QLabel(title)
+            label.setObjectName("card_title")
+            head.addWidget(label)
+            head.addStretch(1)
+            head.addWidget(card_note(note) if isinstance(note, str) else note)
+            rows.addLayout(head)
         if isinstance(content, QWidget):
-            column.addWidget(content, 1)
+            rows.addWidget(content, 1)
         else:
-            column.addLayout(content, 1)
-
-
-def _head(title: str, note: QWidget | str) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.setSpacing(8)
-    label = QLabel(title)
-    label.setObjectName("card_title")
-    row.addWidget(label)
-    row.addStretch(1)
-    if isinstance(note, str):
-        note_label = QLabel(note)
-        note_label.setObjectName("card_note")
-        note = note_label
-    row.addWidget(note)
-    return row
-
-
-_LEAST, _MOST = 0.2, 0.9
+            rows.addLayout(content, 1)
 
 
 class Columns(QSplitter):
-    """`share` is the left one's of the width; neither can be closed."""
+    """Two columns with a handle between them; `share` of the width, the left one's, stays when the window grows."""
 
     def __init__(self, left: QWidget, right: QWidget, share: float) -> None:
         super().__init__(Qt.Orientation.Horizontal)
@@ -104,12 +131,12 @@ class Columns(QSplitter):
 
     @property
     def share(self) -> float:
-        """The left column's share of the width."""
         return self._share
 
     def set_share(self, share: float) -> None:
         """Another share, as far as the columns allow it."""
-        self._share = max(_LEAST, min(_MOST, share))
+        least, most = _SHARE_RANGE
+        self._share = max(least, min(most, share))
         self._place()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -127,8 +154,29 @@ class Columns(QSplitter):
         self._share = left / max(1, left + right)
 
 
+class OnResize(QObject):
+    """Calls `action` whenever `watched` has another size, as long as `owner` lives; with `moves` also at another place."""
+
+    def __init__(self, watched: QWidget, owner: QObject, action: Callable[[], object], *, moves: bool = False) -> None:
+        super().__init__(owner)
+        self._action = action
+        self._types = (QEvent.Type.Resize, QEvent.Type.Move) if moves else (QEvent.Type.Resize,)
+        watched.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() in self._types:
+            self._action()
+        return False
+
+
+# ---- keys and wheel
+
+
 def takes_enter(dialog: QWidget, event: QKeyEvent) -> bool:
-    """Whether a key press of `dialog` was Enter; it is done with then, also where it means nothing."""
+    """Whether a key press of `dialog` was Enter, which presses the focused button or opens the focused list.
+
+    Space, which does it elsewhere, stops the robot. Enter is done with also where it means nothing.
+    """
     if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
         return False
     focus = dialog.focusWidget()
@@ -140,9 +188,6 @@ def takes_enter(dialog: QWidget, event: QKeyEvent) -> bool:
     return True
 
 
-_OPENING = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
-
-
 def name_list(combo: QComboBox, name: str) -> None:
     """Under Linux Qt tells a screen reader what is chosen instead of the name, so the name is its description, too."""
     combo.setAccessibleName(name)
@@ -152,7 +197,7 @@ def name_list(combo: QComboBox, name: str) -> None:
 class QuietCombo(QComboBox):
     """A click opens it, or Enter when Tab has come to it; in the open list the arrows choose, Enter takes and Escape leaves.
 
-    Closed it takes no key and no turn of the wheel: neither may choose something by the way.
+    Closed it takes no key and no turn of the wheel, which would choose unnoticed.
 
     Parameters
     ----------
@@ -170,7 +215,7 @@ class QuietCombo(QComboBox):
         event.ignore()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in _OPENING and not event.isAutoRepeat():
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not event.isAutoRepeat():
             self.showPopup()
             return
         event.ignore()
@@ -183,18 +228,45 @@ class QuietCombo(QComboBox):
 
 Key = Qt.Key
 SCROLL_KEYS = frozenset({Key.Key_Up, Key.Key_Down, Key.Key_PageUp, Key.Key_PageDown, Key.Key_Home, Key.Key_End})
-"""What a list keeps for itself while it has the focus, so that none of them reaches the robot by way of its parent."""
+"""Keys that a list keeps for itself while it has the focus, so that none of them reaches the robot by way of its parent."""
 
 
-def listen_to_tab(view: QAbstractItemView) -> None:
-    """By Tab only: a click into the list must not take the arrows from the robot."""
-    view.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+class ScrolledList(QListView):
+    """A list without selection, which the arrow keys scroll."""
+
+    def __init__(self, row_px: int) -> None:
+        super().__init__()
+        self._row_px = row_px
+        _set_scrolled(self)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        _scroll(self, event, self._row_px)
 
 
-def scroll(view: QAbstractItemView, event: QKeyEvent, row_px: int) -> bool:
-    """Scroll by a row, a page or to an end; False for any other key."""
+class ScrolledTable(QTableView):
+    """A table without selection, which the arrow keys scroll."""
+
+    def __init__(self, row_px: int) -> None:
+        super().__init__()
+        self._row_px = row_px
+        self.setTabKeyNavigation(False)
+        _set_scrolled(self)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        _scroll(self, event, self._row_px)
+
+
+def _set_scrolled(view: QAbstractItemView) -> None:
+    view.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click into the list must not take the arrows from the robot
+    view.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+    view.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+    view.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+
+
+def _scroll(view: QAbstractItemView, event: QKeyEvent, row_px: int) -> None:
+    """Scroll by a row, a page or to an end; any other key is left to the parent."""
     bar = view.verticalScrollBar()
-    ways = {
+    positions = {
         Key.Key_Up: bar.value() - row_px,
         Key.Key_Down: bar.value() + row_px,
         Key.Key_PageUp: bar.value() - bar.pageStep(),
@@ -202,46 +274,16 @@ def scroll(view: QAbstractItemView, event: QKeyEvent, row_px: int) -> bool:
         Key.Key_Home: bar.minimum(),
         Key.Key_End: bar.maximum(),
     }
-    place = ways.get(Key(event.key()))
-    if place is None:
-        return False
-    bar.setValue(place)
+    position = positions.get(Key(event.key()))
+    if position is None:
+        event.ignore()
+        return
+    bar.setValue(position)
     event.accept()
-    return True
-
-
-class ScrolledList(QListView):
-    """A list that nobody chooses from."""
-
-    def __init__(self, row_px: int) -> None:
-        super().__init__()
-        self._row_px = row_px
-        listen_to_tab(self)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not scroll(self, event, self._row_px):
-            event.ignore()
-
-
-class ScrolledTable(QTableView):
-    """A table that nobody chooses from."""
-
-    def __init__(self, row_px: int) -> None:
-        super().__init__()
-        self._row_px = row_px
-        self.setTabKeyNavigation(False)
-        listen_to_tab(self)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not scroll(self, event, self._row_px):
-            event.ignore()
 
 
 class StillWheel(QObject):
-    """For all lists and numbers that `dialog` has when it is made; what lies below them is scrolled instead.
-
-    An open list is turned as ever.
-    """
+    """Ignores the wheel on combo and spin boxes that `dialog` has now; what contains them scrolls instead."""
 
     def __init__(self, dialog: QWidget) -> None:
         super().__init__(dialog)
@@ -254,152 +296,3 @@ class StillWheel(QObject):
             event.ignore()
             return True
         return False
-
-
-class Sign(Enum):
-    """What a sign stands for."""
-
-    WHEEL = "steering wheel"
-    READY = "ready"
-    DRIVES = "drives"
-    PAUSE = "pause"
-    STOP = "stop"
-    BARRED = "barred"
-    WARNING = "warning"
-    INFO = "information"
-
-
-def paint_sign(painter: QPainter, box: QRectF, sign: Sign, ink: QColor) -> None:
-    """The sign in one colour, as large as fits into `box`."""
-    painter.save()
-    painter.translate(box.center())
-    side = min(box.width(), box.height()) / 2
-    painter.scale(side, side)
-    painter.fillPath(_path(sign), ink)
-    painter.restore()
-
-
-def key_cap_width(key: str) -> float:
-    return QFontMetrics(theme.semi_bold(theme.Size.LABEL)).horizontalAdvance(key) + 12.0
-
-
-def paint_key_cap(painter: QPainter, middle: QPointF, key: str, ink: QColor) -> None:
-    """The name of a key in a small outlined cap."""
-    cap = QRectF(0, 0, key_cap_width(key), 18)
-    cap.moveCenter(middle)
-    edge = QColor(ink)
-    edge.setAlphaF(0.55)
-    painter.setPen(QPen(edge, 1))
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.drawRoundedRect(cap, 4, 4)
-    painter.setPen(ink)
-    painter.setFont(theme.semi_bold(theme.Size.LABEL))
-    painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, key)
-
-
-def octagon(box: QRectF, cut: float) -> QPolygonF:
-    """`box` with its corners cut off by `cut` each way."""
-    left, top, right, bottom = box.left(), box.top(), box.right(), box.bottom()
-    corners = [
-        (left + cut, top), (right - cut, top), (right, top + cut), (right, bottom - cut),
-        (right - cut, bottom), (left + cut, bottom), (left, bottom - cut), (left, top + cut),
-    ]  # fmt: skip
-    return QPolygonF([QPointF(x, y) for x, y in corners])
-
-
-@cache
-def _path(sign: Sign) -> QPainterPath:
-    """The sign in a box of -1..1, y down."""
-    return {
-        Sign.WHEEL: _wheel,
-        Sign.READY: _ready,
-        Sign.DRIVES: _drives,
-        Sign.PAUSE: _pause,
-        Sign.STOP: _stop,
-        Sign.BARRED: _barred,
-        Sign.WARNING: _warning,
-        Sign.INFO: _info,
-    }[sign]()
-
-
-def _stroker(width: float) -> QPainterPathStroker:
-    stroker = QPainterPathStroker()
-    stroker.setWidth(width)
-    stroker.setCurveThreshold(0.005)  # the usual one is for pixels, and makes octagons of circles this small
-    return stroker
-
-
-def _lines(width: float, *lines: list[tuple[float, float]], joined: bool = False) -> QPainterPath:
-    """Open lines of some width, with round ends and corners; `joined` closes them."""
-    path = QPainterPath()
-    for points in lines:
-        path.addPolygon(QPolygonF([QPointF(x, y) for x, y in points]))
-        if joined:
-            path.closeSubpath()
-    stroker = _stroker(width)
-    stroker.setCapStyle(Qt.PenCapStyle.RoundCap)
-    stroker.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
-    return stroker.createStroke(path)
-
-
-def _ring(radius: float, width: float) -> QPainterPath:
-    path = QPainterPath()
-    path.addEllipse(QPointF(0, 0), radius, radius)
-    return _stroker(width).createStroke(path)
-
-
-def _disc(x: float, y: float, radius: float) -> QPainterPath:
-    path = QPainterPath()
-    path.addEllipse(QPointF(x, y), radius, radius)
-    return path
-
-
-def _filled(points: QPolygonF) -> QPainterPath:
-    path = QPainterPath()
-    path.addPolygon(points)
-    path.closeSubpath()
-    return path
-
-
-def _wheel() -> QPainterPath:
-    spokes = [[(0.0, 0.0), (0.84 * math.cos(a), 0.84 * math.sin(a))] for a in (math.radians(d) for d in (90, 210, 330))]
-    return _ring(0.84, 0.26).united(_lines(0.26, *spokes)).united(_disc(0, 0, 0.28))
-
-
-def _ready() -> QPainterPath:
-    return _ring(0.86, 0.22).united(_filled(QPolygonF([QPointF(-0.26, -0.46), QPointF(0.54, 0.0), QPointF(-0.26, 0.46)])))
-
-
-def _drives() -> QPainterPath:
-    chevrons = [[(x, -0.66), (x + 0.66, 0.0), (x, 0.66)] for x in (-0.72, 0.06)]
-    return _lines(0.34, *chevrons)
-
-
-def _pause() -> QPainterPath:
-    path = QPainterPath()
-    path.addRoundedRect(QRectF(-0.68, -0.82, 0.48, 1.64), 0.1, 0.1)
-    path.addRoundedRect(QRectF(0.20, -0.82, 0.48, 1.64), 0.1, 0.1)
-    return path
-
-
-def _stop() -> QPainterPath:
-    bar = QPainterPath()
-    bar.addRect(QRectF(-0.54, -0.18, 1.08, 0.36))
-    return _filled(octagon(QRectF(-0.96, -0.96, 1.92, 1.92), 0.56)).subtracted(bar)
-
-
-def _barred() -> QPainterPath:
-    return _ring(0.84, 0.28).united(_lines(0.28, [(-0.56, 0.56), (0.56, -0.56)]))
-
-
-def _warning() -> QPainterPath:
-    plate = _lines(0.24, [(0.0, -0.78), (0.86, 0.72), (-0.86, 0.72)], joined=True)
-    plate = plate.united(_filled(QPolygonF([QPointF(0.0, -0.78), QPointF(0.86, 0.72), QPointF(-0.86, 0.72)])))
-    return plate.subtracted(_lines(0.22, [(0.0, -0.28), (0.0, 0.22)])).subtracted(_disc(0.0, 0.53, 0.13))
-
-
-def _info() -> QPainterPath:
-    path = _disc(0, 0, 0.96)  # what is added inside becomes a hole
-    path.addPath(_disc(0, -0.5, 0.16))
-    path.addPath(_lines(0.26, [(0.0, -0.06), (0.0, 0.54)]))
-    return path

@@ -1,11 +1,4 @@
-"""What was advised, asked for, commanded and sent, side by side as texts. No Qt here.
-
-What the gate limited and rejected, newest first, repeats counted. No Qt here.
-
-Where every command comes from, and what the gate did to it.
-
-Who asked for what and what was sent, and below it how quick and how welcome the program is.
-"""
+"""Where every command comes from (advised, asked for, commanded, sent), and what the gate limited or rejected."""
 
 from __future__ import annotations
 
@@ -14,19 +7,20 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QLabel, QSizePolicy, QTableView, QVBoxLayout, QWidget
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter
+from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import SPEED_WORD, side, tip
 from app.ui.workers import Pace
-from app.widgets.basics import ScrolledTable
-from app.widgets.servo_table import NONE, TONE_ROLE, Cell, Tone, number
+from app.widgets.basics import ScrolledTable, card_note
+from app.widgets.painting import NONE, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
+from app.widgets.servo_table import TONE_ROLE, Cell, Tone
 from core.control.gate import RejectReason, Source
 from core.control.pilot import DriveView
-from core.types import Advice, Command
+from core.types import Command
 
 if TYPE_CHECKING:
     from hardware.servos.bus_ipc import BusStatus
@@ -34,9 +28,8 @@ if TYPE_CHECKING:
 
 HEADINGS = (mark("bend"), mark("pitch"), mark("advance mm/s"), mark("sheath mm/s"))
 LABELS = (mark("Advised"), mark("You asked"), mark("Program"), mark("Sent"))
-_SAME_BEND, _SAME_MM_S = 0.03, 0.5
-_LASTING = 3
-"""Renewals in a row: the speed of a single cycle of the bus swings with its period."""
+_SAME_BEND, _SAME_MM_S = 0.03, 0.5  # smaller differences are not marked
+_LASTING = 3  # renewals in a row: the speed of a single cycle of the bus swings with its period
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,21 +54,29 @@ class Provenance:
             self._differing = [0, 0, 0, 0]
             return tuple(ProvenanceRow(label, note=NONE) for label in LABELS)
         by_operator, by_program = view.sent_by is Source.OPERATOR, view.sent_by is Source.PROGRAM
-        wanted = view.asked if by_operator else view.commanded if by_program else None
+        commanded = ProvenanceRow(LABELS[2], note=tr("does not drive"))
+        if view.commanded is not None:
+            tone = Tone.PLAIN if by_program else Tone.FAINT
+            commanded = ProvenanceRow(LABELS[2], _motion(view.commanded, tone), drives=by_program)
         return (
             _advised(view),
-            ProvenanceRow(LABELS[1], _motion(view.asked, _tone(by_operator)), drives=by_operator),
-            ProvenanceRow(LABELS[2], _motion(view.commanded, _tone(by_program)), drives=by_program)
-            if view.commanded is not None
-            else ProvenanceRow(LABELS[2], note=tr("does not drive")),
-            self._sent(view.sent, wanted),
+            ProvenanceRow(LABELS[1], _motion(view.asked, Tone.PLAIN if by_operator else Tone.FAINT), drives=by_operator),
+            commanded,
+            self._sent(view.sent, view.asked if by_operator else view.commanded if by_program else None),
         )
 
     def _sent(self, sent: Command | None, wanted: Command | None) -> ProvenanceRow:
         if sent is None:
             self._differing = [0, 0, 0, 0]
             return ProvenanceRow(LABELS[3], note=tr("no motion: holding"))
-        differs = _differs(sent, wanted) if wanted is not None else (False,) * 4
+        differs = (False,) * 4
+        if wanted is not None:
+            differs = (
+                abs(sent.bend - wanted.bend) > _SAME_BEND,
+                abs(sent.pitch - wanted.pitch) > _SAME_BEND,
+                abs(sent.advance_mm_s - wanted.advance_mm_s) > _SAME_MM_S,
+                abs(sent.delivery_mm_s - wanted.delivery_mm_s) > _SAME_MM_S,
+            )
         self._differing = [count + 1 if now else 0 for count, now in zip(self._differing, differs, strict=True)]
         cells = tuple(
             Cell(f"\N{NOT EQUAL TO} {cell.text}", Tone.WARN, tr("limited by the gate")) if count >= _LASTING else cell
@@ -84,38 +85,28 @@ class Provenance:
         return ProvenanceRow(LABELS[3], cells)
 
 
-def _tone(drives: bool) -> Tone:
-    return Tone.PLAIN if drives else Tone.FAINT
-
-
 def _advised(view: DriveView) -> ProvenanceRow:
-    if view.advice is None:
-        return ProvenanceRow(
-            LABELS[0], note=tr("no advice: {why}", why=tr_text(str(view.blanked))) if view.blanked else tr("no advice")
-        )
-    none = Cell(NONE, Tone.FAINT)
-    return ProvenanceRow(LABELS[0], (Cell(_turn(view.advice)), none, Cell(_speed(view.advice)), none))
-
-
-def _turn(advice: Advice) -> str:
-    if abs(advice.steer_deg) < 0.5:
-        return tr("straight")
-    return tr("{angle:.0f}° {side}", angle=abs(advice.steer_deg), side=side(advice.steer_deg))
-
-
-def _speed(advice: Advice) -> str:
-    return f"{number(advice.advance_mm_s, 1)} {tr(SPEED_WORD[advice.speed]).lower()}"
+    advice, none = view.advice, Cell(NONE, Tone.FAINT)
+    if advice is None:
+        why = tr("no advice: {why}", why=tr_text(str(view.blanked))) if view.blanked else tr("no advice")
+        return ProvenanceRow(LABELS[0], note=why)
+    turn = tr("straight")
+    if abs(advice.steer_deg) >= 0.5:
+        turn = tr("{angle:.0f}° {side}", angle=abs(advice.steer_deg), side=side(advice.steer_deg))
+    speed = f"{number(advice.advance_mm_s, 1)} {tr(SPEED_WORD[advice.speed]).lower()}"
+    return ProvenanceRow(LABELS[0], (Cell(turn), none, Cell(speed), none))
 
 
 def _motion(command: Command | None, tone: Tone) -> tuple[Cell, ...]:
     if command is None:
         return ()
-    return (
-        Cell(_share(command.bend, tr("right"), tr("left")), tone),
-        Cell(_share(command.pitch, tr("up"), tr("down")), tone),
-        Cell(number(command.advance_mm_s, 1), tone),
-        Cell(number(command.delivery_mm_s, 1), tone),
+    texts = (
+        _share(command.bend, tr("right"), tr("left")),
+        _share(command.pitch, tr("up"), tr("down")),
+        number(command.advance_mm_s, 1),
+        number(command.delivery_mm_s, 1),
     )
+    return tuple(Cell(text, tone) for text in texts)
 
 
 def _share(value: float, positive: str, negative: str) -> str:
@@ -124,21 +115,10 @@ def _share(value: float, positive: str, negative: str) -> str:
     return f"{abs(value):.2f} {positive if value > 0.0 else negative}"
 
 
-def _differs(sent: Command, wanted: Command) -> tuple[bool, bool, bool, bool]:
-    return (
-        abs(sent.bend - wanted.bend) > _SAME_BEND,
-        abs(sent.pitch - wanted.pitch) > _SAME_BEND,
-        abs(sent.advance_mm_s - wanted.advance_mm_s) > _SAME_MM_S,
-        abs(sent.delivery_mm_s - wanted.delivery_mm_s) > _SAME_MM_S,
-    )
-
-
 MAX_ENTRIES = 500
-_LOOK_BACK = 30
-_BURST_S = 1.0
-"""The same thing again within so long is counted, not told again."""
-_IDLE = frozenset({RejectReason.NO_COMMAND, RejectReason.NOT_ARMED})
-"""Nobody moves the robot, and so it holds: nothing was refused."""
+_LOOK_BACK = 30  # entries in which a repetition is looked for
+_BURST_S = 1.0  # the same event again within so long raises a count
+_IDLE = frozenset({RejectReason.NO_COMMAND, RejectReason.NOT_ARMED})  # nothing was asked for, so nothing was refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,24 +138,15 @@ class LogEntry:
         return not self.joint
 
 
-@dataclass(frozen=True, slots=True)
-class LogChanges:
-    """Since the last look: entries that were put before the others, rows that were renewed (after that), entries that were cut."""
-
-    added: int
-    renewed: tuple[int, ...]
-    cut: int
-
-
 def rejected_commands(status: BusStatus) -> int:
-    """How often something that was asked for was refused as a whole."""
+    """How many commands were refused as a whole."""
     return sum(count for reason, count in status.rejections.items() if reason not in _IDLE)
 
 
 class ClampLog:
-    """Fed with every status that the window sees.
+    """What the gate limited and rejected, newest first, repeats counted; fed with every status that the window receives.
 
-    It sees fewer than there are cycles of the bus, so clamps are samples; ``BusStatus.clamp_count`` counts all of them. Rejections
+    Those are fewer than the cycles of the bus, so clamps are samples; ``BusStatus.clamp_count`` counts all of them. Rejections
     are taken from the status' own counts, and none is missed.
     """
 
@@ -183,74 +154,59 @@ class ClampLog:
         self.entries: list[LogEntry] = []
         self._cycle: int | None = None
         self._rejections: dict[RejectReason, int] = {}
-        self._serial = self._added = self._cut = 0
-        self._renewed: set[int] = set()
+        self._serial = 0
 
-    def see(self, status: BusStatus, clock: str) -> None:
-        """Take in a status; `clock` is the time of day for people."""
+    def add_status(self, status: BusStatus, clock: str) -> None:
+        """Log the events of a status; `clock` is the time of day as text."""
         if self._cycle is None or status.cycle < self._cycle:  # the first of a bus process: what it counted before is no news
             self._rejections = dict(status.rejections)
         elif status.cycle == self._cycle:
             return
         self._cycle = status.cycle
         for clamp in status.clamps:
-            text = (
-                f"{number(clamp.asked_mm, 2)} \N{RIGHTWARDS ARROW} {number(clamp.allowed_mm, 2)} mm, {tr_text(clamp.limit.value)}"
-            )
-            self._tell((clamp.joint, clamp.limit), clamp.joint, text, 1, status.time_s, clock)
+            change = f"{number(clamp.asked_mm, 2)} \N{RIGHTWARDS ARROW} {number(clamp.allowed_mm, 2)} mm"
+            text = f"{change}, {tr_text(clamp.limit.value)}"
+            self._add((clamp.joint, clamp.limit), clamp.joint, text, 1, status.time_s, clock)
         for joint in status.at_end:
-            self._tell((joint, "end"), joint, tr("stopped at the end of its envelope"), 1, status.time_s, clock)
+            self._add((joint, "end"), joint, tr("stopped at the end of its envelope"), 1, status.time_s, clock)
         for reason, count in status.rejections.items():
             more = count - self._rejections.get(reason, 0)
             if more > 0 and reason not in _IDLE:
                 known = status.rejection is not None and status.rejection.reason is reason and status.rejection.detail
-                self._tell(reason, "", f"{reason.value}: {known}" if known else reason.value, more, status.time_s, clock)
+                self._add(reason, "", f"{reason.value}: {known}" if known else reason.value, more, status.time_s, clock)
         self._rejections = dict(status.rejections)
 
-    def take_changes(self) -> LogChanges:
-        """What a view has to do to be up to date."""
-        newest = self._serial
-        rows = sorted(newest - serial for serial in self._renewed if newest - serial < len(self.entries))
-        changes = LogChanges(self._added, tuple(rows), self._cut)
-        self._added = self._cut = 0
-        self._renewed.clear()
-        return changes
-
-    def _tell(self, key: Hashable, joint: str, text: str, count: int, now_s: float, clock: str) -> None:
+    def _add(self, key: Hashable, joint: str, text: str, count: int, now_s: float, clock: str) -> None:
         for row, entry in enumerate(self.entries[:_LOOK_BACK]):
             if entry.key == key and 0.0 <= now_s - entry.last_s <= _BURST_S:
-                # a detail that was seen once is worth more than a newer count without one
+                # the detail of an earlier rejection is kept where the newer one has none
                 kept = entry.text if entry.is_rejection and ":" not in text else text
                 self.entries[row] = replace(entry, text=kept, count=entry.count + count, last_s=now_s)
-                self._renewed.add(entry.serial)
                 return
         self._serial += 1
         self.entries.insert(0, LogEntry(clock, joint.replace("_", " "), text, count, now_s, key, self._serial))
-        self._added += 1
-        if len(self.entries) > MAX_ENTRIES:
-            del self.entries[MAX_ENTRIES:]
-            self._cut += 1
+        del self.entries[MAX_ENTRIES:]
 
 
 LATENCY_LIMIT_MS = 100.0
 _LABEL_WIDTH = 100.0
 _ROWS = 6  # headings, four rows, measures
-_LEFT = Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft
 
 
-class ProvenanceTable(QWidget):
-    """A mark stands before the row that drives; what the gate sent differently is marked with an unequal sign."""
+class ProvenanceTable(PaintedWidget):
+    """Advised, asked, commanded and sent; below it the latency from capture to servo, and how much of the advice is followed.
+
+    A mark stands before the row that drives; what the gate sent differently is marked with an unequal sign.
+    """
+
+    ground = "PANEL"
 
     def __init__(self) -> None:
-        super().__init__()
+        name, explanation = tr("Advice, commands and what was sent"), tip("commands", "capture_to_servo", "following")
+        super().__init__(name, explanation, hint=(440, _ROWS * 20), least=(300, _ROWS * 17))
         self._rows: tuple[ProvenanceRow, ...] = tuple(ProvenanceRow(label, note=NONE) for label in LABELS)
         self._latency_ms: float | None = None
         self._follow: float | None = None
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(300, _ROWS * 17)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName(tr("Advice, commands and what was sent"))
-        self.setToolTip(tip("commands", "capture_to_servo", "following"))
 
     @property
     def text(self) -> str:
@@ -260,22 +216,21 @@ class ProvenanceTable(QWidget):
             + (row.note or ", ".join(f"{tr(head)} {cell.text}" for head, cell in zip(HEADINGS, row.cells, strict=True)))
             for row in self._rows
         ]
-        return "\n".join([*lines, self.latency_text, self.follow_text])
+        return "\n".join([*lines, self._latency_text, self._follow_text])
 
     @property
-    def latency_text(self) -> str:
-        if self._latency_ms is None:
-            return tr("capture \N{RIGHTWARDS ARROW} servo {time}", time=NONE)
-        late = "! " if self._latency_ms > LATENCY_LIMIT_MS else ""
-        return tr("capture \N{RIGHTWARDS ARROW} servo {time}", time=f"{late}{self._latency_ms:.0f} ms")
+    def _is_late(self) -> bool:
+        return self._latency_ms is not None and self._latency_ms > LATENCY_LIMIT_MS
 
     @property
-    def follow_text(self) -> str:
+    def _latency_text(self) -> str:
+        time = NONE if self._latency_ms is None else f"{'! ' if self._is_late else ''}{self._latency_ms:.0f} ms"
+        return tr("capture \N{RIGHTWARDS ARROW} servo {time}", time=time)
+
+    @property
+    def _follow_text(self) -> str:
         share = NONE if self._follow is None else f"{100 * self._follow:.0f} %"
         return tr("following the advice {share}", share=share)
-
-    def sizeHint(self) -> QSize:
-        return QSize(440, _ROWS * 20)
 
     def show_rows(self, rows: tuple[ProvenanceRow, ...], latency_ms: float | None, follow: float | None) -> None:
         """Repaints when something changed that can be read."""
@@ -286,67 +241,43 @@ class ProvenanceTable(QWidget):
             self.setAccessibleDescription(self.text)
             self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(theme.PANEL))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         height = self.height() / _ROWS
         width = (self.width() - _LABEL_WIDTH) / len(HEADINGS)
-        painter.setFont(theme.font(11))
-        painter.setPen(QColor(theme.TEXT_FAINT))
         for k, heading in enumerate(HEADINGS):
-            painter.drawText(QRectF(_LABEL_WIDTH + k * width, 0, width, height), _LEFT, tr(heading))
+            draw_text(painter, QRectF(_LABEL_WIDTH + k * width, 0, width, height), tr(heading), theme.font(11), theme.TEXT_FAINT)
         for k, row in enumerate(self._rows):
             _paint_row(painter, QRectF(0, (k + 1) * height, self.width(), height), row, width, is_sent=k == len(self._rows) - 1)
-        self._paint_measures(painter, QRectF(0, 5 * height, self.width(), height))
-        painter.end()
-
-    def _paint_measures(self, painter: QPainter, box: QRectF) -> None:
-        late = self._latency_ms is not None and self._latency_ms > LATENCY_LIMIT_MS
-        painter.setFont(theme.semi_bold(12))
-        painter.setPen(QColor(theme.FAULT if late else theme.TEXT_DIM))
-        painter.drawText(box.adjusted(4, 0, 0, 0), _LEFT, self.latency_text)
-        left = box.left() + max(170.0, box.width() * 0.42)
-        painter.setPen(QColor(theme.TEXT_DIM))
-        painter.drawText(QRectF(left, box.top(), 166, box.height()), _LEFT, self.follow_text)
+        box, font = QRectF(0, 5 * height, self.width(), height), theme.semi_bold(12)
+        draw_text(painter, box.adjusted(4, 0, 0, 0), self._latency_text, font, theme.FAULT if self._is_late else theme.TEXT_DIM)
+        left = max(170.0, box.width() * 0.42)
+        draw_text(painter, QRectF(left, box.top(), 166, height), self._follow_text, font, theme.TEXT_DIM)
         track = QRectF(left + 170, box.center().y() - 4, box.right() - left - 170, 8)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.RAISED))
-        painter.drawRoundedRect(track, 3, 3)
+        draw_track(painter, track)
         if self._follow is not None:
-            painter.setBrush(QColor(theme.SKY))
-            painter.drawRoundedRect(QRectF(track.left(), track.top(), max(3.0, self._follow * track.width()), track.height()), 3, 3)
+            draw_bar(painter, track, self._follow, theme.SKY)
 
 
 def _paint_row(painter: QPainter, box: QRectF, row: ProvenanceRow, width: float, *, is_sent: bool) -> None:
     if is_sent:
         painter.fillRect(box, theme.colour(theme.RAISED, 0.8))
-    size = 14 if box.height() >= 22 else 13
+    size, strong = 14 if box.height() >= 22 else 13, row.drives or is_sent
+    plain = theme.semi_bold(size) if strong else theme.font(size)
     if row.drives:
-        middle = QPointF(box.left() + 7, box.center().y())
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.SKY))
-        painter.drawPolygon(QPolygonF([middle + QPointF(x, y) for x, y in ((-4.0, -5.0), (5.0, 0.0), (-4.0, 5.0))]))
-    strong = row.drives or is_sent
-    painter.setFont(theme.semi_bold(size) if strong else theme.font(size))
-    painter.setPen(QColor(theme.SKY if row.drives else theme.TEXT if is_sent else theme.TEXT_DIM))
-    painter.drawText(box.adjusted(16, 0, 0, 0), _LEFT, tr(row.label))
+        set_colours(painter, theme.SKY)
+        painter.drawPolygon(polygon([(-4.0, -5.0), (5.0, 0.0), (-4.0, 5.0)], QPointF(box.left() + 7, box.center().y())))
+    colour = theme.SKY if row.drives else theme.TEXT if is_sent else theme.TEXT_DIM
+    draw_text(painter, box.adjusted(16, 0, 0, 0), tr(row.label), plain, colour)
     if not row.cells:
-        note_font = theme.font(size)
-        painter.setFont(note_font)
-        painter.setPen(QColor(theme.TEXT_FAINT))
-        room = box.adjusted(_LABEL_WIDTH, 0, 0, 0)
-        painter.drawText(room, _LEFT, theme.elide(note_font, row.note, int(room.width())))
+        draw_text(painter, box.adjusted(_LABEL_WIDTH, 0, 0, 0), row.note, theme.font(size), theme.TEXT_FAINT, elided=True)
     for k, cell in enumerate(row.cells):
         place = QRectF(_LABEL_WIDTH + k * width, box.top(), width - 4, box.height())
-        text_font = theme.semi_bold(size) if strong or cell.tone >= Tone.WARN else theme.font(size)
-        painter.setFont(theme.fitted(text_font, cell.text, int(place.width())))
-        painter.setPen(QPen(QColor(theme.of(TONE_ROLE[cell.tone]))))
-        painter.drawText(place, _LEFT, cell.text)
+        font = theme.semi_bold(size) if cell.tone >= Tone.WARN else plain
+        draw_text(painter, place, cell.text, font, theme.of(TONE_ROLE[cell.tone]), smallest_px=11)
 
 
 _SHOW_EVERY_S = 0.2
-_ROW = 17
+_ROW = 17  # height, px
 _WIDTHS = {mark("When"): 66, mark("Joint"): 68, mark("What the gate did"): 0, "\N{MULTIPLICATION SIGN}": 46}
 _LOG_STYLE = """
 QTableView { background: @PANEL; border: 1px solid @PANEL; font-size: 12px; }
@@ -379,17 +310,15 @@ class CommandPanel(QWidget):
         self._log = ClampLog()
         self._known = False
         self._table = ProvenanceTable()
-        self._heading = QLabel(_heading(None))
-        self._heading.setObjectName("card_note")
+        self._heading = card_note(_heading(None))
         self._heading.setFixedHeight(16)
         self._model = ClampModel(self._log, self)
         self._view = self._make_view()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(3)
-        column.addWidget(self._table, 3)
-        column.addWidget(self._heading)
-        column.addWidget(self._view, 2)
+        for widget, stretch in ((self._table, 3), (self._heading, 0), (self._view, 2)):
+            column.addWidget(widget, stretch)
         self.setAccessibleName(tr("Commands"))
 
     @property
@@ -404,14 +333,14 @@ class CommandPanel(QWidget):
     def show_view(self, view: DriveView | None, status: BusStatus | None) -> None:
         """The newest state of driving, and of the bus; None where there is none."""
         if status is not None:
-            self._log.see(status, self._time_of_day())
+            self._log.add_status(status, self._time_of_day())
         known = view is not None
         if not self._pace.due() and known is self._known:
             return
         self._known = known
         latency_ms = 1000.0 * view.latency_s if view is not None and view.latency_s is not None else None
         self._table.show_rows(self._provenance.rows(view), latency_ms, view.follow_share if view is not None else None)
-        self._model.renew()
+        self._model.update_rows()
         heading = _heading(status)
         if heading != self._heading.text():
             self._heading.setText(heading)
@@ -420,15 +349,13 @@ class CommandPanel(QWidget):
         view = ScrolledTable(_ROW)
         view.setModel(self._model)
         theme.set_sheet(view, _LOG_STYLE)
-        view.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         view.setShowGrid(False)
         view.setWordWrap(False)
-        view.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        view.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        view.verticalHeader().hide()
-        view.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        view.verticalHeader().setMinimumSectionSize(_ROW)
-        view.verticalHeader().setDefaultSectionSize(_ROW)
+        rows = view.verticalHeader()
+        rows.hide()
+        rows.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        rows.setMinimumSectionSize(_ROW)
+        rows.setDefaultSectionSize(_ROW)
         header = view.horizontalHeader()
         header.hide()
         header.setMinimumSectionSize(20)
@@ -442,30 +369,30 @@ class CommandPanel(QWidget):
 
 
 class ClampModel(QAbstractTableModel):
-    """The log as a Qt model; ``renew`` announces what has changed since the last time."""
+    """The log as a Qt model."""
 
     def __init__(self, log: ClampLog, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._log = log
         self._shown: list[LogEntry] = []
 
-    def renew(self) -> None:
-        changes = self._log.take_changes()
-        if not changes.added and not changes.renewed:
-            return
-        if changes.added:
-            fresh = min(changes.added, len(self._log.entries))
-            if changes.cut and self._shown:
-                first = max(0, len(self._log.entries) - fresh)
-                self.beginRemoveRows(QModelIndex(), first, len(self._shown) - 1)
-                del self._shown[first:]
-                self.endRemoveRows()
-            self.beginInsertRows(QModelIndex(), 0, fresh - 1)
-            self._shown[:0] = self._log.entries[:fresh]
+    def update_rows(self) -> None:
+        """Announce what has changed in the log since the last time."""
+        entries, newest = self._log.entries, self._shown[0].serial if self._shown else 0
+        added = sum(entry.serial > newest for entry in entries)
+        cut = len(self._shown) + added - len(entries)
+        if cut > 0:
+            self.beginRemoveRows(QModelIndex(), len(self._shown) - cut, len(self._shown) - 1)
+            del self._shown[-cut:]
+            self.endRemoveRows()
+        if added:
+            self.beginInsertRows(QModelIndex(), 0, added - 1)
+            self._shown[:0] = entries[:added]
             self.endInsertRows()
-        for row in changes.renewed:
-            self._shown[row] = self._log.entries[row]
-            self.dataChanged.emit(self.index(row, 0), self.index(row, len(_WIDTHS) - 1))
+        for row in range(added, len(entries)):
+            if self._shown[row] is not entries[row]:
+                self._shown[row] = entries[row]
+                self.dataChanged.emit(self.index(row, 0), self.index(row, len(_WIDTHS) - 1))
 
     def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
         return 0 if parent.isValid() else len(self._shown)

@@ -1,47 +1,57 @@
-"""Distances of head and tail from the centerline, to their side.
-
-How much room the head has to the wall, and how hard the robot leans on it where the rig can tell.
-"""
+"""Distances of head and tail from the centerline; the room between head and wall, and the contact force where it is measured."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QBrush, QColor, QFont, QFontMetrics, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QPainter
 
 from app.ui import theme
 from app.ui.i18n import tr
 from app.ui.texts import REASON_TEXT, side, tip
 from app.ui.workers import Pace
-from app.widgets.servo_table import number
+from app.widgets.painting import (
+    CENTER,
+    LEFT,
+    NONE,
+    RIGHT,
+    PaintedWidget,
+    draw_bar,
+    draw_box,
+    draw_middle_bar,
+    draw_text,
+    draw_tick,
+    draw_track,
+    number,
+    polygon,
+    set_colours,
+    text_width,
+)
 from core.control.clearance import BreachWatch, Clearance, Ladder, clearance_of
 from core.types import Pose, RobotStatus, Scene
 
-_RANGE_IN_LIMITS = 5.0
+_RANGE_IN_LIMITS = 5.0  # what a bar shows to each side, over the allowed distance
 _NAME_PX = 56
-_SMALLEST_PX = 13
+_SMALLEST_PX, _LARGEST_PX = 13, 24  # of the numbers
 
 
-class DistanceBars(QWidget):
+class DistanceBars(PaintedWidget):
     """Two bars that grow from the centerline to the side on which head and tail lie; the green band is what is allowed.
 
     Bars on opposite sides mean that the robot has crossed. A bar that leaves the range ends in an arrow.
     """
 
+    ground = "PANEL"
+
     def __init__(self, d_allow_px: float) -> None:
-        super().__init__()
+        explanation = tip("d_head", "d_tail", "crossed")
+        super().__init__(tr("Distances from the centerline"), explanation, hint=(240, 160), least=(200, 100))
         self._allow_px = d_allow_px
         self._mm_per_px: float | None = None
         self._offsets: tuple[float, float] | None = None
         self._numbers: tuple[float, float] | None = None
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(200, 100)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName(tr("Distances from the centerline"))
-        self.setToolTip(tip("d_head", "d_tail", "crossed"))
 
     def set_allowed(self, d_allow_px: float) -> None:
         self._allow_px = d_allow_px
@@ -51,7 +61,7 @@ class DistanceBars(QWidget):
     def texts(self) -> tuple[str, str]:
         """The numbers of d_head and d_tail."""
         if self._numbers is None:
-            return "\N{EN DASH}", "\N{EN DASH}"
+            return NONE, NONE
         return self._text(self._numbers[0]), self._text(self._numbers[1])
 
     def set_scale(self, mm_per_px: float | None) -> None:
@@ -61,9 +71,6 @@ class DistanceBars(QWidget):
     def _text(self, offset_px: float) -> str:
         text = f"{abs(offset_px):.1f} px"
         return text if self._mm_per_px is None else f"{text} = {abs(offset_px) * self._mm_per_px:.2f} mm"
-
-    def sizeHint(self) -> QSize:
-        return QSize(240, 160)
 
     def show_pose(self, pose: Pose | None, *, renew_text: bool = True) -> None:
         """The bars follow at once, the numbers when it is time to renew texts."""
@@ -76,80 +83,50 @@ class DistanceBars(QWidget):
             self.setAccessibleDescription("d_head {}, d_tail {}".format(*self.texts))
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(theme.PANEL))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        row = (self.height() - 20) / 2
-        for k, (name, colour_name) in enumerate((("d_head", theme.D_HEAD), ("d_tail", theme.D_TAIL))):
-            box = QRectF(0, k * row, self.width(), row)
-            self._paint_row(painter, box, k, name, colour_name)
-        self._paint_axis(painter, QRectF(0, 2 * row, self.width(), 20))
-        painter.end()
+    def paint(self, painter: QPainter) -> None:
+        height = (self.height() - 20) / 2
+        for k, (name, colour) in enumerate((("d_head", theme.D_HEAD), ("d_tail", theme.D_TAIL))):
+            self._paint_row(painter, QRectF(0, k * height, self.width(), height), k, name, colour)
+        self._paint_axis(painter, QRectF(0, 2 * height, self.width(), 20))
 
-    def _paint_row(self, painter: QPainter, box: QRectF, index: int, name: str, colour_name: str) -> None:
-        text_box = QRectF(box.left(), box.top(), box.width(), box.height() - 26)
-        painter.setPen(QColor(colour_name))
-        painter.setFont(theme.semi_bold(theme.Size.BODY))
-        painter.drawText(text_box, Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignLeft, name)
-        painter.setPen(QColor(theme.TEXT if self._numbers is not None else theme.TEXT_FAINT))
-        largest = theme.bold(max(_SMALLEST_PX, min(24, int(text_box.height() + 4))))  # in a low window the row is low, too
-        painter.setFont(theme.fitted(largest, self.texts[index], int(box.width() - _NAME_PX)))
-        right = Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignRight
-        painter.drawText(text_box.adjusted(0, 0, 0, 4), right, self.texts[index])
+    def _paint_row(self, painter: QPainter, box: QRectF, index: int, name: str, colour: str) -> None:
+        bottom = Qt.AlignmentFlag.AlignBottom
+        line = QRectF(box.left(), box.top(), box.width(), box.height() - 26)
+        draw_text(painter, line, name, theme.semi_bold(theme.Size.BODY), colour, bottom | Qt.AlignmentFlag.AlignLeft)
+        text, ink = self.texts[index], theme.TEXT if self._numbers is not None else theme.TEXT_FAINT
+        largest = theme.bold(max(_SMALLEST_PX, min(_LARGEST_PX, int(line.height() + 4))))  # in a low window the row is low, too
+        font = theme.fitted(largest, text, int(box.width() - _NAME_PX))
+        draw_text(painter, line.adjusted(0, 0, 0, 4), text, font, ink, bottom | Qt.AlignmentFlag.AlignRight)
         track = QRectF(box.left(), box.bottom() - 20, box.width(), 14)
-        self._paint_track(painter, track)
-        if self._offsets is not None:
-            self._paint_bar(painter, track, self._offsets[index], colour_name)
-
-    def _paint_track(self, painter: QPainter, track: QRectF) -> None:
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.RAISED))
-        painter.drawRoundedRect(track, 3, 3)
-        half = track.width() / 2 / _RANGE_IN_LIMITS
-        middle = track.center().x()
+        middle, allowed = track.center().x(), track.width() / 2 / _RANGE_IN_LIMITS
+        draw_track(painter, track)
         painter.setBrush(theme.colour(theme.ALLOWED, 0.30))
-        painter.drawRect(QRectF(middle - half, track.top(), 2 * half, track.height()))
-        painter.setPen(QPen(QColor(theme.ALLOWED), 2))
-        for x in (middle - half, middle + half):
-            painter.drawLine(QPointF(x, track.top() - 3), QPointF(x, track.bottom() + 3))
-
-    def _paint_bar(self, painter: QPainter, track: QRectF, offset_px: float, colour_name: str) -> None:
-        span = _RANGE_IN_LIMITS * self._allow_px
-        middle, half = track.center().x(), track.width() / 2
-        end = middle + half * max(-1.0, min(1.0, offset_px / span))
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(colour_name))
-        painter.drawRect(QRectF(min(middle, end), track.top() + 3, max(2.0, abs(end - middle)), track.height() - 6))
-        if abs(offset_px) > span:
-            inward = -8 if offset_px > 0 else 8
-            tip = QPointF(end, track.center().y())
-            painter.setBrush(QColor(theme.TEXT))
-            painter.drawPolygon(QPolygonF([tip, tip + QPointF(inward, -7), tip + QPointF(inward, 7)]))
-        painter.setPen(QPen(QColor(theme.TEXT), 2))
-        painter.drawLine(QPointF(middle, track.top() - 3), QPointF(middle, track.bottom() + 3))
+        painter.drawRect(QRectF(middle - allowed, track.top(), 2 * allowed, track.height()))
+        for x in (middle - allowed, middle + allowed):
+            draw_tick(painter, track, x, theme.ALLOWED, 2, 3)
+        if self._offsets is not None:
+            share = self._offsets[index] / (_RANGE_IN_LIMITS * self._allow_px)
+            draw_middle_bar(painter, track, share, colour, inset=3, arrow=8)
+            draw_tick(painter, track, middle, theme.TEXT, 2, 3)
 
     def _paint_axis(self, painter: QPainter, box: QRectF) -> None:
-        painter.setPen(QColor(theme.TEXT_FAINT))
-        painter.setFont(theme.font(theme.Size.LABEL))
-        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, side(-1.0))
-        painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, side(1.0))
-        half = box.width() / 2 / _RANGE_IN_LIMITS
+        font, half = theme.font(theme.Size.LABEL), box.width() / 2 / _RANGE_IN_LIMITS
+        draw_text(painter, box, side(-1.0), font, theme.TEXT_FAINT, LEFT)
+        draw_text(painter, box, side(1.0), font, theme.TEXT_FAINT, RIGHT)
         for x, text in ((-half, f"{self._allow_px:g}"), (0.0, "0"), (half, f"{self._allow_px:g}")):
             label = QRectF(box.center().x() + x - 20, box.top(), 40, box.height())
-            painter.drawText(label, Qt.AlignmentFlag.AlignCenter, text)
+            draw_text(painter, label, text, font, theme.TEXT_FAINT, CENTER)
 
 
 FORCE_MARKS_N = (0.15, 0.5)
 """What 95 % of a trial's forces should keep below, and what none may exceed."""
 _FORCE_RANGE_N = 0.6
-_FORCE_BAND_N = 0.03
+_FORCE_BAND_N = 0.03  # how far a force must be below a mark to count as below it again
 _NEAR_USED, _USED_BAND = 0.85, 0.1
 """Share of the room that is used up; the band is one to two pixels in a usual vessel, the picture's noise."""
 _AT_WALL_PX = 1.0
 _TEXT_EVERY_S = 0.2
-_ROLE = ("ALLOWED", "ORANGE", "FAULT")
-_HEIGHT = 48
+_ROLE = ("ALLOWED", "ORANGE", "FAULT")  # colour of each level
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,16 +138,24 @@ class _Block:
     level: int
     marks: tuple[tuple[float, str], ...]
 
+    @property
+    def kind(self) -> tuple[int, str]:
+        """What must be shown at once when it changes."""
+        return self.level, self.texts[0] if self.share is None else ""
 
-class ClearanceBar(QWidget):
-    """The room to the wall as a bar that is full on the centerline, and the contact force beside it when the robot tells it.
 
-    A breach (no room left) and a force beyond its marks are said in words, colour and with a sign; they go away only when they are
-    clearly over. Without a pose the reason stands there instead of numbers. `pixels_per_mm` None: no millimetres.
+class ClearanceBar(PaintedWidget):
+    """The room to the wall as a bar that is full on the centerline, and the contact force beside it when the robot measures it.
+
+    A breach (no room left) and a force beyond its marks are shown in words, colour and with a sign, until they are clearly over.
+    Without a pose the reason stands there instead of numbers. `pixels_per_mm` None: no millimetres.
     """
 
+    ground = "WINDOW"
+
     def __init__(self, pixels_per_mm: float | None = None) -> None:
-        super().__init__()
+        super().__init__(tr("Room to the wall"), tip("clearance", "force"), hint=(440, 48), height=48)
+        self.setMinimumWidth(230)
         self._pixels_per_mm = pixels_per_mm
         self._walls = Ladder((_NEAR_USED,), _USED_BAND)
         self._breaches = BreachWatch()
@@ -178,12 +163,6 @@ class ClearanceBar(QWidget):
         self._pace = Pace(_TEXT_EVERY_S)
         self._room = _room_block(None, 0, tr("no picture yet"))
         self._force: _Block | None = None
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumWidth(230)
-        self.setFixedHeight(_HEIGHT)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(tr("Room to the wall"))
-        self.setToolTip(tip("clearance", "force"))
 
     def set_scale(self, pixels_per_mm: float | None) -> None:
         self._pixels_per_mm = pixels_per_mm
@@ -198,9 +177,6 @@ class ClearanceBar(QWidget):
         """Whether the breach warning stands."""
         return self._room.level == 2
 
-    def sizeHint(self) -> QSize:
-        return QSize(440, _HEIGHT)
-
     def show_scene(self, scene: Scene | None, status: RobotStatus | None) -> None:
         """The room in `scene` and the force in `status`; None: not known."""
         clearance = clearance_of(scene, self._pixels_per_mm) if scene is not None else None
@@ -210,25 +186,21 @@ class ClearanceBar(QWidget):
             wall = 2
         room = _room_block(clearance, wall, _why_unknown(scene))
         force = _force_block(force_n, self._forces.update(force_n)) if force_n is not None else None
-        changed = _kind(room) != _kind(self._room) or _kind(force) != _kind(self._force)
+        was_force = self._force
+        changed = room.kind != self._room.kind or (force and force.kind) != (was_force and was_force.kind)
         if not self._pace.due() and not changed:
             # bars follow at once, numbers when they can be read
-            room = _with_texts(room, self._room)
-            force = _with_texts(force, self._force) if force is not None and self._force is not None else force
-        if (room, force) != (self._room, self._force):
+            room = replace(room, texts=self._room.texts)
+            force = replace(force, texts=was_force.texts) if force is not None and was_force is not None else force
+        if (room, force) != (self._room, was_force):
             self._room, self._force = room, force
             self.setAccessibleDescription(self.text)
             self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(theme.WINDOW))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
         worst = max(self._room.level, self._force.level if self._force is not None else 0)
-        painter.setPen(QPen(QColor(theme.FAULT), 2) if worst == 2 else QPen(QColor(theme.LINE), 1))
-        painter.setBrush(QColor(theme.PANEL))
-        painter.drawRoundedRect(frame, 6, 6)
+        draw_box(painter, frame, 6, theme.PANEL, *((theme.FAULT, 2) if worst == 2 else (theme.LINE, 1)))
         inside = frame.adjusted(12, 4, -12, -3)
         if self._force is None:
             _paint_block(painter, inside, self._room)
@@ -236,19 +208,14 @@ class ClearanceBar(QWidget):
             left = inside.width() * 0.58
             _paint_block(painter, QRectF(inside.left(), inside.top(), left - 14, inside.height()), self._room)
             _paint_block(painter, inside.adjusted(left, 0, 0, 0), self._force)
-        painter.end()
 
 
 def _room_block(clearance: Clearance | None, level: int, why_unknown: str) -> _Block:
     marks = ((0.0, tr("wall")), (1.0, tr("centerline")))
     if clearance is None:
-        return _Block(
-            (tr("Room to the wall: {why}", why=why_unknown), why_unknown, tr("Room: not known"), tr("not known")),
-            None,
-            0,
-            marks,
-        )
-    # how far the head seems to be in the wall is an error of the picture, as long as it is no breach
+        texts = (tr("Room to the wall: {why}", why=why_unknown), why_unknown, tr("Room: not known"), tr("not known"))
+        return _Block(texts, None, 0, marks)
+    # a head slightly inside the wall is an error of the picture, as long as it is no breach
     least = -math.inf if level == 2 else 0.0
     room = f"{number(max(least, clearance.room_px), 0)} px"
     both = room if clearance.room_mm is None else f"{room}, {number(max(least, clearance.room_mm), 1)} mm"
@@ -288,67 +255,36 @@ def _why_unknown(scene: Scene | None) -> str:
     return tr(REASON_TEXT[scene.refusal.reason].title).lower() if scene.refusal is not None else tr("no pose")
 
 
-def _kind(block: _Block | None) -> tuple[int, str] | None:
-    """What must be shown at once when it changes."""
-    return None if block is None else (block.level, block.texts[0] if block.share is None else "")
-
-
-def _with_texts(block: _Block, old: _Block) -> _Block:
-    return _Block(old.texts, block.share, block.level, block.marks)
-
-
 def _paint_block(painter: QPainter, box: QRectF, block: _Block) -> None:
-    text_box = QRectF(box.left(), box.top(), box.width(), 20)
+    line = QRectF(box.left(), box.top(), box.width(), 20)
     if block.level:
-        _paint_sign(painter, QPointF(box.left() + 8, text_box.center().y()), block.level)
-        text_box.adjust(22, 0, 0, 0)
+        _paint_triangle(painter, QPointF(box.left() + 8, line.center().y()), block.level)
+        line.adjust(22, 0, 0, 0)
+    font = theme.bold(14) if block.level else theme.semi_bold(14)
+    text = next((text for text in block.texts if text_width(font, text) <= line.width()), block.texts[-1])
     role = "TEXT_FAINT" if block.share is None else _ROLE[block.level] if block.level else "TEXT"
-    painter.setPen(QColor(theme.of(role)))
-    text_font = theme.bold(14) if block.level else theme.semi_bold(14)
-    metrics = QFontMetrics(text_font)
-    text = next((text for text in block.texts if metrics.horizontalAdvance(text) <= text_box.width()), block.texts[-1])
-    painter.setFont(theme.fitted(text_font, text, int(text_box.width())))
-    painter.drawText(text_box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, text)
+    draw_text(painter, line, text, font, theme.of(role), smallest_px=11)
     track = QRectF(box.left(), box.top() + 21, box.width(), 8)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.RAISED))
-    painter.drawRoundedRect(track, 3, 3)
+    draw_track(painter, track)
     if block.share is not None:
-        _paint_fill(painter, track, block)
-    _paint_marks(painter, track, block.marks, box)
-
-
-def _paint_fill(painter: QPainter, track: QRectF, block: _Block) -> None:
-    share = max(0.0, min(1.0, block.share or 0.0))
-    if block.level == 2 and share < 0.1:  # no room: nothing to fill, and yet it must be seen
-        painter.setBrush(QBrush(QColor(theme.FAULT), Qt.BrushStyle.BDiagPattern))
-        painter.drawRoundedRect(track, 3, 3)
-    painter.setBrush(QColor(theme.of(_ROLE[block.level])))
-    painter.drawRoundedRect(QRectF(track.left(), track.top(), max(3.0, share * track.width()), track.height()), 3, 3)
-
-
-def _paint_marks(painter: QPainter, track: QRectF, marks: tuple[tuple[float, str], ...], box: QRectF) -> None:
-    mark_font = QFont(theme.font(10))
-    painter.setFont(mark_font)
-    metrics = QFontMetrics(mark_font)
-    for share, text in marks:
+        share = max(0.0, min(1.0, block.share))
+        if block.level == 2 and share < 0.1:  # no room: nothing to fill, and yet it must be seen
+            painter.setBrush(QBrush(QColor(theme.FAULT), Qt.BrushStyle.BDiagPattern))
+            painter.drawRoundedRect(track, 3, 3)
+        draw_bar(painter, track, share, theme.of(_ROLE[block.level]))
+    for share, mark in block.marks:
         x = track.left() + share * track.width()
         if 0.0 < share < 1.0:
-            painter.setPen(QPen(QColor(theme.TEXT), 1.5))
-            painter.drawLine(QPointF(x, track.top() - 2), QPointF(x, track.bottom() + 2))
-        width = metrics.horizontalAdvance(text) + 2.0
+            draw_tick(painter, track, x, theme.TEXT, 1.5, 2)
+        width = text_width(theme.font(10), mark) + 2.0
         left = max(box.left(), min(x - width / 2, box.right() - width))
-        painter.setPen(QColor(theme.TEXT_FAINT))
-        painter.drawText(QRectF(left, track.bottom() + 1, width, 12), Qt.AlignmentFlag.AlignCenter, text)
+        draw_text(painter, QRectF(left, track.bottom() + 1, width, 12), mark, theme.font(10), theme.TEXT_FAINT, CENTER)
 
 
-def _paint_sign(painter: QPainter, middle: QPointF, level: int) -> None:
+def _paint_triangle(painter: QPainter, middle: QPointF, level: int) -> None:
     """A warning triangle; filled when the limit is passed."""
-    name = theme.of(_ROLE[level])
-    triangle = QPolygonF([middle + QPointF(x, y) for x, y in ((0.0, -7.0), (8.0, 6.5), (-8.0, 6.5))])
-    painter.setPen(QPen(QColor(name), 1.6))
-    painter.setBrush(QColor(name) if level == 2 else Qt.BrushStyle.NoBrush)
-    painter.drawPolygon(triangle)
-    painter.setPen(QColor(theme.INK if level == 2 else name))
-    painter.setFont(theme.bold(11))
-    painter.drawText(QRectF(middle.x() - 8, middle.y() - 5, 16, 12), Qt.AlignmentFlag.AlignCenter, "!")
+    colour, is_over = theme.of(_ROLE[level]), level == 2
+    set_colours(painter, colour if is_over else None, colour, 1.6)
+    painter.drawPolygon(polygon(((0.0, -7.0), (8.0, 6.5), (-8.0, 6.5)), middle))
+    box = QRectF(middle.x() - 8, middle.y() - 5, 16, 12)
+    draw_text(painter, box, "!", theme.bold(11), theme.INK if is_over else colour, CENTER)

@@ -1,7 +1,4 @@
-"""What happened, newest first.
-
-What happened, as a list for Qt's views, newest first.
-"""
+"""What happened, newest first, as a list with a filter."""
 
 from __future__ import annotations
 
@@ -12,25 +9,19 @@ from datetime import datetime, timedelta
 from enum import Enum
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QObject, QPersistentModelIndex, QPoint, QRectF, QSize, Qt, Slot
-from PySide6.QtGui import QColor, QFontMetrics, QGuiApplication, QPainter, QPen, QShowEvent
-from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHBoxLayout,
-    QLabel,
-    QMenu,
-    QStyle,
-    QStyledItemDelegate,
-    QStyleOptionViewItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtGui import QColor, QGuiApplication, QPainter
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QVBoxLayout, QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.widgets.basics import QuietCombo, ScrolledList
+from app.widgets.painting import RIGHT, draw_box, draw_text, text_width
 
-MOST_ROWS = 2000
-Index = QModelIndex | QPersistentModelIndex
+MOST_ROWS = 2000  # events that are kept
+SAME_WITHIN = timedelta(seconds=2.0)
+_ROW_HEIGHT = 24
+_STYLE = "QListView { border: 1px solid @PANEL; } QListView:focus { border: 1px solid @SKY; }"
+_Index = QModelIndex | QPersistentModelIndex
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +31,6 @@ class KindLook:
     word: str
     role: str
     plural: str
-
-    @property
-    def colour(self) -> str:
-        """In the scheme in use."""
-        return theme.of(self.role)
 
 
 class LogKind(Enum):
@@ -83,10 +69,14 @@ class EventModel(QAbstractListModel):
         self._kind: LogKind | None = None
         self.shown: list[LoggedEvent] = []
 
-    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default, never changed
+    @property
+    def newest(self) -> LoggedEvent | None:
+        return self._all[0] if self._all else None
+
+    def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default, never changed
         return 0 if parent.isValid() else len(self.shown)
 
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
+    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         if not index.isValid() or index.row() >= len(self.shown):
             return None
         event = self.shown[index.row()]
@@ -97,66 +87,42 @@ class EventModel(QAbstractListModel):
         return event.text if role == Qt.ItemDataRole.ToolTipRole else None
 
     def add(self, event: LoggedEvent) -> bool:
-        """Put `event` in front; the oldest one goes when there are too many. False when the filter keeps it back."""
+        """Put `event` in front; the oldest one goes when there are too many. False when the filter hides it."""
         self._all.appendleft(event)
         passes = self._passes(event)
         if passes:
             self.beginInsertRows(QModelIndex(), 0, 0)
             self.shown.insert(0, event)
             self.endInsertRows()
-        if len(self._all) > MOST_ROWS:
-            oldest = self._all.pop()
-            if self.shown and self.shown[-1] is oldest:
-                last = len(self.shown) - 1
-                self.beginRemoveRows(QModelIndex(), last, last)
-                self.shown.pop()
-                self.endRemoveRows()
+        if len(self._all) > MOST_ROWS and self._passes(self._all.pop()):
+            last = len(self.shown) - 1
+            self.beginRemoveRows(QModelIndex(), last, last)
+            self.shown.pop()
+            self.endRemoveRows()
         return passes
 
-    def add_all(self, events: deque[LoggedEvent]) -> None:
-        """Many at once, oldest first."""
-        self.beginResetModel()
-        self._all.extendleft(events)
-        while len(self._all) > MOST_ROWS:
-            self._all.pop()
-        self._filter()
-        self.endResetModel()
-
     def replace_newest(self, event: LoggedEvent) -> None:
-        if not self._all:
-            return
         self._all[0] = event
-        if self.shown and self._passes(event):
+        if self._passes(event):
             self.shown[0] = event
-            first = self.index(0)
-            self.dataChanged.emit(first, first)
+            self.dataChanged.emit(self.index(0), self.index(0))
 
     def show_kind(self, kind: LogKind | None) -> None:
         self.beginResetModel()
         self._kind = kind
-        self._filter()
-        self.endResetModel()
-
-    def _filter(self) -> None:
         self.shown = [event for event in self._all if self._passes(event)]
+        self.endResetModel()
 
     def _passes(self, event: LoggedEvent) -> bool:
         return self._kind is None or event.kind is self._kind
 
 
-SAME_WITHIN = timedelta(seconds=2.0)
-_ROW_HEIGHT = 24
-_STYLE = "QListView { border: 1px solid @PANEL; } QListView:focus { border: 1px solid @SKY; }"
-
-
 class EventLog(QWidget):
-    """A list with a filter. While it is hidden an event costs no more than a place in a queue."""
+    """A list of events with a filter by their kind."""
 
     def __init__(self, now: Callable[[], datetime] = datetime.now) -> None:
         super().__init__()
         self._now = now
-        self._waiting: deque[LoggedEvent] = deque(maxlen=MOST_ROWS)
-        self._newest: LoggedEvent | None = None
         self._model = EventModel(self)
         self._view = _EventList(self._model)
         self._view.customContextMenuRequested.connect(self._open_menu)
@@ -182,26 +148,15 @@ class EventLog(QWidget):
     @property
     def lines(self) -> list[str]:
         """What the filter lets through, newest first."""
-        self._take_in()
         return [event.line for event in self._model.shown]
 
     def add(self, kind: LogKind, text: str) -> None:
         """Something happened now; a repetition of the newest event within two seconds raises its count instead."""
-        now, newest = self._now(), self._newest
-        event = LoggedEvent(now, kind, tr_text(" ".join(text.split())))
-        is_same = newest is not None and (newest.kind, newest.text) == (kind, event.text) and abs(now - newest.at) <= SAME_WITHIN
-        if newest is not None and is_same:
-            event = replace(event, times=newest.times + 1)
-        self._newest = event
-        if not self.isVisible():
-            if is_same and self._waiting:
-                self._waiting[-1] = event
-                return
-            if not is_same:
-                self._waiting.append(event)
-                return
-        self._take_in()
-        self._put(event, is_same)
+        event, newest = LoggedEvent(self._now(), kind, tr_text(" ".join(text.split()))), self._model.newest
+        if newest is not None and (newest.kind, newest.text) == (kind, event.text) and abs(event.at - newest.at) <= SAME_WITHIN:
+            self._model.replace_newest(replace(event, times=newest.times + 1))
+        elif self._model.add(event):
+            self._view.keep_place()
 
     def show_kind(self, kind: LogKind | None) -> None:
         """Show one kind only; None shows everything."""
@@ -213,24 +168,8 @@ class EventLog(QWidget):
         """All lines that are shown, to the clipboard."""
         QGuiApplication.clipboard().setText("\n".join(self.lines))
 
-    def _put(self, event: LoggedEvent, is_same: bool) -> None:
-        if is_same:
-            self._model.replace_newest(event)
-        elif self._model.add(event):
-            self._view.keep_place()
-
-    def _take_in(self) -> None:
-        if self._waiting:
-            self._model.add_all(self._waiting)
-            self._waiting.clear()
-
-    def showEvent(self, event: QShowEvent) -> None:
-        self._take_in()
-        super().showEvent(event)
-
     @Slot()
     def _on_filter(self) -> None:
-        self._take_in()
         self._model.show_kind(self._filter.currentData())
         self._view.scrollToTop()
 
@@ -243,16 +182,13 @@ class EventLog(QWidget):
 
 
 class _EventList(ScrolledList):
-    """Rows of equal height. Whoever has scrolled down keeps the lines that he reads."""
+    """Rows of equal height. A list that was scrolled down keeps its lines in place."""
 
     def __init__(self, model: EventModel) -> None:
         super().__init__(_ROW_HEIGHT)
         self.setModel(model)
         self.setItemDelegate(_EventPainter(self))
         self.setUniformItemSizes(True)
-        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         theme.set_sheet(self, _STYLE)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setMinimumHeight(2 * _ROW_HEIGHT)
@@ -269,10 +205,10 @@ class _EventList(ScrolledList):
 class _EventPainter(QStyledItemDelegate):
     """Time, kind as a mark and a word, text, and how often."""
 
-    def sizeHint(self, option: QStyleOptionViewItem, index: Index) -> QSize:
+    def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
         return QSize(200, _ROW_HEIGHT)
 
-    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
         event = index.data(Qt.ItemDataRole.UserRole)
         if not isinstance(event, LoggedEvent):
             return
@@ -282,23 +218,15 @@ class _EventPainter(QStyledItemDelegate):
         if option.state & QStyle.StateFlag.State_MouseOver:  # type: ignore[attr-defined]
             painter.fillRect(option.rect, QColor(theme.RAISED))  # type: ignore[attr-defined]
         small, look = theme.font(theme.Size.LABEL), event.kind.value
-        centre = Qt.AlignmentFlag.AlignVCenter
-        painter.setFont(small)
-        painter.setPen(QColor(theme.TEXT_FAINT))
-        painter.drawText(room, centre, f"{event.at:%H:%M:%S}")
-        room.adjust(QFontMetrics(small).horizontalAdvance("00:00:00") + 10, 0, 0, 0)
-        painter.setPen(QPen(Qt.PenStyle.NoPen))
-        painter.setBrush(QColor(look.colour))
-        painter.drawRoundedRect(QRectF(room.left(), room.center().y() - 4, 8, 8), 2, 2)
-        painter.setPen(QColor(theme.TEXT_DIM))
-        painter.drawText(room.adjusted(14, 0, 0, 0), centre, tr(look.word))
-        room.adjust(14 + QFontMetrics(small).horizontalAdvance(tr("operator")) + 10, 0, 0, 0)
+        draw_text(painter, room, f"{event.at:%H:%M:%S}", small, theme.TEXT_FAINT)
+        room.adjust(text_width(small, "00:00:00") + 10, 0, 0, 0)
+        draw_box(painter, QRectF(room.left(), room.center().y() - 4, 8, 8), 2, theme.of(look.role))
+        room.adjust(14, 0, 0, 0)
+        draw_text(painter, room, tr(look.word), small, theme.TEXT_DIM)
+        room.adjust(text_width(small, tr("operator")) + 10, 0, 0, 0)
         if event.times > 1:
             times = f"\N{MULTIPLICATION SIGN}{event.times}"
-            painter.drawText(room, Qt.AlignmentFlag.AlignRight | centre, times)
-            room.adjust(0, 0, -QFontMetrics(small).horizontalAdvance(times) - 8, 0)
-        text_font = theme.font(13)
-        painter.setFont(text_font)
-        painter.setPen(QColor(theme.TEXT))
-        painter.drawText(room, centre, theme.elide(text_font, event.text, int(room.width())))
+            draw_text(painter, room, times, small, theme.TEXT_DIM, RIGHT)
+            room.adjust(0, 0, -text_width(small, times) - 8, 0)
+        draw_text(painter, room, event.text, theme.font(13), theme.TEXT, elided=True)
         painter.restore()

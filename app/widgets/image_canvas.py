@@ -1,9 +1,4 @@
-"""A picture that is looked at closely: zoom at the wheel, moved by hand, drawn as sharply as the screen can show it.
-
-Where a picture lies in a widget, and its visible part as pixels: any size, any zoom, at the widget's cost only.
-
-Contrast and brightness of the picture as it is shown; the image itself is not changed.
-"""
+"""An image of any size with zoom, panning, contrast and brightness; only its visible part is rendered."""
 
 from __future__ import annotations
 
@@ -21,12 +16,14 @@ from app.ui.theme import ON_PICTURE
 from core.types import Image, Point
 
 _ZOOM_MAX = 40.0
-_MARGIN_PX = 60.0
+_MARGIN_PX = 60.0  # of the surroundings that may be seen
 _LARGE_PIXEL = 1 / 3  # image pixels per screen pixel
+_WHEEL_FACTOR = 1.2
+_CLOSE_UP = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class PictureView:
+class Viewport:
     """``zoom`` screen pixels per image pixel; the image point ``center`` lies in the middle of a widget of ``room``."""
 
     size: tuple[int, int]
@@ -35,14 +32,14 @@ class PictureView:
     center: Point
 
     @classmethod
-    def fitted(cls, size: tuple[int, int], room: tuple[int, int]) -> PictureView:
-        """The whole picture."""
+    def fitted(cls, size: tuple[int, int], room: tuple[int, int]) -> Viewport:
+        """The whole image."""
         zoom = min(room[0] / size[0], room[1] / size[1])
         return cls(size, room, max(zoom, 1e-3), ((size[0] - 1) / 2, (size[1] - 1) / 2))
 
     @property
     def is_fitted(self) -> bool:
-        return self.zoom <= PictureView.fitted(self.size, self.room).zoom * 1.0001
+        return self.zoom <= Viewport.fitted(self.size, self.room).zoom * 1.0001
 
     @property
     def transform(self) -> QTransform:
@@ -60,33 +57,32 @@ class PictureView:
             (point[1] - self.center[1]) * self.zoom + self.room[1] / 2,
         )
 
-    def zoomed(self, factor: float, at: Point) -> PictureView:
+    def zoomed(self, factor: float, at: Point) -> Viewport:
         """Larger or smaller, with the widget's place `at` over the same place of the image."""
-        least = PictureView.fitted(self.size, self.room).zoom
+        least = Viewport.fitted(self.size, self.room).zoom
         zoom = min(max(self.zoom * factor, least), max(_ZOOM_MAX, least))
         if zoom <= least * 1.0001:
-            return PictureView.fitted(self.size, self.room)
+            return Viewport.fitted(self.size, self.room)
         fixed = self.to_image(*at)
         x, y = (fixed[axis] - (at[axis] - self.room[axis] / 2) / zoom for axis in (0, 1))
         return replace(self, zoom=zoom, center=(x, y)).inside()
 
-    def panned(self, dx: float, dy: float) -> PictureView:
+    def panned(self, dx: float, dy: float) -> Viewport:
         """Moved by so many widget pixels."""
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] - dy / self.zoom)).inside()
 
-    def in_room(self, room: tuple[int, int]) -> PictureView:
+    def in_room(self, room: tuple[int, int]) -> Viewport:
         """The same in a widget of another size."""
-        return PictureView.fitted(self.size, room) if self.is_fitted else replace(self, room=room).inside()
+        return Viewport.fitted(self.size, room) if self.is_fitted else replace(self, room=room).inside()
 
-    def inside(self) -> PictureView:
-        """No farther away than that some of the picture's surroundings are seen."""
-        x, y = (self._limited(axis) for axis in (0, 1))
-        return replace(self, center=(x, y))
-
-    def _limited(self, axis: int) -> float:
-        middle, slack = (self.size[axis] - 1) / 2, (self.size[axis] - self.room[axis] / self.zoom) / 2
-        reach = max(0.0, slack + _MARGIN_PX / self.zoom)
-        return min(max(self.center[axis], middle - reach), middle + reach)
+    def inside(self) -> Viewport:
+        """Moved so far that the image does not leave the widget."""
+        center = []
+        for value, size, room in zip(self.center, self.size, self.room, strict=True):
+            middle, slack = (size - 1) / 2, (size - room / self.zoom) / 2
+            reach = max(0.0, slack + _MARGIN_PX / self.zoom)
+            center.append(min(max(value, middle - reach), middle + reach))
+        return replace(self, center=(center[0], center[1]))
 
     def shows(self, point: Point, margin_px: float) -> bool:
         """Whether a place of the image lies in the widget, at least `margin_px` from its border."""
@@ -99,13 +95,12 @@ def halvings(image: Image) -> tuple[Image, ...]:
     levels = [image]
     while max(levels[-1].shape[:2]) > 2000:
         height, width = levels[-1].shape[:2]
-        levels.append(
-            np.asarray(cv2.resize(levels[-1], ((width + 1) // 2, (height + 1) // 2), interpolation=cv2.INTER_AREA), np.uint8)
-        )
+        half = (width + 1) // 2, (height + 1) // 2
+        levels.append(np.asarray(cv2.resize(levels[-1], half, interpolation=cv2.INTER_AREA), np.uint8))
     return tuple(levels)
 
 
-def render(levels: tuple[Image, ...], view: PictureView, ratio: float, contrast: float, brightness: float) -> QImage:
+def render(levels: tuple[Image, ...], view: Viewport, ratio: float, contrast: float, brightness: float) -> QImage:
     """The visible part as it lies in the widget.
 
     Parameters
@@ -123,16 +118,12 @@ def render(levels: tuple[Image, ...], view: PictureView, ratio: float, contrast:
     left, top = view.to_image(0.0, 0.0)
     step = 1.0 / (view.zoom * ratio)
     # device pixel centre -> place in the level, pixel centres at integers
-    matrix = np.array(
-        [
-            [step / across, 0.0, (left + 0.5 + 0.5 * step) / across - 0.5],
-            [0.0, step / down, (top + 0.5 + 0.5 * step) / down - 0.5],
-        ]
-    )
+    shift_x, shift_y = ((edge + 0.5 + 0.5 * step) / per_px - 0.5 for edge, per_px in ((left, across), (top, down)))
+    matrix = np.array([[step / across, 0.0, shift_x], [0.0, step / down, shift_y]])
     room = max(1, round(view.room[0] * ratio)), max(1, round(view.room[1] * ratio))
     # Cubic shows edges where they are when pixels are large, for twice the time; between level and screen is less than a factor 2.
     how = (cv2.INTER_CUBIC if step < _LARGE_PIXEL else cv2.INTER_LINEAR) | cv2.WARP_INVERSE_MAP
-    # Beyond the picture's border is nothing: the border's colour would look like more of it.
+    # beyond the image it is dark: a replicated border would look like more of the image
     x0, y0 = (max(0, round(value * ratio)) for value in view.to_screen((-0.5, -0.5)))
     x1, y1 = (round(value * ratio) for value in view.to_screen((view.size[0] - 0.5, view.size[1] - 0.5)))
     x1, y1 = min(x1, room[0]), min(y1, room[1])
@@ -150,26 +141,22 @@ def render(levels: tuple[Image, ...], view: PictureView, ratio: float, contrast:
     return picture
 
 
-_WHEEL_FACTOR = 1.2
-_CLOSE_UP = 5.0
-
-
-class PictureCanvas(QWidget):
-    """Shows the visible part of an image; who draws on it takes ``levels`` and ``view`` and calls ``paint_picture`` first."""
+class ImageCanvas(QWidget):
+    """Shows the visible part of an image. A subclass that draws on it uses ``view`` and calls ``paint_picture`` first."""
 
     def __init__(self) -> None:
         super().__init__()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setCursor(Qt.CursorShape.CrossCursor)
         self._levels: tuple[Image, ...] = ()
-        self._view = PictureView((1, 1), (1, 1), 1.0, (0.0, 0.0))
+        self._view = Viewport((1, 1), (1, 1), 1.0, (0.0, 0.0))
         self._picture: QImage | None = None
         self._light = (1.0, 0.0)
         self._pan_from: QPointF | None = None
         self._is_pannable = False
 
     @property
-    def view(self) -> PictureView:
+    def view(self) -> Viewport:
         return self._view
 
     @property
@@ -195,7 +182,7 @@ class PictureCanvas(QWidget):
         """Another image, the whole of it; none: nothing."""
         if levels:
             size = levels[0].shape[1], levels[0].shape[0]
-            self._view = PictureView.fitted(size, self._room)
+            self._view = Viewport.fitted(size, self._room)
         self._levels = levels
         self._pan_from = None
         self._renew_picture()
@@ -207,7 +194,7 @@ class PictureCanvas(QWidget):
 
     def fit(self) -> None:
         """The whole image."""
-        self._set_view(PictureView.fitted(self._view.size, self._view.room))
+        self._set_view(Viewport.fitted(self._view.size, self._view.room))
 
     def zoom_at(self, factor: float, at: Point) -> None:
         """Zoom by a factor; the widget's place `at` stays over the same place of the image."""
@@ -215,16 +202,16 @@ class PictureCanvas(QWidget):
 
     def close_up_at(self, middle: Point) -> None:
         """A place of the image several times as large; once more: the whole image."""
-        whole = PictureView.fitted(self._view.size, self._view.room)
+        whole = Viewport.fitted(self._view.size, self._view.room)
         near = replace(whole, zoom=whole.zoom * _CLOSE_UP, center=middle).inside()
         self._set_view(whole if self._view == near else near)
 
-    def see(self, point: Point) -> None:
+    def scroll_to(self, point: Point) -> None:
         """Bring a place of the image into sight."""
         if not self._view.shows(point, 20.0):
             self._set_view(replace(self._view, center=point).inside())
 
-    # ---- moved by hand
+    # ---- panning
 
     def begin_pan(self, position: QPointF) -> None:
         self._pan_from = position
@@ -233,7 +220,7 @@ class PictureCanvas(QWidget):
         if self._pan_from is not None:
             step = position - self._pan_from
             self._pan_from = position
-            self._renew_cursor()  # only now: a click may mean something else
+            self._renew_cursor()  # only now, as a click may mean something else
             self._set_view(self._view.panned(step.x(), step.y()))
 
     def end_pan(self) -> None:
@@ -271,7 +258,7 @@ class PictureCanvas(QWidget):
     def _room(self) -> tuple[int, int]:
         return max(1, self.width()), max(1, self.height())
 
-    def _set_view(self, view: PictureView) -> None:
+    def _set_view(self, view: Viewport) -> None:
         if view != self._view:
             self._view = view
             self._renew_picture()
@@ -291,7 +278,10 @@ _STEP = 10
 
 
 class LightSliders(QWidget):
-    """``changed`` carries contrast (1 = as it is) and brightness (0 = as it is, in grey levels)."""
+    """Contrast and brightness of an image as it is shown.
+
+    ``changed`` carries contrast (1 = as it is) and brightness (0 = as it is, in grey levels).
+    """
 
     changed = Signal(float, float)
 
@@ -300,24 +290,22 @@ class LightSliders(QWidget):
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setVerticalSpacing(2)
-        self._contrast, self._brightness = self._slider(tr("Contrast"), ", ."), self._slider(tr("Brightness"), "< >")
-        for row, (name, keys, slider) in enumerate(
-            ((tr("Contrast"), ", .", self._contrast), (tr("Brightness"), "< >", self._brightness))
-        ):
-            for column, text, role in ((0, name, "TEXT_DIM"), (2, keys, "TEXT_FAINT")):
-                label = QLabel(text)
-                theme.set_sheet(label, f"color: @{role}; font-size: 12px;")
-                grid.addWidget(label, row, column)
-            grid.addWidget(slider, row, 1)
+        self._contrast = self._add_slider(grid, 0, tr("Contrast"), ", .")
+        self._brightness = self._add_slider(grid, 1, tr("Brightness"), "< >")
 
-    def _slider(self, name: str, keys: str) -> QSlider:
+    def _add_slider(self, grid: QGridLayout, row: int, name: str, keys: str) -> QSlider:
+        for column, text, role in ((0, name, "TEXT_DIM"), (2, keys, "TEXT_FAINT")):
+            label = QLabel(text)
+            theme.set_sheet(label, f"color: @{role}; font-size: 12px;")
+            grid.addWidget(label, row, column)
         slider = QSlider(Qt.Orientation.Horizontal)
         slider.setRange(-100, 100)
         slider.setPageStep(_STEP)
         slider.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         slider.setAccessibleName(name)
         slider.setToolTip(tr("{name} of the picture on the screen  (keys {keys}; / resets both)", name=name, keys=keys))
-        slider.valueChanged.connect(self._tell)
+        slider.valueChanged.connect(lambda _value: self.changed.emit(*self.light))
+        grid.addWidget(slider, row, 1)
         return slider
 
     @property
@@ -333,6 +321,3 @@ class LightSliders(QWidget):
     def reset(self) -> None:
         self._contrast.setValue(0)
         self._brightness.setValue(0)
-
-    def _tell(self) -> None:
-        self.changed.emit(*self.light)

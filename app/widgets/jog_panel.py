@@ -1,13 +1,10 @@
-"""The keys that move the robot, on the screen: they light up when pressed, and can be held with the mouse too.
-
-How far the head is bent and the robot in, and what the keys make of that while they are held.
-"""
+"""The keys that move the robot, on the screen: they light up when pressed, can be held with the mouse, and show how far it went."""
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QComboBox, QGridLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QPointF, QRectF, Signal
+from PySide6.QtGui import QPainter
+from PySide6.QtWidgets import QComboBox, QGridLayout, QVBoxLayout, QWidget
 
 from app.operator.manual_drive import Motion
 from app.ui import theme
@@ -15,112 +12,85 @@ from app.ui.i18n import mark, tr
 from app.ui.texts import tip
 from app.widgets.basics import QuietCombo
 from app.widgets.mode_bar import MouseHeld
+from app.widgets.painting import (
+    CENTER,
+    NONE,
+    RIGHT,
+    PaintedWidget,
+    draw_box,
+    draw_middle_bar,
+    draw_text,
+    draw_track,
+    set_colours,
+    text_width,
+)
 from core.config.models import JogConfig
 from core.config.safety import ServosConfig
 from core.control.motion import JogSpeeds, hand_speeds
 from core.types import RobotStatus
 
 _LINE_PX, _BETWEEN_PX, _SMALLEST_PX = 17, 6, 10
-_UNKNOWN = "\N{EN DASH}"
 
 
-class JogReadout(QWidget):
+class JogReadout(PaintedWidget):
     """Bend and pitch as bars from the middle, how far the robot is in, and below them how fast a held key changes that.
 
-    What is not known is a dash, and a bar without a mark: it must not pass for a straight head.
+    An unknown value is a dash and a bar without a mark, which differs from a straight head.
     """
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(tr("Bend, pitch and insertion"), tip("bend", "pitch", "insertion", "hand_speeds"), height=2 * _LINE_PX)
         self._bend: float | None = None
         self._pitch: float | None = None
         self._insertion_mm: float | None = None
-        self._speeds = ""
-        self.setFixedHeight(2 * _LINE_PX)
-        self.setAccessibleName(tr("Bend, pitch and insertion"))
-        self._say()
-        self.setToolTip(tip("bend", "pitch", "insertion", "hand_speeds"))
+        self.speeds = ""
+        self._describe()
 
     @property
     def text(self) -> str:
-        return tr(
-            "bend {bend}, pitch {pitch}, in {inserted} mm",
-            bend=_number(self._bend),
-            pitch=_number(self._pitch),
-            inserted=self._inserted,
-        )
-
-    @property
-    def speeds(self) -> str:
-        return self._speeds
+        bend, pitch = (NONE if share is None else f"{share:.2f}" for share in (self._bend, self._pitch))
+        return tr("bend {bend}, pitch {pitch}, in {inserted} mm", bend=bend, pitch=pitch, inserted=self._inserted)
 
     @property
     def _inserted(self) -> str:
-        return _UNKNOWN if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
+        return NONE if self._insertion_mm is None else f"{self._insertion_mm:.0f}"
 
     def show_values(self, bend: float | None, pitch: float | None, insertion_mm: float | None) -> None:
         """Shares of full pull, -1..1, and millimetres; None: not known."""
-        values = (_rounded(bend, 2), _rounded(pitch, 2), _rounded(insertion_mm, 0))
+        values = tuple(
+            None if value is None else round(value, digits) for value, digits in ((bend, 2), (pitch, 2), (insertion_mm, 0))
+        )
         if values != (self._bend, self._pitch, self._insertion_mm):
             self._bend, self._pitch, self._insertion_mm = values
-            self._say()
+            self._describe()
 
     def show_speeds(self, speeds: str) -> None:
-        self._speeds = speeds
-        self._say()
+        self.speeds = speeds
+        self._describe()
 
-    def _say(self) -> None:
-        self.setAccessibleDescription(f"{self.text}; {self._speeds}" if self._speeds else self.text)
+    def _describe(self) -> None:
+        self.setAccessibleDescription(f"{self.text}; {self.speeds}" if self.speeds else self.text)
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        label = theme.font(theme.Size.LABEL)
-        painter.setFont(label)
-        metrics = QFontMetrics(label)
+    def paint(self, painter: QPainter) -> None:
+        label, names = theme.font(theme.Size.LABEL), (tr("bend"), tr("pitch"))
         inserted = tr("in {inserted} mm", inserted=self._inserted)
-        names = (tr("bend"), tr("pitch"))
         # room for three digits, so that the bars do not grow and shrink as the robot goes in
-        last_px = max(metrics.horizontalAdvance(text) for text in (inserted, tr("in {inserted} mm", inserted="000")))
-        spare_px = self.width() - last_px - sum(metrics.horizontalAdvance(name) for name in names) - 4 * _BETWEEN_PX
-        left = 0.0
+        last_px = max(text_width(label, text) for text in (inserted, tr("in {inserted} mm", inserted="000")))
+        spare_px = self.width() - last_px - sum(text_width(label, name) for name in names) - 4 * _BETWEEN_PX
+        bar_px, left = max(8.0, spare_px / 2), 0.0
         for name, share in zip(names, (self._bend, self._pitch), strict=True):
-            painter.setPen(QColor(theme.TEXT_DIM))
-            name_px = metrics.horizontalAdvance(name)
-            painter.drawText(QRectF(left, 0, name_px + 1, _LINE_PX), Qt.AlignmentFlag.AlignVCenter, name)
-            left += name_px + _BETWEEN_PX
-            _paint_bar(painter, QRectF(left, _LINE_PX / 2 - 4, max(8.0, spare_px / 2), 8), share)
-            left += max(8.0, spare_px / 2) + _BETWEEN_PX
-        painter.setPen(QColor(theme.TEXT_DIM))
-        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(QRectF(self.width() - last_px, 0, last_px, _LINE_PX), right, inserted)
-        painter.setPen(QColor(theme.TEXT_DIM if self.isEnabled() else theme.TEXT_FAINT))
-        painter.setFont(theme.fitted(label, self._speeds, self.width(), _SMALLEST_PX))
+            name_px = text_width(label, name)
+            draw_text(painter, QRectF(left, 0, name_px + 1, _LINE_PX), name, label, theme.TEXT_DIM)
+            track = QRectF(left + name_px + _BETWEEN_PX, _LINE_PX / 2 - 4, bar_px, 8)
+            draw_track(painter, track)
+            if share is not None:
+                draw_middle_bar(painter, track, share, theme.SKY)
+            left = track.right() + _BETWEEN_PX
+        draw_text(painter, QRectF(self.width() - last_px, 0, last_px, _LINE_PX), inserted, label, theme.TEXT_DIM, RIGHT)
+        colour = theme.TEXT_DIM if self.isEnabled() else theme.TEXT_FAINT
         room = QRectF(0, _LINE_PX, self.width(), _LINE_PX)
-        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), self._speeds, self.width()))
-        painter.end()
-
-
-def _rounded(value: float | None, digits: int) -> float | None:
-    return None if value is None else round(value, digits)
-
-
-def _number(share: float | None) -> str:
-    return _UNKNOWN if share is None else f"{share:.2f}"
-
-
-def _paint_bar(painter: QPainter, track: QRectF, share: float | None) -> None:
-    """From the middle of `track` to the left or right; `share` is -1..1, or None."""
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.RAISED))
-    painter.drawRoundedRect(track, 3, 3)
-    if share is None:
-        return
-    center = track.center().x()
-    end = center + max(-1.0, min(1.0, share)) * track.width() / 2
-    painter.setBrush(QColor(theme.SKY))
-    painter.drawRect(QRectF(min(center, end), track.top(), max(2.0, abs(end - center)), track.height()))
+        draw_text(painter, room, self.speeds, label, colour, smallest_px=_SMALLEST_PX, elided=True)
 
 
 def speeds_in_words(speeds: JogSpeeds) -> str:
@@ -133,11 +103,8 @@ def speeds_in_words(speeds: JogSpeeds) -> str:
     )
 
 
-_FEEDS = (Motion.ADVANCE, Motion.RETRACT, Motion.DELIVER, Motion.WITHDRAW)
 _FED = mark("{motion}: hold to move, release to stop; {speed:.3g} mm/s")
 _PULLED = mark("{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s")
-_ALL = (True,) * 7
-_LEFT, _RIGHT, _UP, _DOWN = (QPointF(-1, 0), QPointF(1, 0), QPointF(0, -1), QPointF(0, 1))
 
 
 class JogPanel(QWidget):
@@ -156,34 +123,31 @@ class JogPanel(QWidget):
         self._caps: dict[Motion, _Cap] = {}
         self._rig: tuple[JogConfig, ServosConfig] | None = None
         self._status: RobotStatus | None = None
-        self._known: tuple[bool, ...] = _ALL
+        self._known: tuple[bool, ...] = (True,) * 7
         self._enabled = (True, "")
         grid = QGridLayout()
         grid.setSpacing(4)
         for motion, row, column, arrow, key, text in (
             (Motion.PITCH_DOWN, 0, 0, None, "Q", tr("dip")),
-            (Motion.ADVANCE, 0, 1, _UP, "W", tr("advance")),
+            (Motion.ADVANCE, 0, 1, QPointF(0, -1), "W", tr("advance")),
             (Motion.PITCH_UP, 0, 2, None, "E", tr("lift")),
-            (Motion.STEER_LEFT, 1, 0, _LEFT, "A", tr("left")),
-            (Motion.RETRACT, 1, 1, _DOWN, "S", tr("retract")),
-            (Motion.STEER_RIGHT, 1, 2, _RIGHT, "D", tr("right")),
+            (Motion.STEER_LEFT, 1, 0, QPointF(-1, 0), "A", tr("left")),
+            (Motion.RETRACT, 1, 1, QPointF(0, 1), "S", tr("retract")),
+            (Motion.STEER_RIGHT, 1, 2, QPointF(1, 0), "D", tr("right")),
             (Motion.DELIVER, 0, 3, None, "PgUp", tr("sheath +")),
             (Motion.WITHDRAW, 1, 3, None, "PgDn", tr("sheath \N{MINUS SIGN}")),
+            (Motion.STRAIGHTEN, 2, 0, None, "X", tr("straighten")),
         ):
-            cap = _Cap(arrow, key, text)
+            is_wide = motion is Motion.STRAIGHTEN
+            cap = _Cap(arrow, key, text, wide=is_wide)
             cap.setAccessibleName(tr(motion.value))
             cap.setToolTip(tr("{motion}: hold to move, release to stop", motion=tr(motion.value)))
             cap.pressed.connect(lambda which=motion: self.pressed.emit(which))
             cap.released.connect(lambda which=motion: self.released.emit(which))
-            grid.addWidget(cap, row, column)
+            grid.addWidget(cap, row, column, 1, 2 if is_wide else 1)
             self._caps[motion] = cap
-        straighten = _Cap(None, "X", tr("straighten"), wide=True)
-        straighten.setAccessibleName(tr(Motion.STRAIGHTEN.value))
-        straighten.setToolTip(tr("bring bend and pitch back to the middle: hold to move, release to stop"))
-        straighten.pressed.connect(lambda: self.pressed.emit(Motion.STRAIGHTEN))
-        straighten.released.connect(lambda: self.released.emit(Motion.STRAIGHTEN))
-        grid.addWidget(straighten, 2, 0, 1, 2)
-        self._caps[Motion.STRAIGHTEN] = straighten
+        wide = tr("bring bend and pitch back to the middle: hold to move, release to stop")
+        self._caps[Motion.STRAIGHTEN].setToolTip(wide)
         self._speed = self._speed_choice()
         grid.addWidget(self._speed, 2, 2, 1, 2)
         self._readout = JogReadout()
@@ -206,16 +170,21 @@ class JogPanel(QWidget):
     def set_speeds(self, hand: JogConfig, servos: ServosConfig) -> None:
         """Whose speeds the keys have: a share of `hand`'s full speeds, as far as the joints may go that fast."""
         self._rig = hand, servos
-        self._tell_speeds()
+        self._show_speeds()
 
-    def _tell_speeds(self) -> None:
+    def _show_speeds(self) -> None:
         if self._rig is None:
             return
         speeds = hand_speeds(*self._rig, self._speed.currentData())
         self._readout.show_speeds(speeds_in_words(speeds))
-        for motion, speed_mm_s in _speed_of(speeds).items():
-            text = _FED if motion in _FEEDS else _PULLED
-            self._caps[motion].setToolTip(tr(text, motion=tr(motion.value), speed=speed_mm_s))
+        for text, speed_mm_s, motions in (
+            (_FED, speeds.advance_mm_s, (Motion.ADVANCE, Motion.RETRACT)),
+            (_FED, speeds.delivery_mm_s, (Motion.DELIVER, Motion.WITHDRAW)),
+            (_PULLED, speeds.bend_mm_s, (Motion.STEER_LEFT, Motion.STEER_RIGHT)),
+            (_PULLED, speeds.pitch_mm_s, (Motion.PITCH_UP, Motion.PITCH_DOWN)),
+        ):
+            for motion in motions:
+                self._caps[motion].setToolTip(tr(text, motion=tr(motion.value), speed=speed_mm_s))
 
     def show_held(self, held: frozenset[Motion]) -> None:
         """Light the caps of what is held."""
@@ -223,7 +192,7 @@ class JogPanel(QWidget):
             cap.light(motion in held)
 
     def show_status(self, status: RobotStatus | None) -> None:
-        """How the head is bent, as the tendons are pulled, and how far in the robot is; None: nobody knows."""
+        """How the head is bent, as the tendons are pulled, and how far in the robot is; None: not known."""
         self._status = status
         if status is None:
             self._readout.show_values(None, None, None)
@@ -252,7 +221,7 @@ class JogPanel(QWidget):
         return choice
 
     def _on_speed(self, place: int) -> None:
-        self._tell_speeds()
+        self._show_speeds()
         self.speed_changed.emit(self._speed.itemData(place))
 
     def set_enabled(self, enabled: bool, why: str = "") -> None:
@@ -274,76 +243,39 @@ class _Cap(MouseHeld):
     released = Signal()
 
     def __init__(self, arrow: QPointF | None, key: str, text: str, *, wide: bool = False) -> None:
-        super().__init__()
+        super().__init__(hint=(62, 22 if wide else 30), least=(46, 22 if wide else 30))
         self._arrow = arrow
         self._key = key
         self._text = text
         self._wide = wide
-        self._lit = False
-        self.setMinimumSize(46, self.sizeHint().height())
+        self.is_lit = False
         self.setMaximumHeight(28 if wide else 44)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-
-    def sizeHint(self) -> QSize:
-        return QSize(62, 22 if self._wide else 30)
-
-    @property
-    def is_lit(self) -> bool:
-        return self._lit
 
     def light(self, on: bool) -> None:
-        if on != self._lit:
-            self._lit = on
+        if on != self.is_lit:
+            self.is_lit = on
             self.update()
 
     def on_held(self, held: bool) -> None:
         (self.pressed if held else self.released).emit()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
         back, text, label = theme.RAISED, theme.TEXT, theme.TEXT_DIM
-        if self._lit:
+        if self.is_lit:
             back, text, label = theme.SKY, theme.INK, theme.INK
         elif not self.isEnabled():
             back, text, label = theme.PANEL, theme.TEXT_FAINT, theme.TEXT_FAINT
-        painter.setPen(QPen(QColor(theme.SKY if self._lit else theme.LINE), 1))
-        painter.setBrush(QColor(back))
-        painter.drawRoundedRect(frame, 5, 5)
-        painter.setPen(QColor(text))
+        draw_box(painter, frame, 5, back, theme.SKY if self.is_lit else theme.LINE)
         if self._wide:
-            painter.setFont(theme.semi_bold(12))
-            painter.drawText(frame, Qt.AlignmentFlag.AlignCenter, f"{self._key}:  {self._text}")
+            draw_text(painter, frame, f"{self._key}:  {self._text}", theme.semi_bold(12), text, CENTER)
             return
         top = QRectF(frame.left(), frame.center().y() - 15, frame.width(), 16)
-        painter.setFont(theme.semi_bold(13))
-        painter.drawText(top.translated(8 if self._arrow is not None else 0, 0), Qt.AlignmentFlag.AlignCenter, self._key)
-        if self._arrow is not None:
-            self._paint_arrow(painter, QPointF(top.center().x() - 9, top.center().y()), self._arrow, text)
-        painter.setPen(QColor(label))
-        painter.setFont(theme.font(11))
-        painter.drawText(QRectF(frame.left(), frame.center().y() + 1, frame.width(), 14), Qt.AlignmentFlag.AlignCenter, self._text)
-        painter.end()
-
-    @staticmethod
-    def _paint_arrow(painter: QPainter, middle: QPointF, direction: QPointF, name: str) -> None:
-        across = QPointF(-direction.y(), direction.x())
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(name))
-        back = middle - direction * 4
-        painter.drawPolygon(QPolygonF([middle + direction * 5, back + across * 5, back - across * 5]))
-
-
-def _speed_of(speeds: JogSpeeds) -> dict[Motion, float]:
-    """What each key makes, mm/s."""
-    return {
-        Motion.ADVANCE: speeds.advance_mm_s,
-        Motion.RETRACT: speeds.advance_mm_s,
-        Motion.DELIVER: speeds.delivery_mm_s,
-        Motion.WITHDRAW: speeds.delivery_mm_s,
-        Motion.STEER_LEFT: speeds.bend_mm_s,
-        Motion.STEER_RIGHT: speeds.bend_mm_s,
-        Motion.PITCH_UP: speeds.pitch_mm_s,
-        Motion.PITCH_DOWN: speeds.pitch_mm_s,
-    }
+        draw_text(painter, top.translated(8 if self._arrow else 0, 0), self._key, theme.semi_bold(13), text, CENTER)
+        if self._arrow:
+            tip_at = QPointF(top.center().x() - 9, top.center().y()) + self._arrow * 5
+            across, back_at = QPointF(-self._arrow.y(), self._arrow.x()) * 5, tip_at - self._arrow * 9
+            set_colours(painter, text)
+            painter.drawPolygon([tip_at, back_at + across, back_at - across])
+        below = QRectF(frame.left(), frame.center().y() + 1, frame.width(), 14)
+        draw_text(painter, below, self._text, theme.font(11), label, CENTER)

@@ -1,20 +1,16 @@
-"""The live picture with its overlays; a click sets the target.
-
-A magnifying glass over the robot's head, in a corner of the live view: 40-px vectors are too small for two metres.
-
-Marks over a picture that Qt paints alone.
-"""
+"""The live picture with its overlays and a loupe over the robot's head; a click sets the target."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPaintEvent, QPen, QPicture, QResizeEvent, QTransform
+from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPicture, QResizeEvent, QTransform
 from PySide6.QtWidgets import QLabel, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui import theme
@@ -22,7 +18,8 @@ from app.ui.i18n import tr
 from app.ui.texts import target_note
 from app.ui.theme import ON_PICTURE
 from app.ui.workers import Pace
-from app.widgets.scene_overlay import Layer, LoupeCorner, Marks, Overlay, scene_shapes
+from app.widgets.painting import PaintedWidget, set_colours
+from app.widgets.scene_overlay import Layer, Marks, scene_shapes
 from app.widgets.scene_painter import on_screen
 from core.config.models import PursuitConfig
 from core.control.clearance import predict
@@ -32,8 +29,8 @@ from core.types import Advice, Frame, Image, Point, Points, Scene
 class MarksLabel(QLabel):
     """Records marks as drawing commands, and lets Qt paint them.
 
-    Painting takes milliseconds, recording a fraction of that; while Python paints, the interpreter is locked for the threads of
-    perception and control, while Qt paints, it is free.
+    Painting takes milliseconds, recording a fraction of that. While Python paints, the interpreter is locked for the threads of
+    perception and control; while Qt paints, it is free.
     """
 
     def __init__(self, parent: QWidget) -> None:
@@ -53,25 +50,82 @@ class MarksLabel(QLabel):
         self.setPicture(commands)
 
 
-_SPAN_PX = 110.0
+_NEAR_PX, _CLEAR_PX = 20, 60  # distances of the head at which the loupe leaves a corner, and from which a corner is free
+_SETTLE_S = 1.0
+_MUCH, _SHARE = 30.0, 0.5  # how much less a corner must hide to be much better: weight, and share of what is hidden now
+_COVERED = 150.0  # weight of something that lies over the loupe
+
+
+class LoupeCorner:
+    """Chooses the corner in which the loupe hides least.
+
+    It leaves a corner at once when the head comes near, and for a much better one only after a second: it must not jump about.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._corner: int | None = None
+        self._better_since_s: float | None = None
+
+    def choose(
+        self, corners: Sequence[QRectF], head: QPointF, places: Points, weights: NDArray[np.float64], covers: Sequence[QRectF] = ()
+    ) -> int:
+        """Which of `corners`.
+
+        Parameters
+        ----------
+        corners : where the loupe would lie, on the view.
+        head : where the robot's head is.
+        places, weights : (N, 2) what there is to see, also beyond the view, and (N,) how much each matters.
+        covers : what lies over the loupe.
+        """
+        hidden = [
+            float(weights[_within(corner, places)].sum()) + _COVERED * any(corner.intersects(cover) for cover in covers)
+            for corner in corners
+        ]
+        free = [k for k, corner in enumerate(corners) if not _grown(corner, _CLEAR_PX).contains(head)]
+        best = min(free or range(len(corners)), key=lambda k: hidden[k])
+        now = self._corner
+        if now is None or now >= len(corners) or (free and _grown(corners[now], _NEAR_PX).contains(head)):
+            self._corner, self._better_since_s = best, None
+            return best
+        if hidden[now] - hidden[best] <= max(_MUCH, _SHARE * hidden[now]):
+            self._better_since_s = None
+            return now
+        self._better_since_s = self._clock() if self._better_since_s is None else self._better_since_s
+        if self._clock() - self._better_since_s < _SETTLE_S:
+            return now
+        self._corner, self._better_since_s = best, None
+        return best
+
+
+def _within(rect: QRectF, places: Points) -> NDArray[np.bool_]:
+    x, y = places[:, 0], places[:, 1]
+    return np.asarray((x > rect.left()) & (x < rect.right()) & (y > rect.top()) & (y < rect.bottom()))
+
+
+def _grown(rect: QRectF, by_px: float) -> QRectF:
+    return rect.adjusted(-by_px, -by_px, by_px, by_px)
+
+
+_SPAN_PX = 110.0  # what the loupe shows, working pixels
 _SHARE_OF_VIEW = 0.36
 _ASPECT = 0.75
 _LOUPE_LABEL_PX = (11, 16)
 _WIDTH_PER_LABEL_PX = 13  # two labels have room beside each other
-_CORNERS = ((1, 0), (0, 0), (1, 1), (0, 1))
+_CORNERS = ((1, 0), (0, 0), (1, 1), (0, 1))  # right, bottom
 
 
-class HeadLoupe(QWidget):
-    """Shows about 110 working pixels around the head with the same marks as the live view.
+class HeadLoupe(PaintedWidget):
+    """Shows about 110 working pixels around the head with the same marks as the live view, in a corner of it.
 
-    ``clicked`` carries the place that was clicked in it, in source pixels: what it hides of the picture is not meant. It stays in
-    a corner in which it hides little, and leaves it when the head comes near.
+    ``clicked`` carries the place that was clicked in it, in source pixels.
     """
 
     clicked = Signal(float, float)
 
     def __init__(self, parent: QWidget, marks: Marks) -> None:
-        super().__init__(parent)
+        super().__init__(tr("Magnified head"), parent=parent)
         self._parent = parent
         self._marks = marks
         self._image: QImage | None = None
@@ -79,8 +133,6 @@ class HeadLoupe(QWidget):
         self._to_widget = QTransform()
         self._corner = LoupeCorner()
         self._drawn = MarksLabel(self)
-        self._drawn.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.setAccessibleName(tr("Magnified head"))
         self.hide()
 
     def show_head(
@@ -120,17 +172,14 @@ class HeadLoupe(QWidget):
     def _place(self, head: QPointF, to_view: QTransform, covers: Sequence[QRectF]) -> None:
         room = self._parent.rect()
         width = int(_SHARE_OF_VIEW * min(room.width(), room.height() / _ASPECT))
-        corners = [self._rect(k, (width, int(width * _ASPECT))) for k in range(len(_CORNERS))]
+        height = int(width * _ASPECT)
+        corners = [
+            QRectF(room.width() - width - 10 if right else 10, room.height() - height - 10 if bottom else 10, width, height)
+            for right, bottom in _CORNERS
+        ]
         places, weights = self._marks.places()
         corner = self._corner.choose(corners, head, on_screen(places, to_view), weights, covers)
         self.setGeometry(corners[corner].toRect())
-
-    def _rect(self, corner: int, size: tuple[int, int]) -> QRectF:
-        right, bottom = _CORNERS[corner]
-        room = self._parent.rect()
-        return QRectF(
-            room.width() - size[0] - 10 if right else 10, room.height() - size[1] - 10 if bottom else 10, size[0], size[1]
-        )
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() is not Qt.MouseButton.LeftButton:
@@ -140,14 +189,12 @@ class HeadLoupe(QWidget):
         self.clicked.emit(place.x() - 0.5, place.y() - 0.5)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        """One place is meant, and the first half has told it."""
+        """The second half of a double click is no second place."""
         event.accept()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         if self._image is None:
             return
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         glass = self._glass(1.0)
         painter.fillPath(glass, QColor(ON_PICTURE.INK))
@@ -156,10 +203,8 @@ class HeadLoupe(QWidget):
         painter.setWorldTransform(self._to_widget)
         painter.drawImage(self._image.offset(), self._image)
         painter.restore()
-        painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
+        set_colours(painter, None, ON_PICTURE.TEXT, 2)
         painter.drawPath(glass)
-        painter.end()
 
     def _glass(self, inset: float) -> QPainterPath:
         glass = QPainterPath()
@@ -175,16 +220,16 @@ def _middle(scene: Scene) -> Point | None:
     return scene.to_source(scene.path.head) if scene.path is not None else None
 
 
-_VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8
+_VESSEL, _ROBOT, _VESSEL_SKELETON, _ROBOT_SKELETON = 1, 2, 4, 8  # bits of the label image
 _ZOOM_MAX = 12.0
-_GHOST_S = 2.0
+_GHOST_S = 2.0  # how far the predicted path goes
 _LABEL_PX = 13
 _LOUPE_EVERY_S = 0.09
 _PIXELS_PER_MM = PursuitConfig().pixels_per_mm
 
 
 class LiveView(QWidget):
-    """Shows a frame and what was understood of it. Plot items are made once and updated in place.
+    """Shows a frame and its scene. Plot items are made once and updated in place.
 
     ``clicked`` carries a place in source pixels; ``cleared`` comes on a right click. `pixels_per_mm` (working px) gives the ghost
     of the advised move its length.
@@ -203,7 +248,6 @@ class LiveView(QWidget):
         self._size: tuple[int, int] | None = None
         self._scene: Scene | None = None
         self._target: Point | None = None
-        self._masks_on = self._vessel_on = self._robot_on = self._loupe_on = True
         self._image: Image | None = None
         self._ghost: Points | None = None
         self._view = pg.GraphicsView()
@@ -216,7 +260,7 @@ class LiveView(QWidget):
         for item in (self._picture, self._labels):
             item.setVisible(False)
             self._box.addItem(item, ignoreBounds=True)
-        self._box.left_clicked.connect(self._on_left_click)
+        self._box.left_clicked.connect(lambda point: self._on_place(point.x() - 0.5, point.y() - 0.5))
         self._box.right_clicked.connect(self.cleared)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -230,7 +274,7 @@ class LiveView(QWidget):
         self._covers: tuple[QWidget, ...] = ()
 
     def set_covers(self, *widgets: QWidget) -> None:
-        """What lies over the picture at times: the loupe goes out of its way."""
+        """Widgets that lie over the picture at times; the loupe keeps clear of them."""
         self._covers = widgets
 
     @property
@@ -239,7 +283,7 @@ class LiveView(QWidget):
 
     @property
     def ghost(self) -> Points | None:
-        """Where the shown advice leads, in working px; None: nothing is advised."""
+        """The head's predicted path if the shown advice is followed, working px; None without advice."""
         return self._ghost
 
     def set_scale(self, pixels_per_mm: float) -> None:
@@ -252,7 +296,7 @@ class LiveView(QWidget):
         self._scene = scene
         self._ghost = predict(scene, advice, _GHOST_S, self._pixels_per_mm) if advice is not None else None
         self._image = frame.image
-        if is_first:  # nothing of an older picture is on the screen: what is drawn over it may come a moment later
+        if is_first:  # no older picture is on the screen, so what is drawn over it may come a moment later
             QTimer.singleShot(0, self, self._draw_over)
         else:
             self._draw_over()
@@ -268,13 +312,13 @@ class LiveView(QWidget):
         QTimer.singleShot(0, self, self._show_loupe)  # a picture that stands still has no next frame to put it right
 
     def drop_ghost(self) -> None:
-        """Where the last advice led is not advised any more."""
+        """Remove the predicted path: the advice has ended."""
         if self._ghost is not None:
             self._ghost = None
             self._draw_over()
 
     def blank_overlays(self) -> None:
-        """Take everything away that was understood: it is not true any more. The last picture and the target stay."""
+        """Remove everything that was perceived. The last picture and the target stay."""
         if self._scene is not None:
             self._scene = None
             self._show_labels()
@@ -282,7 +326,7 @@ class LiveView(QWidget):
             self._show_loupe()
 
     def clear(self) -> None:
-        """Show nothing at all: what comes next is another world."""
+        """Show nothing at all: what comes next is another rig."""
         self.blank_overlays()
         self._size = None
         self._image = None
@@ -295,14 +339,6 @@ class LiveView(QWidget):
         self._show_loupe()
 
     def set_layer(self, layer: Layer, visible: bool) -> None:
-        if layer is Layer.MASKS:
-            self._masks_on = visible
-        elif layer is Layer.VESSEL:
-            self._vessel_on = visible
-        elif layer is Layer.ROBOT:
-            self._robot_on = visible
-        elif layer is Layer.LOUPE:
-            self._loupe_on = visible
         self._marks.set_layer(layer, visible)
         self._draw_marks()
         self._show_labels()
@@ -323,19 +359,19 @@ class LiveView(QWidget):
             self.fit()
 
     def _show_labels(self) -> None:
-        """Masks, and skeletons as long as there is no graph or path to draw as lines, as one picture of label bits."""
+        """Masks, and skeletons where there is no graph or path to draw as lines, as one image of label bits."""
         scene = self._scene
         if scene is None or scene.masks is None:
             self._labels.setVisible(False)
             return
         labels = np.zeros(scene.masks.vessel.shape, np.uint8)
-        if self._masks_on:
+        if self._marks.is_on(Layer.MASKS):
             labels |= scene.masks.vessel.view(np.uint8) * np.uint8(_VESSEL)
             labels |= scene.masks.robot.view(np.uint8) * np.uint8(_ROBOT)
         if scene.skeletons is not None:
-            if self._vessel_on and scene.vessel_graph is None:
+            if self._marks.is_on(Layer.VESSEL) and scene.vessel_graph is None:
                 labels |= scene.skeletons.vessel.view(np.uint8) * np.uint8(_VESSEL_SKELETON)
-            if self._robot_on and scene.path is None:
+            if self._marks.is_on(Layer.ROBOT) and scene.path is None:
                 labels |= scene.skeletons.robot.view(np.uint8) * np.uint8(_ROBOT_SKELETON)
         self._labels.setImage(labels, autoLevels=False, levels=None)
         across, down = scene.scale_xy or (scene.scale, scene.scale)
@@ -346,16 +382,15 @@ class LiveView(QWidget):
         scene = self._scene
         shapes = scene_shapes(scene, self._ghost) if scene is not None else None
         note = target_note(scene) if scene is not None and self._target is not None else ""
-        self._marks.set_overlay(Overlay(shapes, scene.pose if scene is not None else None, self._target, note))
+        self._marks.set_scene(shapes, scene.pose if scene is not None else None, self._target, note)
         self._draw_marks()
 
     def _draw_marks(self) -> None:
         if self._size is None:
             return
         self._drawn.setGeometry(self._view.geometry())
-        self._drawn.record(
-            self._marks, self._to_view(), 0 if self._loupe_on else _LABEL_PX
-        )  # the loupe shows the same values larger
+        label_px = 0 if self._marks.is_on(Layer.LOUPE) else _LABEL_PX  # the loupe shows the same values larger
+        self._drawn.record(self._marks, self._to_view(), label_px)
 
     def _to_view(self) -> QTransform:
         """From source pixels to the view's."""
@@ -364,7 +399,7 @@ class LiveView(QWidget):
 
     def _show_loupe(self) -> None:
         scene, image = self._scene, self._image
-        if not self._loupe_on or scene is None or image is None or scene.path is None:
+        if not self._marks.is_on(Layer.LOUPE) or scene is None or image is None or scene.path is None:
             self._loupe.hide()
             return
         x, y = scene.to_source(scene.path.head)
@@ -372,11 +407,8 @@ class LiveView(QWidget):
         covers = [QRectF(cover.geometry()) for cover in self._covers if cover.isVisible()]
         self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)), self._to_view(), covers)
 
-    def _on_left_click(self, point: QPointF) -> None:
-        self._on_place(point.x() - 0.5, point.y() - 0.5)
-
     def _on_place(self, x: float, y: float) -> None:
-        """A place of the picture, source pixels, if it is one."""
+        """A click at a place of the picture, source pixels, if it is one."""
         if self._size is not None and -0.5 <= x < self._size[0] - 0.5 and -0.5 <= y < self._size[1] - 0.5:
             self.clicked.emit(x, y)
 
@@ -429,7 +461,7 @@ class _PictureBox(pg.ViewBox):  # type: ignore[misc]
     def mouseClickEvent(self, event: pg.GraphicsScene.mouseEvents.MouseClickEvent) -> None:
         event.accept()
         if event.double():
-            return  # its first half may have closed what lay over the picture, and never meant a place
+            return  # its first half may have closed a message over the picture
         if event.button() == Qt.MouseButton.LeftButton:
             self.left_clicked.emit(self.mapSceneToView(event.scenePos()))
         elif event.button() == Qt.MouseButton.RightButton:

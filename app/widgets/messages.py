@@ -1,12 +1,6 @@
-"""A message that goes away by itself, at the lower edge of the live picture.
+"""Messages that take no key from the window, so that STOP and driving by hand work while they are open.
 
-A message over the live picture: starting, no new picture, recording over, fault.
-
-Offers at the lower edge of the picture: something can be done now, and nothing waits for an answer.
-
-Unlike a dialog it takes no key from the window, so STOP and the hand on the robot work while it is open.
-
-A question in the place where it was raised: unlike a dialog it takes no key from the window, so STOP works while it is open.
+Over the picture: toast, notice, offers. In a panel: a question.
 """
 
 from __future__ import annotations
@@ -17,69 +11,59 @@ from dataclasses import dataclass
 from enum import Enum
 from math import ceil
 
-from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QColor, QFontMetricsF, QMouseEvent, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtCore import QRectF, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QColor, QFontMetricsF, QMouseEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
+from app.widgets.basics import OnResize, column
+from app.widgets.painting import CENTER, PaintedWidget, draw_box, draw_text, draw_track
 
 _SHOWN_MS = 6000
-_AFTER = re.compile(r"[/_-]")
+_BREAK_AFTER = re.compile(r"[/_-]")  # where a long name of a file may be broken
+_TOAST_STYLE = "background: @RAISED; color: @TEXT; border: 1px solid @{}; border-radius: 8px; padding: 8px 16px; font-size: 14px;"
 
 
 class Toast(QLabel):
-    """One line or two; the newest message replaces the one before."""
+    """One line or two at the lower edge of the parent, for six seconds; the newest message replaces the one before."""
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(parent, wordWrap=True, alignment=CENTER, textInteractionFlags=Qt.TextInteractionFlag.NoTextInteraction)
         self._parent = parent
-        self.setWordWrap(True)
-        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self._lift_px = 0
         self._message = ""
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
+        self._timer = QTimer(self, singleShot=True, interval=_SHOWN_MS)
         self._timer.timeout.connect(self.hide)
-        parent.installEventFilter(self)
+        OnResize(parent, self, self._place)
         self.hide()
 
     def show_message(self, text: str, *, is_fault: bool = False) -> None:
-        text = tr_text(text)
-        edge = "@FAULT" if is_fault else "@LINE"
-        theme.set_sheet(
-            self,
-            f"background: @RAISED; color: @TEXT; border: 1px solid {edge}; border-radius: 8px; padding: 8px 16px; font-size: 14px;",
-        )
-        self._message = text
-        self.setText(_AFTER.sub("\\g<0>\N{ZERO WIDTH SPACE}", text))  # where a long name of a file may be broken
-        self.setAccessibleName(text)
+        self._message = tr_text(text)
+        theme.set_sheet(self, _TOAST_STYLE.format("FAULT" if is_fault else "LINE"))
+        self.setText(_BREAK_AFTER.sub("\\g<0>\N{ZERO WIDTH SPACE}", self._message))
+        self.setAccessibleName(self._message)
         self._place()
         self.show()
         self.raise_()
-        self._timer.start(_SHOWN_MS)
+        self._timer.start()
 
     def text(self) -> str:
-        """The message as it was said."""
+        """The message, without the marks where it may be broken."""
         return self._message
 
     def lift(self, height_px: int) -> None:
         """Stay so far above the lower edge, where something else lies."""
         self._lift_px = height_px
-        if self.isVisible():
-            self._place()
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize and self.isVisible():
-            self._place()
-        return False
+        self._place()
 
     def _place(self) -> None:
+        if not self._message:
+            return
         room = self._parent.rect()
         widest = max(200, room.width() - 40)
-        self.setFixedWidth(min(widest, self.fontMetrics().horizontalAdvance(self.text()) + 60))
+        self.setFixedWidth(min(widest, self.fontMetrics().horizontalAdvance(self._message) + 60))
         self.setFixedHeight(self.heightForWidth(self.width()))
         self.move((room.width() - self.width()) // 2, room.height() - self.height() - 16 - self._lift_px)
 
@@ -93,44 +77,39 @@ class NoticeKind(Enum):
 
 
 _WIDEST_PX, _EDGE_PX, _TITLE_PX, _DETAIL_PX, _FOOT_PX, _BUTTON_PX = 560, 20, 54, 62, 16, 46
-_SIZES_PX = (14, 13, 12, 11)
+_SIZES_PX = (14, 13, 12, 11)  # of the detail's font
 _WRAPPED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 
 
-class Notice(QWidget):
-    """A card in the middle of its parent. PROGRESS has a moving bar; a fault or an ended recording has a button to start again.
+class Notice(PaintedWidget):
+    """A card in the middle of its parent: starting, no new picture, recording over, fault. It is as high as its text needs.
 
-    It is as high as its text needs: what to do stands at the end of it.
+    PROGRESS has a moving bar; a fault or an ended recording has a button to start again (``restart``).
     """
 
     restart = Signal()
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(hint=(520, 170), parent=parent)
         self._parent = parent
         self._kind = NoticeKind.PROGRESS
-        self._title = ""
-        self._detail = ""
+        self._title = self._detail = ""
         self._phase = 0.0
-        self._timer = QTimer(self)
-        self._timer.setInterval(50)
+        self._timer = QTimer(self, interval=50)
         self._timer.timeout.connect(self._move_bar)
         self._button = QPushButton(tr("Start again  (F5)"))
         self._button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click must not take the keys from the robot
         self._button.clicked.connect(self.restart)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(24, 24, 24, 20)
-        column.addStretch(1)
-        column.addWidget(self._button, 0, Qt.AlignmentFlag.AlignHCenter)
-        parent.installEventFilter(self)
+        rows = QVBoxLayout(self)
+        rows.setContentsMargins(24, 24, 24, 20)
+        rows.addStretch(1)
+        rows.addWidget(self._button, 0, Qt.AlignmentFlag.AlignHCenter)
+        OnResize(parent, self, self._place)
         self.hide()
 
     @property
     def text(self) -> str:
         return f"{self._title}. {self._detail}" if self._detail else self._title
-
-    def sizeHint(self) -> QSize:
-        return QSize(520, 170)
 
     def show_notice(self, kind: NoticeKind, title: str, detail: str = "", *, restartable: bool = False) -> None:
         self._kind, self._title, self._detail = kind, tr_text(title), tr_text(detail)
@@ -150,11 +129,6 @@ class Notice(QWidget):
         self._timer.stop()
         self.hide()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize:
-            self._place()
-        return False
-
     def _place(self) -> None:
         room = self._parent.rect()
         width = min(_WIDEST_PX, room.width() - 2 * _EDGE_PX)
@@ -165,7 +139,7 @@ class Notice(QWidget):
 
     @property
     def _around(self) -> int:
-        """What is not the detail's, of the height."""
+        """The height without the detail."""
         return _TITLE_PX + _FOOT_PX + (_BUTTON_PX if self._button.isVisibleTo(self) else 0)
 
     def _detail_height(self, size_px: int) -> int:
@@ -177,35 +151,22 @@ class Notice(QWidget):
         self._phase = (self._phase + 0.02) % 1.0
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        painter.setPen(QPen(QColor(theme.of(self._kind.value)), 2))
-        painter.setBrush(theme.colour(theme.PANEL, 0.96))
-        painter.drawRoundedRect(frame, 10, 10)
-        painter.setPen(QColor(theme.TEXT))
-        painter.setFont(theme.fitted(theme.bold(22), self._title, int(frame.width() - 40)))
-        painter.drawText(QRectF(20, 16, frame.width() - 40, 32), Qt.AlignmentFlag.AlignCenter, self._title)
-        painter.setPen(QColor(theme.TEXT_DIM))
+    def paint(self, painter: QPainter) -> None:
+        frame, colour = QRectF(self.rect()).adjusted(1, 1, -1, -1), theme.of(self._kind.value)
+        draw_box(painter, frame, 10, theme.colour(theme.PANEL, 0.96), colour, 2)
+        title = QRectF(20, 16, frame.width() - 40, 32)
+        draw_text(painter, title, self._title, theme.bold(22), theme.TEXT, CENTER, smallest_px=11)
         room = QRectF(_EDGE_PX, _TITLE_PX, frame.width() - 2 * _EDGE_PX, self.height() - self._around)
         size_px = next((size for size in _SIZES_PX if self._detail_height(size) <= room.height()), _SIZES_PX[-1])
+        painter.setPen(QColor(theme.TEXT_DIM))
         painter.setFont(theme.font(size_px))
         painter.drawText(room, _WRAPPED, self._detail)
         if self._kind is NoticeKind.PROGRESS:
-            self._paint_bar(painter, QRectF(60, frame.bottom() - 26, frame.width() - 120, 6))
-        painter.end()
-
-    def _paint_bar(self, painter: QPainter, track: QRectF) -> None:
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.RAISED))
-        painter.drawRoundedRect(track, 3, 3)
-        width = track.width() * 0.28
-        left = track.left() - width + (track.width() + width) * self._phase
-        bar = QRectF(max(left, track.left()), track.top(), 0, track.height())
-        bar.setRight(min(left + width, track.right()))
-        painter.setBrush(QColor(theme.of(self._kind.value)))
-        painter.drawRoundedRect(bar, 3, 3)
+            track = QRectF(60, frame.bottom() - 26, frame.width() - 120, 6)
+            draw_track(painter, track)
+            width = track.width() * 0.28
+            left = track.left() - width + (track.width() + width) * self._phase
+            draw_box(painter, QRectF(left, track.top(), width, track.height()).intersected(track), 3, colour)
 
 
 _OFFER_WIDEST_PX = 900
@@ -233,8 +194,8 @@ class Offer:
     Attributes
     ----------
     text, detail : what is the matter, and a second line.
-    answers : the first one is the one that is meant, unless work goes on; pressing any of them closes the offer first.
-    share : None: no work goes on; 0..1: how much is done; negative: work goes on, nobody knows how long.
+    answers : the first one is the main one, unless work goes on; pressing any of them closes the offer first.
+    share : None: no work goes on; 0..1: how much is done; negative: work goes on for an unknown time.
     is_fault : something went wrong.
     dismissed : when the cross is pressed; without one the offer only goes.
     """
@@ -259,23 +220,17 @@ class OfferStrip(QFrame):
         self._offers: dict[str, Offer] = {}
         self._shown: Offer | None = None
         self._buttons: list[QPushButton] = []
-        self._text, self._detail, self._more = QLabel(), QLabel(), QLabel()
-        self._text.setWordWrap(True)
-        self._detail.setWordWrap(True)
+        self._text, self._detail, self._more = QLabel(wordWrap=True), QLabel(wordWrap=True), QLabel()
         self._text.setStyleSheet(f"color: {_INK.TEXT}; font-size: 14px; font-weight: 600; border: none; background: none;")
         for label in (self._detail, self._more):
             label.setStyleSheet(f"color: {_INK.TEXT_DIM}; font-size: 12px; border: none; background: none;")
-        self._bar = QProgressBar()
-        self._bar.setTextVisible(False)
+        self._bar = QProgressBar(textVisible=False)
         self._bar.setFixedHeight(6)
         self._bar.setStyleSheet(
             f"QProgressBar {{ background: {_INK.WINDOW}; border: none; border-radius: 3px; }}"
             f"QProgressBar::chunk {{ background: {_INK.SKY}; border-radius: 3px; }}"
         )
-        words = QVBoxLayout()
-        words.setSpacing(2)
-        for widget in (self._text, self._detail, self._bar):
-            words.addWidget(widget)
+        words = column((self._text, 0), (self._detail, 0), (self._bar, 0), spacing=2)
         self._row = QHBoxLayout()
         self._row.setSpacing(6)
         whole = QHBoxLayout(self)
@@ -286,15 +241,13 @@ class OfferStrip(QFrame):
         whole.addLayout(self._row)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setCursor(Qt.CursorShape.ArrowCursor)
-        parent.installEventFilter(self)
+        OnResize(parent, self, self._place)
         self.hide()
 
     @property
     def text(self) -> str:
         """What is shown, "" when nothing is."""
-        if self._shown is None:
-            return ""
-        return f"{self._shown.text} {self._shown.detail}".strip()
+        return f"{self._shown.text} {self._shown.detail}".strip() if self._shown is not None else ""
 
     @property
     def answers(self) -> dict[str, QPushButton]:
@@ -314,13 +267,12 @@ class OfferStrip(QFrame):
     def has(self, key: str) -> bool:
         return key in self._offers
 
-    # ---- what is shown
-
     def _show(self) -> None:
         before, self._shown = self._shown, next(iter(self._offers.values()), None)
         offer = self._shown
         if offer is None:
-            had_focus = self.isAncestorOf(self.window().focusWidget()) if self.window().focusWidget() is not None else False
+            focus = self.window().focusWidget()
+            had_focus = focus is not None and self.isAncestorOf(focus)
             self.hide()
             if had_focus:
                 self._parent.setFocus()
@@ -353,8 +305,8 @@ class OfferStrip(QFrame):
             button.hide()
             button.deleteLater()
         self._buttons = []
-        for place, answer in enumerate(offer.answers):
-            self._add_button(answer.name, answer.meaning or answer.name, place == 0 and offer.share is None)
+        for k, answer in enumerate(offer.answers):
+            self._add_button(answer.name, answer.meaning or answer.name, k == 0 and offer.share is None)
         cross = self._add_button("\N{MULTIPLICATION SIGN}", tr("Close this"), False)
         cross.setAccessibleName(tr("Close this offer"))
         cross.setFixedWidth(30)
@@ -380,14 +332,9 @@ class OfferStrip(QFrame):
         if action is not None:
             action()
 
-    # ---- its place
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize and self.isVisible():
-            self._place()
-        return False
-
     def _place(self) -> None:
+        if self._shown is None:
+            return
         room = self._parent.rect()
         width = min(_OFFER_WIDEST_PX, room.width() - 2 * _MARGIN_PX)
         layout = self.layout()
@@ -399,7 +346,7 @@ class OfferStrip(QFrame):
 
 
 class _AnswerButton(QPushButton):
-    """The second half of a double click is no answer: by then the button may be another offer's, which nobody has read."""
+    """The second half of a double click is no answer: by then the button may be another offer's, which was not read."""
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         event.accept()
@@ -410,7 +357,7 @@ BUTTON_STYLE = "padding: 0 9px; min-height: 20px; font-size: 12px;"
 
 
 class QuestionStrip(QWidget):
-    """One line with the question, the answer that does it, and Cancel. Left alone for 20 s it takes itself back.
+    """One line with a question, the answer that does it, and Cancel, in the place where it was raised. It closes itself after 20 s.
 
     ``closed`` comes after either answer. What is asked for is done by the callback given to ``ask``.
     """
@@ -429,16 +376,13 @@ class QuestionStrip(QWidget):
             button.setStyleSheet(BUTTON_STYLE)
         self._yes.clicked.connect(self._on_yes)
         self._no.clicked.connect(self.cancel)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(_OPEN_MS)
+        self._timer = QTimer(self, singleShot=True, interval=_OPEN_MS)
         self._timer.timeout.connect(self.cancel)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
-        row.addWidget(self._question, 1)
-        row.addWidget(self._yes)
-        row.addWidget(self._no)
+        for widget, stretch in ((self._question, 1), (self._yes, 0), (self._no, 0)):
+            row.addWidget(widget, stretch)
         self.setAccessibleName(tr("Question"))
 
     @property

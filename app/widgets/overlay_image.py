@@ -1,7 +1,4 @@
-"""A picture with everything that was understood drawn in, as a person would put it on a slide. OpenCV only, no window needed.
-
-Draws marks and texts on a picture with OpenCV.
-"""
+"""A picture with everything that was perceived drawn in and a caption below it: snapshots, ``perceive --overlay`` and clips."""
 
 from __future__ import annotations
 
@@ -10,174 +7,37 @@ from functools import cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtGui import QColor, QFont, QImage, QPainter, QTransform
+from PySide6.QtWidgets import QApplication
 
 from app.ui import theme
 from app.ui.i18n import english_texts
 from app.ui.texts import REASON_TEXT, STATE_TITLE, advice_headline, signed_degrees
 from app.ui.theme import ON_PICTURE
-from app.widgets.scene_overlay import LETTER_DROP, LETTER_HEIGHT, SceneShapes, scene_shapes, state_outline
-from core.config.models import RESOURCES
-from core.types import Advice, Image, Mask, Point, Points, Pose, PoseState, Scene, Vector
+from app.widgets.painting import CENTER, draw_box, draw_text, set_colours, text_width
+from app.widgets.scene_overlay import Marks, SceneShapes, scene_shapes
+from app.widgets.state_badge import paint_state
+from core.types import Advice, Image, Mask, Scene
 
-SHIFT = 4
-"""Bits of sub-pixel places that OpenCV draws at: 1/16 px."""
-
-
-def to_fixed(outline: Points) -> NDArray[np.int32]:
-    """A polyline (N, 2) as OpenCV takes it for sub-pixel drawing."""
-    return np.round(outline * (1 << SHIFT)).astype(np.int32).reshape(-1, 1, 2)
-
-
-class ImagePainter:
-    """Draws marks at source-pixel places on the enlarged picture; widths are pixels of a picture 1280 px wide."""
-
-    def __init__(self, canvas: Image, zoom: float, origin: Point, unit: float) -> None:
-        self._canvas = canvas
-        self._zoom = zoom
-        self._origin = np.array(origin)
-        self._unit = unit
-        self._labels: list[Points] = []
-
-    @property
-    def unit(self) -> float:
-        return self._unit
-
-    def _at(self, points: Points | list[Point]) -> Points:
-        return np.asarray((np.asarray(points, np.float64) + 0.5 - self._origin) * self._zoom - 0.5)
-
-    def _width(self, width: float) -> int:
-        return max(1, round(width * self._unit))
-
-    def _lines(self, lines: list[Points], name: str, width: float, *, closed: bool = False) -> None:
-        """Polylines given in canvas pixels, first a dark edge, then the colour."""
-        fixed = [to_fixed(line) for line in lines]
-        for colour, extra in ((theme.rgb(ON_PICTURE.INK), 2.0), (theme.rgb(name), 0.0)):
-            cv2.polylines(self._canvas, fixed, closed, colour, self._width(width + extra), cv2.LINE_AA, SHIFT)
-
-    def _fill(self, outline: Points, name: str) -> None:
-        fixed = to_fixed(outline)
-        cv2.fillPoly(self._canvas, [fixed], theme.rgb(name), cv2.LINE_AA, SHIFT)
-        cv2.polylines(self._canvas, [fixed], True, theme.rgb(ON_PICTURE.INK), self._width(1.0), cv2.LINE_AA, SHIFT)
-
-    def polylines(self, lines: tuple[Points, ...], name: str, width: float) -> None:
-        drawn = [self._at(line) for line in lines if len(line) > 1]
-        if drawn:
-            self._lines(drawn, name, width)
-
-    def dashes(self, first: Point, second: Point, name: str, width: float) -> None:
-        start, end = self._at([first, second])
-        count = max(1, int(np.linalg.norm(end - start) / (8.0 * self._unit)))
-        stops = np.linspace(start, end, 2 * count + 1)
-        self._lines([stops[k : k + 2] for k in range(0, 2 * count, 2)], name, width)
-
-    def arrow(self, vector: Vector, name: str, width: float) -> None:
-        start, end = self._at([vector.start, vector.end])
-        along = np.asarray(vector.direction) * self._unit
-        across = np.array([-along[1], along[0]])
-        self._lines([np.array([start, end])], name, width)
-        self._fill(np.array([end + along * 14, end - along * 6 + across * 10, end - along * 6 - across * 10]), name)
-
-    def ring(self, point: Point, name: str, radius: float) -> None:
-        turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-        (middle,) = self._at([point])
-        circle = np.column_stack([np.cos(turn), np.sin(turn)])
-        self._lines([middle + circle * radius * self._unit], name, 3.0, closed=True)
-        self._fill(middle + circle * 2.5 * self._unit, name)
-
-    def diamond(self, point: Point, name: str, radius: float) -> None:
-        (middle,) = self._at([point])
-        self._fill(middle + np.array([(0, -1), (1, 0), (0, 1), (-1, 0)]) * radius * self._unit, name)
-
-    def line(self, first: Point, second: Point, name: str, width: float) -> None:
-        self._lines([self._at([first, second])], name, width)
-
-    def angle(self, corner: Point, unit_arc: Points, name: str) -> None:
-        """The arc from the vessel's direction to the robot's, with the vessel's direction as a thin line through the corner."""
-        (middle,) = self._at([corner])
-        arc = middle + unit_arc * 70.0 * self._unit
-        self._lines([np.array([middle, middle + (arc[0] - middle) * 1.3])], ON_PICTURE.VESSEL_VECTOR, 1.5)
-        self._lines([arc], name, 2.5)
-
-    def label_beside(self, point: Point, line: Vector, side: float, text: str, name: str) -> None:
-        """A text beside `point`, on one side of `line` (+1: to the right of its direction)."""
-        across = np.array([-line.direction[1], line.direction[0]]) * side
-        width = text_width(text, "SemiBold", round(20 * self._unit)) + 20 * self._unit
-        reach = 22.0 * self._unit + abs(across[0]) * width / 2 + abs(across[1]) * 15.0 * self._unit
-        (middle,) = self._at([point])
-        middle = middle + across * reach
-        gap = np.array([width, 32.0 * self._unit])
-        if any((np.abs(middle - other) < gap).all() for other in self._labels):
-            middle = middle + across * 32.0 * self._unit
-        self._labels.append(middle)
-        self._label(middle, text, name)
-
-    def frame(self, origin: Points, size: Point) -> None:
-        """A thin rectangle from `origin`, source pixels."""
-        corners = origin + np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * np.array(size)
-        self._lines([self._at(corners)], ON_PICTURE.TEXT, 1.5, closed=True)
-
-    def paste(self, inset: Image, left: int, top: int) -> None:
-        """Put a picture into a corner, with a frame."""
-        height, width = inset.shape[:2]
-        edge = self._width(3.0)
-        cv2.rectangle(inset, (0, 0), (width - 1, height - 1), theme.rgb(ON_PICTURE.INK), edge + 2)
-        cv2.rectangle(inset, (1, 1), (width - 2, height - 2), theme.rgb(ON_PICTURE.TEXT), edge - 1)
-        self._canvas[top : top + height, left : left + width] = inset
-
-    def stamp(self, text: str) -> None:
-        self._label(np.array([44.0, self._canvas.shape[0] / self._unit - 30.0]) * self._unit, text, ON_PICTURE.SIM)
-
-    def _label(self, middle: Points, text: str, name: str) -> None:
-        """A text on a dark plate around `middle`, moved inside the picture."""
-        size = round(20 * self._unit)
-        width, height = text_width(text, "SemiBold", size) + size, round(1.5 * size)
-        x = float(np.clip(middle[0] - width / 2, 2, max(2, self._canvas.shape[1] - width - 2)))
-        y = float(np.clip(middle[1] - height / 2, 2, max(2, self._canvas.shape[0] - height - 2)))
-        left, top = round(x), round(y)
-        plate = self._canvas[top : top + height, left : left + width]
-        plate[:] = (plate * 0.25 + np.array(theme.rgb(ON_PICTURE.INK)) * 0.75).astype(np.uint8)
-        put_text(self._canvas, text, (left + size // 2, top + round(1.1 * size)), name, "SemiBold", size)
-
-
-@cache
-def _face(weight: str) -> cv2.FontFace:
-    """The program's font, or OpenCV's own when the file is missing."""
-    face = cv2.FontFace("sans")
-    path = RESOURCES / "fonts" / f"Inter-{weight}.otf"
-    if path.is_file():
-        face.set(str(path))
-    return face
-
-
-def put_text(canvas: Image, text: str, left_baseline: tuple[int, int], name: str, weight: str, size: int) -> None:
-    cv2.putText(canvas, text, left_baseline, theme.rgb(name), _face(weight), max(size, 6), 0)
-
-
-def text_width(text: str, weight: str, size: int) -> int:
-    _, _, width, _ = cv2.getTextSize((8192, 512), text, (0, 256), _face(weight), max(size, 6))
-    return int(width)
-
-
-def fitting_size(text: str, weight: str, size: int, width: int) -> int:
-    """The largest size up to `size` at which `text` fits."""
-    while size > 8 and text_width(text, weight, size) > width:
-        size -= 1
-    return size
-
-
-_INSET_SPAN_PX = 112.0
+_WIDTH = 1280  # of a picture on which marks have their usual size
+_MARK_SCALE = 1.5  # of that size over the live view's
+_LABEL_PX = 13
+_CAPTION_PX, _CAPTION_MIN_PX = 104, 36
+_INSET_SPAN_PX = 112.0  # what the inset shows, working pixels
 _INSET_MAX_COVERED = 0.35
 _BAND_ROWS = 256
 
 
-def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, longer_side_px: int = 1280, stamp: str = "") -> Image:
+def draw_overlay(
+    image: Image, scene: Scene, advice: Advice | None = None, *, longer_side_px: int = _WIDTH, stamp: str = ""
+) -> Image:
     """The picture with masks, skeletons, vectors, theta and distances, and a caption strip below it.
 
     Parameters
     ----------
     image : RGB uint8 (H, W, 3), the frame that `scene` was made of.
-    scene : what was understood; what is missing is not drawn.
+    scene : what was perceived; missing parts are not drawn.
     advice : adds speed and steering to the caption.
     longer_side_px : small pictures are enlarged to this, so that lines and texts are fine; larger ones keep their size.
     stamp : a word in the lower left corner, such as "SIM".
@@ -186,32 +46,63 @@ def draw_overlay(image: Image, scene: Scene, advice: Advice | None = None, *, lo
     -------
     RGB uint8; the picture, enlarged by the same factor in x and y, with the caption below.
     """
-    height, width = image.shape[:2]
-    zoom = max(1.0, longer_side_px / max(height, width))
+    _start_qt()
+    zoom = max(1.0, longer_side_px / max(image.shape[:2]))
     canvas = _tinted(image, scene, zoom)
-    unit = max(1.0, max(canvas.shape[:2]) / 1280)
-    shapes = scene_shapes(scene)
+    height, width = canvas.shape[:2]
+    unit = _MARK_SCALE * max(1.0, max(height, width) / _WIDTH)
+    drawn = QImage(width, height + max(_CAPTION_MIN_PX, round(_CAPTION_PX * width / _WIDTH)), QImage.Format.Format_RGB888)
+    pixels = np.ndarray((drawn.height(), width, 3), np.uint8, drawn.bits(), strides=(drawn.bytesPerLine(), 3, 1))
+    pixels[:height] = canvas
+    pixels[height:] = theme.rgb(ON_PICTURE.PANEL)
+
+    shapes, marks = scene_shapes(scene), Marks(digits=1)
+    marks.set_scene(shapes, scene.pose, scene.to_source(scene.route.target) if scene.route is not None else None)
     corner = _free_corner(canvas, scene, zoom)
-    brush = ImagePainter(canvas, zoom, (0.0, 0.0), unit)
-    _draw_shapes(brush, scene, shapes, labels=corner is None)
+    drawn.setDevicePixelRatio(unit)
+    painter = QPainter(drawn)
+    room = QRectF(0, 0, width / unit, height / unit)
+    painter.setClipRect(room)
+    to_canvas = QTransform.fromScale(zoom / unit, zoom / unit)
+    marks.draw(painter, to_canvas, room, _LABEL_PX if corner is None else 0, smooth=True)
     if corner is not None:
-        _draw_inset(brush, corner, image, scene, shapes)
+        _draw_inset(painter, pixels, corner, image, scene, shapes, marks, to_canvas, unit)
     if stamp:
-        brush.stamp(stamp)
-    with english_texts():  # its letters are, and a picture is kept
-        caption = _caption(scene, advice, canvas.shape[1])
-    return np.concatenate([canvas, caption])
+        font = theme.semi_bold(_LABEL_PX)
+        box = QRectF(12.0, room.height() - 30.0, text_width(font, stamp) + 14.0, 20.0)
+        draw_box(painter, box, 4.0, theme.colour(ON_PICTURE.INK, 0.75))
+        draw_text(painter, box, stamp, font, ON_PICTURE.SIM, CENTER)
+    painter.end()
+
+    drawn.setDevicePixelRatio(1.0)
+    painter = QPainter(drawn)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.translate(0, height)
+    painter.scale(width / _WIDTH, width / _WIDTH)
+    with english_texts():  # a picture is kept, and its letters are English
+        _draw_caption(painter, scene, advice)
+    painter.end()
+    return pixels.copy()
+
+
+@cache
+def _start_qt() -> QApplication | None:
+    """Texts need Qt's fonts: a command without a window starts them without a screen."""
+    if QApplication.instance() is not None:
+        return None
+    application = QApplication(["lumenpilot", "-platform", "offscreen"])
+    theme.apply_theme(application)
+    return application
 
 
 def _tinted(image: Image, scene: Scene, zoom: float) -> Image:
     """The picture, enlarged, with both masks in colour and their edges as thin lines."""
     size = (max(1, round(image.shape[1] * zoom)), max(1, round(image.shape[0] * zoom)))
     # Lanczos would ring beside the highlights
-    canvas = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_CUBIC), np.uint8) if zoom > 1.0 else image.copy()
-    if scene.masks is None:
-        return canvas
-    for mask, name, opacity in ((scene.masks.vessel, ON_PICTURE.VESSEL, 0.20), (scene.masks.robot, ON_PICTURE.ROBOT, 0.38)):
-        canvas = _tint(canvas, mask, name, opacity)
+    canvas = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_CUBIC), np.uint8) if zoom > 1.0 else image
+    if scene.masks is not None:
+        for mask, name, opacity in ((scene.masks.vessel, ON_PICTURE.VESSEL, 0.20), (scene.masks.robot, ON_PICTURE.ROBOT, 0.38)):
+            canvas = _tint(canvas, mask, name, opacity)
     return canvas
 
 
@@ -220,7 +111,7 @@ def _tint(canvas: Image, mask: Mask, name: str, opacity: float) -> Image:
     size = (canvas.shape[1], canvas.shape[0])
     blur = max(0.6, 0.7 * size[0] / mask.shape[1])
     wide = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
-    margin = math.ceil(4.0 * blur) + 1  # farther than this the blur does not see
+    margin = math.ceil(4.0 * blur) + 1  # the reach of the blur
     tinted = np.empty_like(canvas)
     for top in range(0, size[1], _BAND_ROWS):
         bottom, above = min(top + _BAND_ROWS, size[1]), min(top, margin)
@@ -256,107 +147,71 @@ def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, in
     return best
 
 
-def _draw_inset(brush: ImagePainter, corner: tuple[int, int, int, int], image: Image, scene: Scene, shapes: SceneShapes) -> None:
+def _draw_inset(
+    painter: QPainter,
+    pixels: Image,
+    corner: tuple[int, int, int, int],
+    image: Image,
+    scene: Scene,
+    shapes: SceneShapes,
+    marks: Marks,
+    to_canvas: QTransform,
+    unit: float,
+) -> None:
     """The surroundings of the head, magnified, with the labels; a frame shows where they are."""
-    left, top, width, height = corner
     if shapes.robot_vector is None or shapes.vessel_vector is None:
         return
+    left, top, width, height = corner
     span = _INSET_SPAN_PX / scene.scale
     zoom = width / span
     middle = (np.array(shapes.robot_vector.center) + np.array(shapes.vessel_vector.center)) / 2
-    origin = middle - np.array([span, height / zoom]) / 2
-    shift = (0.5 - origin) * zoom - 0.5
-    place = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
+    x, y = (middle - np.array([span, height / zoom]) / 2).tolist()
+    _draw_frame(painter, to_canvas.mapRect(QRectF(x, y, span, height / zoom)))
+    place = np.array([[zoom, 0.0, (0.5 - x) * zoom - 0.5], [0.0, zoom, (0.5 - y) * zoom - 0.5]])
     warped = cv2.warpAffine(image, place, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    inset = np.asarray(warped, np.uint8)
-    _draw_shapes(ImagePainter(inset, zoom, (float(origin[0]), float(origin[1])), brush.unit), scene, shapes, labels=True)
-    brush.frame(origin, (span, height / zoom))
-    brush.paste(inset, left, top)
+    pixels[top : top + height, left : left + width] = warped
+    box = QRectF(left / unit, top / unit, width / unit, height / unit)
+    to_inset = QTransform(zoom / unit, 0.0, 0.0, zoom / unit, box.left() - x * zoom / unit, box.top() - y * zoom / unit)
+    painter.save()
+    painter.setClipRect(box)
+    marks.draw(painter, to_inset, box, _LABEL_PX, tags=False, smooth=True)
+    painter.restore()
+    _draw_frame(painter, box.adjusted(1, 1, -1, -1))
 
 
-def _draw_shapes(brush: ImagePainter, scene: Scene, shapes: SceneShapes, *, labels: bool) -> None:
-    brush.polylines(shapes.vessel_lines, ON_PICTURE.VESSEL, 2.5)
-    if shapes.route is not None:
-        brush.polylines((shapes.route,), ON_PICTURE.ROUTE, 4.0)
-    if shapes.robot_line is not None:
-        brush.polylines((shapes.robot_line,), ON_PICTURE.ROBOT, 3.5)
-    for first, second in shapes.bridges:
-        brush.dashes(first, second, ON_PICTURE.TEXT, 2.5)
-    if shapes.vessel_vector is not None:
-        brush.arrow(shapes.vessel_vector, ON_PICTURE.VESSEL_VECTOR, 3.5)
-    if shapes.robot_vector is not None:
-        brush.arrow(shapes.robot_vector, ON_PICTURE.ROBOT_VECTOR, 3.5)
-    if shapes.nearest is not None:
-        brush.diamond(shapes.nearest, ON_PICTURE.NEAREST, 8.0)
-    if shapes.head is not None:
-        brush.ring(shapes.head, ON_PICTURE.HEAD, 11.0)
-    if scene.route is not None:
-        brush.ring(scene.to_source(scene.route.target), ON_PICTURE.TARGET, 14.0)
-    if scene.pose is not None:
-        _draw_measures(brush, scene.pose, shapes, labels)
+def _draw_frame(painter: QPainter, box: QRectF) -> None:
+    for colour, width in ((ON_PICTURE.INK, 3.0), (ON_PICTURE.TEXT, 1.5)):
+        set_colours(painter, None, colour, width)
+        painter.drawRect(box)
 
 
-def _draw_measures(brush: ImagePainter, pose: Pose, shapes: SceneShapes, labels: bool) -> None:
-    robot, vessel = shapes.robot_vector, shapes.vessel_vector
-    if robot is None or vessel is None or shapes.head_foot is None or shapes.tail_foot is None or shapes.angle_arc is None:
-        return
-    brush.line(shapes.head_foot, robot.end, ON_PICTURE.D_HEAD, 3.0)
-    brush.line(shapes.tail_foot, robot.start, ON_PICTURE.D_TAIL, 3.0)
-    if labels:
-        brush.angle(robot.start, shapes.angle_arc, ON_PICTURE.THETA)
-        head_side = 1.0 if pose.c_head_px > 0 else -1.0
-        # on the side of the vessel where the head is not: there is the least to cover
-        brush.label_beside(vessel.center, vessel, -head_side, f"θ {signed_degrees(pose.theta_signed_deg, 1)}", ON_PICTURE.THETA)
-        brush.label_beside(robot.end, vessel, head_side, f"d_head {pose.d_head_px:.1f} px", ON_PICTURE.D_HEAD)
-        tail_side = 1.0 if pose.c_tail_px > 0 else -1.0
-        brush.label_beside(robot.start, vessel, tail_side, f"d_tail {pose.d_tail_px:.1f} px", ON_PICTURE.D_TAIL)
-
-
-def _caption(scene: Scene, advice: Advice | None, width: int) -> Image:
-    """The strip below the picture: state with its letter and shape, the values, or the reason why there is no pose."""
-    unit = width / 1280
-    strip = np.full((max(36, round(104 * unit)), width, 3), theme.rgb(ON_PICTURE.PANEL), np.uint8)
-    side = round(76 * unit)
-    _draw_state(strip, (round(18 * unit) + side / 2, strip.shape[0] / 2), side, scene.pose.state if scene.pose else None)
-    left = round(124 * unit)
-    if scene.pose is not None:
-        pose = scene.pose
+def _draw_caption(painter: QPainter, scene: Scene, advice: Advice | None) -> None:
+    """State with its letter and shape, and the values, or the reason why there is no pose; in a strip of 1280 x 104."""
+    pose = scene.pose
+    paint_state(painter, QRectF(18, 14, 76, 76), pose.state if pose is not None else None, on_picture=True)
+    if pose is not None:
         title = STATE_TITLE[pose.state]
         parts = [
             (f"θ {signed_degrees(pose.theta_signed_deg, 1)}", ON_PICTURE.THETA),
             (f"d_head {pose.d_head_px:.1f} px", ON_PICTURE.D_HEAD),
-        ]
-        parts += [
             (f"d_tail {pose.d_tail_px:.1f} px", ON_PICTURE.D_TAIL),
             (f"confidence {pose.confidence:.2f}", ON_PICTURE.TEXT_DIM),
         ]
     else:
         title = REASON_TEXT[scene.refusal.reason].title if scene.refusal else "No pose"
         parts = [(f"no pose: {scene.refusal}" if scene.refusal else "no pose", ON_PICTURE.TEXT_DIM)]
-    put_text(strip, title, (left, round(46 * unit)), ON_PICTURE.TEXT, "Bold", round(34 * unit))
-    x = left
-    for text, name in parts:
-        size = fitting_size(text, "SemiBold", round(24 * unit), width - x)
-        put_text(strip, text, (x, round(84 * unit)), name, "SemiBold", size)
-        x += text_width(text, "SemiBold", size) + round(34 * unit)
+    _write(painter, 124, 46, title, theme.bold(34), ON_PICTURE.TEXT)
+    x = 124
+    for text, colour in parts:
+        font = theme.fitted(theme.semi_bold(24), text, _WIDTH - x, 8)
+        _write(painter, x, 84, text, font, colour)
+        x += text_width(font, text) + 34
     if advice is not None:
-        text = advice_headline(advice)
-        size = round(30 * unit)
-        x = width - text_width(text, "Bold", size) - round(26 * unit)
-        put_text(strip, text, (x, round(46 * unit)), ON_PICTURE.TEXT, "Bold", size)
-    return strip
+        headline, font = advice_headline(advice), theme.bold(30)
+        _write(painter, _WIDTH - text_width(font, headline) - 26, 46, headline, font, ON_PICTURE.TEXT)
 
 
-def _draw_state(strip: Image, middle: Point, side: float, state: PoseState | None) -> None:
-    outline = np.asarray(middle) + state_outline(state) * side / 2
-    fixed = to_fixed(outline)
-    colour = theme.rgb(theme.STATE_COLOUR[state])
-    if state is None:
-        cv2.polylines(strip, [fixed], True, colour, max(1, round(side / 24)), cv2.LINE_AA, SHIFT)
-    else:
-        cv2.fillPoly(strip, [fixed], colour, cv2.LINE_AA, SHIFT)
-    size = round(side * LETTER_HEIGHT[state])
-    letter, name = (state.value, ON_PICTURE.INK) if state is not None else ("\N{EN DASH}", ON_PICTURE.TEXT_DIM)
-    x = round(middle[0] - text_width(letter, "Bold", size) / 2)
-    y = round(middle[1] + 0.36 * size + side * LETTER_DROP.get(state, 0.0))
-    put_text(strip, letter, (x, y), name, "Bold", size)
+def _write(painter: QPainter, x: float, baseline: float, text: str, font: QFont, colour: str) -> None:
+    painter.setFont(font)
+    painter.setPen(QColor(colour))
+    painter.drawText(QPointF(x, baseline), text)

@@ -9,7 +9,8 @@ from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel,
 from app.operator.preflight import Preflight, PreflightFinding, PreflightModel
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.widgets.basics import Sign, paint_sign, takes_enter
+from app.widgets.basics import takes_enter
+from app.widgets.painting import Sign, paint_sign
 from hardware.preflight.preflight import Level
 
 _SIZE = QSize(780, 560)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QMouseEvent, QPainter
+from PySide6.QtWidgets import QSizePolicy
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
+from app.widgets.painting import PaintedWidget, draw_box, draw_text, set_colours
 from core.session.writer import RecordStatus
 
-_SIZE = QSize(196, 34)
 
-
-class RecordBar(QWidget):
+class RecordBar(PaintedWidget):
     """A button that begins and ends a recording; while it records it is filled and counts. ``clicked`` asks for the other state."""
 
     clicked = Signal()
@@ -21,8 +20,8 @@ class RecordBar(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._status = RecordStatus()
-        self._lines = (tr("Record"), "F9")
-        self.setFixedSize(_SIZE)
+        self._lines = _lines_of(self._status)
+        self.setFixedSize(196, 34)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self._describe()
@@ -42,60 +41,45 @@ class RecordBar(QWidget):
             self.update()
 
     def _describe(self) -> None:
-        """Name, description and tool tip, which tells more than the lines do, and changes without them."""
-        if self._tip() != self.toolTip():
-            self.setToolTip(self._tip())
-        if self.text != self.accessibleDescription():
-            self.setAccessibleName(tr("Recording") if self._status.recording else tr("Record"))
-            self.setAccessibleDescription(self.text)
-
-    def _tip(self) -> str:
-        free = (
-            tr("{value:.1f} GB free on the disk", value=self._status.disk_free / 1000000000.0)
-            if self._status.disk_free is not None
-            else ""
-        )
-        where = str(self._status.folder) if self._status.folder is not None else ""
-        keys = (
+        """Name, description and tool tip, which changes more often than the lines do."""
+        status = self._status
+        facts = (
             tr("F9 begins or ends a session"),
             tr("F10 saves the last seconds without having recorded"),
             tr("M marks this moment with a number"),
+            str(status.folder or ""),
+            tr("{value:.1f} GB free on the disk", value=status.disk_free / 1e9) if status.disk_free is not None else "",
+            tr_text(status.warning),
+            tr_text(status.problem),
         )
-        lines = (*keys, where, free, tr_text(self._status.warning), tr_text(self._status.problem))
-        return "\n".join(line for line in lines if line)
+        tool_tip = "\n".join(line for line in facts if line)
+        if tool_tip != self.toolTip():
+            self.setToolTip(tool_tip)
+        if self.text != self.accessibleDescription():
+            self.setAccessibleName(tr("Recording") if status.recording else tr("Record"))
+            self.setAccessibleDescription(self.text)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self.clicked.emit()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        """One click was meant: the second would end at once what the first has begun, or begin another session."""
+        """The second half of a double click does not end at once what the first has begun."""
         event.accept()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
+        status, (first, second) = self._status, self._lines
         frame = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        is_bad = bool(self._status.problem)
-        is_on = self._status.recording or self._status.armed
-        edge = theme.VERMILLION if is_on or is_bad else theme.LINE
-        painter.setPen(QPen(QColor(edge), 1.5))
-        painter.setBrush(QColor(theme.RAISED if self._status.recording else theme.PANEL))
-        painter.drawRoundedRect(frame, 6, 6)
-        painter.setPen(QPen(QColor(theme.VERMILLION), 1.5))
-        painter.setBrush(QColor(theme.VERMILLION) if self._status.recording else Qt.BrushStyle.NoBrush)
+        is_marked = status.recording or status.armed or bool(status.problem)
+        edge = theme.VERMILLION if is_marked else theme.LINE
+        draw_box(painter, frame, 6, theme.RAISED if status.recording else theme.PANEL, edge, 1.5)
+        set_colours(painter, theme.VERMILLION if status.recording else None, theme.VERMILLION, 1.5)
         painter.drawEllipse(QRectF(frame.left() + 12, frame.center().y() - 6, 12, 12))
-        first, second = self._lines
-        left = frame.left() + 34
-        painter.setFont(theme.semi_bold(13))
-        painter.setPen(QColor(theme.TEXT))
-        width = painter.fontMetrics().horizontalAdvance(first)
-        painter.drawText(QRectF(left, frame.top(), frame.width(), frame.height()), Qt.AlignmentFlag.AlignVCenter, first)
-        painter.setFont(theme.font(12))
-        painter.setPen(QColor(theme.VERMILLION if is_bad or self._status.dropped else theme.TEXT_DIM))
-        room = QRectF(left + width + 10, frame.top(), frame.right() - left - width - 16, frame.height())
-        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), second, int(room.width())))
-        painter.end()
+        draw_text(painter, frame.adjusted(34, 0, 34, 0), first, theme.semi_bold(13), theme.TEXT)
+        left = frame.left() + 44 + painter.fontMetrics().horizontalAdvance(first)
+        room = QRectF(left, frame.top(), frame.right() - left - 6, frame.height())
+        colour = theme.VERMILLION if status.problem or status.dropped else theme.TEXT_DIM
+        draw_text(painter, room, second, theme.font(12), colour, elided=True)
 
 
 def _lines_of(status: RecordStatus) -> tuple[str, str]:

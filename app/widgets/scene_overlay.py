@@ -1,42 +1,34 @@
-"""In which corner of the view the loupe hides least.
-
-What is drawn over the live picture: the switched-on layers of a scene, as marks of constant size.
-
-A scene as shapes in source pixels, which both the live view and the overlay pictures draw.
-
-The shape that stands for each pose state, as an outline that Qt and OpenCV both draw.
-"""
+"""What is drawn over a picture: a scene as shapes in source pixels, and the switchable layers of marks that show them."""
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter, QTransform
 
 from app.ui.i18n import mark
 from app.ui.texts import signed_degrees
 from app.ui.theme import ON_PICTURE
 from app.widgets.scene_painter import ScenePainter
-from core.types import Point, Points, Pose, PoseState, Scene, Vector
+from core.types import Point, Points, Pose, Scene, Vector
 
-_MIN_STEP_PX = 5.0
+_MIN_STEP_PX = 5.0  # of polylines, working pixels
+_CLEAR_OFFSET_PX = 3.0  # from which on a label changes its side of the vessel line
+_WEIGHTS = {"vessel": 1.0, "robot": 2.0, "route": 3.0, "target": 200.0}  # how much it matters to see it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneShapes:
     """Shapes in source pixels (pixel centres at integers). What the scene does not have is None or empty.
 
-    ``head_foot`` and ``tail_foot`` are the feet of the robot vector's end and start on the vessel line, so that the pieces
+    ``head_foot`` and ``tail_foot`` are the projections of the robot vector's end and start on the vessel line, so that
     robot_vector.end -> head_foot and robot_vector.start -> tail_foot are d_head and d_tail. ``angle_arc`` (N, 2) turns from the
-    vessel's direction to the robot's around ``robot_vector.start``, with radius 1: painters scale it. ``ghost`` (N, 2) is where the
-    head goes next, ``robot_width`` the robot's thickness.
+    vessel's direction to the robot's around ``robot_vector.start``, with radius 1: painters scale it. ``ghost`` (N, 2) is the
+    predicted path of the head, ``robot_width`` the robot's thickness.
     """
 
     vessel_lines: tuple[Points, ...]
@@ -60,7 +52,9 @@ def scene_shapes(scene: Scene, ghost: Points | None = None) -> SceneShapes:
     `ghost` is the head's predicted path in working pixels.
     """
     robot, vessel = _vector(scene, scene.robot_vector), _vector(scene, scene.vessel_vector)
-    both = robot is not None and vessel is not None and scene.pose is not None
+    head_foot = tail_foot = angle_arc = None
+    if robot is not None and vessel is not None and scene.pose is not None:
+        head_foot, tail_foot, angle_arc = foot(vessel, robot.end), foot(vessel, robot.start), _arc(vessel, robot)
     return SceneShapes(
         vessel_lines=tuple(_line(scene, edge.points) for edge in scene.vessel_graph.edges) if scene.vessel_graph else (),
         robot_line=_line(scene, scene.path.points) if scene.path else None,
@@ -69,9 +63,9 @@ def scene_shapes(scene: Scene, ghost: Points | None = None) -> SceneShapes:
         nearest=scene.to_source(scene.centerline.nearest) if scene.centerline else None,
         robot_vector=robot,
         vessel_vector=vessel,
-        head_foot=foot(vessel, robot.end) if both and robot and vessel else None,
-        tail_foot=foot(vessel, robot.start) if both and robot and vessel else None,
-        angle_arc=_arc(vessel, robot) if both and robot and vessel else None,
+        head_foot=head_foot,
+        tail_foot=tail_foot,
+        angle_arc=angle_arc,
         route=_line(scene, scene.route.points) if scene.route else None,
         ghost=scene.points_to_source(ghost) if ghost is not None else None,
         robot_width=2.0 * scene.path.radius_px / scene.scale if scene.path else 0.0,
@@ -109,87 +103,6 @@ def _arc(vessel: Vector, robot: Vector) -> Points:
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-_NEAR_PX, _CLEAR_PX = 20, 60
-_SETTLE_S = 1.0
-_MUCH, _SHARE = 30.0, 0.5
-_VESSEL, _ROBOT, _ROUTE, _TARGET = 1.0, 2.0, 3.0, 200.0
-_COVERED = 150.0
-
-
-class LoupeCorner:
-    """Leaves a corner at once when the head comes near, and for a much better one only after a second: it must not jump about."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._corner: int | None = None
-        self._better_since_s: float | None = None
-
-    def choose(
-        self,
-        corners: Sequence[QRectF],
-        head: QPointF,
-        places: Points,
-        weights: NDArray[np.float64],
-        covers: Sequence[QRectF] = (),
-    ) -> int:
-        """Which of `corners`.
-
-        Parameters
-        ----------
-        corners : where the loupe would lie, on the view.
-        head : where the robot's head is.
-        places : (N, 2) what there is to see, also beyond the view.
-        weights : (N,) how much each place matters.
-        covers : what lies over the loupe.
-        """
-        hidden = [
-            float(weights[_within(corner, places)].sum()) + _COVERED * any(corner.intersects(cover) for cover in covers)
-            for corner in corners
-        ]
-        free = [k for k, corner in enumerate(corners) if not _grown(corner, _CLEAR_PX).contains(head)]
-        best = min(free or range(len(corners)), key=lambda k: hidden[k])
-        now = self._corner
-        if now is None or now >= len(corners) or (free and _grown(corners[now], _NEAR_PX).contains(head)):
-            self._move(best)
-        elif hidden[now] - hidden[best] > max(_MUCH, _SHARE * hidden[now]):
-            self._better_since_s = self._clock() if self._better_since_s is None else self._better_since_s
-            if self._clock() - self._better_since_s >= _SETTLE_S:
-                self._move(best)
-        else:
-            self._better_since_s = None
-        assert self._corner is not None
-        return self._corner
-
-    def _move(self, corner: int) -> None:
-        self._corner, self._better_since_s = corner, None
-
-
-def seen_places(shapes: SceneShapes | None, target: Point | None) -> tuple[Points, NDArray[np.float64]]:
-    """What there is to see in a picture: places (N, 2) in source pixels, and how much each matters (N,)."""
-    parts: list[tuple[Points, float]] = []
-    if shapes is not None:
-        parts += [(line, _VESSEL) for line in shapes.vessel_lines]
-        parts += [(line, _ROBOT) for line in (shapes.robot_line,) if line is not None]
-        parts += [(line, _ROUTE) for line in (shapes.route, shapes.ghost) if line is not None]
-    if target is not None:
-        parts.append((np.array([target], np.float64), _TARGET))
-    if not parts:
-        return np.empty((0, 2)), np.empty(0)
-    return np.concatenate([line for line, _ in parts]), np.concatenate([np.full(len(line), weight) for line, weight in parts])
-
-
-def _within(rect: QRectF, places: Points) -> NDArray[np.bool_]:
-    x, y = places[:, 0], places[:, 1]
-    return np.asarray((x > rect.left()) & (x < rect.right()) & (y > rect.top()) & (y < rect.bottom()))
-
-
-def _grown(rect: QRectF, by_px: float) -> QRectF:
-    return rect.adjusted(-by_px, -by_px, by_px, by_px)
-
-
-_CLEAR_OFFSET_PX = 3.0
-
-
 @dataclass(frozen=True, slots=True)
 class LayerText:
     """Key, label and tool tip of a layer."""
@@ -218,98 +131,97 @@ class Layer(Enum):
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Overlay:
-    """All that is needed to draw. ``target`` is in source pixels; ``target_note`` is written beside it."""
-
-    shapes: SceneShapes | None
-    pose: Pose | None
-    target: Point | None
-    target_note: str = ""
-
-
 class Marks:
-    """Drawn in screen pixels: lines and texts keep their size at any zoom. A dark edge keeps them visible on any picture."""
+    """The marks of a scene, in screen pixels: lines and texts keep their size at any zoom.
 
-    def __init__(self) -> None:
-        self._overlay = Overlay(None, None, None)
+    `digits` of the distances, and of the angle, on their labels.
+    """
+
+    def __init__(self, digits: int = 0) -> None:
+        self._digits = digits
+        self._shapes: SceneShapes | None = None
+        self._pose: Pose | None = None
+        self._target: Point | None = None
+        self._target_note = ""
         self._visible = set(Layer)
         self._head_side = self._tail_side = 1.0
 
-    def set_overlay(self, overlay: Overlay) -> None:
-        self._overlay = overlay
-        if overlay.pose is not None:
-            self._head_side = _steady_side(self._head_side, overlay.pose.c_head_px)
-            self._tail_side = _steady_side(self._tail_side, overlay.pose.c_tail_px)
+    def set_scene(self, shapes: SceneShapes | None, pose: Pose | None, target: Point | None, target_note: str = "") -> None:
+        """What to draw. `target` is in source pixels; `target_note` is written beside it."""
+        self._shapes, self._pose, self._target, self._target_note = shapes, pose, target, target_note
+        if pose is not None:
+            self._head_side = _steady_side(self._head_side, pose.c_head_px)
+            self._tail_side = _steady_side(self._tail_side, pose.c_tail_px)
 
     def set_layer(self, layer: Layer, visible: bool) -> None:
-        if visible:
-            self._visible.add(layer)
-        else:
-            self._visible.discard(layer)
+        (self._visible.add if visible else self._visible.discard)(layer)
+
+    def is_on(self, layer: Layer) -> bool:
+        return layer in self._visible
 
     def places(self) -> tuple[Points, NDArray[np.float64]]:
         """What there is to see, drawn or not, (N, 2) in source pixels, and how much each place matters (N,)."""
-        return seen_places(self._overlay.shapes, self._overlay.target)
+        return seen_places(self._shapes, self._target)
 
-    def draw(self, painter: QPainter, to_screen: QTransform, room: QRectF, label_px: int, *, tags: bool = True) -> None:
+    def draw(
+        self, painter: QPainter, to_screen: QTransform, room: QRectF, label_px: int, *, tags: bool = True, smooth: bool = False
+    ) -> None:
         """Draw with `to_screen` (source pixels to the screen) within `room` on the screen; labels in that size, 0 for none.
 
-        A magnified part is drawn without `tags`: the whole picture has them, and here they would lie on what is magnified.
+        A magnified part is drawn without `tags`: the whole picture has them, and here they would cover what is magnified.
+        A picture that is kept is drawn `smooth`.
         """
-        pencil = ScenePainter(painter, to_screen, label_px, room)
-        shapes, pose = self._overlay.shapes, self._overlay.pose
+        marks = ScenePainter(painter, to_screen, label_px, room, smooth=smooth)
+        shapes, visible = self._shapes, self._visible
         if shapes is not None:
-            if Layer.VESSEL in self._visible:
-                pencil.polylines(shapes.vessel_lines, ON_PICTURE.VESSEL, 2.0)
-            if Layer.ROUTE in self._visible and shapes.route is not None:
-                pencil.polylines((shapes.route,), ON_PICTURE.ROUTE, 4.0, Qt.PenStyle.DashLine)
-            if Layer.ROBOT in self._visible:
-                _draw_robot(pencil, shapes)
-            if Layer.GHOST in self._visible and shapes.ghost is not None:
-                pencil.tube(shapes.ghost, ON_PICTURE.GHOST, shapes.robot_width)
-            if Layer.VECTORS in self._visible:
-                _draw_vectors(pencil, shapes, pose, -self._head_side)
-            if Layer.DISTANCES in self._visible and pose is not None:
-                _draw_distances(pencil, shapes, pose, (self._head_side, self._tail_side))
-            if Layer.NEAREST in self._visible and shapes.nearest is not None:
-                pencil.diamond(shapes.nearest, ON_PICTURE.NEAREST, 6.0)
-            if Layer.HEAD in self._visible and shapes.head is not None:
-                pencil.ring(shapes.head, ON_PICTURE.HEAD, 8.0)
-        if Layer.ROUTE in self._visible and self._overlay.target is not None:
-            pencil.crosshair(self._overlay.target, ON_PICTURE.TARGET, 13.0)
-            if tags and self._overlay.target_note:
-                pencil.tag(self._overlay.target, self._overlay.target_note, ON_PICTURE.TARGET)
+            if Layer.VESSEL in visible:
+                marks.polylines(shapes.vessel_lines, ON_PICTURE.VESSEL, 2.0)
+            if Layer.ROUTE in visible and shapes.route is not None:
+                marks.polylines((shapes.route,), ON_PICTURE.ROUTE, 4.0, Qt.PenStyle.DashLine)
+            if Layer.ROBOT in visible:
+                if shapes.robot_line is not None:
+                    marks.polylines((shapes.robot_line,), ON_PICTURE.ROBOT, 3.0)
+                for first, second in shapes.bridges:
+                    marks.polylines((np.array([first, second]),), ON_PICTURE.TEXT, 2.0, Qt.PenStyle.DotLine)
+            if Layer.GHOST in visible and shapes.ghost is not None:
+                marks.tube(shapes.ghost, ON_PICTURE.GHOST, shapes.robot_width)
+            if Layer.VECTORS in visible:
+                self._draw_vectors(marks, shapes)
+            if Layer.DISTANCES in visible:
+                self._draw_distances(marks, shapes)
+            if Layer.NEAREST in visible and shapes.nearest is not None:
+                marks.diamond(shapes.nearest, ON_PICTURE.NEAREST, 6.0)
+            if Layer.HEAD in visible and shapes.head is not None:
+                marks.ring(shapes.head, ON_PICTURE.HEAD, 8.0)
+        if Layer.ROUTE in visible and self._target is not None:
+            marks.crosshair(self._target, ON_PICTURE.TARGET, 13.0)
+            if tags and self._target_note:
+                marks.tag(self._target, self._target_note, ON_PICTURE.TARGET)
 
+    def _draw_vectors(self, marks: ScenePainter, shapes: SceneShapes) -> None:
+        robot, vessel = shapes.robot_vector, shapes.vessel_vector
+        if vessel is not None:
+            marks.arrow(vessel, ON_PICTURE.VESSEL_VECTOR, 3.0)
+        if robot is not None:
+            marks.arrow(robot, ON_PICTURE.ROBOT_VECTOR, 3.0)
+        if robot is not None and vessel is not None and shapes.angle_arc is not None and self._pose is not None:
+            marks.angle(robot.start, shapes.angle_arc, ON_PICTURE.THETA)
+            # on the side of the vessel where the head is not: there is the least to cover
+            text = f"θ {signed_degrees(self._pose.theta_signed_deg, self._digits)}"
+            marks.label_beside(vessel.center, vessel, -self._head_side, text, ON_PICTURE.THETA)
 
-def _draw_robot(pencil: ScenePainter, shapes: SceneShapes) -> None:
-    if shapes.robot_line is not None:
-        pencil.polylines((shapes.robot_line,), ON_PICTURE.ROBOT, 3.0)
-    for first, second in shapes.bridges:
-        pencil.polylines((np.array([first, second]),), ON_PICTURE.TEXT, 2.0, Qt.PenStyle.DotLine)
-
-
-def _draw_vectors(pencil: ScenePainter, shapes: SceneShapes, pose: Pose | None, angle_side: float) -> None:
-    if shapes.vessel_vector is not None:
-        pencil.arrow(shapes.vessel_vector, ON_PICTURE.VESSEL_VECTOR, 3.0)
-    if shapes.robot_vector is not None:
-        pencil.arrow(shapes.robot_vector, ON_PICTURE.ROBOT_VECTOR, 3.0)
-    if shapes.angle_arc is None or shapes.robot_vector is None or shapes.vessel_vector is None or pose is None:
-        return
-    pencil.angle(shapes.robot_vector.start, shapes.angle_arc, ON_PICTURE.THETA)
-    # on the side of the vessel where the head is not: there is the least to cover
-    vessel = shapes.vessel_vector
-    pencil.label_beside(vessel.center, vessel, angle_side, f"θ {signed_degrees(pose.theta_signed_deg, 0)}", ON_PICTURE.THETA)
-
-
-def _draw_distances(pencil: ScenePainter, shapes: SceneShapes, pose: Pose, sides: tuple[float, float]) -> None:
-    robot, vessel = shapes.robot_vector, shapes.vessel_vector
-    if robot is None or vessel is None or shapes.head_foot is None or shapes.tail_foot is None:
-        return
-    pencil.measure(shapes.head_foot, robot.end, ON_PICTURE.D_HEAD, Qt.PenStyle.SolidLine)
-    pencil.measure(shapes.tail_foot, robot.start, ON_PICTURE.D_TAIL, Qt.PenStyle.DotLine)
-    pencil.label_beside(robot.end, vessel, sides[0], f"d_head {pose.d_head_px:.0f}", ON_PICTURE.D_HEAD)
-    pencil.label_beside(robot.start, vessel, sides[1], f"d_tail {pose.d_tail_px:.0f}", ON_PICTURE.D_TAIL)
+    def _draw_distances(self, marks: ScenePainter, shapes: SceneShapes) -> None:
+        robot, vessel, pose = shapes.robot_vector, shapes.vessel_vector, self._pose
+        if robot is None or vessel is None or pose is None or shapes.head_foot is None or shapes.tail_foot is None:
+            return
+        marks.measure(shapes.head_foot, robot.end, ON_PICTURE.D_HEAD, Qt.PenStyle.SolidLine)
+        marks.measure(shapes.tail_foot, robot.start, ON_PICTURE.D_TAIL, Qt.PenStyle.DotLine)
+        unit = " px" if self._digits else ""
+        for name, point, value, side, colour in (
+            ("d_head", robot.end, pose.d_head_px, self._head_side, ON_PICTURE.D_HEAD),
+            ("d_tail", robot.start, pose.d_tail_px, self._tail_side, ON_PICTURE.D_TAIL),
+        ):
+            marks.label_beside(point, vessel, side, f"{name} {value:.{self._digits}f}{unit}", colour)
 
 
 def _steady_side(side: float, offset_px: float) -> float:
@@ -317,39 +229,16 @@ def _steady_side(side: float, offset_px: float) -> float:
     return side if abs(offset_px) < _CLEAR_OFFSET_PX else (1.0 if offset_px > 0 else -1.0)
 
 
-LETTER_HEIGHT: dict[PoseState | None, float] = {
-    None: 0.60,
-    PoseState.A: 0.60,
-    PoseState.B: 0.64,
-    PoseState.C: 0.50,
-    PoseState.D: 0.54,
-}
-"""Font size over the box's side."""
-LETTER_DROP: dict[PoseState | None, float] = {PoseState.C: 0.13}
-"""How far below the middle of the box the letter sits, over the box's side: a triangle's visual middle is lower."""
-
-
-def state_outline(state: PoseState | None) -> Points:
-    """Closed outline (N, 2) in a box of -1..1: A circle, B square, C triangle, D diamond, None circle."""
-    if state is PoseState.B:
-        return _rounded([(-0.86, -0.86), (0.86, -0.86), (0.86, 0.86), (-0.86, 0.86)], 0.2)
-    if state is PoseState.C:
-        corners = [(0.0, -1.0), (1.06, 0.84), (-1.06, 0.84)]
-        return _rounded(corners, 0.22)
-    if state is PoseState.D:
-        return _rounded([(0.0, -1.02), (1.02, 0.0), (0.0, 1.02), (-1.02, 0.0)], 0.16)
-    turn = np.linspace(0.0, 2 * math.pi, 72, endpoint=False)
-    return 0.95 * np.column_stack([np.cos(turn), np.sin(turn)])
-
-
-def _rounded(corners: list[Point], rounding: float) -> Points:
-    """The polygon with its corners replaced by quadratic curves that start `rounding` before them."""
-    points = np.array(corners)
-    along = np.linspace(0.0, 1.0, 8)[:, None]
-    pieces = []
-    for k, corner in enumerate(points):
-        before, after = points[k - 1] - corner, points[(k + 1) % len(points)] - corner
-        enter = corner + before / np.linalg.norm(before) * rounding
-        leave = corner + after / np.linalg.norm(after) * rounding
-        pieces.append((1 - along) ** 2 * enter + 2 * along * (1 - along) * corner + along**2 * leave)
-    return np.concatenate(pieces)
+def seen_places(shapes: SceneShapes | None, target: Point | None) -> tuple[Points, NDArray[np.float64]]:
+    """What there is to see in a picture: places (N, 2) in source pixels, and how much each matters (N,)."""
+    parts: list[tuple[Points, str]] = []
+    if shapes is not None:
+        parts += [(line, "vessel") for line in shapes.vessel_lines]
+        parts += [(line, "robot") for line in (shapes.robot_line,) if line is not None]
+        parts += [(line, "route") for line in (shapes.route, shapes.ghost) if line is not None]
+    if target is not None:
+        parts.append((np.array([target], np.float64), "target"))
+    if not parts:
+        return np.empty((0, 2)), np.empty(0)
+    weights = [np.full(len(line), _WEIGHTS[kind]) for line, kind in parts]
+    return np.concatenate([line for line, _ in parts]), np.concatenate(weights)

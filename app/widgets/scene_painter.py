@@ -1,4 +1,4 @@
-"""Draws marks of constant screen size at places of the source picture."""
+"""Draws marks of constant screen size at places of the source picture, on a widget or a QImage."""
 
 from __future__ import annotations
 
@@ -9,22 +9,37 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, 
 
 from app.ui import theme
 from app.ui.theme import ON_PICTURE
+from app.widgets.painting import CENTER, draw_box, draw_text, polygon, set_colours
 from core import geometry
 from core.types import Point, Points, Vector
 
 _ARC_RADIUS = 44.0
-_LABEL_GAP = 16.0
+_LABEL_GAP = 16.0  # from a point to its label
 _LABEL_PLACES = ((0, 0), (1, 0), (0, -1), (0, 1), (2, 0), (1, -1), (1, 1))
-"""Rows outward and places along the line, in the order in which a label would have them: beside its point first."""
-_MARGIN = 60.0
+"""Rows outward and places along the line, in order of preference: beside its point first."""
+_MARGIN = 60.0  # around the visible part, in which lines are still drawn
 _TAG_PX = 15
-_TUBE_MIN, _TUBE_DASH = 14.0, 6.0
+_TUBE_MIN, _TUBE_DASH = 14.0, 6.0  # least width, and length of a dash
+_DIAMOND = ((0, -1), (1, 0), (0, 1), (-1, 0))
+_EDGE = theme.colour(ON_PICTURE.INK, 0.55)
 
 
 class ScenePainter:
-    """Lines have a dark edge that keeps them visible on any picture; labels keep out of each other's way."""
+    """Lines have a dark edge that keeps them visible on any picture; labels keep out of each other's way.
 
-    def __init__(self, painter: QPainter, to_screen: QTransform, label_px: int, room: QRectF | None = None) -> None:
+    Parameters
+    ----------
+    painter : of a widget, a QPicture or a QImage; its transformation is reset.
+    to_screen : from source pixels (pixel (0, 0) covers 0..1) to the painter's pixels.
+    label_px : text size of labels, 0 for none.
+    room : the visible part, by default all that is painted on.
+    smooth : the dark edges are antialiased, too, which takes four times as long.
+    """
+
+    def __init__(
+        self, painter: QPainter, to_screen: QTransform, label_px: int, room: QRectF | None = None, *, smooth: bool = False
+    ) -> None:
+        self._smooth = smooth
         self._painter = painter
         self._to_screen = to_screen
         self._label_px = label_px
@@ -52,19 +67,15 @@ class ScenePainter:
         return path
 
     def _stroke(self, path: QPainterPath, name: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> None:
-        halo = QPen(theme.colour(ON_PICTURE.INK, 0.55), width + 2.0)
-        halo.setCapStyle(Qt.PenCapStyle.FlatCap)
-        halo.setJoinStyle(Qt.PenJoinStyle.BevelJoin)
-        pen = QPen(QColor(name), width, style)
-        pen.setCapStyle(Qt.PenCapStyle.FlatCap if style == Qt.PenStyle.DashLine else Qt.PenCapStyle.RoundCap)
-        pen.setJoinStyle(Qt.PenJoinStyle.BevelJoin)
+        bevel, flat = Qt.PenJoinStyle.BevelJoin, Qt.PenCapStyle.FlatCap
+        cap = flat if style == Qt.PenStyle.DashLine else Qt.PenCapStyle.RoundCap
         self._painter.setBrush(Qt.BrushStyle.NoBrush)
         # the dark edge costs a quarter without antialiasing, and the line covers its inner border
-        self._painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        self._painter.setPen(halo)
+        self._painter.setRenderHint(QPainter.RenderHint.Antialiasing, self._smooth)
+        self._painter.setPen(QPen(_EDGE, width + 2.0, Qt.PenStyle.SolidLine, flat, bevel))
         self._painter.drawPath(path)
         self._painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        self._painter.setPen(pen)
+        self._painter.setPen(QPen(QColor(name), width, style, cap, bevel))
         self._painter.drawPath(path)
 
     def polylines(self, lines: tuple[Points, ...], name: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> None:
@@ -83,19 +94,16 @@ class ScenePainter:
         across = QPointF(-direction.y(), direction.x())
         self._segment(start, end, name, width, Qt.PenStyle.SolidLine)
         tip = end + direction * 9.0
-        head = QPolygonF([tip, end - direction * 5.0 + across * 7.0, end - direction * 5.0 - across * 7.0])
-        self._painter.setPen(QPen(theme.colour(ON_PICTURE.INK, 0.55), 1.2))
-        self._painter.setBrush(QColor(name))
-        self._painter.drawPolygon(head)
+        set_colours(self._painter, name, _EDGE, 1.2)
+        self._painter.drawPolygon([tip, end - direction * 5.0 + across * 7.0, end - direction * 5.0 - across * 7.0])
 
     def angle(self, corner: Point, unit_arc: Points, name: str) -> None:
         """The arc from the vessel's direction to the robot's, the vessel's direction as a thin line through the corner."""
         middle = self._at(corner)
         arc = [middle + QPointF(x, y) * _ARC_RADIUS for x, y in unit_arc.tolist()]
         self._segment(middle, middle + (arc[0] - middle) * 1.35, ON_PICTURE.VESSEL_VECTOR, 1.2, Qt.PenStyle.DashLine)
-        path = QPainterPath(arc[0])
-        for point in arc[1:]:
-            path.lineTo(point)
+        path = QPainterPath()
+        path.addPolygon(arc)
         self._stroke(path, name, 2.0)
 
     def tube(self, line: Points, name: str, width_px: float) -> None:
@@ -112,8 +120,7 @@ class ScenePainter:
         end, ahead = QPointF(*way[-1].tolist()), _unit(QPointF(*(way[-1] - way[-2]).tolist())) * (half + 8.0)
         aside = QPointF(-ahead.y(), ahead.x())
         self._painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)  # the dashes cover the border
-        self._painter.setPen(Qt.PenStyle.NoPen)
-        self._painter.setBrush(theme.colour(name, 0.45))
+        set_colours(self._painter, theme.colour(name, 0.45))
         self._painter.drawPolygon(QPolygonF(edges[0] + edges[1][::-1]))
         self._painter.setPen(QPen(theme.colour(ON_PICTURE.INK, 0.65), 4.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
         self._painter.drawLines(dashes)
@@ -171,34 +178,26 @@ class ScenePainter:
         free = [box for box in places if not any(box.intersects(other) for other in self._labels)]
         self._text_box((free or places or [above])[0], text, text_font, name)
 
-    def _text_box(self, box: QRectF, text: str, text_font: QFont, name: str) -> None:
-        self._painter.setPen(Qt.PenStyle.NoPen)
-        self._painter.setBrush(theme.colour(ON_PICTURE.INK, 0.72))
-        self._painter.drawRoundedRect(box, 4.0, 4.0)
-        self._painter.setPen(QColor(name))
-        self._painter.setFont(text_font)
-        self._painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+    def _text_box(self, box: QRectF, text: str, font: QFont, name: str) -> None:
+        draw_box(self._painter, box, 4.0, theme.colour(ON_PICTURE.INK, 0.72))
+        draw_text(self._painter, box, text, font, name, CENTER)
 
     def ring(self, point: Point, name: str, radius: float) -> None:
         path = QPainterPath()
         path.addEllipse(self._at(point), radius, radius)
         self._stroke(path, name, 2.5)
-        self._painter.setPen(Qt.PenStyle.NoPen)
-        self._painter.setBrush(QColor(name))
+        set_colours(self._painter, name)
         self._painter.drawEllipse(self._at(point), 2.0, 2.0)
 
     def diamond(self, point: Point, name: str, radius: float) -> None:
-        at = self._at(point)
-        corners = [at + QPointF(x, y) * radius for x, y in ((0, -1), (1, 0), (0, 1), (-1, 0))]
-        self._painter.setPen(QPen(theme.colour(ON_PICTURE.INK, 0.8), 1.5))
-        self._painter.setBrush(QColor(name))
-        self._painter.drawPolygon(QPolygonF(corners))
+        set_colours(self._painter, name, theme.colour(ON_PICTURE.INK, 0.8), 1.5)
+        self._painter.drawPolygon(polygon([(x * radius, y * radius) for x, y in _DIAMOND], self._at(point)))
 
     def crosshair(self, point: Point, name: str, radius: float) -> None:
         at = self._at(point)
         path = QPainterPath()
         path.addEllipse(at, radius * 0.7, radius * 0.7)
-        for x, y in ((0, -1), (1, 0), (0, 1), (-1, 0)):
+        for x, y in _DIAMOND:
             path.moveTo(at + QPointF(x, y) * radius * 0.4)
             path.lineTo(at + QPointF(x, y) * radius * 1.3)
         self._stroke(path, name, 2.5)
@@ -206,7 +205,7 @@ class ScenePainter:
 
 def on_screen(places: Points, to_screen: QTransform) -> Points:
     """Places (N, 2) of the source picture on the screen."""
-    x, y = places[:, 0] + 0.5, places[:, 1] + 0.5  # as Pencil._at
+    x, y = places[:, 0] + 0.5, places[:, 1] + 0.5  # as ScenePainter._at
     t = to_screen
     return np.column_stack([x * t.m11() + y * t.m21() + t.dx(), x * t.m12() + y * t.m22() + t.dy()])
 

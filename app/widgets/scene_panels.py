@@ -1,9 +1,4 @@
-"""The View menu of the windows that show a scene.
-
-What the operator window and the player have in common: the widgets that show a scene, and their places.
-
-How panels stand in a window: below each other, side by side, and in two columns.
-"""
+"""What the operator window and the player have in common: the widgets that show a scene, their places, and their View menu."""
 
 from __future__ import annotations
 
@@ -11,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui import theme
 from app.ui.actions import MenuEntry, turn_page
@@ -20,7 +15,7 @@ from app.ui.texts import REASON_TEXT
 from app.ui.window_base import WindowFrame
 from app.ui.workers import Pace
 from app.widgets.advice_line import AdviceLine
-from app.widgets.basics import Card, Columns
+from app.widgets.basics import Card, Columns, card_note, page_tabs, row, set_window_margins, side
 from app.widgets.distance_bars import ClearanceBar, DistanceBars
 from app.widgets.live_view import LiveView
 from app.widgets.mode_bar import ModeBadge
@@ -33,78 +28,18 @@ from core.config.calibration import ScaleConfig
 from core.config.models import PerceptionConfig, PoseConfig
 from core.types import PoseState, RobotStatus, Scene, Tick
 
-_TOP_PX = 4
-
-
-def column(*parts: tuple[QWidget, int], spacing: int = theme.GAP) -> QVBoxLayout:
-    """Widgets below each other, each with its stretch."""
-    layout = QVBoxLayout()
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.setSpacing(spacing)
-    for widget, stretch in parts:
-        layout.addWidget(widget, stretch)
-    return layout
-
-
-def row(*widgets: QWidget) -> QWidget:
-    """Widgets side by side, equally wide."""
-    layout = QHBoxLayout()
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.setSpacing(theme.GAP)
-    for widget in widgets:
-        layout.addWidget(widget, 1)
-    return holder(layout)
-
-
-def holder(layout: QLayout) -> QWidget:
-    """A widget that is nothing but the place of a layout."""
-    widget = QWidget()
-    widget.setLayout(layout)
-    return widget
-
-
-def side(layout: QLayout, narrowest: int, widest: int) -> QWidget:
-    """The right one of two columns: beyond a width its dials gain nothing, and the picture everything. Pixels."""
-    widget = holder(layout)
-    widget.setMinimumWidth(narrowest)
-    widget.setMaximumWidth(widest)
-    return widget
-
-
-def set_window_margins(layout: QLayout) -> None:
-    """Those of the panels to the window's edges."""
-    layout.setContentsMargins(theme.GAP, _TOP_PX, theme.GAP, theme.GAP)
-
-
-def card_note(text: str) -> QLabel:
-    """The small text at the right of a card's title, for who changes it later."""
-    label = QLabel(text)
-    label.setObjectName("card_note")
-    return label
-
-
-def page_tabs() -> QTabWidget:
-    """Pages that share a place."""
-    pages = QTabWidget()
-    pages.setDocumentMode(True)
-    pages.setAccessibleName(tr("Pages"))
-    pages.tabBar().setAccessibleName(tr("Pages"))
-    pages.tabBar().setDrawBase(False)
-    return pages
-
-
 _LEFT_SHARE = 0.62
-_RIGHT_WIDTH = (470, 660)
+_RIGHT_WIDTH = (470, 660)  # least and most, px
 
 
 class ScenePanels(QWidget):
-    """Makes the widgets of a scene; whose it is, and what else there is, says the class below it, which also lays them out.
+    """Makes the widgets of a scene; a subclass lays them out and adds others.
 
     Parameters
     ----------
     perception : its limits of the pose states are shown on all dials.
     pixels_per_mm : of the picture.
-    text_every_s : texts are renewed no more often, unless the state is another one.
+    text_every_s : texts are renewed no more often, unless the state changes.
     """
 
     def __init__(self, perception: PerceptionConfig, pixels_per_mm: float, text_every_s: float) -> None:
@@ -121,7 +56,7 @@ class ScenePanels(QWidget):
         self.clearance = ClearanceBar()
         self.pages = page_tabs()
         self._allowed = (card_note(""), card_note(""))
-        self._tell_allowed(limits)
+        self._show_allowed(limits)
         self._scale: ScaleConfig | None = None
         self._text_pace = Pace(text_every_s)
         self._state: PoseState | None = None
@@ -144,7 +79,7 @@ class ScenePanels(QWidget):
     # ---- a scene
 
     def _renews_text(self, scene: Scene, *, asked: bool = False) -> bool:
-        """A new state renews all texts together: the numbers beside it must be the ones that made it."""
+        """Whether texts are renewed now. A new state renews all of them, as it follows from the numbers beside it."""
         state = scene.pose.state if scene.pose is not None else None
         is_due = asked or self._text_pace.due() or state is not self._state
         self._state = state
@@ -159,7 +94,7 @@ class ScenePanels(QWidget):
         self.clearance.show_scene(scene, status)
 
     def _show_advice(self, tick: Tick, why_none: str, *, renew_text: bool) -> None:
-        """`why_none` is said where the scene itself has no reason for being without."""
+        """`why_none` is shown where the scene itself has no reason for the lack of advice."""
         if tick.scene.refusal is not None:
             why_none = tr(REASON_TEXT[tick.scene.refusal.reason].title).lower()
         self.advice.show_advice(tick.advice, self._state, why_none, is_unsure=self.badge.is_unsure, renew_text=renew_text)
@@ -172,7 +107,7 @@ class ScenePanels(QWidget):
         self.advice.show_advice(None, None, title[0].lower() + title[1:])
         self.clearance.show_scene(None, None)
 
-    def _tell_allowed(self, limits: PoseConfig) -> None:
+    def _show_allowed(self, limits: PoseConfig) -> None:
         angle, distances = self._allowed
         angle.setText(tr("allowed {limit:g}°", limit=limits.theta_allow_deg))
         distances.setText(tr("allowed {limit:g} px", limit=limits.d_allow_px))
@@ -185,7 +120,7 @@ class ScenePanels(QWidget):
         return row(Card(tr("Angle to the vessel"), self.gauge, angle), Card(tr("Distances"), self.bars, distances))
 
     def _lay_out(self, header: QHBoxLayout, left: QWidget, right: QVBoxLayout) -> QWidget:
-        """A header and two columns below it, ``columns``; returns their place: what covers that leaves the header in sight."""
+        """A header and two columns below it, ``columns``; returns their place, which a page may cover without the header."""
         stage = QWidget()
         self.columns = Columns(left, side(right, *_RIGHT_WIDTH), _LEFT_SHARE)
         room = QHBoxLayout(stage)
@@ -202,10 +137,14 @@ class ScenePanels(QWidget):
 def add_scene_view_menu(window: WindowFrame, panels: ScenePanels, more: Sequence[MenuEntry] = ()) -> list[QAction]:
     """Overlays, the whole picture and `more`, pages; returns the actions in this order. Those of overlays follow their switches."""
     bar = panels.overlay_bar
+
+    def toggle_all() -> None:
+        bar.set_all(not any(bar.is_on(layer) for layer in Layer))
+
     layers = [MenuEntry(tr(layer.value.label), partial(bar.toggle, layer), (layer.value.key,), checked=True) for layer in Layer]
     entries = [
         *layers,
-        MenuEntry(tr("&All overlays on or off"), partial(_toggle_all, bar), ("0",)),
+        MenuEntry(tr("&All overlays on or off"), toggle_all, ("0",)),
         None,
         MenuEntry(tr("&Whole picture"), panels.fit, ("F",)),
         *more,
@@ -217,7 +156,3 @@ def add_scene_view_menu(window: WindowFrame, panels: ScenePanels, more: Sequence
     of_layer = dict(zip(Layer, actions, strict=False))
     bar.toggled.connect(lambda layer, on: of_layer[layer].setChecked(on))
     return actions
-
-
-def _toggle_all(bar: OverlayBar) -> None:
-    bar.set_all(not any(bar.is_on(layer) for layer in Layer))

@@ -1,37 +1,19 @@
-"""What the servo table says, as texts with a tone: a bus status becomes seven rows, two tendon pairs and one line. No Qt here.
+"""The seven servos: what each reports, the balance of the tendon pairs, the bus itself, and what can be done about them.
 
-Texts with a tone, which tables of the operator window are made of. No Qt here.
-
-The seven servos: what each reports, the balance of the tendon pairs, the bus itself, and what can be done about them.
-
-The cells of the servo table as a Qt model, and the view that paints them.
-
-Whether the wires of each tendon pair are as tight as they should be.
+A bus status becomes seven rows of cells, two tendon pairs and one line; the widgets below show them.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QModelIndex,
-    QObject,
-    QPersistentModelIndex,
-    QPoint,
-    QPointF,
-    QRectF,
-    QSize,
-    Qt,
-    Signal,
-    Slot,
-)
-from PySide6.QtGui import QColor, QHideEvent, QPainter, QPaintEvent, QPen, QPolygonF, QResizeEvent
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QPoint, QRectF, Qt, Signal, Slot
+from PySide6.QtGui import QColor, QHideEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -39,7 +21,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QMenu,
     QPushButton,
-    QSizePolicy,
     QStackedLayout,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -53,6 +34,19 @@ from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import tip
 from app.ui.workers import Pace
 from app.widgets.messages import BUTTON_STYLE, QuestionStrip
+from app.widgets.painting import (
+    LEFT,
+    NONE,
+    RIGHT,
+    PaintedWidget,
+    draw_middle_bar,
+    draw_text,
+    draw_tick,
+    draw_track,
+    number,
+    set_colours,
+    text_width,
+)
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.types import RobotStatus
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, wire_force_mn
@@ -61,11 +55,8 @@ if TYPE_CHECKING:
     from hardware.servos.bus_ipc import BusStatus
 
 
-NONE = "\N{EN DASH}"
-
-
 class Tone(IntEnum):
-    """How a text is meant. What warns also carries a sign: colour alone says nothing to some."""
+    """How a text is meant. A warning also carries a sign, as some operators see no difference in colour."""
 
     FAINT = 0
     PLAIN = 1
@@ -99,17 +90,10 @@ class Cell:
 Row = tuple[Cell, ...]
 
 
-def number(value: float, digits: int) -> str:
-    """No minus before a zero, and a real minus sign."""
-    value = round(value, digits) + 0.0
-    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
-
-
-SILENT_AFTER_S = 1.0
-"""What the bus said longer ago is not true any more."""
+SILENT_AFTER_S = 1.0  # age from which on a status of the bus is not shown
 _CYCLE_P99_LIMIT_MS = 30.0
-_LONG_TRAVEL_MM = 50.0
-_TRACK_STEPS = 200.0
+_LONG_TRAVEL_MM = 50.0  # of a feed; tendons travel less
+_TRACK_STEPS = 200.0  # resolution of the bar of a joint's position
 
 
 class Column(Enum):
@@ -191,23 +175,20 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
     low, sags = servos.min_voltage_v, servos.min_voltage_v + safety.voltage_warn_margin_v
     heat = Tone.BAD if state.temperature_c >= hot else Tone.WARN if state.temperature_c >= warm else Tone.PLAIN
     volts = Tone.BAD if state.voltage_v <= low else Tone.WARN if state.voltage_v <= sags else Tone.PLAIN
-    most_ma = servos.max_current_ma
-    strain = Tone.BAD if state.current_ma is not None and abs(state.current_ma) > most_ma else Tone.PLAIN
-    error = _error(state)
-    name = Cell(_name(joint), max(Tone.PLAIN, heat, volts, error.tone))
+    error, current = _error(state), Cell(NONE)
+    if state.current_ma is not None:
+        strain = Tone.BAD if abs(state.current_ma) > servos.max_current_ma else Tone.PLAIN
+        limit = tr("limit {most:g} mA for half a second", most=servos.max_current_ma)
+        current = _signed(number(state.current_ma, 0), strain, limit)
     return (
-        name,
+        Cell(_name(joint), max(Tone.PLAIN, heat, volts, error.tone)),
         _position(joint, state),
-        Cell(_mm(joint, state.goal_mm), Tone.FAINT if not armed else Tone.PLAIN),
-        Cell(NONE)
-        if state.current_ma is None
-        else _signed_cell(number(state.current_ma, 0), strain, tr("limit {most:g} mA for half a second", most=most_ma)),
-        _signed_cell(f"{state.temperature_c:.0f}", heat, tr("warning from {warm:g} °C, limit {hot:g} °C", warm=warm, hot=hot)),
-        _signed_cell(f"{state.voltage_v:.1f}", volts, tr("warning from {sags:g} V, limit {low:g} V", sags=sags, low=low)),
-        Cell(tr("on"), Tone.PLAIN) if state.torque else _signed_cell(tr("off"), Tone.BAD if armed else Tone.FAINT),
-        Cell(tr("yes"), Tone.PLAIN)
-        if zeroed
-        else _signed_cell(tr("no"), Tone.WARN, tr("zero the joint, with slack wires, before arming")),
+        Cell(_mm(joint, state.goal_mm), Tone.PLAIN if armed else Tone.FAINT),
+        current,
+        _signed(f"{state.temperature_c:.0f}", heat, tr("warning from {warm:g} °C, limit {hot:g} °C", warm=warm, hot=hot)),
+        _signed(f"{state.voltage_v:.1f}", volts, tr("warning from {sags:g} V, limit {low:g} V", sags=sags, low=low)),
+        Cell(tr("on")) if state.torque else _signed(tr("off"), Tone.BAD if armed else Tone.FAINT),
+        Cell(tr("yes")) if zeroed else _signed(tr("no"), Tone.WARN, tr("zero the joint, with slack wires, before arming")),
         error,
     )
 
@@ -216,42 +197,29 @@ def _unknown(joint: JointConfig, reading: MissingServo | None) -> Row:
     blank = (Cell(NONE, Tone.FAINT),) * (len(Column) - 2)
     if reading is None:
         return (Cell(_name(joint), Tone.FAINT), *blank, Cell(NONE, Tone.FAINT))
-    short = tr("restarted") if reading.restarted else tr("silent")
-    tip = (
-        tr("the servo restarted: zero its joint again")
-        if reading.restarted
-        else tr("{reason}, {misses} times in a row", reason=tr_text(reading.reason), misses=reading.misses)
-    )
-    return (Cell(_name(joint), Tone.BAD), *blank, Cell(short, Tone.BAD, tip))
+    if reading.restarted:
+        error = Cell(tr("restarted"), Tone.BAD, tr("the servo restarted: zero its joint again"))
+    else:
+        why = tr("{reason}, {misses} times in a row", reason=tr_text(reading.reason), misses=reading.misses)
+        error = Cell(tr("silent"), Tone.BAD, why)
+    return (Cell(_name(joint), Tone.BAD), *blank, error)
 
 
 def _position(joint: JointConfig, state: ServoState) -> Cell:
-    at = state.position_mm
+    at, low, high, margin = state.position_mm, joint.low_mm, joint.high_mm, joint.warn_margin_mm
     if at is None:
         return Cell(NONE, Tone.FAINT, tr("not known before the joint is zeroed"))
-    span = joint.high_mm - joint.low_mm
-    margin = joint.warn_margin_mm
-    if not joint.low_mm <= at <= joint.high_mm:
-        tone = Tone.BAD
-    else:
-        tone = Tone.WARN if not joint.low_mm + margin <= at <= joint.high_mm - margin else Tone.PLAIN
+    tone = Tone.BAD if not low <= at <= high else Tone.PLAIN if low + margin <= at <= high - margin else Tone.WARN
 
     def share(mm: float) -> float:
-        return round((mm - joint.low_mm) / span * _TRACK_STEPS) / _TRACK_STEPS
+        return round((mm - low) / (high - low) * _TRACK_STEPS) / _TRACK_STEPS
 
-    track = Track(
-        share(at),
-        None if state.goal_mm is None else share(state.goal_mm),
-        share(joint.low_mm + margin),
-        share(joint.high_mm - margin),
+    goal = None if state.goal_mm is None else share(state.goal_mm)
+    explanation = tr(
+        "envelope {low_mm:g} to {high_mm:g} mm, slow within {margin:g} mm of its ends", low_mm=low, high_mm=high, margin=margin
     )
-    tip = tr(
-        "envelope {low_mm:g} to {high_mm:g} mm, slow within {margin:g} mm of its ends",
-        low_mm=joint.low_mm,
-        high_mm=joint.high_mm,
-        margin=margin,
-    )
-    return Cell(SIGN[tone] + _mm(joint, at), tone, tip, track)
+    track = Track(share(at), goal, share(low + margin), share(high - margin))
+    return Cell(SIGN[tone] + _mm(joint, at), tone, explanation, track)
 
 
 def _error(state: ServoState) -> Cell:
@@ -263,16 +231,16 @@ def _error(state: ServoState) -> Cell:
     return Cell(tr("none"), Tone.FAINT)
 
 
-def _signed_cell(text: str, tone: Tone, tip: str = "") -> Cell:
+def _signed(text: str, tone: Tone, tip: str = "") -> Cell:
     return Cell(SIGN[tone] + text, tone, tip)
 
 
 def _name(joint: JointConfig) -> str:
-    return f"{tr_text(joint.name).replace('_', ' ')} \N{MIDDLE DOT} {joint.id}"
+    return f"{_plain(joint.name)} \N{MIDDLE DOT} {joint.id}"
 
 
 def _mm(joint: JointConfig, value_mm: float | None) -> str:
-    """Hundredths for a tendon, tenths for a feed: so much can be read, and matters."""
+    """Hundredths for a tendon, tenths for a feed."""
     return NONE if value_mm is None else number(value_mm, 1 if joint.high_mm - joint.low_mm > _LONG_TRAVEL_MM else 2)
 
 
@@ -280,7 +248,7 @@ def _mm(joint: JointConfig, value_mm: float | None) -> str:
 class PairBalance:
     """Two wires that pull against each other. ``sum_mm`` of their pulls should be ``wanted_mm``, twice the pretension.
 
-    None: not known. ``forces_n`` of the wires is told by the motors' currents, friction included.
+    None: not known. ``forces_n`` of the wires are computed from the motors' currents, friction included.
     """
 
     names: tuple[JointName, JointName]
@@ -302,6 +270,29 @@ class PairBalance:
             return ""
         return tr("slack") if self.sum_mm < self.wanted_mm else tr("too tight")
 
+    @property
+    def title(self) -> str:
+        return f"{tr_text(self.names[0])} + {tr_text(self.names[1])}"
+
+    @property
+    def total(self) -> str:
+        return NONE if self.sum_mm is None else number(self.sum_mm, 2)
+
+    @property
+    def sum(self) -> str:
+        return tr("{total} of {wanted_mm:.2f} mm", total=self.total, wanted_mm=self.wanted_mm)
+
+    @property
+    def forces(self) -> str:
+        if self.forces_n is None:
+            return ""
+        return "{} / {} N".format(*(number(force, 1 if abs(force) < 100.0 else 0) for force in self.forces_n))
+
+    @property
+    def text(self) -> str:
+        """All that is known, in full."""
+        return ", ".join(part for part in (f"{self.title}: {self.sum}", self.word, self.forces) if part)
+
 
 def pair_balances(status: BusStatus | None, servos: ServosConfig) -> tuple[PairBalance, PairBalance]:
     """Right and left, up and down. Before arming nothing is pretensioned, so slack wires are no warning then."""
@@ -319,14 +310,11 @@ def _balance(status: BusStatus | None, servos: ServosConfig, place: int) -> Pair
     forces = None
     if one is not None and other is not None:
         forces = wire_force_mn(joints[0], one) / 1000.0, wire_force_mn(joints[1], other) / 1000.0
-    known = PairBalance(balance.names, balance.wanted_mm, states[0].position_mm + states[1].position_mm, forces, Tone.PLAIN)
-    share = known.share or 0.0
-    tone = Tone.PLAIN
-    if status.armed and abs(share) > 0.5:
-        tone = Tone.BAD if abs(share) >= 1.0 else Tone.WARN
-    elif not status.armed:
-        tone = Tone.FAINT
-    return PairBalance(known.names, known.wanted_mm, known.sum_mm, known.forces_n, tone)
+    known = replace(balance, sum_mm=states[0].position_mm + states[1].position_mm, forces_n=forces)
+    if not status.armed:
+        return known
+    off = abs(known.share or 0.0)
+    return replace(known, tone=Tone.BAD if off >= 1.0 else Tone.WARN if off > 0.5 else Tone.PLAIN)
 
 
 def bus_line(status: BusStatus | None, silence_s: float | None = None) -> Cell:
@@ -350,11 +338,7 @@ def bus_line(status: BusStatus | None, silence_s: float | None = None) -> Cell:
     ]
     whole = f"  {chr(0xB7)}  ".join(parts)
     tip = f"{whole}\n" + tr("cycle: half of the periods of the last ten seconds were shorter than the first, 99 % than p99")
-    if broken := [
-        f"{tr_text(r.name).replace('_', ' ')} {error_words(r.error)}"
-        for r in status.servos
-        if isinstance(r, ServoState) and r.error
-    ]:
+    if broken := [f"{_plain(r.name)} {error_words(r.error)}" for r in status.servos if isinstance(r, ServoState) and r.error]:
         return Cell(f"!! {'; '.join(broken)}", Tone.BAD, tip)  # for which a narrow table has no room
     return Cell(whole, Tone.WARN if slow else Tone.PLAIN, tip)
 
@@ -367,7 +351,7 @@ _WIDTHS = {
     Column.ERROR: (56, 0.35),
 }  # fmt: skip
 """Least width in px, and share of what is left."""
-_HEADER, _ROW = 19, (15, 34)
+_HEADER, _ROW = 19, (15, 34)  # heights, the row's least and most
 _STYLE = """
 QTableView { background: @PANEL; border: none; }
 QHeaderView::section { background: @PANEL; color: @TEXT_FAINT; border: none;
@@ -481,14 +465,12 @@ class ServoDelegate(QStyledItemDelegate):
         if cell.tone >= Tone.WARN:
             painter.fillRect(box.adjusted(1, 0, -1, 0), theme.colour(theme.of(TONE_ROLE[cell.tone]), 0.16))
         size = 14 if box.height() >= 26 else 13 if box.height() >= 21 else 12
-        text_font = theme.semi_bold(size) if column is Column.JOINT or cell.tone >= Tone.WARN else theme.font(size)
+        font = theme.semi_bold(size) if column is Column.JOINT or cell.tone >= Tone.WARN else theme.font(size)
         inside = box.adjusted(_PAD + (_GAP if column is Column.ERROR else 0), 0, -_PAD, 0)
         if cell.track is not None:
             _paint_track(painter, inside.adjusted(2, 0, -_NUMBER_PX, 0), cell.track, cell.tone)
-        painter.setFont(theme.fitted(text_font, cell.text, int(inside.width()), 9))
-        painter.setPen(QColor(theme.of(TONE_ROLE[cell.tone])))
-        side = Qt.AlignmentFlag.AlignLeft if column in _LEFT else Qt.AlignmentFlag.AlignRight
-        painter.drawText(inside, side | Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), cell.text, int(inside.width())))
+        side = LEFT if column in _LEFT else RIGHT
+        draw_text(painter, inside, cell.text, font, theme.of(TONE_ROLE[cell.tone]), side, smallest_px=9, elided=True)
         painter.restore()
 
 
@@ -496,8 +478,7 @@ def _paint_track(painter: QPainter, box: QRectF, track: Track, tone: Tone) -> No
     """The envelope as a strip with darker ends; a line at the goal, a block at the joint."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     strip = QRectF(box.left(), box.center().y() - 3.5, box.width(), 7.0)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(theme.colour(theme.ORANGE, 0.40))
+    set_colours(painter, theme.colour(theme.ORANGE, 0.40))
     painter.drawRect(strip)
     painter.setBrush(QColor(theme.LINE))
     low, high = (strip.left() + share * strip.width() for share in (track.low_warn, track.high_warn))
@@ -507,136 +488,68 @@ def _paint_track(painter: QPainter, box: QRectF, track: Track, tone: Tone) -> No
         return strip.left() + max(0.0, min(1.0, share)) * strip.width()
 
     if track.goal is not None:
-        painter.setPen(QPen(QColor(theme.TEXT_DIM), 1.5))
-        painter.drawLine(QPointF(x(track.goal), strip.top() - 3), QPointF(x(track.goal), strip.bottom() + 3))
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.of("SKY" if tone < Tone.WARN else TONE_ROLE[tone])))
+        draw_tick(painter, strip, x(track.goal), theme.TEXT_DIM, 1.5, 3)
+    set_colours(painter, theme.of("SKY" if tone < Tone.WARN else TONE_ROLE[tone]))
     painter.drawRect(QRectF(x(track.at) - 2.5, strip.top() - 1, 5.0, strip.height() + 2))
 
 
 _HEIGHT = 33
-_ROLE = {**TONE_ROLE, Tone.PLAIN: "ALLOWED"}
-_RANGE = 1.25
+_RANGE = 1.25  # excess that the balance's bar shows to each side
 
 
-class TendonBalance(QWidget):
+class TendonBalance(PaintedWidget):
     """Two bars that grow from the middle: to the left when a pair of wires hangs slack, to the right when it is too tight.
 
     Half a pair's pretension off is worth a warning; the marks show where that begins.
     """
 
+    ground = "PANEL"
+
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(tr("Balance of the tendon pairs"), tip("tendon_balance"), hint=(440, _HEIGHT), height=_HEIGHT)
         self._pairs: tuple[PairBalance, ...] = ()
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setFixedHeight(_HEIGHT)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(tr("Balance of the tendon pairs"))
-        self.setToolTip(tip("tendon_balance"))
-
-    @property
-    def texts(self) -> tuple[str, ...]:
-        """What is said of each pair, in full."""
-        return tuple(f"{_title(pair)}: {_sum(pair)}{_word(pair)}{_forces(pair)}" for pair in self._pairs)
-
-    def sizeHint(self) -> QSize:
-        return QSize(440, _HEIGHT)
 
     def show_pairs(self, pairs: tuple[PairBalance, ...]) -> None:
         if pairs != self._pairs:
             self._pairs = pairs
-            self.setAccessibleDescription("; ".join(self.texts))
+            self.setAccessibleDescription("; ".join(pair.text for pair in pairs))
             self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(theme.PANEL))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         width = (self.width() - 16.0) / 2
         for k, pair in enumerate(self._pairs):
             _paint_pair(painter, QRectF(k * (width + 16.0), 0, width, self.height()), pair)
-        painter.end()
-
-
-def _title(pair: PairBalance) -> str:
-    return f"{tr_text(pair.names[0])} + {tr_text(pair.names[1])}"
-
-
-def _total(pair: PairBalance) -> str:
-    return NONE if pair.sum_mm is None else number(pair.sum_mm, 2)
-
-
-def _sum(pair: PairBalance) -> str:
-    return tr("{total} of {wanted_mm:.2f} mm", total=_total(pair), wanted_mm=pair.wanted_mm)
-
-
-def _word(pair: PairBalance) -> str:
-    return f", {pair.word}" if pair.word else ""
-
-
-def _forces(pair: PairBalance) -> str:
-    if pair.forces_n is None:
-        return ""
-    one, other = (number(force, 1 if abs(force) < 100.0 else 0) for force in pair.forces_n)
-    return f", {one} / {other} N"
 
 
 def _paint_pair(painter: QPainter, box: QRectF, pair: PairBalance) -> None:
-    text_box = QRectF(box.left(), box.top(), box.width(), 16)
-    name = theme.of(_ROLE[pair.tone])
-    warns = pair.tone >= Tone.WARN
-    title = f"! {_title(pair)} {pair.word}:" if warns else f"{_title(pair)} "
-    right = _forces(pair).removeprefix(", ")
-    painter.setFont(theme.semi_bold(12) if warns else theme.font(12))
-    painter.setPen(QColor(name if warns else theme.TEXT_DIM))
-    advance = painter.fontMetrics().horizontalAdvance
-    choices = (f"{title} {_sum(pair)}", f"{title} {_total(pair)} mm")
-    left = next((text for text in choices if advance(text) + advance(right) + 8 <= text_box.width()), choices[-1])
-    if advance(left) + advance(right) + 8 > text_box.width():
-        right = ""
-    painter.drawText(text_box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, left)
-    painter.setPen(QColor(theme.TEXT_DIM))
-    painter.setFont(theme.font(12))
-    painter.drawText(text_box, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, right)
+    line, warns = QRectF(box.left(), box.top(), box.width(), 16), pair.tone >= Tone.WARN
+    colour = theme.ALLOWED if pair.tone is Tone.PLAIN else theme.of(TONE_ROLE[pair.tone])
+    title = f"! {pair.title} {pair.word}:" if warns else f"{pair.title} "
+    font = theme.semi_bold(12) if warns else theme.font(12)
+    room = line.width() - text_width(font, pair.forces) - 8
+    choices = (f"{title} {pair.sum}", f"{title} {pair.total} mm")
+    left = next((text for text in choices if text_width(font, text) <= room), choices[-1])
+    draw_text(painter, line, left, font, colour if warns else theme.TEXT_DIM)
+    if text_width(font, left) <= room:
+        draw_text(painter, line, pair.forces, theme.font(12), theme.TEXT_DIM, RIGHT)
     track = QRectF(box.left(), box.top() + 20, box.width(), 8)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.RAISED))
-    painter.drawRoundedRect(track, 3, 3)
-    _paint_bar(painter, track, pair.share, name)
-
-
-def _paint_bar(painter: QPainter, track: QRectF, share: float | None, name: str) -> None:
     middle, half = track.center().x(), track.width() / 2 / _RANGE
-    painter.setPen(QPen(QColor(theme.TEXT_FAINT), 1))
-    for share_at in (-0.5, 0.5):
-        painter.drawLine(QPointF(middle + share_at * half, track.top() - 1), QPointF(middle + share_at * half, track.bottom() + 1))
-    if share is not None:
-        end = middle + half * max(-_RANGE, min(_RANGE, share))
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(name))
-        painter.drawRect(QRectF(min(middle, end), track.top() + 1, abs(end - middle), track.height() - 2))
-        if abs(share) > _RANGE:
-            inward = -7 if share > 0 else 7
-            tip = QPointF(end, track.center().y())
-            painter.setBrush(QColor(theme.TEXT))
-            painter.drawPolygon(QPolygonF([tip, tip + QPointF(inward, -5), tip + QPointF(inward, 5)]))
-    painter.setPen(QPen(QColor(theme.TEXT), 2))
-    painter.drawLine(QPointF(middle, track.top() - 3), QPointF(middle, track.bottom() + 3))
+    draw_track(painter, track)
+    for mark_at in (-0.5, 0.5):
+        draw_tick(painter, track, middle + mark_at * half, theme.TEXT_FAINT, 1, 1)
+    if pair.share is not None:
+        draw_middle_bar(painter, track, pair.share / _RANGE, colour, inset=1, least=0.0, arrow=7)
+    draw_tick(painter, track, middle, theme.TEXT, 2, 3)
 
 
 _SHOW_EVERY_S = 0.2
-_LINE_ROLE = {**TONE_ROLE, Tone.PLAIN: "TEXT_DIM"}
-
-
-Entry = tuple[str, Callable[[], object]]
-"""Of a menu: its text, and what it does."""
 
 
 class ServoTable(QWidget):
     """Renewed five times a second at most, and there only the cells that changed.
 
     The table takes no keyboard focus, as the arrow keys belong to the robot; all that it offers is in the buttons' menus as well.
-    Each wish is asked back in the widget itself, then told by a signal.
+    Each request is confirmed in the widget itself, then emitted as a signal.
 
     Attributes
     ----------
@@ -670,14 +583,9 @@ class ServoTable(QWidget):
         self._bus.setFixedHeight(16)
         self._question = QuestionStrip()
         self._question.closed.connect(self._on_answered)
-        self._restart_button, self._zero_button, self._off_button = (
-            self._make_button(text, slot)
-            for text, slot in (
-                (tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), self._open_restart_menu),
-                (tr("Zero\N{HORIZONTAL ELLIPSIS}"), self._open_zero_menu),
-                (tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off),
-            )
-        )
+        self._restart_button = self._make_button(tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), self._open_restart_menu)
+        self._zero_button = self._make_button(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self._open_zero_menu)
+        self._off_button = self._make_button(tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off)
         self._asked_by: QWidget = self._zero_button
         self._lay_out()
         self.setAccessibleName(tr("Servos"))
@@ -693,7 +601,7 @@ class ServoTable(QWidget):
 
     @property
     def question(self) -> QuestionStrip:
-        """Where a wish is asked back."""
+        """Where a request is confirmed."""
         return self._question
 
     def show_status(self, status: BusStatus | None, servos: ServosConfig) -> None:
@@ -711,9 +619,8 @@ class ServoTable(QWidget):
         self._safety = safety
 
     def menu_for(self, joint: JointConfig | None) -> QMenu:
-        """What can be done, with one servo (None: with all)."""
-        menu = QMenu(self)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        """What can be done with one servo (None: with all)."""
+        menu = self._make_menu()
         free = self._reachable and not self._armed
         if joint is not None:
             restart = menu.addAction(
@@ -727,9 +634,8 @@ class ServoTable(QWidget):
         menu.addAction(tr("Switch all torque off"), self._ask_torque_off).setEnabled(self._reachable)
         return menu
 
-    # ---- composition
-
-    def _make_button(self, text: str, slot: Callable[[], None]) -> QPushButton:
+    @staticmethod
+    def _make_button(text: str, slot: Callable[[], None]) -> QPushButton:
         button = QPushButton(text)
         button.setStyleSheet(BUTTON_STYLE)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
@@ -752,10 +658,8 @@ class ServoTable(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
-        column.addWidget(self._table, 1)
-        column.addWidget(self._balance)
-        column.addWidget(self._bus)
-        column.addWidget(strip)
+        for widget, stretch in ((self._table, 1), (self._balance, 0), (self._bus, 0), (strip, 0)):
+            column.addWidget(widget, stretch)
 
     # ---- showing
 
@@ -763,19 +667,18 @@ class ServoTable(QWidget):
         believed = status if silence_s is None else None
         self._model.show_rows(servo_rows(believed, self._servos, self._safety))
         self._balance.show_pairs(pair_balances(believed, self._servos))
-        self._show_line(bus_line(status, silence_s))
-        armed, reachable = believed is not None and believed.armed, believed is not None
-        if (armed, reachable) != (self._armed, self._reachable) or status is None:
-            self._armed, self._reachable = armed, reachable
-            self._offer()
-
-    def _show_line(self, line: Cell) -> None:
+        line = bus_line(status, silence_s)
         if line.text != self._bus.text():
             self._bus.setText(line.text)
             self._bus.setToolTip(line.tip)
-            theme.set_sheet(self._bus, f"color: @{_LINE_ROLE[line.tone]}; font-size: 12px;")
+            role = "TEXT_DIM" if line.tone is Tone.PLAIN else TONE_ROLE[line.tone]
+            theme.set_sheet(self._bus, f"color: @{role}; font-size: 12px;")
+        armed, reachable = believed is not None and believed.armed, believed is not None
+        if (armed, reachable) != (self._armed, self._reachable) or status is None:
+            self._armed, self._reachable = armed, reachable
+            self._show_offered()
 
-    def _offer(self) -> None:
+    def _show_offered(self) -> None:
         free = self._reachable and not self._armed
         why = "" if free else tr("press STOP or Torque off first") if self._armed else tr("the servo bus is not open")
         self._restart_button.setEnabled(free)
@@ -795,34 +698,33 @@ class ServoTable(QWidget):
         self.menu_for(self._servos.joints[place] if place >= 0 else None).popup(self._table.viewport().mapToGlobal(at))
 
     def _open_restart_menu(self) -> None:
-        joints: list[Entry] = [
-            (f"{joint.id}  {_plain(joint.name)}", partial(self._ask_restart, joint)) for joint in self._servos.joints
-        ]
-        self._open_menu(self._restart_button, joints)
+        menu = self._make_menu()
+        for joint in self._servos.joints:
+            menu.addAction(f"{joint.id}  {_plain(joint.name)}", partial(self._ask_restart, joint))
+        _popup_above(menu, self._restart_button)
 
     def _open_zero_menu(self) -> None:
-        joints: list[Entry] = [(_plain(joint.name), partial(self._ask_zero, joint.name)) for joint in self._servos.joints]
-        self._open_menu(self._zero_button, [(tr("All joints"), partial(self._ask_zero, None)), *joints])
+        menu = self._make_menu()
+        menu.addAction(tr("All joints"), partial(self._ask_zero, None))
+        for joint in self._servos.joints:
+            menu.addAction(_plain(joint.name), partial(self._ask_zero, joint.name))
+        _popup_above(menu, self._zero_button)
 
-    def _open_menu(self, button: QPushButton, entries: list[Entry]) -> None:
+    def _make_menu(self) -> QMenu:
         menu = QMenu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for text, slot in entries:
-            menu.addAction(text, slot)
-        menu.popup(button.mapToGlobal(QPoint(0, -menu.sizeHint().height())))
+        return menu
 
     def _ask_restart(self, joint: JointConfig) -> None:
         question = tr("Restart servo {id} ({joint})? It must be zeroed again.", id=joint.id, joint=_plain(joint.name))
         self._ask(self._restart_button, question, tr("Restart"), partial(self.reboot_asked.emit, joint.id))
 
     def _ask_zero(self, name: JointName | None) -> None:
-        what = (
-            tr("All joints become 0 mm here") if name is None else tr("{joint} becomes 0 mm here", joint=_plain(name).capitalize())
-        )
-        names = None if name is None else [name]
-        self._ask(
-            self._zero_button, tr("Are the wires slack? {what}.", what=what), tr("Zero"), partial(self.zero_asked.emit, names)
-        )
+        what, names = tr("All joints become 0 mm here"), None
+        if name is not None:
+            what, names = tr("{joint} becomes 0 mm here", joint=_plain(name).capitalize()), [name]
+        question = tr("Are the wires slack? {what}.", what=what)
+        self._ask(self._zero_button, question, tr("Zero"), partial(self.zero_asked.emit, names))
 
     def _ask_torque_off(self) -> None:
         self._ask(self._off_button, tr("All motors let go and the wires hang loose."), tr("Torque off"), self.torque_off_asked.emit)
@@ -834,7 +736,8 @@ class ServoTable(QWidget):
 
     @Slot()
     def _on_answered(self) -> None:
-        had_focus = self._question.isAncestorOf(self.focusWidget()) if self.focusWidget() is not None else False
+        focus = self.focusWidget()
+        had_focus = focus is not None and self._question.isAncestorOf(focus)
         self._strip.setCurrentIndex(0)
         if had_focus:
             self._asked_by.setFocus()
@@ -842,6 +745,10 @@ class ServoTable(QWidget):
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
         self._question.cancel()
+
+
+def _popup_above(menu: QMenu, button: QPushButton) -> None:
+    menu.popup(button.mapToGlobal(QPoint(0, -menu.sizeHint().height())))
 
 
 def _plain(name: str) -> str:

@@ -1,15 +1,11 @@
-"""All keys of a window on one page, over it.
-
-The operator window's keys.
-"""
+"""All keys of a window on one page, over it; and those of the operator window."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetrics, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtCore import QPoint, QRect, QRectF, Qt
+from PySide6.QtGui import QMouseEvent, QPainter
 from PySide6.QtWidgets import QMainWindow, QWidget
 
 from app.operator.manual_drive import KEYS
@@ -17,23 +13,21 @@ from app.ui import theme
 from app.ui.actions import KeyTable, key_names, menu_tables, shown
 from app.ui.i18n import mark, tr
 from app.ui.texts import DEADMAN_KEY
+from app.widgets.basics import OnResize
+from app.widgets.painting import PaintedWidget, draw_box, draw_text, text_width
 
-TablesOf = Callable[[QMainWindow], Sequence[KeyTable]]
-_MOST_WIDTH, _MOST_COLUMNS, _EDGE, _GUTTER = 1280, 4, 28, 22
+_MOST_WIDTH, _EDGE, _GUTTER = 1280, 28, 22
+_COLUMNS = (3, 4)  # in as few as fit
 _TITLE, _HEAD, _ROW, _BETWEEN = 58.0, 29.0, 26.0, 10.0
 _LEAST_ROW = 16.0
 _CLEAR_PX = 4
-_KEYS_SHARE = 0.46
+_KEYS_SHARE = 0.46  # of a column's width, at most
+
+Column = tuple[KeyTable, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Layout:
-    columns: tuple[tuple[KeyTable, ...], ...]
-    scale: float
-
-
-class KeyPage(QWidget):
-    """Covers its parent; a click closes it. What it says is asked for each time that it opens.
+class KeyPage(PaintedWidget):
+    """Covers its parent; a click closes it. Its tables are made each time that it opens.
 
     Parameters
     ----------
@@ -42,20 +36,21 @@ class KeyPage(QWidget):
     above : what the page ends above, a part of the parent that must stay in sight and in reach.
     """
 
-    def __init__(self, parent: QWidget, tables_of: TablesOf, above: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(
+        self, parent: QWidget, tables_of: Callable[[QMainWindow], Sequence[KeyTable]], above: QWidget | None = None
+    ) -> None:
+        super().__init__(tr("Keys"), parent=parent)
         self._parent = parent
         self._tables_of = tables_of
         self._above = above
-        self._tables: tuple[KeyTable, ...] = ()
+        self._tables: Column = ()
         self.hide()
-        self.setAccessibleName(tr("Keys"))
-        parent.installEventFilter(self)
-        if above is not None:
-            above.installEventFilter(self)
+        for watched in (parent, above):
+            if watched is not None:
+                OnResize(watched, self, self._place, moves=True)
 
     @property
-    def tables(self) -> tuple[KeyTable, ...]:
+    def tables(self) -> Column:
         """What it says, as of the last opening."""
         return self._tables
 
@@ -66,85 +61,70 @@ class KeyPage(QWidget):
             self._tables = tuple(self._tables_of(window))
             rows = (row for _, table in self._tables for row in table)
             self.setAccessibleDescription("; ".join(f"{key}: {text}" for key, text in rows))
-        self.setGeometry(self._room())
+        self._place()
         self.setVisible(not self.isVisible())
         self.raise_()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() in (QEvent.Type.Resize, QEvent.Type.Move):
-            self.setGeometry(self._room())
-        return False
-
-    def _room(self) -> QRect:
-        room = self._parent.rect()
+    def _place(self) -> None:
+        room = QRect(self._parent.rect())
         if self._above is not None:
             room.setBottom(self._above.mapTo(self._parent, QPoint(0, 0)).y() - _CLEAR_PX)
-        return room
+        self.setGeometry(room)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.hide()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         painter.fillRect(self.rect(), theme.colour(theme.ON_PICTURE.INK, 0.78))
-        layout = _laid_out(self._tables, self.height() - 24 - _TITLE - _EDGE / 2)
-        heights = [_height(column) * layout.scale for column in layout.columns]
-        page = QRectF(0, 0, min(_MOST_WIDTH, self.width() - 24), _TITLE + max(heights, default=0.0) + _EDGE / 2)
+        columns, scale = _lay_out(self._tables, self.height() - 24 - _TITLE - _EDGE / 2)
+        page = QRectF(0, 0, min(_MOST_WIDTH, self.width() - 24), _TITLE + _tallest(columns) * scale + _EDGE / 2)
         page.moveCenter(QRectF(self.rect()).center())
-        painter.setPen(QPen(QColor(theme.LINE), 1))
-        painter.setBrush(QColor(theme.PANEL))
-        painter.drawRoundedRect(page, 12, 12)
-        painter.setPen(QColor(theme.TEXT))
-        painter.setFont(theme.bold(22))
-        corner = Qt.AlignmentFlag.AlignTop
-        painter.drawText(page.adjusted(_EDGE, 18, 0, 0), Qt.AlignmentFlag.AlignLeft | corner, tr("Keys"))
-        painter.setPen(QColor(theme.TEXT_FAINT))
-        painter.setFont(theme.font(12))
-        painter.drawText(page.adjusted(0, 24, -_EDGE, 0), Qt.AlignmentFlag.AlignRight | corner, tr("F1 or Esc closes this page"))
-        left = page.left() + _EDGE
-        for column, width in zip(layout.columns, _widths(layout.columns, page.width() - 2 * _EDGE), strict=True):
-            _paint_column(painter, QRectF(left, page.top() + _TITLE, width, 0), column, layout.scale)
-            left += width + _GUTTER
-        painter.end()
+        draw_box(painter, page, 12, theme.PANEL, theme.LINE)
+        left, right, top = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight, Qt.AlignmentFlag.AlignTop
+        draw_text(painter, page.adjusted(_EDGE, 18, 0, 0), tr("Keys"), theme.bold(22), theme.TEXT, left | top)
+        hint = page.adjusted(0, 24, -_EDGE, 0)
+        draw_text(painter, hint, tr("F1 or Esc closes this page"), theme.font(12), theme.TEXT_FAINT, right | top)
+        x = page.left() + _EDGE
+        for column, width in zip(columns, _widths(columns, page.width() - 2 * _EDGE), strict=True):
+            _paint_column(painter, QRectF(x, page.top() + _TITLE, width, 0), column, scale)
+            x += width + _GUTTER
 
 
 def _height(tables: Sequence[KeyTable]) -> float:
     return sum(_HEAD + _ROW * len(rows) + _BETWEEN for _, rows in tables)
 
 
-def _laid_out(tables: Sequence[KeyTable], room: float) -> _Layout:
-    """In as few columns as fit, three at least; when nothing fits, the rows move together."""
-    columns: list[tuple[KeyTable, ...]] = []
-    for count in range(3, _MOST_COLUMNS + 1):
+def _tallest(columns: Sequence[Column]) -> float:
+    return max(map(_height, columns), default=0.0)
+
+
+def _lay_out(tables: Column, room: float) -> tuple[tuple[Column, ...], float]:
+    """The columns, and the scale of their rows: when nothing fits, the rows move together."""
+    columns: tuple[Column, ...] = ()
+    for count in _COLUMNS:
         columns = _in_columns(tables, count)
         if _tallest(columns) <= room:
-            return _Layout(tuple(columns), 1.0)
-    return _Layout(tuple(columns), max(_LEAST_ROW / _ROW, room / max(1.0, _tallest(columns))))
+            return columns, 1.0
+    return columns, max(_LEAST_ROW / _ROW, room / max(1.0, _tallest(columns)))
 
 
-def _tallest(columns: Sequence[Sequence[KeyTable]]) -> float:
-    return max((_height(column) for column in columns), default=0.0)
-
-
-def _in_columns(tables: Sequence[KeyTable], count: int) -> list[tuple[KeyTable, ...]]:
+def _in_columns(tables: Column, count: int) -> tuple[Column, ...]:
     """The tables in their order, none of them cut, in `count` columns at most; the tallest is as low as can be."""
     limits = sorted({_height(tables[first:last]) for first in range(len(tables)) for last in range(first + 1, len(tables) + 1)})
     for limit in limits:
-        columns: list[list[KeyTable]] = [[]]
+        columns: list[Column] = [()]
         for table in tables:
-            if columns[-1] and _height([*columns[-1], table]) > limit:
-                columns.append([])
-            columns[-1].append(table)
+            if columns[-1] and _height((*columns[-1], table)) > limit:
+                columns.append(())
+            columns[-1] += (table,)
         if len(columns) <= count and _tallest(columns) <= limit:
-            return [tuple(column) for column in columns]
-    return [tuple(tables)]
+            return tuple(columns)
+    return (tables,)
 
 
-def _widths(columns: Sequence[Sequence[KeyTable]], room: float) -> list[float]:
+def _widths(columns: Sequence[Column], room: float) -> list[float]:
     """Each as its longest row needs; what is left over, or missing, is shared."""
-    metrics = QFontMetrics(theme.font(13))
-    texts = [max(metrics.horizontalAdvance(text) for _, rows in column for _, text in rows) for column in columns]
+    texts = [max(text_width(theme.font(13), text) for _, rows in column for _, text in rows) for column in columns]
     needed = [_keys_width(column) + text + 2.0 for column, text in zip(columns, texts, strict=True)]
     spare = room - _GUTTER * (len(columns) - 1) - sum(needed)
     if spare < 0.0:
@@ -152,33 +132,24 @@ def _widths(columns: Sequence[Sequence[KeyTable]], room: float) -> list[float]:
     return [width + spare / len(columns) for width in needed]
 
 
-def _keys_width(tables: Sequence[KeyTable]) -> float:
-    metrics = QFontMetrics(theme.semi_bold(13))
-    return max(metrics.horizontalAdvance(key) for _, rows in tables for key, _ in rows) + 14.0
+def _keys_width(column: Column) -> float:
+    return max(text_width(theme.semi_bold(13), key) for _, rows in column for key, _ in rows) + 14.0
 
 
-def _paint_column(painter: QPainter, place: QRectF, tables: Sequence[KeyTable], scale: float) -> None:
+def _paint_column(painter: QPainter, place: QRectF, tables: Column, scale: float) -> None:
     keys_px = min(_keys_width(tables), _KEYS_SHARE * place.width())
-    top = place.top()
+    line = QRectF(place)
     for title, rows in tables:
-        painter.setPen(QColor(theme.SKY))
-        painter.setFont(theme.semi_bold(14))
-        painter.drawText(QRectF(place.left(), top, place.width(), _HEAD * scale - 3), Qt.AlignmentFlag.AlignVCenter, title)
-        top += _HEAD * scale
+        line.setHeight(_HEAD * scale - 3)
+        draw_text(painter, line, title, theme.semi_bold(14), theme.SKY)
+        line.moveTop(line.top() + _HEAD * scale)
+        line.setHeight(_ROW * scale)
         for key, text in rows:
-            _paint_row(painter, QRectF(place.left(), top, place.width(), _ROW * scale), key, text, keys_px)
-            top += _ROW * scale
-        top += _BETWEEN * scale
-
-
-def _paint_row(painter: QPainter, place: QRectF, key: str, text: str, keys_px: float) -> None:
-    painter.setPen(QColor(theme.TEXT))
-    painter.setFont(theme.fitted(theme.semi_bold(13), key, int(keys_px - 6)))
-    painter.drawText(place, Qt.AlignmentFlag.AlignVCenter, key)
-    painter.setPen(QColor(theme.TEXT_DIM))
-    room = place.adjusted(keys_px, 0, 0, 0)
-    painter.setFont(theme.fitted(theme.font(13), text, int(room.width())))
-    painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(painter.font(), text, int(room.width())))
+            draw_text(painter, line, key, theme.fitted(theme.semi_bold(13), key, int(keys_px - 6)), theme.TEXT)
+            room = line.adjusted(keys_px, 0, 0, 0)
+            draw_text(painter, room, text, theme.font(13), theme.TEXT_DIM, smallest_px=11, elided=True)
+            line.moveTop(line.top() + _ROW * scale)
+        line.moveTop(line.top() + _BETWEEN * scale)
 
 
 _HELD = (mark("Hold to move, release to stop"), tuple((key_names(keys), motion.value) for motion, keys in KEYS.items()))

@@ -5,25 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QSizePolicy, QWidget
+import numpy as np
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import REASON_TEXT, STATE_TITLE, refusal_line, tip, why_line
-from app.widgets.scene_overlay import LETTER_DROP, LETTER_HEIGHT, state_outline
+from app.widgets.painting import CENTER, NONE, RIGHT, PaintedWidget, draw_text, polygon, set_colours
 from core.config.models import PoseConfig
-from core.types import PoseState, Scene
+from core.types import Point, Points, PoseState, Scene
 
 _HEIGHT = 104
 _WRAPPED = int(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
+_LETTER_HEIGHT = {None: 0.60, PoseState.A: 0.60, PoseState.B: 0.64, PoseState.C: 0.50, PoseState.D: 0.54}
+"""Font size over the box's side."""
+_TRIANGLE_DROP = 0.13  # how far below the middle C's letter sits, over the box's side: a triangle's visual middle is lower
 
 
-class StateBadge(QWidget):
+class StateBadge(PaintedWidget):
     """Shape, letter and colour tell the state: A circle, B square, C triangle, D diamond; a dashed ring with "-" means no pose.
 
-    A shape that is not filled means that the program is not sure of it.
+    The shape of an unsure state is not filled.
 
     Parameters
     ----------
@@ -31,20 +34,17 @@ class StateBadge(QWidget):
     confident_from : the confidence from which on an answer is sure, 0 to 1.
     """
 
+    ground = "PANEL"
+
     def __init__(self, limits: PoseConfig, confident_from: float) -> None:
-        super().__init__()
+        self._meanings = tip("state", "confidence")
+        super().__init__(tr("Pose state"), self._meanings, hint=(440, _HEIGHT), height=_HEIGHT)
         self._limits, self._confident_from = limits, confident_from
         self._state: PoseState | None = None
-        self._is_unsure = False
-        self._sureness = ""
-        self._title = tr("Waiting")
-        self._why = ""
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setFixedHeight(_HEIGHT)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(tr("Pose state"))
-        self._meanings = tip("state", "confidence")
-        self.setToolTip(self._meanings)
+        self.is_unsure = False
+        self.sureness = ""
+        self.title = tr("Waiting")
+        self.why = ""
 
     def set_limits(self, limits: PoseConfig, confident_from: float) -> None:
         self._limits, self._confident_from = limits, confident_from
@@ -53,33 +53,12 @@ class StateBadge(QWidget):
     def letter(self) -> str:
         return self._state.value if self._state is not None else "-"
 
-    @property
-    def title(self) -> str:
-        return self._title
-
-    @property
-    def why(self) -> str:
-        return self._why
-
-    @property
-    def sureness(self) -> str:
-        """How sure the state is; empty without one."""
-        return self._sureness
-
-    @property
-    def is_unsure(self) -> bool:
-        return self._is_unsure
-
-    def sizeHint(self) -> QSize:
-        return QSize(440, _HEIGHT)
-
     def show_scene(self, scene: Scene, *, renew_text: bool = True) -> None:
         """The state of `scene`, or the reason why it has none. A new letter or title always renews the sentence too."""
-        pose = scene.pose
+        pose, refusal = scene.pose, scene.refusal
         if pose is not None:
             self._set(pose.state, tr(STATE_TITLE[pose.state]), lambda: why_line(pose, self._limits), renew_text, pose.confidence)
-        elif scene.refusal is not None:
-            refusal = scene.refusal
+        elif refusal is not None:
             self._set(None, tr(REASON_TEXT[refusal.reason].title), lambda: refusal_line(refusal), renew_text)
         else:
             self.show_nothing(tr("No pose"), "")
@@ -91,15 +70,15 @@ class StateBadge(QWidget):
     def _set(
         self, state: PoseState | None, title: str, why: Callable[[], str], renew_text: bool, confidence: float | None = None
     ) -> None:
-        changed = state is not self._state or title != self._title
+        changed = state is not self._state or title != self.title
         if not changed and not renew_text:
             return
         text = why()
         is_unsure, sureness = self._judge(confidence)
-        if not changed and text == self._why and sureness == self._sureness:
+        if not changed and text == self.why and sureness == self.sureness:
             return
-        self._state, self._title, self._why = state, title, text
-        self._is_unsure, self._sureness = is_unsure, sureness
+        self._state, self.title, self.why = state, title, text
+        self.is_unsure, self.sureness = is_unsure, sureness
         self.setAccessibleDescription(f"{self.letter}: {title}{f' ({sureness})' if sureness else ''}. {text}")
         # a long reason may not fit; the tool tip has all of it
         self.setToolTip(text if state is None and text else self._meanings)
@@ -114,34 +93,20 @@ class StateBadge(QWidget):
         percent = min(math.floor(100.0 * confidence + 1e-9), 99)
         return is_unsure, tr("unsure: {percent} %", percent=percent) if is_unsure else tr("{percent} % sure", percent=percent)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(theme.PANEL))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         side = self.height() - 4.0
-        box = QRectF(2.0, 2.0, side, side)
-        paint_state(painter, box, self._state, filled=not self._is_unsure)
-        left = box.right() + 18
-        width = self.width() - left - 2
-        room = width - self._paint_sureness(painter, QRectF(left, 2, width, 36))
-        painter.setPen(QColor(theme.TEXT))
-        painter.setFont(theme.fitted(theme.bold(theme.Size.TITLE), self._title, int(room)))
-        painter.drawText(QRectF(left, 2, room, 36), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, self._title)
+        paint_state(painter, QRectF(2.0, 2.0, side, side), self._state, filled=not self.is_unsure)
+        left = side + 20.0
+        head = QRectF(left, 2, self.width() - left - 2, 36)
+        if self.sureness:
+            font = theme.bold() if self.is_unsure else theme.font()
+            draw_text(painter, head, self.sureness, font, theme.FAULT if self.is_unsure else theme.TEXT_DIM, RIGHT)
+            head.adjust(0, 0, -QFontMetricsF(font).horizontalAdvance(self.sureness) - theme.GAP, 0)
+        draw_text(painter, head, self.title, theme.bold(theme.Size.TITLE), theme.TEXT, smallest_px=11)
+        place = QRectF(left, 42, self.width() - left - 2, self.height() - 42)
         painter.setPen(QColor(theme.TEXT_DIM))
-        place = QRectF(left, 42, width, self.height() - 42)
-        painter.setFont(_wrapped_font(self._why, place))
-        painter.drawText(place, _WRAPPED, self._why)
-        painter.end()
-
-    def _paint_sureness(self, painter: QPainter, place: QRectF) -> float:
-        """At the right of `place`; returns the width that it takes, with a gap."""
-        if not self._sureness:
-            return 0.0
-        font = theme.bold() if self._is_unsure else theme.font()
-        painter.setFont(font)
-        painter.setPen(QColor(theme.FAULT if self._is_unsure else theme.TEXT_DIM))
-        painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, self._sureness)
-        return QFontMetricsF(font).horizontalAdvance(self._sureness) + theme.GAP
+        painter.setFont(_wrapped_font(self.why, place))
+        painter.drawText(place, _WRAPPED, self.why)
 
 
 def _wrapped_font(text: str, place: QRectF) -> QFont:
@@ -153,22 +118,47 @@ def _wrapped_font(text: str, place: QRectF) -> QFont:
     return result
 
 
-def paint_state(painter: QPainter, box: QRectF, state: PoseState | None, *, filled: bool = True) -> None:
-    """The state's shape and letter inside `box`; not `filled`, only its outline, as of a state that is not sure."""
-    name = theme.STATE_COLOUR[state]
-    side, middle = box.height(), box.center()
-    outline = QPolygonF([middle + QPointF(x, y) * (side / 2) for x, y in state_outline(state).tolist()])
+def paint_state(painter: QPainter, box: QRectF, state: PoseState | None, *, filled: bool = True, on_picture: bool = False) -> None:
+    """The state's shape and letter inside `box`; not `filled`, only its outline, as of a state that is not sure.
+
+    `on_picture`: in the colours of what lies over a picture, instead of the window's.
+    """
+    scheme = theme.ON_PICTURE if on_picture else theme.current()
+    colour, side = theme.STATE_COLOUR[state] if state is not None else scheme.TEXT_FAINT, box.height()
     if state is None:
-        painter.setPen(QPen(QColor(name), max(2.0, side / 28), Qt.PenStyle.DashLine))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
+        set_colours(painter, None, QPen(QColor(colour), max(2.0, side / 28), Qt.PenStyle.DashLine))
     elif not filled:
-        painter.setPen(theme.outline_of(name, max(2.0, side / 20)))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
+        set_colours(painter, None, theme.outline_of(colour, max(2.0, side / 20)))
     else:
-        painter.setPen(theme.edge_of(name))
-        painter.setBrush(QColor(name))
-    painter.drawPolygon(outline)
-    painter.setPen(QColor(theme.TEXT_DIM if state is None else theme.STATE_INK if filled else theme.TEXT))
-    painter.setFont(theme.bold(max(9, round(side * LETTER_HEIGHT[state]))))
-    letter = state.value if state is not None else "\N{EN DASH}"
-    painter.drawText(box.translated(0, side * LETTER_DROP.get(state, 0.0)), Qt.AlignmentFlag.AlignCenter, letter)
+        set_colours(painter, colour, None if on_picture else theme.edge_of(colour))
+    painter.drawPolygon(polygon((state_outline(state) * (side / 2)).tolist(), box.center()))
+    ink = scheme.TEXT_DIM if state is None else theme.STATE_INK if filled else scheme.TEXT
+    place = box.translated(0, side * _TRIANGLE_DROP if state is PoseState.C else 0.0)
+    font = theme.bold(max(9, round(side * _LETTER_HEIGHT[state])))
+    draw_text(painter, place, state.value if state is not None else NONE, font, ink, CENTER)
+
+
+def state_outline(state: PoseState | None) -> Points:
+    """Closed outline (N, 2) in a box of -1..1: A circle, B square, C triangle, D diamond, None circle."""
+    match state:
+        case PoseState.B:
+            return _rounded([(-0.86, -0.86), (0.86, -0.86), (0.86, 0.86), (-0.86, 0.86)], 0.2)
+        case PoseState.C:
+            return _rounded([(0.0, -1.0), (1.06, 0.84), (-1.06, 0.84)], 0.22)
+        case PoseState.D:
+            return _rounded([(0.0, -1.02), (1.02, 0.0), (0.0, 1.02), (-1.02, 0.0)], 0.16)
+    turn = np.linspace(0.0, 2 * math.pi, 72, endpoint=False)
+    return 0.95 * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def _rounded(corners: list[Point], rounding: float) -> Points:
+    """The polygon with its corners replaced by quadratic curves that start `rounding` before them."""
+    points = np.array(corners)
+    along = np.linspace(0.0, 1.0, 8)[:, None]
+    pieces = []
+    for k, corner in enumerate(points):
+        before, after = points[k - 1] - corner, points[(k + 1) % len(points)] - corner
+        enter = corner + before / np.linalg.norm(before) * rounding
+        leave = corner + after / np.linalg.norm(after) * rounding
+        pieces.append((1 - along) ** 2 * enter + 2 * along * (1 - along) * corner + along**2 * leave)
+    return np.concatenate(pieces)

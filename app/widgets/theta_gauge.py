@@ -4,47 +4,41 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPen, QPixmap
 
 from app.ui import theme
 from app.ui.texts import side, signed_degrees, tip
+from app.widgets.painting import CENTER, NONE, PaintedWidget, draw_text, set_colours
 from core.types import Pose
 
-_OVERFLOW_DEG = 22.0
+_OVERFLOW_DEG = 22.0  # how far the dial goes on below 90 degrees, for all angles up to 180
 _SMALL_PX = 66.0  # below this radius the number needs the room of the outermost labels
 
 
-class ThetaGauge(QWidget):
+class ThetaGauge(PaintedWidget):
     """A half circle from -90 (left) over 0 (along the vessel) to +90 degrees (right); 90..180 is squeezed into the ends below it.
 
     The green arc is what counts as "along the vessel". Without a pose the needle is gone and the number is a dash.
     """
 
+    ground = "PANEL"
+
     def __init__(self, theta_allow_deg: float) -> None:
-        super().__init__()
+        super().__init__("theta", tip("theta"), hint=(240, 160), least=(200, 100))
         self._allow_deg = theta_allow_deg
         self._theta_deg: float | None = None
         self._number: float | None = None
         self._scale: QPixmap | None = None
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setMinimumSize(200, 100)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("theta")
-        self.setToolTip(tip("theta"))
 
     @property
     def text(self) -> str:
         """The number on the dial."""
-        return "\N{EN DASH}" if self._number is None else signed_degrees(self._number, 1)
+        return NONE if self._number is None else signed_degrees(self._number, 1)
 
     @property
     def direction(self) -> str:
         return "" if self._number is None or abs(self._number) < 0.05 else side(self._number)
-
-    def sizeHint(self) -> QSize:
-        return QSize(240, 160)
 
     def show_pose(self, pose: Pose | None, *, renew_text: bool = True) -> None:
         """The needle follows at once, the number when it is time to renew texts."""
@@ -64,17 +58,14 @@ class ThetaGauge(QWidget):
         self._allow_deg, self._scale = theta_allow_deg, None
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         # room: tick labels outside the arc, the number under the hub
         radius = min(self.width() / 2 - 30.0, self.height() - 72.0)
         hub = QPointF(self.width() / 2, 22.0 + radius)
-        painter = QPainter(self)
         painter.drawPixmap(0, 0, self._dial(hub, radius))
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._theta_deg is not None:
-            self._paint_needle(painter, hub, radius, self._theta_deg)
+            _paint_needle(painter, hub, radius, self._theta_deg)
         self._paint_number(painter, hub, radius)
-        painter.end()
 
     def _dial(self, hub: QPointF, radius: float) -> QPixmap:
         """The scale, painted once per size: it costs more than the needle and never changes."""
@@ -91,57 +82,52 @@ class ThetaGauge(QWidget):
 
     def _paint_scale(self, painter: QPainter, hub: QPointF, radius: float) -> None:
         rim = QRectF(hub.x() - radius, hub.y() - radius, 2 * radius, 2 * radius)
-        self._paint_arc(painter, rim, -90, 90, QPen(QColor(theme.LINE), 8))
+        beyond = theme.colour(theme.LINE, 0.55)
+        _paint_arc(painter, rim, -90, 90, QColor(theme.LINE))
         for low in (-180, 90):
-            self._paint_arc(painter, rim, low, low + 90, QPen(theme.colour(theme.LINE, 0.55), 8))
-        self._paint_arc(painter, rim, -self._allow_deg, self._allow_deg, QPen(QColor(theme.ALLOWED), 8))
-        painter.setFont(theme.font(theme.Size.LABEL))
+            _paint_arc(painter, rim, low, low + 90, beyond)
+        _paint_arc(painter, rim, -self._allow_deg, self._allow_deg, QColor(theme.ALLOWED))
         for degrees in range(-90, 91, 15):
             major = degrees % 45 == 0
-            inner = _on_dial(hub, radius - (12 if major else 8), degrees)
             painter.setPen(QPen(QColor(theme.TEXT_DIM if major else theme.TEXT_FAINT), 1.6 if major else 1.0))
-            painter.drawLine(inner, _on_dial(hub, radius - 4, degrees))
+            painter.drawLine(_on_dial(hub, radius - (12 if major else 8), degrees), _on_dial(hub, radius - 4, degrees))
             if major:
-                self._paint_label(painter, _on_dial(hub, radius + 15, degrees), f"{abs(degrees)}")
+                _paint_label(painter, _on_dial(hub, radius + 15, degrees), f"{abs(degrees)}")
         for degrees in (-180, 180) if radius >= _SMALL_PX else ():
-            self._paint_label(painter, _on_dial(hub, radius + 17, degrees), "180")
-
-    @staticmethod
-    def _paint_arc(painter: QPainter, rim: QRectF, low: float, high: float, pen: QPen) -> None:
-        pen.setCapStyle(Qt.PenCapStyle.FlatCap)
-        painter.setPen(pen)
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        first, last = _dial_angle(high), _dial_angle(low)
-        painter.drawArc(rim, round((90 - first) * 16), round((first - last) * 16))
-
-    @staticmethod
-    def _paint_label(painter: QPainter, middle: QPointF, text: str) -> None:
-        painter.setPen(QColor(theme.TEXT_DIM))
-        painter.drawText(QRectF(middle.x() - 20, middle.y() - 10, 40, 20), Qt.AlignmentFlag.AlignCenter, text)
-
-    @staticmethod
-    def _paint_needle(painter: QPainter, hub: QPointF, radius: float, theta_deg: float) -> None:
-        tip = _on_dial(hub, radius - 2, theta_deg)
-        direction = (tip - hub) * (1.0 / max(radius - 2, 1.0))
-        across = QPointF(-direction.y(), direction.x())
-        painter.setPen(QPen(QColor(theme.PANEL), 1.5))
-        painter.setBrush(QColor(theme.THETA))
-        painter.drawPolygon(QPolygonF([tip, hub + across * 6, hub - direction * 12, hub - across * 6]))
-        painter.setBrush(QColor(theme.TEXT))
-        painter.drawEllipse(hub, 4.0, 4.0)
+            _paint_label(painter, _on_dial(hub, radius + 17, degrees), "180")
 
     def _paint_number(self, painter: QPainter, hub: QPointF, radius: float) -> None:
-        shown = self._number is not None
-        painter.setPen(QColor(theme.TEXT if shown else theme.TEXT_FAINT))
-        painter.setFont(theme.bold(theme.Size.NUMBER if radius >= _SMALL_PX else 26))
-        painter.drawText(QRectF(hub.x() - 90, hub.y() + 10, 180, 34), Qt.AlignmentFlag.AlignCenter, self.text)
-        painter.setFont(theme.semi_bold(13))
+        is_small = radius < _SMALL_PX
+        number = QRectF(hub.x() - 90, hub.y() + 10, 180, 34)
+        font = theme.bold(26 if is_small else theme.Size.NUMBER)
+        draw_text(painter, number, self.text, font, theme.TEXT if self._number is not None else theme.TEXT_FAINT, CENTER)
         for sign in (-1.0, 1.0):
-            painter.setPen(QColor(theme.TEXT if side(sign) == self.direction else theme.TEXT_FAINT))
             box = QRectF(hub.x() + sign * radius * 0.56 - 30, hub.y() - 20, 60, 20)
-            if radius < _SMALL_PX:  # on so small a dial they would lie on ticks and needle: beside the number
+            if is_small:  # on so small a dial they would lie on ticks and needle: beside the number
                 box = QRectF(hub.x() + sign * 84 - 30, hub.y() + 17, 60, 20)
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, side(sign))
+            colour = theme.TEXT if side(sign) == self.direction else theme.TEXT_FAINT
+            draw_text(painter, box, side(sign), theme.semi_bold(13), colour, CENTER)
+
+
+def _paint_arc(painter: QPainter, rim: QRectF, low: float, high: float, colour: QColor) -> None:
+    set_colours(painter, None, QPen(colour, 8, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap))
+    first, last = _dial_angle(high), _dial_angle(low)
+    painter.drawArc(rim, round((90 - first) * 16), round((first - last) * 16))
+
+
+def _paint_label(painter: QPainter, middle: QPointF, text: str) -> None:
+    box = QRectF(middle.x() - 20, middle.y() - 10, 40, 20)
+    draw_text(painter, box, text, theme.font(theme.Size.LABEL), theme.TEXT_DIM, CENTER)
+
+
+def _paint_needle(painter: QPainter, hub: QPointF, radius: float, theta_deg: float) -> None:
+    tip_at = _on_dial(hub, radius - 2, theta_deg)
+    direction = (tip_at - hub) * (1.0 / max(radius - 2, 1.0))
+    across = QPointF(-direction.y(), direction.x())
+    set_colours(painter, theme.THETA, theme.PANEL, 1.5)
+    painter.drawPolygon([tip_at, hub + across * 6, hub - direction * 12, hub - across * 6])
+    painter.setBrush(QColor(theme.TEXT))
+    painter.drawEllipse(hub, 4.0, 4.0)
 
 
 def _dial_angle(theta_deg: float) -> float:

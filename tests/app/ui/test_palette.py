@@ -10,7 +10,7 @@ import pytest
 
 from app.ui import theme
 from app.ui.theme import fitted, semi_bold
-from app.widgets.scene_overlay import state_outline
+from app.widgets.state_badge import state_outline
 from core.types import PoseState
 
 

@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.ui import theme
-from app.widgets.live_view import LiveView, _middle
-from app.widgets.scene_overlay import Layer, LoupeCorner
+from app.widgets.live_view import LiveView, LoupeCorner, _middle
+from app.widgets.scene_overlay import Layer
 from core.types import Advice, Frame, Masks, RobotPath, Route, Scene, Skeletons, Speed
 from tests.app.fakes import FakeBench, make_pose, make_scene
 from tests.app.hand_clock import Clock

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPointF, QRectF
 
-from app.widgets.scene_overlay import LoupeCorner, seen_places
+from app.widgets.live_view import LoupeCorner
+from app.widgets.scene_overlay import seen_places
 from core.types import Points
 from tests.app.hand_clock import Clock
 

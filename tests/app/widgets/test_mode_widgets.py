@@ -644,17 +644,6 @@ def test_log_keeps_the_newest_two_thousand(log: EventLog, visible: bool) -> None
     assert log.lines[-1].endswith("  7")
 
 
-def test_a_hidden_log_bothers_no_view_until_it_is_shown(log: EventLog) -> None:
-    changes: list[int] = []
-    log._model.rowsInserted.connect(lambda: changes.append(1))
-    log._model.modelReset.connect(lambda: changes.append(1))
-    for k in range(100):
-        log.add(LogKind.NOTE, str(k))
-    assert changes == []
-    log.show()
-    assert changes == [1] and log._model.rowCount() == 100
-
-
 def test_filter_shows_one_kind_also_of_what_comes_later(log: EventLog, wall: WallClock) -> None:
     log.show()
     log.add(LogKind.NOTE, "a")

@@ -92,11 +92,3 @@ def test_any_shape(shape: tuple[int, int]) -> None:
     picture = draw_overlay(image, scene, stamp="SIM")
     assert picture.shape[1] >= shape[1]
     assert picture.shape[0] > shape[0]
-
-
-def test_missing_font_files_are_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: object) -> None:
-    monkeypatch.setattr(overlay_image, "RESOURCES", tmp_path)
-    overlay_image._face.cache_clear()
-    image = np.full((120, 160, 3), 128, np.uint8)
-    assert draw_overlay(image, make_scene(make_pose())).shape[1] == 1280
-    overlay_image._face.cache_clear()

@@ -7,10 +7,10 @@ import pytest
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QPainter, QPixmap
 
-from app.widgets.image_canvas import PictureCanvas
+from app.widgets.image_canvas import ImageCanvas
 
 
-class Painted(PictureCanvas):
+class Painted(ImageCanvas):
     """On a screen of any density."""
 
     def __init__(self, ratio: float) -> None:

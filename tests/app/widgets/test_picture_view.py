@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from app.ui import theme
-from app.widgets.image_canvas import PictureView, halvings, render
+from app.widgets.image_canvas import Viewport, halvings, render
 
 SIZE, ROOM = (640, 480), (900, 600)
 
 
 def test_the_whole_picture_lies_in_the_middle() -> None:
-    view = PictureView.fitted(SIZE, ROOM)
+    view = Viewport.fitted(SIZE, ROOM)
     assert view.zoom == 1.25
     assert view.to_screen((-0.5, -0.5)) == (50.0, 0.0)
     assert view.to_screen((639.5, 479.5)) == (850.0, 600.0)
@@ -21,14 +21,14 @@ def test_the_whole_picture_lies_in_the_middle() -> None:
 
 @pytest.mark.parametrize("zoom", [1.0, 3.7, 25.0])
 def test_there_and_back(zoom: float) -> None:
-    view = PictureView.fitted(SIZE, ROOM).zoomed(zoom, (200.0, 100.0))
+    view = Viewport.fitted(SIZE, ROOM).zoomed(zoom, (200.0, 100.0))
     assert view.to_image(*view.to_screen((123.4, 56.7))) == pytest.approx((123.4, 56.7))
     mapped = view.transform.map(123.4 + 0.5, 56.7 + 0.5)
     assert mapped == pytest.approx(view.to_screen((123.4, 56.7)))
 
 
 def test_zoom_keeps_the_place_and_ends_at_the_whole_picture() -> None:
-    view = PictureView.fitted(SIZE, ROOM)
+    view = Viewport.fitted(SIZE, ROOM)
     fixed = view.to_image(300.0, 200.0)
     near = view.zoomed(4.0, (300.0, 200.0))
     assert near.to_image(300.0, 200.0) == pytest.approx(fixed)
@@ -37,14 +37,14 @@ def test_zoom_keeps_the_place_and_ends_at_the_whole_picture() -> None:
 
 
 def test_the_picture_cannot_be_lost() -> None:
-    view = PictureView.fitted(SIZE, ROOM).zoomed(5.0, (0.0, 0.0)).panned(1e6, -1e6)
+    view = Viewport.fitted(SIZE, ROOM).zoomed(5.0, (0.0, 0.0)).panned(1e6, -1e6)
     left, _ = view.to_screen((-0.5, 0.0))
     assert left == pytest.approx(60.0), "no more than a margin of surroundings"
 
 
 def test_another_widget_size_keeps_what_is_seen() -> None:
-    assert PictureView.fitted(SIZE, ROOM).in_room((640, 480)).zoom == 1.0
-    near = PictureView.fitted(SIZE, ROOM).zoomed(4.0, (450.0, 300.0))
+    assert Viewport.fitted(SIZE, ROOM).in_room((640, 480)).zoom == 1.0
+    near = Viewport.fitted(SIZE, ROOM).zoomed(4.0, (450.0, 300.0))
     assert near.in_room((500, 500)).center == near.center
 
 
@@ -59,7 +59,7 @@ def test_a_pixel_is_rendered_where_it_lies(size: tuple[int, int]) -> None:
     unit = size[0] // 640
     image[100 * unit : 104 * unit, 200 * unit : 204 * unit] = (255, 0, 0)
     for factor in (1.0, 3.0, 8.0):
-        view = PictureView.fitted(size, ROOM).zoomed(factor, (300.0, 130.0))
+        view = Viewport.fitted(size, ROOM).zoomed(factor, (300.0, 130.0))
         picture = render(halvings(image), view, 1.0, 1.0, 0.0)
         x, y = view.to_screen((202.0 * unit - 0.5, 102.0 * unit - 0.5))
         assert picture.pixelColor(round(x), round(y)).red() > 200
@@ -68,7 +68,7 @@ def test_a_pixel_is_rendered_where_it_lies(size: tuple[int, int]) -> None:
 
 def test_beyond_the_picture_is_nothing_and_light_changes_greys() -> None:
     image = np.full((480, 640, 3), 100, np.uint8)
-    view = PictureView.fitted(SIZE, ROOM)
+    view = Viewport.fitted(SIZE, ROOM)
     picture = render((image,), view, 1.0, 2.0, 10.0)
     assert picture.pixelColor(20, 300).name().upper() == theme.INK
     assert picture.pixelColor(450, 300).red() == (100 - 128) * 2 + 128 + 10

@@ -17,8 +17,9 @@ from app.ui import theme
 from app.widgets.command_panel import MAX_ENTRIES, ClampLog, CommandPanel
 from app.widgets.distance_bars import ClearanceBar
 from app.widgets.live_view import LiveView
+from app.widgets.painting import number
 from app.widgets.scene_overlay import Layer
-from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_words, known_joints, number, pair_balances, servo_rows
+from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_words, known_joints, pair_balances, servo_rows
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Limit
@@ -427,8 +428,8 @@ def told(log: ClampLog) -> list[tuple[str, str, int]]:
 
 def test_log_tells_clamps_newest_first() -> None:
     log = ClampLog()
-    log.see(bus(cycle=1, clamps=(clamp(),)), "12:00:00")
-    log.see(bus(cycle=2, clamps=(clamp("delivery_1", -3.0, -2.9, Limit.STEP),)), "12:00:01")
+    log.add_status(bus(cycle=1, clamps=(clamp(),)), "12:00:00")
+    log.add_status(bus(cycle=2, clamps=(clamp("delivery_1", -3.0, -2.9, Limit.STEP),)), "12:00:01")
     assert told(log) == [
         ("delivery 1", f"{MINUS}3.00 → {MINUS}2.90 mm, step from the measured position", 1),
         ("right", "1.20 → 0.80 mm, speed", 1),
@@ -438,55 +439,55 @@ def test_log_tells_clamps_newest_first() -> None:
 def test_log_counts_repeats_of_the_same_limit_until_a_second_has_passed() -> None:
     log = ClampLog()
     for cycle in range(1, 6):
-        log.see(bus(cycle=cycle, time_s=0.02 * cycle, clamps=(clamp(asked_mm=cycle), clamp("left"))), "12:00:00")
+        log.add_status(bus(cycle=cycle, time_s=0.02 * cycle, clamps=(clamp(asked_mm=cycle), clamp("left"))), "12:00:00")
     assert told(log) == [("left", "1.20 → 0.80 mm, speed", 5), ("right", "5.00 → 0.80 mm, speed", 5)]
-    log.see(bus(cycle=6, time_s=2.0, clamps=(clamp(),)), "12:00:02")
+    log.add_status(bus(cycle=6, time_s=2.0, clamps=(clamp(),)), "12:00:02")
     assert told(log)[0] == ("right", "1.20 → 0.80 mm, speed", 1)
 
 
 def test_log_sees_a_cycle_once() -> None:
     log = ClampLog()
     for _ in range(3):
-        log.see(bus(cycle=7, clamps=(clamp(),)), "12:00:00")
+        log.add_status(bus(cycle=7, clamps=(clamp(),)), "12:00:00")
     assert told(log) == [("right", "1.20 → 0.80 mm, speed", 1)]
 
 
 def test_log_misses_no_rejection_of_the_cycles_between() -> None:
     log = ClampLog()
-    log.see(bus(cycle=1, rejections={RejectReason.STALE_POSE: 4}), "12:00:00")
+    log.add_status(bus(cycle=1, rejections={RejectReason.STALE_POSE: 4}), "12:00:00")
     assert told(log) == [], "what was counted before is no news"
     seen = Rejection(RejectReason.STALE_POSE, "182 ms (at most 150 ms)")
-    log.see(bus(cycle=2, rejection=seen, rejections={RejectReason.STALE_POSE: 5}), "12:00:00")
-    log.see(bus(cycle=5, rejections={RejectReason.STALE_POSE: 8}), "12:00:00")
+    log.add_status(bus(cycle=2, rejection=seen, rejections={RejectReason.STALE_POSE: 5}), "12:00:00")
+    log.add_status(bus(cycle=5, rejections={RejectReason.STALE_POSE: 8}), "12:00:00")
     assert told(log) == [("rejected", "pose behind the command too old: 182 ms (at most 150 ms)", 4)]
 
 
 def test_rest_is_no_rejection() -> None:
     log = ClampLog()
-    log.see(bus(cycle=1), "12:00:00")
-    log.see(bus(cycle=2, rejections={RejectReason.NO_COMMAND: 30, RejectReason.NOT_ARMED: 2}), "12:00:00")
+    log.add_status(bus(cycle=1), "12:00:00")
+    log.add_status(bus(cycle=2, rejections={RejectReason.NO_COMMAND: 30, RejectReason.NOT_ARMED: 2}), "12:00:00")
     assert told(log) == []
 
 
 def test_a_new_bus_process_starts_its_counts_anew() -> None:
     log = ClampLog()
-    log.see(bus(cycle=900, rejections={RejectReason.OVER_RATE: 9}), "12:00:00")
-    log.see(bus(cycle=3, rejections={RejectReason.OVER_RATE: 1}), "12:00:00")
+    log.add_status(bus(cycle=900, rejections={RejectReason.OVER_RATE: 9}), "12:00:00")
+    log.add_status(bus(cycle=3, rejections={RejectReason.OVER_RATE: 1}), "12:00:00")
     assert told(log) == []
-    log.see(bus(cycle=4, rejections={RejectReason.OVER_RATE: 2}), "12:00:00")
+    log.add_status(bus(cycle=4, rejections={RejectReason.OVER_RATE: 2}), "12:00:00")
     assert told(log) == [("rejected", "goal too far away", 1)]
 
 
 def test_driving_against_the_end_is_told() -> None:
     log = ClampLog()
-    log.see(bus(cycle=1, at_end=("advance",)), "12:00:00")
+    log.add_status(bus(cycle=1, at_end=("advance",)), "12:00:00")
     assert told(log) == [("advance", "stopped at the end of its envelope", 1)]
 
 
 def test_log_keeps_500_entries() -> None:
     log = ClampLog()
     for cycle in range(MAX_ENTRIES + 20):
-        log.see(bus(cycle=cycle, time_s=2.0 * cycle, clamps=(clamp(asked_mm=cycle),)), "12:00:00")
+        log.add_status(bus(cycle=cycle, time_s=2.0 * cycle, clamps=(clamp(asked_mm=cycle),)), "12:00:00")
     assert len(log.entries) == MAX_ENTRIES
     assert log.entries[0].text.startswith("519.00")
 
