@@ -231,13 +231,13 @@ def _measure(folder: Path, config: Config) -> dict[str, Any]:
         window.start()
         until(lambda: window.place >= 0)
         opens_s = time.monotonic() - began_s
-        until(lambda: reader.wait(0.0) and window.rows == len(reader))
+        until(lambda: reader.wait(0.0) and len(window.course) == len(reader))
         known_s = time.monotonic() - began_s
         rng, seeks_ms = np.random.default_rng(0), []
-        for place in rng.integers(0, window.rows, _SEEKS).tolist():
+        for place in rng.integers(0, len(window.course), _SEEKS).tolist():
             window.go(place)
             seeks_ms.append(1000.0 * until(lambda wanted=place: window.place == wanted))  # type: ignore[misc]
-        rows, memory_mb = window.rows, psutil.Process().memory_info().rss / 2**20
+        rows, memory_mb = len(window.course), psutil.Process().memory_info().rss / 2**20
         window.close()
         window.deleteLater()
         application.sendPostedEvents(window, QEvent.Type.DeferredDelete.value)

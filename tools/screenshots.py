@@ -767,10 +767,10 @@ def player(studio: Studio) -> None:
     window.show()
     window.start()
     try:
-        studio.until(lambda: window.rows > _SHOWN_FRAME and bool(window.events), "the session in the player")
+        studio.until(lambda: len(window.course) > _SHOWN_FRAME and bool(window.session.events), "the session in the player")
         window.go(_SHOWN_FRAME)
         studio.until(lambda: window.place == _SHOWN_FRAME, "the frame in the player")
-        window.select((window.time_s - 1.0, window.time_s + 1.5))
+        window.select((window.clock.position_s - 1.0, window.clock.position_s + 1.5))
         studio.wait(0.3)
         studio.take(window, "player")
     finally:

@@ -393,7 +393,7 @@ def run_play(session: Path, against: Path | None = None) -> int:
         panels = window.panels
         switches = overlay_switches(panels.overlay_bar, without=(Layer.LOUPE,) if against is not None else ())
         LayoutState(window, "player", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
-        return run_until_closed(application, window, window.say)
+        return run_until_closed(application, window, window.show_message)
     finally:
         reader.close()
 

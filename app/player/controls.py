@@ -1,19 +1,11 @@
-"""Playing: a slider in milliseconds, buttons for play and single frames, jumps with their chooser, speed, selection and clip.
-
-Where one types a time as the clock shows it: 1:23.4, or plain seconds.
-
-The events of a recorded session as a list; choosing one goes there.
-
-Beside the PLAYBACK banner: what was recorded, SIM or LIVE, on which rig, when.
-
-A line for a note that goes into a file.
-"""
+"""The controls of the player: the bar below the timeline, the list of events, what was recorded, a line for notes."""
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QRectF, QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QValidator
@@ -36,7 +28,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.player.session_model import LISTED, MARK_LOOK, SPEEDS, JumpKind, clock_text, event_line
+from app.player.course import LISTED, MARK_LOOK, SPEEDS, JumpKind, clock_text, event_line
 from app.player.timeline import paint_mark
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
@@ -58,7 +50,7 @@ def typed_ms(text: str) -> int | None:
 
 
 class TimeField(QSpinBox):
-    """Its value is in milliseconds. What is no time is not taken: leaving the field shows the value again."""
+    """A time in milliseconds. When the text is no time, leaving the field shows the value again."""
 
     def textFromValue(self, value: int) -> str:
         return clock_text(value / 1000)
@@ -74,10 +66,10 @@ class TimeField(QSpinBox):
         return (QValidator.State.Intermediate if is_begun else QValidator.State.Invalid), text, position
 
     def fixup(self, text: str) -> str:
-        """What was typed is no time: the value as it is."""
         return self.textFromValue(self.value())
 
 
+_PLAY = "\N{BLACK RIGHT-POINTING TRIANGLE}"
 _BUTTON = 34
 _LONGEST_MS = 2**31 - 1
 """A damaged row may be of another month; sliders end here."""
@@ -96,18 +88,18 @@ QProgressBar::chunk { background: @LINE; border-radius: 4px; }
 
 
 class PlayerBar(QWidget):
-    """Shows and asks; it decides nothing. Times are milliseconds from the first row."""
+    """Slider, time, buttons and choosers. Times are milliseconds from the first row."""
 
-    play_asked = Signal()
-    step_asked = Signal(int)
-    jump_asked = Signal(int)
+    play_requested = Signal()
+    step_requested = Signal(int)
+    jump_requested = Signal(int)
     sought_ms = Signal(int)
     speed_chosen = Signal(float)
     jump_kind_chosen = Signal(object)
-    clip_asked = Signal()
-    cancel_asked = Signal()
-    note_asked = Signal()
-    snapshot_asked = Signal()
+    clip_requested = Signal()
+    cancel_requested = Signal()
+    note_requested = Signal()
+    snapshot_requested = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -123,12 +115,11 @@ class PlayerBar(QWidget):
         self.position.setFixedWidth(124)
         self.position.setAccessibleName(tr("Go to a time"))
         self.position.setToolTip(tr("Time from the first frame; type one as 1:23.4 or in seconds, and press Enter  (key T)"))
-        self.length = _label(tr("of {time}", time="0:00.000"))
-        self.frame = _label("")
+        self.length, self.frame = QLabel(tr("of {time}", time="0:00.000")), QLabel()
+        for label in (self.length, self.frame):
+            theme.set_sheet(label, "color: @TEXT_DIM;")
         self.frame.setObjectName("card_note")
-        self.play = self._button(
-            "\N{BLACK RIGHT-POINTING TRIANGLE}", tr("Play or pause  (Space)"), self.play_asked.emit, tr("Play")
-        )
+        self.play = self._button(_PLAY, tr("Play or pause  (Space)"), self.play_requested.emit, tr("Play"))
         self.play.setObjectName("play")
         self.play.setFixedWidth(56)
         self.kind = QComboBox()
@@ -143,17 +134,20 @@ class PlayerBar(QWidget):
         name_list(self.speed, tr("Speed"))
         self.speed.setToolTip(tr("Speed  ([ slower, ] faster)"))
         self.speed.setFixedWidth(78)
-        self.clip = self._button(
-            tr("Clip"), tr("Save the selection as a video, without one the session  (E)"), self.clip_asked.emit
-        )
-        self.note = self._button(tr("Note"), tr("Add a note at this time  (M)"), self.note_asked.emit)
-        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (S)"), self.snapshot_asked.emit)
+        clip_tip = tr("Save the selection as a video, without one the session  (E)")
+        self.clip = self._button(tr("Clip"), clip_tip, self.clip_requested.emit)
+        self.note = self._button(tr("Note"), tr("Add a note at this time  (M)"), self.note_requested.emit)
+        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (S)"), self.snapshot_requested.emit)
         self.progress = QProgressBar()
         self.progress.setFixedHeight(24)
         self.progress.setAccessibleName(tr("Clip being written"))
-        self.cancel = self._button(tr("Cancel"), tr("Stop writing the clip  (Esc)"), self.cancel_asked.emit, tr("Cancel the clip"))
+        cancel_tip = tr("Stop writing the clip  (Esc)")
+        self.cancel = self._button(tr("Cancel"), cancel_tip, self.cancel_requested.emit, tr("Cancel the clip"))
         self._lay_out()
-        self._wire()
+        self.slider.valueChanged.connect(self.sought_ms)
+        self.position.valueChanged.connect(self.sought_ms)
+        self.speed.activated.connect(lambda _index: self.speed_chosen.emit(self.speed.currentData()))
+        self.kind.activated.connect(lambda _index: self.jump_kind_chosen.emit(self.kind.currentData()))
         self.show_progress(None)
         self.show_length(0, 0)
 
@@ -175,12 +169,12 @@ class PlayerBar(QWidget):
                 self.position.setValue(time_ms)
         self.frame.setText(tr("frame {place} of {count}", place=place + 1, count=self._rows) if self._rows else tr("no frames"))
 
-    def abandon(self) -> None:
-        """Forget a time that was typed and not confirmed; leaving the field would count it otherwise."""
+    def discard_typed_time(self) -> None:
+        """Of a time that was typed and not confirmed: leaving the field would take it."""
         self.position.lineEdit().setText(self.position.textFromValue(self.position.value()))
 
     def show_playing(self, on: bool) -> None:
-        self.play.setText("\N{DOUBLE VERTICAL BAR}" if on else "\N{BLACK RIGHT-POINTING TRIANGLE}")
+        self.play.setText("\N{DOUBLE VERTICAL BAR}" if on else _PLAY)
         self.play.setAccessibleName(tr("Pause") if on else tr("Play"))
 
     def show_speed(self, speed: float) -> None:
@@ -203,32 +197,31 @@ class PlayerBar(QWidget):
         if share is not None:
             self.progress.setValue(round(100 * share))
 
-    def _button(self, text: str, tip: str, slot: object, name: str = "") -> QPushButton:
+    def _button(self, text: str, tip: str, slot: Callable[[], object], name: str = "") -> QPushButton:
         button = QPushButton(text)
         button.setToolTip(tip)
         button.setAccessibleName(name or tip.partition("  (")[0])
         button.setFixedWidth(max(_BUTTON, QFontMetrics(theme.font(14)).horizontalAdvance(text) + 18))
-        button.clicked.connect(slot)
+        button.clicked.connect(lambda _checked=False: slot())
         return button
 
     def _lay_out(self) -> None:
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(5)
-        before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), lambda: self.step_asked.emit(-1))
-        after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), lambda: self.step_asked.emit(1))
-        previous = self._button("P", tr("Previous of the kind beside  (P)"), lambda: self.jump_asked.emit(-1))
-        following = self._button("N", tr("Next of the kind beside  (N)"), lambda: self.jump_asked.emit(1))
-        for step in (before, self.play, after):
-            row.addWidget(step)
-        row.addSpacing(6)
-        for jump in (previous, self.kind, following):
-            row.addWidget(jump)
-        row.addSpacing(6)
+        step, jump = self.step_requested.emit, self.jump_requested.emit
+        before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), partial(step, -1))
+        after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), partial(step, 1))
+        previous = self._button("P", tr("Previous of the kind beside  (P)"), partial(jump, -1))
+        following = self._button("N", tr("Next of the kind beside  (N)"), partial(jump, 1))
+        for group in ((before, self.play, after), (previous, self.kind, following)):
+            for widget in group:
+                row.addWidget(widget)
+            row.addSpacing(6)
         row.addWidget(self.speed)
         row.addStretch(1)
-        for widget in (self.progress, self.cancel, self.clip, self.note, self.snapshot):
-            row.addWidget(widget)
+        for right in (self.progress, self.cancel, self.clip, self.note, self.snapshot):
+            row.addWidget(right)
         top = QHBoxLayout()
         top.setContentsMargins(0, 0, 0, 0)
         top.setSpacing(8)
@@ -245,18 +238,6 @@ class PlayerBar(QWidget):
         self.frame.setMinimumWidth(150)
         self.frame.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 
-    def _wire(self) -> None:
-        self.slider.valueChanged.connect(self.sought_ms)
-        self.position.valueChanged.connect(self.sought_ms)
-        self.speed.activated.connect(lambda _index: self.speed_chosen.emit(self.speed.currentData()))
-        self.kind.activated.connect(lambda _index: self.jump_kind_chosen.emit(self.kind.currentData()))
-
-
-def _label(text: str) -> QLabel:
-    label = QLabel(text)
-    theme.set_sheet(label, "color: @TEXT_DIM;")
-    return label
-
 
 _ROW_HEIGHT = 24
 _TIME_WIDTH = 86
@@ -271,9 +252,9 @@ class SessionEvents(QListView):
 
     def __init__(self) -> None:
         super().__init__()
-        self._model = _Model()
+        self._model = _EventModel()
         self.setModel(self._model)
-        self.setItemDelegate(_Painter(self))
+        self.setItemDelegate(_EventDelegate(self))
         self.setUniformItemSizes(True)
         self.setFrameShape(QListView.Shape.NoFrame)
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
@@ -289,7 +270,7 @@ class SessionEvents(QListView):
         return [self._model.line(event) for event in self._model.events]
 
     def show_events(self, events: Sequence[Event], first_s: float) -> None:
-        """All events; times are told from the first row."""
+        """All events; times count from `first_s`."""
         self._model.show(tuple(event for event in events if event.kind in LISTED), first_s)
 
     def show_time(self, time_s: float) -> None:
@@ -302,7 +283,7 @@ class SessionEvents(QListView):
         self.chosen.emit(self._model.events[index.row()])
 
 
-class _Model(QAbstractListModel):
+class _EventModel(QAbstractListModel):
     def __init__(self) -> None:
         super().__init__()
         self.events: tuple[Event, ...] = ()
@@ -331,7 +312,7 @@ class _Model(QAbstractListModel):
         return event_line(event) if role == Qt.ItemDataRole.ToolTipRole else None
 
 
-class _Painter(QStyledItemDelegate):
+class _EventDelegate(QStyledItemDelegate):
     """Time, mark, text."""
 
     def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
@@ -339,7 +320,7 @@ class _Painter(QStyledItemDelegate):
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
         model, event = index.model(), index.data(Qt.ItemDataRole.UserRole)
-        assert isinstance(model, _Model)
+        assert isinstance(model, _EventModel)
         room = QRectF(option.rect)  # type: ignore[attr-defined]
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -370,7 +351,7 @@ _HEIGHT = 34
 
 
 class RecordedPlate(QWidget):
-    """An outlined word, never filled as the banner of something that happens now."""
+    """What was recorded, SIM or LIVE, on which rig, when: an outlined word, not filled as the banner of a live rig."""
 
     def __init__(self, manifest: Manifest | None, name: str) -> None:
         super().__init__()
@@ -382,7 +363,7 @@ class RecordedPlate(QWidget):
         self.show_written(False)
 
     def show_written(self, is_written: bool) -> None:
-        """Whether it is still being recorded: what has not ended yet was not cut off."""
+        """Whether it is still being recorded: then it is not cut off."""
         self._note = _note(self._manifest, self._name, is_written=is_written)
         self.setAccessibleName(self.text)
         self.setToolTip(self.text)
@@ -390,7 +371,6 @@ class RecordedPlate(QWidget):
 
     @property
     def text(self) -> str:
-        """All that is said."""
         return tr("recorded {kind}, {note}", kind=tr_text(self._kind), note=self._note)
 
     def sizeHint(self) -> QSize:
@@ -402,8 +382,7 @@ class RecordedPlate(QWidget):
         colour = QColor(theme.of(self._kind if self._kind in _KNOWN else "FAULT"))
         word, word_font = tr("recorded {kind}", kind=tr_text(self._kind)), theme.bold(14)
         plate = QRectF(1, 3, QFontMetrics(word_font).horizontalAdvance(word) + 24, _HEIGHT - 6)
-        pen = QPen(colour, 2, Qt.PenStyle.DashLine)
-        painter.setPen(pen)
+        painter.setPen(QPen(colour, 2, Qt.PenStyle.DashLine))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(plate, 6, 6)
         painter.setFont(word_font)
@@ -431,20 +410,19 @@ _MOST_LETTERS = 2000
 
 
 class NoteField(QLineEdit):
-    """`hint` stands in it while it is empty; `edge` is the role of its frame's colour, which the focus makes bright."""
+    """A line for a note that goes into a file; `hint` is its placeholder, `edge` the role of its frame's colour."""
 
     def __init__(self, hint: str, edge: str = "LINE") -> None:
         super().__init__()
         self.setPlaceholderText(hint)
         self.setAccessibleName(tr("Note"))
         self.setMaxLength(_MOST_LETTERS)
+        frame = f"border: 1px solid @{edge}; border-radius: 6px; padding: 5px 10px;"
         theme.set_sheet(
-            self,
-            f"QLineEdit {{ background: @PANEL; color: @TEXT; border: 1px solid @{edge}; border-radius: 6px; padding: 5px 10px; }}"
-            " QLineEdit:focus { border-color: @SKY; }",
+            self, f"QLineEdit {{ background: @PANEL; color: @TEXT; {frame} }} QLineEdit:focus {{ border-color: @SKY; }}"
         )
 
     @property
     def kept_text(self) -> str:
-        """What is written, as a file can hold it: half of a surrogate pair, pasted, becomes a question mark."""
+        """The text as a file can hold it: half of a surrogate pair, pasted, becomes a question mark."""
         return self.text().encode("utf-8", errors="replace").decode("utf-8").strip()

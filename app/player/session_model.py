@@ -1,519 +1,254 @@
-"""What is known of a session that is played: rows, events, problems, and what a replay saw. It grows while the session is read.
-
-Where something happened in a recorded session: marks for the timeline, gaps, and places to jump to. No Qt here.
-
-Where playing is: a position that runs with the clock at some speed. No Qt here.
-
-The recorded values of a row that no dial shows, as lines to read and to copy. No Qt here.
-
-What ``replay --jsonl`` wrote, found by the session's rows, so that the player can show it beside the recording. No Qt here.
-"""
+"""The session that is played: its rows, events and problems, which become known while it is read; notes, snapshots and clips."""
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
+import logging
+import threading
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
-from app.ui import theme
-from app.ui.i18n import mark, tr, tr_text
-from app.ui.texts import refusal_text, signed_degrees
-from app.widgets.painting import number
+from app.player.course import Course, course_of
+from app.player.replayed import Replayed
+from app.ui.i18n import tr
+from app.ui.snapshot import Origin, SnapshotWriter
+from app.ui.workers import QueuedCallback, Worker
+from app.widgets.overlay_image import draw_overlay
 from core.devices import UserError
-from core.evaluation.replay import Change, event_target, seen
-from core.session.codec import InvalidRecord, PerceivedLine, RecordedRow, read_json, scene_from_json
-from core.session.files import lines_of, read_line
-from core.session.manifest import Event, EventKind
-from core.session.reader import SessionReader, Timeline, losses
-from core.types import Point, PoseState, Scene
+from core.files import name_of
+from core.session.export import export_mp4
+from core.session.files import add_event, is_being_written
+from core.session.manifest import Event, SessionError
+from core.session.reader import SessionReader, losses
+from core.types import Image, Tick
 
-_GAP_FACTOR, _LEAST_GAP_S = 4.0, 0.25
-
-
-class Shape(Enum):
-    """Told by shape as well as by colour."""
-
-    FLAG = "flag"
-    TRIANGLE = "triangle"
-    HOLLOW_TRIANGLE = mark("hollow triangle")
-    DIAMOND = "diamond"
-    SQUARE = "square"
-    RING = "ring"
-    CROSS = "cross"
-
-
-@dataclass(frozen=True, slots=True)
-class MarkLook:
-    """Word, colour (its role in the palette) and shape of a kind of event; what is drawn later lies above."""
-
-    word: str
-    role: str
-    shape: Shape
-
-    @property
-    def colour(self) -> str:
-        """In the scheme in use."""
-        return theme.of(self.role)
-
-
-MARK_LOOK: dict[EventKind, MarkLook] = {
-    EventKind.DROPPED: MarkLook(mark("dropped"), "FAULT", Shape.CROSS),
-    EventKind.LOST: MarkLook(mark("lost by the camera"), "FAULT", Shape.HOLLOW_TRIANGLE),
-    EventKind.MODE: MarkLook(mark("mode"), "SKY", Shape.SQUARE),
-    EventKind.ALERT: MarkLook(mark("alert"), "YELLOW", Shape.HOLLOW_TRIANGLE),
-    EventKind.CLEARED: MarkLook(mark("cleared"), "TEXT_DIM", Shape.HOLLOW_TRIANGLE),
-    EventKind.TARGET: MarkLook(mark("target"), "TARGET", Shape.RING),
-    EventKind.OVERRIDE: MarkLook(mark("override"), "ORANGE", Shape.DIAMOND),
-    EventKind.FAULT: MarkLook(mark("fault"), "FAULT", Shape.TRIANGLE),
-    EventKind.NOTE: MarkLook(mark("note"), "TEXT", Shape.FLAG),
-}
-"""Kinds that have a mark; arming and disarming are told by their mode, the file names of the video by nobody."""
-LISTED = tuple(kind for kind in EventKind if kind is not EventKind.VIDEO)
-
-
-class JumpKind(Enum):
-    """What N and P go to, in the order of the chooser."""
-
-    STATE = mark("State change")
-    FAULT = mark("Fault")
-    OVERRIDE = mark("Override")
-    NOTE = mark("Note")
-    MODE = mark("Mode")
-    TARGET = mark("Target")
-    GAP = mark("Gap")
-    REPLAY = mark("Difference")
-    ANY = mark("Any event")
-
-
-_EVENTS_OF = {
-    JumpKind.FAULT: (EventKind.FAULT,),
-    JumpKind.OVERRIDE: (EventKind.OVERRIDE,),
-    JumpKind.NOTE: (EventKind.NOTE,),
-    JumpKind.MODE: (EventKind.MODE,),
-    JumpKind.TARGET: (EventKind.TARGET,),
-    JumpKind.ANY: LISTED,
-}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Course:
-    """The rows of a session over time. ``times_s`` (N,) from the first row, never going back; ``first_s`` on the recorded clock.
-
-    ``rows`` are the session's row numbers; ``states``, ``modes`` and ``theta_deg`` as in ``Timeline``; ``gaps`` are places before
-    which frames are lost. Of a replay: its angles, and the places where it begins to differ.
-    """
-
-    first_s: float
-    times_s: NDArray[np.float64]
-    rows: NDArray[np.int64]
-    states: NDArray[np.int8]
-    modes: NDArray[np.int8]
-    theta_deg: NDArray[np.float64]
-    gaps: NDArray[np.int64]
-    other_theta_deg: NDArray[np.float64] | None = None
-    differs: NDArray[np.int64] | None = None
-
-    def __len__(self) -> int:
-        return len(self.times_s)
-
-    @property
-    def duration_s(self) -> float:
-        return float(self.times_s[-1]) if len(self) else 0.0
-
-    def place_at(self, time_s: float) -> int:
-        """The row shown at a time from the first row."""
-        return max(0, int(np.searchsorted(self.times_s, time_s, side="right")) - 1)
-
-
-def course_of(line: Timeline) -> Course:
-    """What the player needs of a timeline; a clock that went back stands still."""
-    if not len(line.time_s):
-        none = np.zeros(0, np.int64)
-        return Course(0.0, none.astype(np.float64), none, line.state, line.mode, line.theta_deg, none)
-    times_s = np.maximum.accumulate(line.time_s) - line.time_s[0]
-    steps_s = np.diff(times_s)
-    usual_s = float(np.median(steps_s)) if steps_s.size else 0.0
-    is_gap = (steps_s > max(_LEAST_GAP_S, _GAP_FACTOR * usual_s)) | (np.diff(line.row) > 1)
-    return Course(float(line.time_s[0]), times_s, line.row, line.state, line.mode, line.theta_deg, np.flatnonzero(is_gap) + 1)
-
-
-def places_of(kind: JumpKind, course: Course, events: Sequence[Event]) -> NDArray[np.int64]:
-    """The rows that N and P stop at, in their order."""
-    if kind is JumpKind.STATE:
-        return np.flatnonzero(np.diff(course.states)) + 1
-    if kind is JumpKind.GAP:
-        return course.gaps
-    if kind is JumpKind.REPLAY:
-        return course.differs if course.differs is not None else np.zeros(0, np.int64)
-    times_s = np.array([event.time_s for event in events if event.kind in _EVENTS_OF[kind]]) - course.first_s
-    if not len(course):
-        return np.zeros(0, np.int64)
-    # the first row that was captured when it had happened
-    return np.unique(np.clip(np.searchsorted(course.times_s, times_s - 1e-6), 0, len(course) - 1))
-
-
-def neighbour(places: NDArray[np.int64], place: int, step: int) -> int | None:
-    """The next one after `place` (`step` 1) or before it (-1); None where there is none."""
-    found = places[places > place] if step > 0 else places[places < place]
-    if not len(found):
-        return None
-    return int(found[0] if step > 0 else found[-1])
-
-
-def target_at(events: Sequence[Event], scene: Scene, time_s: float) -> Point | None:
-    """The operator's destination in source pixels: where the route ends, without one what was chosen last until then."""
-    if scene.route is not None:
-        return scene.to_source(scene.route.target)
-    chosen = [event for event in events if event.kind is EventKind.TARGET and event.time_s <= time_s]
-    return event_target(chosen[-1]) if chosen else None
-
-
-def event_line(event: Event) -> str:
-    """What happened, in words."""
-    word = tr(MARK_LOOK[event.kind].word if event.kind in MARK_LOOK else event.kind.value)
-    detail = event.data.get("detail")
-    said = event.text if event.kind is EventKind.NOTE else tr_text(event.text)  # a note is the user's own
-    text = said + (f" ({tr_text(detail)})" if isinstance(detail, str) and detail else "")
-    return f"{word}: {text}" if text else word
-
-
-def clock_text(time_s: float) -> str:
-    """For example "1:02.345", with hours where there are any."""
-    ms = max(0, round(time_s * 1000))
-    minutes, rest = divmod(ms, 60_000)
-    hours, minutes = divmod(minutes, 60)
-    front = f"{hours}:{minutes:02d}" if hours else f"{minutes}"
-    return f"{front}:{rest // 1000:02d}.{rest % 1000:03d}"
-
-
-_LARGE_DEG = 5.0
-"""A larger change of theta is worth a stop."""
-
-
-class Replayed:
-    """Reads the file once, and single lines of it again when they are shown. ``skipped`` counts lines that cannot be used.
-
-    Raises UserError: not such a file, or another session's.
-    """
-
-    def __init__(self, path: Path, session: str) -> None:
-        self._path = path
-        self._places: dict[int, tuple[int, int]] = {}
-        self._values: dict[int, tuple[float, int]] = {}
-        self.skipped = 0
-        try:
-            for line in lines_of(path):
-                try:
-                    record = read_line(partial(read_json, PerceivedLine), line)
-                    row = self._row_of(record.image, session)
-                    if record.state is not None and record.theta_signed_deg is None:
-                        raise InvalidRecord("theta_signed_deg: missing")
-                    state = list(PoseState).index(record.state) if record.state is not None else -1
-                    self._values[row] = (math.nan if state < 0 else record.theta_signed_deg or 0.0), state
-                    self._places[row] = line.offset, len(line.data or b"")
-                except InvalidRecord:
-                    self.skipped += 1
-        except OSError as error:
-            raise UserError(f"{path}: cannot be read ({error.strerror})") from None
-        if not self._places:
-            raise UserError(f"{path}: no results in it; write them with: replay SESSION --jsonl FILE")
-
-    def _row_of(self, image: str, session: str) -> int:
-        name, _, row = image.rpartition("#")
-        if not name or not row.isdecimal():
-            raise InvalidRecord("image: not a row of a session")
-        if name != session:
-            raise UserError(f"{self._path}: results of another session ({name})")
-        return int(row)
-
-    def theta_deg(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Signed angles of these rows, NaN where there is none."""
-        return np.array([self._values.get(row, (math.nan, -1))[0] for row in rows.tolist()], np.float64)
-
-    def changed(self, rows: NDArray[np.int64], theta_deg: NDArray[np.float64], states: NDArray[np.int8]) -> NDArray[np.int64]:
-        """Places of `rows` where a difference begins: another state, a pose lost or gained, or an angle more than 5 degrees off."""
-        others = np.array([self._values.get(row, (math.nan, -2))[1] for row in rows.tolist()], np.int64)
-        turn = np.abs((self.theta_deg(rows) - theta_deg + 180.0) % 360.0 - 180.0)
-        differs = (others != -2) & ((others != states) | (np.nan_to_num(turn) > _LARGE_DEG))
-        return np.flatnonzero(differs & ~np.concatenate([[False], differs[:-1]]))
-
-    def scene(self, row: int) -> Scene | None:
-        """What was seen of a row, in source pixels; None: nothing, or it is damaged."""
-        if row not in self._places:
-            return None
-        offset, size = self._places[row]
-        try:
-            with self._path.open("rb") as file:
-                file.seek(offset)
-                return scene_from_json(file.read(size))
-        except (InvalidRecord, OSError):
-            return None
-
-
-def compared_line(before: Scene, after: Scene) -> str:
-    """Both in one line, after against before."""
-    change = Change(0, 0, 0.0, seen(before), seen(after))
-    states = tr("state {before} \N{RIGHTWARDS ARROW} {after}", before=change.before.state or "-", after=change.after.state or "-")
-    if after.pose is None:
-        return tr("{states}: no pose, {why}", states=states, why=after.refusal)
-    line = f"{states}, {tr('theta')} {signed_degrees(after.pose.theta_signed_deg, 1)}"
-    if change.theta_deg is not None:
-        line += f" ({signed_degrees(change.theta_deg, 1)})"
-    return line + (tr(", head {distance:.1f} px away", distance=change.head_px) if change.head_px is not None else "")
-
-
-_LOOK_MS = 200
+_POLL_MS = 200
 _GROWN = 1.2
+"""While the session is read, the course is renewed when it has grown by this factor: each renewal costs more the longer it is."""
+_CLIP_REPORTS = 100
+_CLIP_POLL_S = 0.05
+_STOP_WITHIN_MS = 10_000
+
+_log = logging.getLogger(__name__)
 
 
-class KnownSession(QObject):
-    """Looks at the reader now and then; the reader reads in a thread of its own.
+class _ClipCancelled(UserError):
+    """Raised in the clip's thread."""
 
-    ``changed`` says that course or events are others, ``looked`` that it has looked, ``emptied`` why there is nothing to play;
-    ``problems_found`` carries all problems, ``said`` a line for people and whether it is a fault.
+
+class PlayedSession(QObject):
+    """Polls the reader, which reads in a thread of its own; all other files are read and written by workers.
+
+    ``changed``: course or events; ``polled``: the reader was asked; ``emptied``: why there is nothing to play;
+    ``problems_found``: all problems; ``is_written``: whether the session is still being recorded; ``compared``: the results of a
+    replay have been read; ``note_refused``: a note that could not be written; ``clip_progressed``: the share of the clip that is
+    written, None when none is; ``message``: a line for people and whether it is a fault.
+
+    Parameters
+    ----------
+    reader : not closed here.
+    folder : of snapshots and clips.
     """
 
     changed = Signal()
-    looked = Signal()
+    polled = Signal()
     emptied = Signal(str)
     problems_found = Signal(object)
-    said = Signal(str, bool)
+    is_written = Signal(bool)
+    compared = Signal()
+    note_refused = Signal(object)
+    clip_progressed = Signal(object)
+    message = Signal(str, bool)
 
-    def __init__(self, reader: SessionReader, parent: QObject | None = None) -> None:
+    def __init__(self, reader: SessionReader, folder: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._reader = reader
-        self._course = course_of(reader.timeline())
-        self._events: tuple[Event, ...] = ()
-        self._has_events = False
-        self._is_written = False
+        self._reader, self._folder = reader, folder
+        manifest = reader.manifest
+        self._kind = manifest.kind if manifest is not None else "UNKNOWN"
+        self._model_name = manifest.model.get("name") if manifest is not None else None
+        self.course: Course = course_of(reader.timeline())
+        """The rows known so far."""
+        self.is_whole = False
+        """Whether all rows are known."""
+        self.events: tuple[Event, ...] = ()
+        """In the order of their times."""
+        self.replayed: Replayed | None = None
+        self._is_written: bool | None = None
         self._losses: list[str] | None = None
-        self._replayed: Replayed | None = None
         self._problems: list[str] | None = None
         self._is_empty = False
-        self._is_whole = False
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LOOK_MS)
-        self._timer.timeout.connect(self._look)
+        self._clip_cancelled: threading.Event | None = None
+        self._poll_timer = QTimer(self, interval=_POLL_MS)
+        self._poll_timer.timeout.connect(self._poll)
+        self._files, self._clips = Worker("player work", self), Worker("clip", self)
+        self._files.done.connect(self._on_done)
+        self._files.failed.connect(self._on_failed)
+        self._clips.done.connect(self._on_clip_ended)
+        self._clips.failed.connect(lambda _clip, why: self._on_clip_ended(_clip, (tr("Clip not saved: {why}", why=why), True)))
+        self._snapshots = SnapshotWriter(folder, self)
+        self._snapshots.saved.connect(lambda line: self.message.emit(line, False))
+        self._snapshots.failed.connect(lambda line: self.message.emit(line, True))
 
-    @property
-    def course(self) -> Course:
-        """The rows known so far."""
-        return self._course
+    def start(self, replay: Path | None = None) -> None:
+        """Begin to poll, and read the events and the results of a replay."""
+        reader = self._reader
+        self._files.submit("events", lambda: (reader.events, is_being_written(reader.folder)))
+        if replay is not None:
+            self._files.submit("replay", lambda: Replayed(replay, name_of(reader.folder)))
+        self._poll_timer.start()
+        self._poll()
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether all rows are known."""
-        return self._is_whole
+    def stop_polling(self) -> None:
+        self._poll_timer.stop()
 
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """In the order of their times."""
-        return self._events
-
-    def start(self) -> None:
-        """Look, and go on looking."""
-        self._timer.start()
-        self._look()
-
-    def stop(self) -> None:
-        self._timer.stop()
-
-    @Slot(object, bool)
-    def take_events(self, events: tuple[Event, ...], is_written: bool) -> None:
-        """The session's events, and whether it is still being recorded."""
-        self._events, self._has_events, self._is_written = events, True, is_written
-        if is_written:
-            self.said.emit(tr("This session is still being recorded: what came later is not shown"), False)
-        self.changed.emit()
-
-    @Slot(object)
-    def take_note(self, event: Event) -> None:
-        """A note that is kept now."""
-        self._events = tuple(sorted((*self._events, event), key=lambda one: one.time_s))
-        self.said.emit(tr("Note kept"), False)
-        self.changed.emit()
-
-    def compare_with(self, replayed: Replayed) -> None:
-        """What a replay saw, beside what was recorded; the course has it from now on."""
-        self._replayed = replayed
-        if replayed.skipped:
-            self.said.emit(tr("{count} results of the replay cannot be read", count=replayed.skipped), True)
-        self._course = self._compared(self._course)
-
-    def _compared(self, course: Course) -> Course:
-        """With what a replay saw, as far as it is known."""
-        replayed = self._replayed
-        if replayed is None:
-            return course
-        differs = replayed.changed(course.rows, course.theta_deg, course.states)
-        return replace(course, other_theta_deg=replayed.theta_deg(course.rows), differs=differs)
+    # ---- what is known
 
     @Slot()
-    def _look(self) -> None:
-        """Rows become known while an hour-long session is being read; problems as they are met."""
+    def _poll(self) -> None:
         is_all = self._reader.wait(0.0)
-        known, shown = len(self._reader), len(self._course)
-        # every look costs more the longer the session is: a few of them are enough while it is read
+        known, shown = len(self._reader), len(self.course)
         if known != shown and (is_all or known > _GROWN * shown):
-            self._course = self._compared(course_of(self._reader.timeline()))
+            self.course = self._with_replay(course_of(self._reader.timeline()))
             self.changed.emit()
-        self._is_whole = is_all
-        if is_all and not len(self._course) and not self._is_empty:
+        self.is_whole = is_all
+        if is_all and not len(self.course) and not self._is_empty:
             self._is_empty = True
             loose = tr("there are pictures, but no rows: repair it with: session recover")
             self.emptied.emit(loose if self._reader.videos else tr("it is empty"))
-        self.looked.emit()
-        self._tell_problems(is_all=is_all)
+        self.polled.emit()
+        self._report_problems(is_all=is_all)
 
-    def _tell_problems(self, *, is_all: bool) -> None:
+    def _with_replay(self, course: Course) -> Course:
+        if self.replayed is None:
+            return course
+        differs = self.replayed.changed(course.rows, course.theta_deg, course.states)
+        return replace(course, other_theta_deg=self.replayed.theta_deg(course.rows), differs=differs)
+
+    def _report_problems(self, *, is_all: bool) -> None:
         problems = list(self._reader.problems)
-        if is_all and self._has_events and self._losses is None:
-            self._losses = losses(self._reader, self._events)  # once: it asks the disk, and a closed session loses no more
+        if is_all and self._is_written is not None and self._losses is None:
+            self._losses = losses(self._reader, self.events)  # once: it asks the disk, and a closed session loses no more
         problems += self._losses or []
-        missing = self._reader.missing_rows
+        missing, manifest = self._reader.missing_rows, self._reader.manifest
         if missing:
             problems.append(tr("{count} rows are missing between those that are there", count=missing))
-        manifest = self._reader.manifest
         if manifest is not None and manifest.counts.dropped:
             problems.append(tr("{count} frames could not be recorded: the recorder was behind", count=manifest.counts.dropped))
-        if manifest is not None and not manifest.closed and self._has_events and not self._is_written:
+        if manifest is not None and not manifest.closed and self._is_written is False:
             problems.append(tr("the session did not end properly; session recover makes a repaired copy"))
         if problems != self._problems:
             self._problems = problems
             self.problems_found.emit(problems)
 
+    def _on_done(self, key: object, result: object) -> None:
+        if isinstance(result, Replayed):
+            self.replayed = result
+            if result.skipped:
+                self.message.emit(tr("{count} results of the replay cannot be read", count=result.skipped), True)
+            self.course = self._with_replay(self.course)
+            self.compared.emit()
+        elif isinstance(result, Event):
+            self.events = tuple(sorted((*self.events, result), key=lambda one: one.time_s))
+            self.message.emit(tr("Note kept"), False)
+        elif isinstance(result, tuple):
+            self.events, self._is_written = result
+            if self._is_written:
+                self.message.emit(tr("This session is still being recorded: what came later is not shown"), False)
+            self.is_written.emit(self._is_written)
+        self.changed.emit()
 
-SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-_LONGEST_GAP_S = 2.0
-"""Nobody wants to look at a frozen picture for longer: what is lost beyond it is passed over, and said."""
+    def _on_failed(self, key: object, line: str) -> None:
+        self.message.emit(line, True)
+        if isinstance(key, Event):
+            self.note_refused.emit(key)
 
+    # ---- what is written
 
-class PlayClock:
-    """``position_s`` counts from the first row. ``turn`` is called at any rate while it plays.
+    def add_note(self, event: Event) -> None:
+        """Into the session's own file."""
+        self._files.submit(event, partial(_add_note, self._reader.folder, event))
 
-    ``passed_s`` tells how much of a gap was passed over in the last turn.
-    """
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._last_s: float | None = None
-        self.position_s = 0.0
-        self.speed = 1.0
-        self.passed_s = 0.0
+    def save_snapshot(self, tick: Tick) -> None:
+        """The picture plain, with overlays, and its values."""
+        self._snapshots.write(tick, Origin(f"{self._kind} PLAYBACK", None, self._model_name))
 
     @property
-    def is_playing(self) -> bool:
-        return self._last_s is not None
+    def has_clip(self) -> bool:
+        """Whether a clip is being written."""
+        return self._clip_cancelled is not None
 
-    def play(self) -> None:
-        self._last_s = self._clock()
+    def write_clip(self, places: tuple[int, int], times_s: tuple[float, float]) -> None:
+        """A video of the rows from the first to the last of `places` (included), named by their times."""
+        if self.has_clip:
+            self.message.emit(tr("A clip is being written already; Esc cancels it"), False)
+            return
+        cancelled = self._clip_cancelled = threading.Event()
+        session, stamp = self._reader.folder, f"{self._kind} PLAYBACK"
+        out, report, (first, last) = _free_path(self._folder, session, times_s), QueuedCallback(self), places
+        count, written = last + 1 - first, 0
 
-    def pause(self) -> None:
-        self._last_s = None
+        def check() -> None:
+            if cancelled.is_set():
+                raise _ClipCancelled("cancelled")
 
-    def seek(self, position_s: float) -> None:
-        """Go on from here, playing or not."""
-        self.position_s = max(0.0, position_s)
-        if self._last_s is not None:
-            self._last_s = self._clock()
+        def draw(tick: Tick) -> Image:
+            return draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=stamp)
 
-    def faster(self, step: int) -> float:
-        """One speed up or down; returns it."""
-        nearest = min(range(len(SPEEDS)), key=lambda k: abs(SPEEDS[k] - self.speed))
-        self.speed = SPEEDS[max(0, min(len(SPEEDS) - 1, nearest + step))]
-        return self.speed
+        def on_row() -> None:
+            nonlocal written
+            check()
+            written += 1
+            share = written / count
+            if written % max(1, count // _CLIP_REPORTS) == 0 or written == count:
+                report.send(lambda it: it.clip_progressed.emit(share) if it.has_clip else None)
 
-    def turn(self, course: Course, end_s: float) -> bool:
-        """Move on; False when `end_s` is reached, where it pauses."""
-        if self._last_s is None:
-            return False
-        now_s = self._clock()
-        place = course.place_at(self.position_s)
-        self.position_s += (now_s - self._last_s) * self.speed
-        self._last_s = now_s
-        self.passed_s = 0.0
-        if place + 1 < len(course):
-            here_s, next_s = float(course.times_s[place]), float(course.times_s[place + 1])
-            if next_s - here_s > _LONGEST_GAP_S and here_s + 0.5 < self.position_s < next_s:
-                self.passed_s = next_s - self.position_s
-                self.position_s = next_s
-        if self.position_s >= end_s:
-            self.position_s = end_s
-            self.pause()
-            return False
-        return True
+        def write() -> tuple[str, bool]:
+            try:
+                with SessionReader(session) as reader:  # of its own, so that playing goes on beside it
+                    while not reader.wait(_CLIP_POLL_S):
+                        check()
+                    pictures = export_mp4(reader, out, draw, first=first, last=last + 1, on_row=on_row)
+            except _ClipCancelled:
+                return tr("Clip cancelled; nothing was kept"), False
+            note = tr(", {count} pictures are lost", count=count - pictures) if pictures < count else ""
+            return tr("Clip saved: {file} ({count} pictures{note})", file=out, count=pictures, note=note), False
 
+        self.clip_progressed.emit(0.0)
+        self._clips.submit(out, write)
 
-_TENDONS = ("right", "left", "up", "down")
-_MOST_LINES = 200
+    def cancel_clip(self) -> None:
+        """Stop soon; nothing is left of the file."""
+        if self._clip_cancelled is not None:
+            self._clip_cancelled.set()
 
+    def _on_clip_ended(self, _clip: object, outcome: tuple[str, bool]) -> None:
+        self._clip_cancelled = None
+        self.clip_progressed.emit(None)
+        self.message.emit(*outcome)
 
-def value_lines(row: RecordedRow) -> list[str]:
-    """Frame, latency by stage, robot, drive, and the servo bus as it was."""
-    scene, status, drive = row.scene, row.status, row.drive
-    camera = tr("{skipped} skipped for newer ones, {lost} lost by the camera", skipped=row.dropped_frames, lost=row.camera_lost)
-    dropped = tr("{camera}, {count} by the recorder", camera=camera, count=row.dropped_rows)
-    size = f"{row.size[0]} \N{MULTIPLICATION SIGN} {row.size[1]}"
-    lines = [
-        tr("frame {index} of the camera, captured at {time:.3f} s, {size} px", index=row.index, time=row.captured_s, size=size),
-        tr("{rate:.1f} frames per second, {dropped}", rate=row.frames_per_second, dropped=dropped),
-    ]
-    stages = dict(scene.latency_ms)
-    total_ms = stages.pop("total", None)
-    if total_ms is not None:
-        lines.append(
-            tr("perception {total:.1f} ms: ", total=total_ms)
-            + ", ".join(f"{tr_text(name)} {ms:.1f}" for name, ms in stages.items())
-        )
-    if scene.pose is not None:
-        lines.append(
-            tr(
-                "confidence {confidence:.2f}, crossed {crossed}",
-                confidence=scene.pose.confidence,
-                crossed=tr("yes") if scene.pose.crossed else tr("no"),
-            )
-        )
-    elif scene.refusal is not None:
-        lines.append(tr("no pose: {why}", why=refusal_text(scene.refusal)))
-    if scene.route_problem:
-        lines.append(tr("no way to the target: {why}", why=tr_text(scene.route_problem)))
-    if status is not None:
-        lines.append(
-            tr("insertion {insertion:.1f} mm, sheath {sheath:.1f} mm", insertion=status.insertion_mm, sheath=status.delivery_mm)
-        )
-        pulls = zip(_TENDONS, status.tendon_pull_mm, status.tendon_force_mn, strict=True)
-        lines.append(
-            tr("tendons: ")
-            + ", ".join(f"{tr_text(name)} {number(pull, 2)} mm {number(force, 0)} mN" for name, pull, force in pulls)
-        )
-    if drive is not None:
-        lines += [
-            tr("fault: {cause}: {detail}", cause=tr_text(str(fault.cause)), detail=tr_text(fault.detail)) for fault in drive.active
-        ]
-        lines += [tr("against arming: {reason}", reason=tr_text(str(reason))) for reason in drive.against_arming]
-    if scene.novelty is not None:
-        lines.append(tr("distance from the kinds of pictures that the model knows {novelty:.2f}", novelty=scene.novelty))
-    if row.bus is not None:
-        lines += ["", tr("servo bus"), *_flat(row.bus)]
-    return lines[:_MOST_LINES]
+    def shut_down(self) -> bool:
+        """Finish notes and snapshots, cancel the clip; False when the disk does not answer."""
+        self.cancel_clip()
+        for worker in (self._files, self._clips):
+            worker.stop(finish=True)
+        return self._snapshots.finish() & self._files.wait(_STOP_WITHIN_MS) & self._clips.wait(_STOP_WITHIN_MS)
 
 
-def _flat(values: dict[str, Any], prefix: str = "") -> Iterator[str]:
-    """Plain values of nested ones, each named by its way."""
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{name}.")
-        elif isinstance(value, list) and value and all(isinstance(inner, dict) for inner in value):
-            for k, inner in enumerate(value, 1):
-                yield from _flat(inner, f"{prefix}{name} {k}.")
-        else:
-            yield f"{prefix}{name} {value}"
+def _add_note(folder: Path, event: Event) -> Event:
+    try:
+        return add_event(folder, event)
+    except SessionError:
+        _log.warning("a note was not kept: %s", event.text)  # the user may have closed the window by now
+        raise
+
+
+def _free_path(folder: Path, session: Path, times_s: tuple[float, float]) -> Path:
+    """A file name that tells what is in the clip, and that does not exist yet."""
+    name = f"{name_of(session)}_{round(times_s[0] * 1000)}-{round(times_s[1] * 1000)}ms"
+    path, k = folder / f"{name}.mp4", 1
+    while path.exists():
+        k += 1
+        path = folder / f"{name}_{k}.mp4"
+    return path

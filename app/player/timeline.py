@@ -1,7 +1,4 @@
-"""A recorded session over time: events as marks, theta as a curve, states and modes as bands, gaps, and where playing is.
-
-Pieces that the timeline is painted of: bands of colour, curves, strokes for crowded rows, and the marks of events.
-"""
+"""The timeline: marks of events, theta as a curve, states and modes as bands, gaps, selection, and where playing is."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from app.player.session_model import MARK_LOOK, Course, Shape, clock_text, event_line
+from app.player.course import MARK_LOOK, Course, Shape, clock_text, event_line
 from app.ui import theme
 from app.ui.i18n import tr
 from app.ui.texts import signed_degrees, tip
@@ -38,7 +35,7 @@ from core.types import PoseState
 
 
 def paint_band(painter: QPainter, lane: QRectF, values: NDArray[np.int64], colours: Sequence[QColor], nothing: QColor) -> None:
-    """One colour a pixel: -1 is "none of them", -2 no row at all."""
+    """One value a pixel, as index of its colour; -1 is `nothing`, -2 transparent."""
     table = np.array([0, nothing.rgba(), *(colour.rgba() for colour in colours)], np.uint32)
     pixels = np.ascontiguousarray(table[values + 2])
     image = QImage(pixels.data, len(pixels), 1, 4 * len(pixels), QImage.Format.Format_ARGB32)
@@ -46,7 +43,7 @@ def paint_band(painter: QPainter, lane: QRectF, values: NDArray[np.int64], colou
 
 
 def curves(xs: NDArray[np.float64], ys: NDArray[np.float64], gap: NDArray[np.bool_]) -> list[list[QPointF]]:
-    """Lines through what is known."""
+    """Lines through the finite values, broken where `gap` is true."""
     known = np.isfinite(ys)
     breaks = np.flatnonzero((known[1:] != known[:-1]) | gap[1:]) + 1
     parts = (part for part in np.split(np.arange(len(xs)), breaks) if len(part) and known[part[0]])
@@ -54,7 +51,7 @@ def curves(xs: NDArray[np.float64], ys: NDArray[np.float64], gap: NDArray[np.boo
 
 
 def extents(xs: NDArray[np.float64], ys: NDArray[np.float64]) -> list[QLineF]:
-    """Lowest to highest value of every pixel, so that no peak is lost; neighbours touch."""
+    """A line from the lowest to the highest value of each pixel column, so that no peak is lost; neighbours touch."""
     columns = np.floor(xs).astype(np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(columns)) + 1])
     low, high = np.fmin.reduceat(ys, edges), np.fmax.reduceat(ys, edges)
@@ -93,18 +90,18 @@ def paint_mark(painter: QPainter, middle: QPointF, shape: Shape, colour_name: st
 
 
 _LEFT, _RIGHT = 50.0, 10.0
-_NAME = 10.0
-"""Between the names of the lanes and the lanes: the mark of the first moment is as wide."""
+_NAME_GAP = 10.0
+"""Between the names of the lanes and the lanes: half of a mark at the first moment lies there."""
 _RULER, _MARKS, _STATES, _MODES = 18.0, 17.0, 13.0, 5.0
 _SPACE = 3.0
 _HOLD_S = 0.6
-"""So long a row stands for the time after it; a slow camera leaves no holes in the bands."""
+"""A row counts for so long after its time, so that a slow camera leaves no holes in the bands."""
 _LEAST_SPAN_S = 0.5
 _STEPS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600)
 _ANGLE_RANGES = (20.0, 45.0, 90.0, 180.0)
 _MARK_REACH_PX = 7.0
 _CROWDED = 3.0
-"""So many rows a pixel are drawn as one stroke from the lowest to the highest."""
+"""With more rows a pixel than this a curve is drawn as ``extents``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,10 +116,10 @@ class _Lanes:
 
 
 class TimelineView(QWidget):
-    """Click or drag seeks, with Shift it selects; the wheel zooms about the pointer. Painted once per course, zoom and size; the
-    cursor lies above.
+    """Click or drag seeks, with Shift it selects; the wheel zooms about the pointer.
 
-    ``sought`` and ``selected`` (first and last) carry seconds from the first row.
+    ``sought`` and ``selected`` (first and last) carry seconds from the first row. The course is painted once per zoom and size,
+    into a pixmap below selection and cursor.
     """
 
     sought = Signal(float)
@@ -159,14 +156,14 @@ class TimelineView(QWidget):
         if self._is_whole:
             self._from_s, self._span_s = 0.0, max(course.duration_s, _LEAST_SPAN_S)
         self._describe()
-        self._repaint()
+        self._paint_again()
 
     def show_time(self, time_s: float, *, follow: bool = False) -> None:
         """The cursor; with `follow` a zoomed view goes with it."""
         self._time_s = time_s
         low, high = self.view
         if not low <= time_s <= high and (follow or not self._is_whole):
-            self._look_at(time_s - 0.1 * self._span_s, self._span_s)
+            self._set_view(time_s - 0.1 * self._span_s, self._span_s)
         self.update()
 
     def show_selection(self, selection: tuple[float, float] | None) -> None:
@@ -179,32 +176,32 @@ class TimelineView(QWidget):
         about_s = self._time_s if about_s is None else about_s
         span_s = self._span_s / factor
         share = (about_s - self._from_s) / self._span_s
-        self._look_at(about_s - min(1.0, max(0.0, share)) * span_s, span_s)
+        self._set_view(about_s - min(1.0, max(0.0, share)) * span_s, span_s)
 
     def fit(self) -> None:
         """The whole session."""
-        self._look_at(0.0, np.inf)
+        self._set_view(0.0, np.inf)
 
     def _describe(self) -> None:
         length = clock_text(self._course.duration_s) if self._course is not None else tr("empty")
-        chosen = (
-            tr("; selected {first} to {last}", first=clock_text(self._selection[0]), last=clock_text(self._selection[1]))
-            if self._selection
-            else ""
-        )
         gaps = tr(", {count} gaps", count=len(self._course.gaps)) if self._course is not None and len(self._course.gaps) else ""
+        chosen = ""
+        if self._selection is not None:
+            first, last = (clock_text(time_s) for time_s in self._selection)
+            chosen = tr("; selected {first} to {last}", first=first, last=last)
+        marks = len(self._events)
         self.setAccessibleDescription(
-            tr("{length} long, {count} marks{gaps}{chosen}", length=length, count=len(self._events), gaps=gaps, chosen=chosen)
+            tr("{length} long, {count} marks{gaps}{chosen}", length=length, count=marks, gaps=gaps, chosen=chosen)
         )
 
-    def _look_at(self, from_s: float, span_s: float) -> None:
+    def _set_view(self, from_s: float, span_s: float) -> None:
         longest_s = max(self._course.duration_s if self._course is not None else 0.0, _LEAST_SPAN_S)
         self._span_s = min(max(span_s, _LEAST_SPAN_S), longest_s)
         self._is_whole = self._span_s >= longest_s
         self._from_s = min(max(0.0, from_s), longest_s - self._span_s)
-        self._repaint()
+        self._paint_again()
 
-    def _repaint(self) -> None:
+    def _paint_again(self) -> None:
         self._picture = None
         self.update()
 
@@ -303,23 +300,21 @@ class TimelineView(QWidget):
 
     def _paint_bands(self, painter: QPainter, course: Course, lanes: _Lanes) -> None:
         rows, fresh = self._columns(course, lanes.states)
-        states = [QColor(theme.STATE_COLOUR[state]) for state in PoseState]
-        nothing = theme.colour(theme.LINE, 0.6)
-        paint_band(painter, lanes.states, np.where(fresh, course.states[rows], -2), states, nothing)
+        colours = [QColor(theme.STATE_COLOUR[state]) for state in PoseState]
+        nothing, states = theme.colour(theme.LINE, 0.6), np.where(fresh, course.states[rows], -2)
+        paint_band(painter, lanes.states, states, colours, nothing)
         if (course.modes >= 0).any():
             modes = [QColor(MODE_LOOK[mode].colour) for mode in Mode]
             paint_band(painter, lanes.modes, np.where(fresh, course.modes[rows], -2), modes, nothing)
-        self._paint_letters(painter, np.where(fresh, course.states[rows], -2), lanes.states)
-
-    def _paint_letters(self, painter: QPainter, states: NDArray[np.int64], lane: QRectF) -> None:
-        """The state's letter wherever its colour is wide enough for one."""
+        # the state's letter wherever its colour is wide enough for one
         painter.setFont(theme.bold(10))
+        painter.setPen(QColor(theme.STATE_INK))
         ratio = self.devicePixelRatioF()
         edges = np.concatenate([[0], np.flatnonzero(np.diff(states)) + 1, [len(states)]])
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             if last - first > 14 * ratio and states[first] >= 0:
+                lane = lanes.states
                 room = QRectF(lane.left() + first / ratio, lane.top(), (last - first) / ratio, lane.height())
-                painter.setPen(QColor(theme.STATE_INK))
                 painter.drawText(room, Qt.AlignmentFlag.AlignCenter, tuple(PoseState)[int(states[first])].value)
 
     def _paint_gaps(self, painter: QPainter, course: Course, lanes: _Lanes) -> None:
@@ -335,7 +330,7 @@ class TimelineView(QWidget):
             painter.fillRect(room, QBrush(theme.colour(theme.FAULT, 0.55), Qt.BrushStyle.BDiagPattern))
 
     def _paint_theta(self, painter: QPainter, course: Course, lane: QRectF) -> None:
-        """The signed angle; its scale follows the session, without its rarest peaks."""
+        """The signed angle; the 99.5th percentile of the session sets its scale."""
         known = np.abs(course.theta_deg[np.isfinite(course.theta_deg)])
         largest = float(np.percentile(known, 99.5)) if known.size else 0.0
         most = next((r for r in _ANGLE_RANGES if largest <= r), _ANGLE_RANGES[-1])
@@ -344,8 +339,9 @@ class TimelineView(QWidget):
         painter.drawLine(QPointF(lane.left(), middle), QPointF(lane.right(), middle))
         painter.setFont(theme.font(10))
         painter.setPen(QColor(theme.TEXT_FAINT))
+        flags = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         for text, y in ((f"+{most:g}°", lane.top() + 5), (f"\N{MINUS SIGN}{most:g}°", lane.bottom() - 5)):
-            painter.drawText(QRectF(0, y - 8, _LEFT - _NAME, 16), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
+            painter.drawText(QRectF(0, y - 8, _LEFT - _NAME_GAP, 16), flags, text)
         if course.other_theta_deg is not None:
             self._paint_curve(painter, course, course.other_theta_deg / most, lane, theme.SKY)
         self._paint_curve(painter, course, course.theta_deg / most, lane, theme.THETA)
@@ -375,9 +371,9 @@ class TimelineView(QWidget):
         painter.setFont(theme.font(10))
         painter.setPen(QColor(theme.TEXT_DIM))
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(QRectF(0, lanes.theta.center().y() - 8, _LEFT - _NAME, 16), right, tr("theta"))
-        painter.drawText(QRectF(0, lanes.marks.top(), _LEFT - _NAME, lanes.marks.height()), right, tr("events"))
-        painter.drawText(QRectF(0, lanes.states.top() - 2, _LEFT - _NAME, lanes.states.height() + 4), right, tr("state"))
+        painter.drawText(QRectF(0, lanes.theta.center().y() - 8, _LEFT - _NAME_GAP, 16), right, tr("theta"))
+        painter.drawText(QRectF(0, lanes.marks.top(), _LEFT - _NAME_GAP, lanes.marks.height()), right, tr("events"))
+        painter.drawText(QRectF(0, lanes.states.top() - 2, _LEFT - _NAME_GAP, lanes.states.height() + 4), right, tr("state"))
 
     def _paint_selection(self, painter: QPainter, first_s: float, last_s: float) -> None:
         lanes = self._lanes()
@@ -448,7 +444,7 @@ class TimelineView(QWidget):
         place = course.place_at(time_s)
         parts = [clock_text(time_s), tr("no pose")]
         if place + 1 in course.gaps and time_s - course.times_s[place] > _HOLD_S:
-            # what was true before a gap is not said of the time in it
+            # in a gap the row before it does not count
             return "  ".join((parts[0], tr("no frames")))
         if course.states[place] >= 0:
             parts[1:] = [

@@ -1,11 +1,4 @@
-"""The player: a recorded session with everything that was understood, frame by frame; never to be mistaken for a live picture.
-
-The menus of the player: everything that it can do, with its key.
-
-All that is to be seen of the player below its menus: the widgets of the operator window that fit, and the timeline.
-
-The player's keys.
-"""
+"""The player: a recorded session with everything that was understood, frame by frame; always marked as not live."""
 
 from __future__ import annotations
 
@@ -21,19 +14,10 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPlainTextEdit, QVBoxLayout, QWidget
 
 from app.player.controls import NoteField, PlayerBar, RecordedPlate, SessionEvents
-from app.player.decoder import Decoded, DecodeThread, PlayerSessionLoader
-from app.player.session_model import (
-    Course,
-    JumpKind,
-    KnownSession,
-    PlayClock,
-    Replayed,
-    compared_line,
-    neighbour,
-    places_of,
-    target_at,
-    value_lines,
-)
+from app.player.course import Course, JumpKind, PlayClock, neighbour, places_of, target_at, value_lines
+from app.player.decoder import Decoded, FrameDecoder
+from app.player.replayed import compared_line
+from app.player.session_model import PlayedSession
 from app.player.timeline import TimelineView
 from app.ui import theme
 from app.ui.actions import KeyTable, MenuEntry, add_help_menu, add_menu, menu_tables, shown
@@ -58,14 +42,15 @@ from core.types import Point, Scene, Tick
 from hardware.rig import RigKind
 
 _ZOOM = 1.5
+"""Of the timeline, by key."""
 
 
 def add_player_menus(window: PlayerWindow) -> None:
-    """Fill the window's menu bar. Keys that step repeat while they are held."""
+    """Fill the window's menu bar; keys that step repeat while they are held."""
     panels = window.panels
     window.add_file_menu(
         [
-            MenuEntry(tr("&Snapshot"), window.take_snapshot, ("S", "Ctrl+S")),
+            MenuEntry(tr("&Snapshot"), window.save_snapshot, ("S", "Ctrl+S")),
             None,
             MenuEntry(tr("Selection as &video"), window.export_clip, ("E",)),
             MenuEntry(tr("&Note"), window.begin_note, ("M",)),
@@ -96,8 +81,8 @@ def add_player_menus(window: PlayerWindow) -> None:
             MenuEntry(tr("Last frame"), partial(window.seek, float("inf")), ("End",)),
             MenuEntry(tr("Go to a &time"), window.go_to_time, ("T",)),
             None,
-            MenuEntry(tr("Slower"), partial(window.faster, -1), ("[",)),
-            MenuEntry(tr("Faster"), partial(window.faster, 1), ("]",)),
+            MenuEntry(tr("Slower"), partial(window.change_speed, -1), ("[",)),
+            MenuEntry(tr("Faster"), partial(window.change_speed, 1), ("]",)),
             MenuEntry(tr("As &recorded"), partial(window.set_speed, 1.0), ("R",)),
         ],
     )
@@ -126,7 +111,7 @@ def add_player_menus(window: PlayerWindow) -> None:
     add_help_menu(window, panels.help.toggle)
 
 
-_ELSE = (
+_MOUSE = (
     mark("Mouse and focus"),
     (
         (mark("Click, drag"), mark("on the timeline: go there")),
@@ -140,12 +125,7 @@ _ELSE = (
 
 def player_keys(window: QMainWindow) -> Sequence[KeyTable]:
     """The keys of the menus, and the mouse."""
-    return (*menu_tables(window), shown(_ELSE))
-
-
-def player_help(parent: QWidget) -> KeyPage:
-    """The page of the player, over `parent`."""
-    return KeyPage(parent, player_keys)
+    return (*menu_tables(window), shown(_MOUSE))
 
 
 _TEXT_EVERY_S = 0.1
@@ -160,35 +140,74 @@ class PlayerPanels(ScenePanels):
         pixels_per_mm = scaled(config, known).policy.pursuit.pixels_per_mm
         super().__init__(config.perception, pixels_per_mm, _TEXT_EVERY_S)
         self._scale = known.scale if known is not None else None
+        self._provenance = Provenance()
         self.banner = SimBanner(RigKind.PLAYBACK)
         self.banner.setFixedWidth(_BANNER_WIDTH)
         self.plate = RecordedPlate(manifest, name)
         self.live.setAccessibleName(tr("Recorded picture"))
-        self.live.setAccessibleDescription(tr("Played back, not live"))
         self.live.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.other = LiveView(pixels_per_mm) if with_other else None
         self.compared = QLabel("", self)
         self.compared.setVisible(with_other)
         self.commands = ProvenanceTable()
         self.events = SessionEvents()
-        self.values = QPlainTextEdit()
-        self.problems = QPlainTextEdit()
+        self.values = _text_page(tr("Recorded values"))
+        self.problems = _text_page(tr("Problems of the session"))
         self.timeline = TimelineView()
         self.bar = PlayerBar()
         self.note = NoteField(tr("Note at this time; Enter keeps it, Esc does not"), "SKY")
         self.note.hide()
-        self._provenance = Provenance()
-        self._style()
-        left = column(
-            (self._pictures(), 5), (self.overlay_bar, 0), (self.note, 0), (_framed(self.timeline), 1), (self.bar, 0), spacing=_GAP
-        )
-        self.help = player_help(self._lay_out(self._header(), holder(left), self._right_side()))
+        self._mode_note = card_note(tr("mode then"))
+        for view in (self.live, self.other):
+            if view is not None:
+                _mark_as_playback(view)
+        corner, loupe = _CornerLabel(tr("PLAYBACK"), self.live), self.live.findChild(HeadLoupe)
+        if isinstance(loupe, HeadLoupe):
+            corner.stackUnder(loupe)
+        timeline = Card("", self.timeline)
+        room = timeline.layout()
+        assert room is not None
+        room.setContentsMargins(6, 3, 4, 3)  # the usual margins of a card are for text
+        pictures, bar = self._lay_out_pictures(), self.overlay_bar
+        left = column((pictures, 5), (bar, 0), (self.note, 0), (timeline, 1), (self.bar, 0), spacing=_GAP)
+        self.help = KeyPage(self._lay_out(self._header(), holder(left), self._right_side()), player_keys)
         self.notice = Notice(self.live)
         self.toast = Toast(self.live)
 
-    @property
-    def views(self) -> tuple[LiveView, ...]:
-        return (self.live,) if self.other is None else (self.live, self.other)
+    def _header(self) -> QHBoxLayout:
+        header = QHBoxLayout()
+        header.setSpacing(14)
+        header.addWidget(self.banner)
+        header.addWidget(self.plate, 1)
+        header.addWidget(self._mode_note)
+        header.addWidget(self.mode)
+        return header
+
+    def _lay_out_pictures(self) -> QWidget:
+        """The recorded picture, and beside it what a replay saw in it."""
+        if self.other is None:
+            return self.live
+        self.other.setAccessibleName(tr("The same picture perceived again"))
+        both = QHBoxLayout()
+        both.setSpacing(6)
+        for view in (self.live, self.other):
+            view.setMinimumSize(300, 225)
+            both.addWidget(view, 1)
+        _CornerLabel(tr("PERCEIVED AGAIN"), self.other)
+        theme.set_sheet(self.compared, "color: @TEXT; font-size: 14px;")
+        self.compared.setAccessibleName(tr("Recorded against perceived again"))
+        pictures = column((self.compared, 0), spacing=4)
+        pictures.insertLayout(0, both, 1)
+        return holder(pictures)
+
+    def _right_side(self) -> QVBoxLayout:
+        self.pages.addTab(self.events, tr("Events"))
+        self.pages.addTab(self.commands, tr("Commands"))
+        self.pages.addTab(self.values, tr("Values"))
+        self.pages.addTab(self.problems, tr("Problems"))
+        return column((Card("", self.badge), 0), (self.advice, 0), (self._dials(), 3), (self.clearance, 0), (self.pages, 3))
+
+    # ---- one row
 
     def show_row(self, row: RecordedRow, tick: Tick, target: Point | None, *, renew_text: bool) -> None:
         """Everything as it was recorded; `target` in source pixels."""
@@ -204,6 +223,16 @@ class PlayerPanels(ScenePanels):
         self._show_drive(row)
         if renew_text:
             self._show_values(row)
+
+    def show_other(self, tick: Tick, other: Scene | None) -> None:
+        """What a replay saw in the same picture."""
+        if self.other is None:
+            return
+        blank = Scene(tick.frame.index, tick.frame.captured_s, tick.scene.source_size, 1.0)
+        self.other.show_frame(tick.frame, other or blank)
+        line = compared_line(tick.scene, other) if other is not None else tr("this row was not")
+        again = f'<span style="color:{theme.SKY}">\N{HORIZONTAL BAR} {tr("perceived again:")}</span>'
+        self.compared.setText(f"{again} {escape(line)}")
 
     def show_lost(self, row: RecordedRow | None, place: int) -> None:
         """A row that cannot be read, or whose picture is lost: then its values are shown without it."""
@@ -248,74 +277,27 @@ class PlayerPanels(ScenePanels):
         count = len(problems)
         self.pages.setTabText(self.pages.indexOf(self.problems), tr("⚠ Problems {count}", count=count) if count else tr("Problems"))
 
-    def _style(self) -> None:
-        # a frame in the banner's colour and its word in the corner: also a part of the screen must not look live
-        for view in self.views:
-            view.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
-            theme.set_sheet(view, f"LiveView {{ border: 2px solid @PLAYBACK; background: {ON_PICTURE.INK}; }}")
-            room = view.layout()
-            assert room is not None
-            room.setContentsMargins(2, 2, 2, 2)
-        corner, loupe = _CornerMark(tr("PLAYBACK"), self.live), self.live.findChild(HeadLoupe)
-        if isinstance(loupe, HeadLoupe):
-            corner.stackUnder(loupe)
-        for page, name in ((self.values, tr("Recorded values")), (self.problems, tr("Problems of the session"))):
-            page.setReadOnly(True)
-            page.setTabChangesFocus(True)
-            page.setAccessibleName(name)
-            theme.set_sheet(page, "QPlainTextEdit { background: @PANEL; color: @TEXT_DIM; border: none; font-size: 13px; }")
 
-    def _header(self) -> QHBoxLayout:
-        header = QHBoxLayout()
-        header.setSpacing(14)
-        header.addWidget(self.banner)
-        header.addWidget(self.plate, 1)
-        self._mode_note = card_note(tr("mode then"))
-        header.addWidget(self._mode_note)
-        header.addWidget(self.mode)
-        return header
-
-    def _pictures(self) -> QWidget:
-        """The recorded picture, and beside it what a replay saw in it."""
-        if self.other is None:
-            return self.live
-        self.other.setAccessibleName(tr("The same picture perceived again"))
-        self.other.setAccessibleDescription(tr("Played back, not live"))
-        both = QHBoxLayout()
-        both.setSpacing(6)
-        for view in self.views:
-            view.setMinimumSize(300, 225)
-            both.addWidget(view, 1)
-        _CornerMark(tr("PERCEIVED AGAIN"), self.other)
-        theme.set_sheet(self.compared, "color: @TEXT; font-size: 14px;")
-        self.compared.setAccessibleName(tr("Recorded against perceived again"))
-        pictures = column((self.compared, 0), spacing=4)
-        pictures.insertLayout(0, both, 1)
-        return holder(pictures)
-
-    def show_other(self, tick: Tick, other: Scene | None) -> None:
-        """What a replay saw in the same picture."""
-        if self.other is None:
-            return
-        blank = Scene(tick.frame.index, tick.frame.captured_s, tick.scene.source_size, 1.0)
-        self.other.show_frame(tick.frame, other or blank)
-        line = compared_line(tick.scene, other) if other is not None else tr("this row was not")
-        again = f'<span style="color:{theme.SKY}">\N{HORIZONTAL BAR} {tr("perceived again:")}</span>'
-        self.compared.setText(f"{again} {escape(line)}")
-
-    def _right_side(self) -> QVBoxLayout:
-        for page, name in (
-            (self.events, tr("Events")),
-            (self.commands, tr("Commands")),
-            (self.values, tr("Values")),
-            (self.problems, tr("Problems")),
-        ):
-            self.pages.addTab(page, name)
-        dials = self._dials()
-        return column((Card("", self.badge), 0), (self.advice, 0), (dials, 3), (self.clearance, 0), (self.pages, 3))
+def _text_page(name: str) -> QPlainTextEdit:
+    page = QPlainTextEdit()
+    page.setReadOnly(True)
+    page.setTabChangesFocus(True)
+    page.setAccessibleName(name)
+    theme.set_sheet(page, "QPlainTextEdit { background: @PANEL; color: @TEXT_DIM; border: none; font-size: 13px; }")
+    return page
 
 
-class _CornerMark(QLabel):
+def _mark_as_playback(view: LiveView) -> None:
+    """A frame in the banner's colour, so that no part of the screen looks live."""
+    view.setAccessibleDescription(tr("Played back, not live"))
+    view.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+    theme.set_sheet(view, f"LiveView {{ border: 2px solid @PLAYBACK; background: {ON_PICTURE.INK}; }}")
+    room = view.layout()
+    assert room is not None
+    room.setContentsMargins(2, 2, 2, 2)
+
+
+class _CornerLabel(QLabel):
     """A word in the lower left corner of its parent."""
 
     def __init__(self, text: str, parent: QWidget) -> None:
@@ -332,21 +314,12 @@ class _CornerMark(QLabel):
         return False
 
 
-def _framed(timeline: TimelineView) -> Card:
-    """As high as it can be: a card's usual margins are for text."""
-    card = Card("", timeline)
-    room = card.layout()
-    assert room is not None
-    room.setContentsMargins(6, 3, 4, 3)
-    return card
-
-
 _TURN_MS = 15
 _STOP_WITHIN_MS = 10_000
 
 
 class PlayerWindow(WindowFrame):
-    """Plays an open session. All reading, decoding and writing is done by other threads; the newest wish wins.
+    """Plays an open session. All reading, decoding and writing is done by other threads; only the newest request counts.
 
     Parameters
     ----------
@@ -358,108 +331,62 @@ class PlayerWindow(WindowFrame):
     def __init__(self, reader: SessionReader, config: Config, against: Path | None = None) -> None:
         super().__init__()
         self.setMinimumWidth(theme.MIN_WIDE_PX)
-        self._reader = reader
-        self._clock = PlayClock()
-        self._jump_kind = JumpKind.STATE
-        self._selection: tuple[float, float] | None = None
-        self._place = -1
-        self._asked = -1
-        self._asked_s = 0.0
-        self._shown: Decoded | None = None
+        self._reader, self._against = reader, against
+        self.clock = PlayClock()
+        self.jump_kind = JumpKind.STATE
+        self.selection: tuple[float, float] | None = None
+        """First and last second of the selection."""
+        self.place = -1
+        """The row that is on the screen; -1 before the first."""
         self.seek_ms = 0.0
+        """From the last request of a row until it was on the screen."""
+        self._requested, self._requested_s = -1, 0.0
+        self._shown: Decoded | None = None
         self._note_s = 0.0
-        self._refused: deque[Event] = deque()
-        self._decode = DecodeThread(reader, self)
-        self._keeper = PlayerSessionLoader(reader, pictures_folder(config.window.pictures_folder), self)
-        self._known = KnownSession(reader, self)
-        self._turn = QTimer(self)
-        self._turn.setInterval(_TURN_MS)
-        self._turn.setTimerType(Qt.TimerType.PreciseTimer)
-        self._against = against
+        self._refused_notes: deque[Event] = deque()
+        self._decoder = FrameDecoder(reader, self)
+        self.session = PlayedSession(reader, pictures_folder(config.window.pictures_folder), self)
+        self._turn = QTimer(self, interval=_TURN_MS, timerType=Qt.TimerType.PreciseTimer)
         self.panels = PlayerPanels(config, reader.manifest, reader.folder.name, with_other=against is not None)
         self.setCentralWidget(self.panels)
         add_player_menus(self)
-        self._wire()
+        self._connect()
         self.setWindowTitle(tr("LumenPilot \N{EM DASH} PLAYBACK of {name}", name=reader.folder.name))
 
-    # ---- what can be asked
-
     @property
-    def place(self) -> int:
-        """The row that is on the screen; -1 before the first."""
-        return self._place
+    def course(self) -> Course:
+        return self.session.course
 
-    @property
-    def rows(self) -> int:
-        """Rows known so far."""
-        return len(self._course)
-
-    @property
-    def time_s(self) -> float:
-        """Where playing is, from the first row."""
-        return self._clock.position_s
-
-    @property
-    def is_playing(self) -> bool:
-        return self._clock.is_playing
-
-    @property
-    def speed(self) -> float:
-        return self._clock.speed
-
-    @property
-    def jump_kind(self) -> JumpKind:
-        return self._jump_kind
-
-    @property
-    def selection(self) -> tuple[float, float] | None:
-        """First and last second of the selection."""
-        return self._selection
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        return self._known.events
-
-    @property
-    def _course(self) -> Course:
-        return self._known.course
-
-    # ---- composition
-
-    def _wire(self) -> None:
-        panels, bar = self.panels, self.panels.bar
-        self._decode.decoded.connect(self._on_decoded)
-        self._decode.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
-        self._keeper.said.connect(self.say)
-        self._keeper.events_read.connect(self._known.take_events)
-        self._keeper.events_read.connect(lambda _events, is_written: panels.plate.show_written(is_written))
-        self._keeper.noted.connect(self._known.take_note)
-        self._keeper.note_refused.connect(self._write_again)
-        self._keeper.replayed_read.connect(self._on_replayed)
-        self._keeper.progressed.connect(bar.show_progress)
-        known = self._known
-        known.said.connect(self.say)
-        known.changed.connect(self._show_course)
-        known.emptied.connect(lambda why: panels.show_nothing(tr("Nothing to play"), why, NoticeKind.WARNING))
-        known.looked.connect(self._on_looked)
-        known.problems_found.connect(panels.show_problems)
+    def _connect(self) -> None:
+        panels, bar, session = self.panels, self.panels.bar, self.session
         self._turn.timeout.connect(self._on_turn)
+        self._decoder.decoded.connect(self._on_decoded)
+        self._decoder.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
+        session.message.connect(self.show_message)
+        session.changed.connect(self._show_course)
+        session.polled.connect(self._on_polled)
+        session.emptied.connect(lambda why: panels.show_nothing(tr("Nothing to play"), why, NoticeKind.WARNING))
+        session.is_written.connect(panels.plate.show_written)
+        session.problems_found.connect(panels.show_problems)
+        session.compared.connect(self._on_compared)
+        session.note_refused.connect(self._on_note_refused)
+        session.clip_progressed.connect(bar.show_progress)
         panels.timeline.sought.connect(self.seek)
         panels.timeline.selected.connect(lambda first, last: self.select((first, last)))
         panels.events.chosen.connect(self._go_to_event)
-        panels.note.returnPressed.connect(self._keep_note)
-        bar.play_asked.connect(self.toggle_play)
-        bar.step_asked.connect(self.step)
-        bar.jump_asked.connect(self.jump)
+        panels.note.returnPressed.connect(self._save_note)
+        bar.play_requested.connect(self.toggle_play)
+        bar.step_requested.connect(self.step)
+        bar.jump_requested.connect(self.jump)
         bar.sought_ms.connect(lambda ms: self.seek(ms / 1000.0))
         bar.speed_chosen.connect(self.set_speed)
         bar.jump_kind_chosen.connect(self.set_jump_kind)
-        bar.clip_asked.connect(self.export_clip)
-        bar.cancel_asked.connect(self._keeper.cancel_clip)
-        bar.note_asked.connect(self.begin_note)
-        bar.snapshot_asked.connect(self.take_snapshot)
+        bar.clip_requested.connect(self.export_clip)
+        bar.cancel_requested.connect(session.cancel_clip)
+        bar.note_requested.connect(self.begin_note)
+        bar.snapshot_requested.connect(self.save_snapshot)
         bar.show_speed(1.0)
-        bar.show_kind(self._jump_kind)
+        bar.show_kind(self.jump_kind)
         if self._against is not None:
             panels.overlay_bar.toggle(Layer.LOUPE)  # two pictures leave no room for it
 
@@ -468,64 +395,56 @@ class PlayerWindow(WindowFrame):
         super().start()
         self.panels.live.setFocus()
         self.panels.show_nothing(tr("Opening"), self._reader.folder.name)
-        self._keeper.read_events()
-        if self._against is not None:
-            self._keeper.read_replayed(self._against)
-        self._known.start()
+        self.session.start(self._against)
 
     # ---- what is known of the session
 
-    @Slot()
-    def _on_looked(self) -> None:
-        if self._asked < 0 and len(self._course):
-            self._ask(0)
+    def _on_polled(self) -> None:
+        if self._requested < 0 and len(self.course):
+            self._request(0)
 
-    @Slot()
     def _show_course(self) -> None:
-        self.panels.timeline.show_course(self._course, self.events)
-        self.panels.bar.show_length(round(self._course.duration_s * 1000), len(self._course))
-        self.panels.events.show_events(self.events, self._course.first_s)
+        self.panels.timeline.show_course(self.course, self.session.events)
+        self.panels.bar.show_length(round(self.course.duration_s * 1000), len(self.course))
+        self.panels.events.show_events(self.session.events, self.course.first_s)
         if self._shown is not None and self._shown.row is not None:
             self.panels.events.show_time(self._shown.row.captured_s)
         self._show_position()
 
-    @Slot(object)
-    def _on_replayed(self, replayed: Replayed) -> None:
-        self._known.compare_with(replayed)
+    def _on_compared(self) -> None:
         self.set_jump_kind(JumpKind.REPLAY)
-        self._show_course()
-        self._decode.replayed = replayed.scene
-        self._decode.ask_again()
+        self._decoder.replayed = self.session.replayed
+        self._decoder.request_again()
 
     # ---- playing
 
     @Slot()
     def toggle_play(self) -> None:
         """Play or pause; at the end play from the beginning."""
-        if self._clock.is_playing:
+        if self.clock.is_playing:
             self.pause()
-        elif len(self._course):
-            if self._clock.position_s >= self._course.duration_s:
-                self._clock.seek(0.0)
-            self._clock.play()
+        elif len(self.course):
+            if self.clock.position_s >= self.course.duration_s:
+                self.clock.seek(0.0)
+            self.clock.play()
             self._turn.start()
             self.panels.bar.show_playing(True)
 
     def pause(self) -> None:
         """Stop at the frame that is shown."""
         was_playing = self._turn.isActive()
-        self._clock.pause()
+        self.clock.pause()
         self._turn.stop()
         self.panels.bar.show_playing(False)
         if was_playing and self._shown is not None:
-            self._show(self._shown)  # while it plays, texts are renewed now and then only
+            self._show(self._shown)  # while it plays, texts are renewed only now and then
 
     @Slot()
     def _on_turn(self) -> None:
-        goes_on = self._clock.turn(self._course, self._course.duration_s)
-        if self._clock.passed_s > 0.0:
-            self.say(tr("Passed over a gap: {seconds:.1f} s without frames", seconds=self._clock.passed_s))
-        self._ask(self._course.place_at(self._clock.position_s))
+        goes_on = self.clock.advance(self.course, self.course.duration_s)
+        if self.clock.skipped_s > 0.0:
+            self.show_message(tr("Passed over a gap: {seconds:.1f} s without frames", seconds=self.clock.skipped_s))
+        self._request(self.course.place_at(self.clock.position_s))
         self._show_position()
         if not goes_on:
             self.pause()
@@ -533,90 +452,88 @@ class PlayerWindow(WindowFrame):
     @Slot(float)
     def seek(self, time_s: float) -> None:
         """To a time from the first row."""
-        if len(self._course):
-            self._clock.seek(min(time_s, self._course.duration_s))
-            self._ask(self._course.place_at(self._clock.position_s))
+        if len(self.course):
+            self.clock.seek(min(time_s, self.course.duration_s))
+            self._request(self.course.place_at(self.clock.position_s))
             self._show_position()
 
     def go(self, place: int) -> None:
         """To a row; playing goes on from there."""
-        if len(self._course):
-            place = max(0, min(len(self._course) - 1, place))
-            self._clock.seek(float(self._course.times_s[place]))
-            self._ask(place)
+        if len(self.course):
+            place = max(0, min(len(self.course) - 1, place))
+            self.clock.seek(float(self.course.times_s[place]))
+            self._request(place)
             self._show_position()
 
     @Slot(int)
     def step(self, step: int) -> None:
         """So many frames on or back, paused."""
         self.pause()
-        self.go(max(0, self._asked) + step)
+        self.go(max(0, self._requested) + step)
 
     def skip(self, seconds: float) -> None:
         """So many seconds on or back."""
-        self.seek(max(0.0, self._clock.position_s + seconds))
+        self.seek(max(0.0, self.clock.position_s + seconds))
 
     @Slot(int)
     def jump(self, step: int) -> None:
         """To the next (1) or previous (-1) of the chosen kind, paused."""
         self.pause()
-        found = neighbour(places_of(self._jump_kind, self._course, self.events), max(0, self._asked), step)
-        if found is None:
-            kind = tr(self._jump_kind.value).lower()
-            self.say(tr("No {kind} after this frame", kind=kind) if step > 0 else tr("No {kind} before this frame", kind=kind))
-        else:
+        found = neighbour(places_of(self.jump_kind, self.course, self.session.events), max(0, self._requested), step)
+        if found is not None:
             self.go(found)
+            return
+        kind = tr(self.jump_kind.value).lower()
+        self.show_message(tr("No {kind} after this frame", kind=kind) if step > 0 else tr("No {kind} before this frame", kind=kind))
 
     @Slot(object)
     def set_jump_kind(self, kind: JumpKind) -> None:
-        self._jump_kind = kind
+        self.jump_kind = kind
         self.panels.bar.show_kind(kind)
 
     def next_jump_kind(self) -> None:
         kinds = list(JumpKind)
-        self.set_jump_kind(kinds[(kinds.index(self._jump_kind) + 1) % len(kinds)])
-        self.say(tr("N and P: {kind}", kind=tr(self._jump_kind.value).lower()))
+        self.set_jump_kind(kinds[(kinds.index(self.jump_kind) + 1) % len(kinds)])
+        self.show_message(tr("N and P: {kind}", kind=tr(self.jump_kind.value).lower()))
 
     @Slot(float)
     def set_speed(self, speed: float) -> None:
-        self._clock.speed = speed
+        self.clock.speed = speed
         self.panels.bar.show_speed(speed)
 
-    def faster(self, step: int) -> None:
+    def change_speed(self, step: int) -> None:
         """One speed up or down."""
-        self.set_speed(self._clock.faster(step))
+        self.set_speed(self.clock.change_speed(step))
 
     def _go_to_event(self, event: Event) -> None:
         self.pause()
-        if len(self._course):
-            time_s = event.time_s - self._course.first_s
-            self.go(int(self._course.times_s.searchsorted(time_s - 1e-6)))
+        if len(self.course):
+            time_s = event.time_s - self.course.first_s
+            self.go(int(self.course.times_s.searchsorted(time_s - 1e-6)))
 
     # ---- rows on the screen
 
-    def _ask(self, place: int) -> None:
-        if place == self._asked:
+    def _request(self, place: int) -> None:
+        if place == self._requested:
             return
-        apart = place - self._asked
+        apart = place - self._requested
         # what comes next: the same step again, or after a jump the frames that follow
-        step = apart if self._clock.is_playing or abs(apart) == 1 else 1
-        self._asked, self._asked_s = place, time.monotonic()
-        self._decode.ask(place, step)
+        step = apart if self.clock.is_playing or abs(apart) == 1 else 1
+        self._requested, self._requested_s = place, time.monotonic()
+        self._decoder.request(place, step)
 
-    @Slot()
-    def _on_decoded(self) -> None:
-        found = self._decode.take()
-        if found is None or self._is_shut:
+    def _on_decoded(self, found: Decoded) -> None:
+        if self._is_shut:
             return
-        self._shown, self._place = found, found.place
+        self._shown, self.place = found, found.place
         self._show(found)
-        if found.place == self._asked:
-            self.seek_ms = 1000.0 * (time.monotonic() - self._asked_s)
+        if found.place == self._requested:
+            self.seek_ms = 1000.0 * (time.monotonic() - self._requested_s)
 
     def _show(self, found: Decoded) -> None:
         if found.row is not None and found.tick is not None:
-            target = target_at(self.events, found.tick.scene, found.row.captured_s)
-            self.panels.show_row(found.row, found.tick, target, renew_text=not self._clock.is_playing)
+            target = target_at(self.session.events, found.tick.scene, found.row.captured_s)
+            self.panels.show_row(found.row, found.tick, target, renew_text=not self.clock.is_playing)
             self.panels.show_other(found.tick, found.other)
         else:
             self.panels.show_lost(found.row, found.place)
@@ -624,92 +541,90 @@ class PlayerWindow(WindowFrame):
             self.panels.events.show_time(found.row.captured_s)
 
     def _show_position(self) -> None:
-        time_s = self._clock.position_s
-        self.panels.timeline.show_time(time_s, follow=self._clock.is_playing)
-        self.panels.bar.show_position(round(time_s * 1000), max(0, self._asked))
+        time_s = self.clock.position_s
+        self.panels.timeline.show_time(time_s, follow=self.clock.is_playing)
+        self.panels.bar.show_position(round(time_s * 1000), max(0, self._requested))
 
-    # ---- keeping
+    # ---- selection, clips, snapshots
 
     def select(self, selection: tuple[float, float] | None) -> None:
         """First and last second of the clip; None: the whole session."""
-        self._selection = selection
+        self.selection = selection
         self.panels.timeline.show_selection(selection)
         self.panels.bar.show_selection(selection[1] - selection[0] if selection is not None else None)
 
     def select_from_here(self) -> None:
         """The selection begins here."""
-        here = self._clock.position_s
-        last = self._selection[1] if self._selection is not None and self._selection[1] > here else self._course.duration_s
+        here = self.clock.position_s
+        last = self.selection[1] if self.selection is not None and self.selection[1] > here else self.course.duration_s
         self.select((here, last))
 
     def select_to_here(self) -> None:
         """The selection ends here."""
-        here = self._clock.position_s
-        self.select((self._selection[0] if self._selection is not None and self._selection[0] < here else 0.0, here))
+        here = self.clock.position_s
+        self.select((self.selection[0] if self.selection is not None and self.selection[0] < here else 0.0, here))
 
     @Slot()
     def export_clip(self) -> None:
         """The selection as a video with overlays, into the pictures' folder; playing goes on."""
-        if not len(self._course):
-            self.say(tr("No clip: there are no frames"), is_fault=True)
+        if not len(self.course):
+            self.show_message(tr("No clip: there are no frames"), is_fault=True)
             return
-        if self._selection is None and not self._known.is_whole:
-            self.say(tr("No clip yet: the session is still being read, and would be cut short"), is_fault=True)
+        if self.selection is None and not self.session.is_whole:
+            self.show_message(tr("No clip yet: the session is still being read, and would be cut short"), is_fault=True)
             return
-        first_s, last_s = self._selection or (0.0, self._course.duration_s)
-        self._keeper.write_clip((self._course.place_at(first_s), self._course.place_at(last_s)), (first_s, last_s))
+        first_s, last_s = self.selection or (0.0, self.course.duration_s)
+        self.session.write_clip((self.course.place_at(first_s), self.course.place_at(last_s)), (first_s, last_s))
 
     @Slot()
-    def take_snapshot(self) -> None:
+    def save_snapshot(self) -> None:
         """The picture that is shown, plain, with overlays, and its values."""
         tick = self._shown.tick if self._shown is not None else None
         if tick is None:
-            self.say(tr("No snapshot: there is no picture"), is_fault=True)
+            self.show_message(tr("No snapshot: there is no picture"), is_fault=True)
         else:
-            self._keeper.take_snapshot(tick)
+            self.session.save_snapshot(tick)
+
+    # ---- notes
 
     @Slot()
     def begin_note(self) -> None:
-        """Write a note at this time; one that is being written is gone on with."""
+        """Write a note at this time, or go on with one that is being written."""
         self.pause()
-        if self.panels.note.isVisible():
-            self.panels.note.setFocus()
-            return
-        self._note_s = self._clock.position_s
-        self.panels.note.clear()
-        self.panels.note.show()
+        if not self.panels.note.isVisible():
+            self._note_s = self.clock.position_s
+            self.panels.note.clear()
+            self.panels.note.show()
         self.panels.note.setFocus()
 
     def _end_note(self) -> None:
         self.panels.note.hide()
         self.panels.live.setFocus()
-        QTimer.singleShot(0, self._offer_refused)
+        QTimer.singleShot(0, self._offer_refused_note)
 
-    def _keep_note(self) -> None:
+    def _save_note(self) -> None:
         text = self.panels.note.kept_text
         self._end_note()
-        if text and len(self._course):
-            event = Event(self._course.first_s + self._note_s, EventKind.NOTE, text)
-            self._keeper.add_note(event)
+        if text and len(self.course):
+            self.session.add_note(Event(self.course.first_s + self._note_s, EventKind.NOTE, text))
 
-    @Slot(object)
-    def _write_again(self, event: Event) -> None:
-        """A note that the disk did not take, at its time; what is being written meanwhile comes first."""
-        self._refused.append(event)
-        self._offer_refused()
+    def _on_note_refused(self, event: Event) -> None:
+        """A note that could not be written is offered again at its time, after what is being written meanwhile."""
+        self._refused_notes.append(event)
+        self._offer_refused_note()
 
-    def _offer_refused(self) -> None:
-        if self._refused and not self.panels.note.isVisible() and not self._is_shut:
-            event = self._refused.popleft()
+    def _offer_refused_note(self) -> None:
+        if self._refused_notes and not self.panels.note.isVisible() and not self._is_shut:
+            event = self._refused_notes.popleft()
             self.begin_note()
-            self._note_s = event.time_s - self._course.first_s
+            self._note_s = event.time_s - self.course.first_s
             self.seek(self._note_s)
             self.panels.note.setText(event.text)
 
     # ---- the window
 
     @Slot(str, bool)
-    def say(self, message: str, is_fault: bool = False) -> None:
+    def show_message(self, message: str, is_fault: bool = False) -> None:
         """A line for the person at the screen."""
         self.panels.toast.show_message(message, is_fault=is_fault)
 
@@ -731,11 +646,11 @@ class PlayerWindow(WindowFrame):
         elif panels.note.isVisible():
             self._end_note()
         elif self.focusWidget() is not panels.live:
-            panels.bar.abandon()
+            panels.bar.discard_typed_time()
             panels.live.setFocus()
-        elif self._keeper.has_clip:
-            self._keeper.cancel_clip()
-        elif self._selection is not None:
+        elif self.session.has_clip:
+            self.session.cancel_clip()
+        elif self.selection is not None:
             self.select(None)
         else:
             super()._on_escape()
@@ -748,21 +663,21 @@ class PlayerWindow(WindowFrame):
         super().keyPressEvent(event)
 
     def _may_close(self) -> bool:
-        """A note that is being written is kept."""
+        """A note that is being written is saved."""
         if self.panels.note.isVisible():
-            self._keep_note()
+            self._save_note()
         return super()._may_close()
 
     def _let_go(self) -> None:
         self._turn.stop()
-        self._known.stop()
+        self.session.stop_polling()
         self.panels.notice.clear()
 
     def _finish(self) -> Sequence[str]:
-        """End the threads; notes and snapshots are finished, a clip is given up."""
-        self._decode.stop()
-        has_saved = self._keeper.shut_down()
-        if not (self._decode.wait(_STOP_WITHIN_MS) and has_saved):
+        """End the threads; notes and snapshots are finished, a clip is cancelled."""
+        self._decoder.stop()
+        has_saved = self.session.shut_down()
+        if not (self._decoder.wait(_STOP_WITHIN_MS) and has_saved):
             return ["the disk did not answer in time; leaving without it"]
         self._reader.close()
         return ()

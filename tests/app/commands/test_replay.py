@@ -20,7 +20,7 @@ import pytest
 
 from app.commands.figures import draw_replay
 from app.commands.replay import ReplayOptions, change_to_json, model_note, prepare_out, replay_config, replay_frames, run_replay
-from app.player.session_model import Replayed
+from app.player.replayed import Replayed
 from core.config.models import Config, RigConfig
 from core.devices import UserError
 from core.evaluation.replay import Change, FrameResult, ReplayTally

@@ -115,7 +115,7 @@ def _texts_below() -> set[str]:
     for path in (
         *ROOT.glob("core/**/*.py"),
         *ROOT.glob("hardware/**/*.py"),
-        ROOT / "app" / "annotation_hand.py",
+        ROOT / "app" / "annotator" / "editing.py",
         *ROOT.glob("app/annot*.py"),
     ):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if path != own else ():

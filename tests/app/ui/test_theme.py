@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.operator.window import OperatorWindow
-from app.player.session_model import MARK_LOOK
+from app.player.course import MARK_LOOK
 from app.ui import theme
 from app.ui.theme import DARK, LIGHT, ON_PICTURE, Scheme
 from app.widgets.alerts import LOOK

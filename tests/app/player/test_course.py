@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.player.session_model import Course, JumpKind, PlayClock, clock_text, course_of, event_line, neighbour, places_of
+from app.player.course import Course, JumpKind, PlayClock, clock_text, course_of, event_line, neighbour, places_of
 from core.session.manifest import Event, EventKind
 from core.session.reader import Timeline
 
@@ -100,25 +100,25 @@ class Wall:
 def test_playing_follows_the_clock_at_its_speed_and_ends() -> None:
     wall, shown = Wall(), course([k / 10 for k in range(21)])
     clock = PlayClock(wall)
-    assert not clock.turn(shown, 2.0)
+    assert not clock.advance(shown, 2.0)
     clock.play()
     wall.now_s += 0.5
-    assert clock.turn(shown, 2.0)
+    assert clock.advance(shown, 2.0)
     assert clock.position_s == pytest.approx(0.5)
     clock.speed = 0.1
     wall.now_s += 1.0
-    clock.turn(shown, 2.0)
+    clock.advance(shown, 2.0)
     assert clock.position_s == pytest.approx(0.6)
     clock.speed = 8.0
     wall.now_s += 1.0
-    assert not clock.turn(shown, 2.0)
+    assert not clock.advance(shown, 2.0)
     assert (clock.position_s, clock.is_playing) == (2.0, False)
 
 
 def test_speeds_go_from_a_tenth_to_eight() -> None:
     clock = PlayClock()
-    assert [clock.faster(1) for _ in range(4)] == [2.0, 4.0, 8.0, 8.0]
-    assert [clock.faster(-1) for _ in range(7)] == [4.0, 2.0, 1.0, 0.5, 0.25, 0.1, 0.1]
+    assert [clock.change_speed(1) for _ in range(4)] == [2.0, 4.0, 8.0, 8.0]
+    assert [clock.change_speed(-1) for _ in range(7)] == [4.0, 2.0, 1.0, 0.5, 0.25, 0.1, 0.1]
 
 
 def test_a_long_gap_is_passed_over_and_told() -> None:
@@ -126,14 +126,14 @@ def test_a_long_gap_is_passed_over_and_told() -> None:
     clock = PlayClock(wall)
     clock.play()
     wall.now_s += 0.6
-    clock.turn(shown, 60.3)
-    assert (clock.position_s, clock.passed_s) == (pytest.approx(0.6), 0.0)
+    clock.advance(shown, 60.3)
+    assert (clock.position_s, clock.skipped_s) == (pytest.approx(0.6), 0.0)
     wall.now_s += 0.2
-    clock.turn(shown, 60.3)
-    assert (clock.position_s, clock.passed_s) == (pytest.approx(60.2), pytest.approx(59.4))
+    clock.advance(shown, 60.3)
+    assert (clock.position_s, clock.skipped_s) == (pytest.approx(60.2), pytest.approx(59.4))
     wall.now_s += 0.01
-    clock.turn(shown, 60.3)
-    assert clock.passed_s == 0.0
+    clock.advance(shown, 60.3)
+    assert clock.skipped_s == 0.0
 
 
 def test_a_seek_while_playing_starts_from_there() -> None:
@@ -143,5 +143,5 @@ def test_a_seek_while_playing_starts_from_there() -> None:
     wall.now_s += 3.0
     clock.seek(1.0)
     wall.now_s += 0.5
-    clock.turn(shown, 9.9)
+    clock.advance(shown, 9.9)
     assert clock.position_s == pytest.approx(1.5)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.player import decoder
-from app.player.decoder import DecodeThread
+from app.player.decoder import FrameDecoder
 from core.session.reader import SessionReader
 from tests.core.session_data import SIZE, record, tick_of
 
@@ -23,11 +23,11 @@ def test_kept_pictures_are_bounded_by_bytes_too(
     session = record(tmp_path, [tick_of(i, 1000.0 + i / 30) for i in range(30)])
     with SessionReader(session) as reader:
         reader.wait(10.0)
-        thread = DecodeThread(reader)
+        thread = FrameDecoder(reader)
         for place in range(30):
             decoded = thread._decode(place)
             assert decoded.tick is not None
             assert thread._decode(place) is decoded, "what is shown is kept in any case"
         assert list(thread._kept) == list(range(30 - kept, 30))
         assert thread._kept_bytes == kept * PICTURE_BYTES
-        assert thread._ahead(decoded) == ahead
+        assert thread._ahead_count(decoded) == ahead

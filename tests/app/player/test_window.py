@@ -18,14 +18,14 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.player import decoder
+from app.player import session_model
+from app.player.course import JumpKind
 from app.player.decoder import drawable
-from app.player.session_model import JumpKind, scene_from_json
 from app.player.window import PlayerWindow
 from app.ui.texts import signed_degrees
 from core.config.models import Config
 from core.control.modes import Mode
-from core.session.codec import scene_to_json
+from core.session.codec import scene_from_json, scene_to_json
 from core.session.files import LineFile
 from core.session.manifest import Event, EventKind, SessionError, event_of_target, read_manifest, write_manifest
 from core.session.reader import SessionReader
@@ -87,14 +87,17 @@ def open_player(qtbot: QtBot, tmp_path: Path) -> Iterator[Open]:
     yield opened
     for window in windows:
         window.close()
-        assert not window._decode.isRunning()
+        assert window._decoder.wait(0)
 
 
 @pytest.fixture
 def player(open_player: Open, session: Path, qtbot: QtBot) -> PlayerWindow:
     """On the first frame, with all rows and events known."""
     window = open_player(session)
-    until(qtbot, lambda: window.place == 0 and window.rows == COUNT and len(window.events) > 3 and window._known.is_whole)
+    until(
+        qtbot,
+        lambda: window.place == 0 and len(window.course) == COUNT and len(window.session.events) > 3 and window.session.is_whole,
+    )
     return window
 
 
@@ -163,22 +166,22 @@ def test_what_was_refused_has_no_pose_and_says_why(player: PlayerWindow, qtbot: 
 def test_space_plays_and_pauses_wherever_the_focus_is(player: PlayerWindow, qtbot: QtBot) -> None:
     player.panels.bar.note.setFocus()
     press(player, Key.Key_Space)
-    assert player.is_playing
+    assert player.clock.is_playing
     assert not player.panels.note.isVisible()
     assert player.panels.bar.play.accessibleName() == "Pause"
     until(qtbot, lambda: player.place > 2)
     press(player, Key.Key_Space)
-    assert not player.is_playing
-    before = player.time_s
+    assert not player.clock.is_playing
+    before = player.clock.position_s
     qtbot.wait(60)
-    assert player.time_s == before
+    assert player.clock.position_s == before
 
 
 def test_a_pause_renews_the_numbers_that_playing_renews_now_and_then(player: PlayerWindow, qtbot: QtBot) -> None:
     press(player, Key.Key_Space)
     until(qtbot, lambda: player.place >= 4)
     press(player, Key.Key_Space)
-    until(qtbot, lambda: player.place == player._asked)
+    until(qtbot, lambda: player.place == player._requested)
     scene = player.panels.live.scene
     assert scene is not None
     assert scene.pose is not None
@@ -188,18 +191,18 @@ def test_a_pause_renews_the_numbers_that_playing_renews_now_and_then(player: Pla
 def test_it_plays_to_the_end_and_from_the_beginning_again(player: PlayerWindow, qtbot: QtBot) -> None:
     for _ in range(3):
         press(player, Key.Key_BracketRight)
-    assert player.speed == 8.0
+    assert player.clock.speed == 8.0
     player.go(COUNT - 10)
     press(player, Key.Key_Space)
-    until(qtbot, lambda: not player.is_playing and player.place == COUNT - 1)
+    until(qtbot, lambda: not player.clock.is_playing and player.place == COUNT - 1)
     press(player, Key.Key_Space)
-    assert player.is_playing
-    assert player.time_s < 1.0
+    assert player.clock.is_playing
+    assert player.clock.position_s < 1.0
     press(player, Key.Key_R)
-    assert player.speed == 1.0
+    assert player.clock.speed == 1.0
     for _ in range(3):
         press(player, Key.Key_BracketLeft)
-    assert (player.speed, player.panels.bar.speed.currentData()) == (0.1, 0.1)
+    assert (player.clock.speed, player.panels.bar.speed.currentData()) == (0.1, 0.1)
 
 
 def test_n_and_p_jump_to_the_chosen_kind(player: PlayerWindow, qtbot: QtBot) -> None:
@@ -242,11 +245,11 @@ def test_the_timeline_is_clicked_zoomed_and_selected(player: PlayerWindow, qtbot
     line = player.panels.timeline
     middle = QPoint((50 + line.width() - 10) // 2, line.height() // 2)
     QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=middle)
-    assert player.time_s == pytest.approx((COUNT - 1) * STEP_S / 2, abs=0.05)
+    assert player.clock.position_s == pytest.approx((COUNT - 1) * STEP_S / 2, abs=0.05)
     press(player, Key.Key_Plus)
     low, high = line.view
     assert high - low == pytest.approx(5.9 / 1.5)
-    assert low < player.time_s < high
+    assert low < player.clock.position_s < high
     press(player, Key.Key_0, modifier=Qt.KeyboardModifier.ControlModifier)
     assert line.view == (0.0, pytest.approx(5.9))
     shift = Qt.KeyboardModifier.ShiftModifier
@@ -277,7 +280,7 @@ def test_the_timeline_tells_what_is_under_the_pointer(player: PlayerWindow) -> N
 def test_the_timeline_claims_nothing_for_a_time_without_frames(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     times_s = [FIRST_S + k * STEP_S for k in range(11)] + [FIRST_S + 6.0 + k * STEP_S for k in range(11)]
     window = open_player(record(tmp_path, (tick_of(k, time_s, full=True) for k, time_s in enumerate(times_s))))
-    until(qtbot, lambda: window.rows == len(times_s) and len(window.events) > 0)
+    until(qtbot, lambda: len(window.course) == len(times_s) and len(window.session.events) > 0)
     line = window.panels.timeline
     width = line.width() - 60
     assert line.text_at(50 + 0.5 / 7.0 * width).startswith("0:00.500  state D")
@@ -315,13 +318,13 @@ def test_the_list_of_events_leads_to_them(player: PlayerWindow, qtbot: QtBot) ->
 def test_a_note_is_kept_in_the_session(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     folder = make_session(tmp_path)
     window = open_player(folder)
-    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    until(qtbot, lambda: window.place == 0 and len(window.course) == COUNT)
     window.go(22)
     press(window, Key.Key_M)
     assert window.panels.note.hasFocus()
     QTest.keyClicks(window.panels.note, "space n and p are letters here")
     press(window, Key.Key_Return)
-    until(qtbot, lambda: any(event.text == "space n and p are letters here" for event in window.events))
+    until(qtbot, lambda: any(event.text == "space n and p are letters here" for event in window.session.events))
     with SessionReader(folder) as reader:
         (kept,) = [event for event in reader.events if "letters" in event.text]
     assert (kept.kind, kept.time_s) == (EventKind.NOTE, pytest.approx(FIRST_S + 2.2))
@@ -330,13 +333,13 @@ def test_a_note_is_kept_in_the_session(open_player: Open, tmp_path: Path, qtbot:
     QTest.keyClicks(window.panels.note, "never mind")
     press(window, Key.Key_Escape)
     assert not window.panels.note.isVisible()
-    assert not any("never" in event.text for event in window.events)
+    assert not any("never" in event.text for event in window.session.events)
 
 
 def test_a_note_stays_at_its_time_and_is_lost_by_nothing(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     folder = make_session(tmp_path)
     window = open_player(folder)
-    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    until(qtbot, lambda: window.place == 0 and len(window.course) == COUNT)
     window.seek(2.0)
     press(window, Key.Key_M)
     QTest.keyClicks(window.panels.note, "head touches")
@@ -345,7 +348,7 @@ def test_a_note_stays_at_its_time_and_is_lost_by_nothing(open_player: Open, tmp_
     QTest.keyClicks(window.panels.note, " the wall")
     window.seek(4.6)
     QTest.keyClick(window.panels.note, Key.Key_Return)
-    until(qtbot, lambda: any(event.text == "head touches the wall" for event in window.events))
+    until(qtbot, lambda: any(event.text == "head touches the wall" for event in window.session.events))
     press(window, Key.Key_M)
     QTest.keyClicks(window.panels.note, "written while closing")
     window.close()
@@ -361,7 +364,7 @@ def test_escape_takes_back_a_time_that_was_typed(player: PlayerWindow, qtbot: Qt
     QTest.keyClicks(player.panels.bar.position, "4.5")
     QTest.keyClick(player.panels.bar.position, Key.Key_Escape)
     qtbot.wait(50)
-    assert player.time_s == pytest.approx(1.0)
+    assert player.clock.position_s == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("typed", ["0:03.5", "3.5", "3,5", "3.5 s", "3500 ms", "0:0:3.5"])
@@ -369,7 +372,7 @@ def test_a_time_is_typed_as_the_clock_shows_it_or_in_seconds(player: PlayerWindo
     press(player, Key.Key_T)
     QTest.keyClicks(player.panels.bar.position, typed)
     QTest.keyClick(player.panels.bar.position, Key.Key_Return)
-    assert player.time_s == pytest.approx(3.5)
+    assert player.clock.position_s == pytest.approx(3.5)
     assert player.panels.bar.position.text() == "0:03.500"
     assert not player.panels.bar.position.hasFocus()
 
@@ -393,23 +396,23 @@ def test_notes_that_the_disk_does_not_take_are_not_lost(
         raise SessionError(f"{folder}: read-only")
 
     window = open_player(make_session(tmp_path))
-    until(qtbot, lambda: window.place == 0 and window.rows == COUNT)
+    until(qtbot, lambda: window.place == 0 and len(window.course) == COUNT)
     with monkeypatch.context() as patch:
-        patch.setattr(decoder, "add_event", refuse)
+        patch.setattr(session_model, "add_event", refuse)
         for place, text in ((22, "a long careful remark"), (30, "another")):
             window.go(place)
             press(window, Key.Key_M)
             QTest.keyClicks(window.panels.note, text)
             press(window, Key.Key_Return)
         written.set()
-        until(qtbot, lambda: window.panels.note.isVisible() and len(window._refused) == 1)
+        until(qtbot, lambda: window.panels.note.isVisible() and len(window._refused_notes) == 1)
     assert "read-only" in window.panels.toast.text()
     until(qtbot, lambda: window.place == 22)
     assert window.panels.note.text() == "a long careful remark"
     press(window, Key.Key_Return)  # there is room again
     until(qtbot, lambda: window.panels.note.text() == "another")
     press(window, Key.Key_Return)
-    until(qtbot, lambda: {"a long careful remark", "another"} <= {event.text for event in window.events})
+    until(qtbot, lambda: {"a long careful remark", "another"} <= {event.text for event in window.session.events})
 
 
 def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
@@ -486,8 +489,8 @@ def test_a_clip_of_the_whole_session_waits_until_all_of_it_is_known(
         until(qtbot, lambda: player.place == 0)
         player.export_clip()
         assert "still being read" in player.panels.toast.text()
-        assert not player._keeper.has_clip
-    until(qtbot, lambda: player._known.is_whole)
+        assert not player.session.has_clip
+    until(qtbot, lambda: player.session.is_whole)
     player.export_clip()
     until(qtbot, lambda: f"{COUNT} pictures" in player.panels.toast.text())
 
@@ -538,10 +541,10 @@ def test_damage_is_listed_and_the_rest_is_played(open_player: Open, tmp_path: Pa
     video.write_bytes(bytes(data))
     (folder / "manifest.json").write_text("{")
     window = open_player(folder)
-    until(qtbot, lambda: window.place == 0 and window.rows == COUNT - 1)
+    until(qtbot, lambda: window.place == 0 and len(window.course) == COUNT - 1)
     assert "manifest is damaged" in window.panels.plate.text
     assert window.panels.plate.text.startswith("recorded UNKNOWN")
-    for place in range(window.rows):
+    for place in range(len(window.course)):
         window.go(place)
         at(qtbot, window, place)
     until(qtbot, lambda: "no picture at" in window.panels.problems.toPlainText())
@@ -630,7 +633,7 @@ def test_a_replay_is_shown_beside_the_recording(open_player: Open, session: Path
     other = window.panels.other
     assert other is not None
     until(qtbot, lambda: other.scene is not None and other.scene.pose is not None)
-    until(qtbot, lambda: window.rows == COUNT)
+    until(qtbot, lambda: len(window.course) == COUNT)
     window.go(5)
     for place, told in ((12, "(+10.0°)"), (20, "no pose, low confidence: 12 %")):
         press(window, Key.Key_N)
