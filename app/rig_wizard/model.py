@@ -12,11 +12,11 @@ from app.ui.workers import Worker
 from core.config.calibration import CalibrationConfig
 from core.config.models import Config
 from core.config.rig_file import RigFile, write_rig
-from hardware.calibration.bench import CalibrationBench, See
+from hardware.calibration.bench import CalibrationBench, Perceive
 from hardware.calibration.rig_draft import RigDraft
 
-OpenBench = Callable[[Config, See], CalibrationBench]
-MakeSight = Callable[[Config], See]
+OpenBench = Callable[[Config, Perceive], CalibrationBench]
+MakeSight = Callable[[Config], Perceive]
 
 _END_MS = 30_000
 
@@ -51,7 +51,7 @@ class RigWizardModel(QObject):
         self.config = self._began_with = config
         self._known = known
         self._open_bench, self._make_sight = open_bench, make_sight
-        self._see: See | None = None
+        self._see: Perceive | None = None
         self.draft: RigDraft | None = None
         self._bench: CalibrationBench | None = None
         self._then: Callable[[object], None] | None = None

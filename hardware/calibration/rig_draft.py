@@ -158,7 +158,7 @@ class RigDraft:
         self.say(f"scale: {self.scale.mm_per_px:.4f} mm/px, \N{PLUS-MINUS SIGN}{100 * self.scale.uncertainty_share:.2f} %")
 
     def _picture_size(self) -> tuple[int, int]:
-        frame = self.bench.feed.newest or self.bench.feed.take(1, 5.0)[0]
+        frame = self.bench.feed.newest or self.bench.feed.next_frames(1, 5.0)[0]
         return frame.image.shape[1], frame.image.shape[0]
 
     # ---- servos
@@ -199,12 +199,12 @@ class RigDraft:
     def wiggle(self, servo_id: int) -> None:
         """Turn one servo both ways, for somebody who watches."""
         with self._moving():
-            servo_identification.wiggle(self.bench.bench, self.servos, self._ids(), servo_id)
+            servo_identification.wiggle(self.bench, self.servos, self._ids(), servo_id)
 
     def identify_one(self, servo_id: int) -> ServoFinding | None:
         """What one servo does, as the camera sees it; None when nothing is clear."""
         with self._moving():
-            finding = servo_identification.identify_servo(self.bench.bench, self.servos, self._ids(), servo_id, self.say)
+            finding = servo_identification.identify_servo(self.bench, self.servos, self._ids(), servo_id, self.say)
         self.findings.pop(servo_id, None)
         if finding is not None:
             self.findings[servo_id] = finding
@@ -267,7 +267,7 @@ class RigDraft:
     def find_zeros(self) -> servo_identification.Zeros:
         """Leave every tendon where it just becomes taut."""
         with self._moving():
-            zeros = servo_identification.find_zeros(self.bench.bench, self.servos, self.say)
+            zeros = servo_identification.find_zeros(self.bench, self.servos, self.say)
         self.zeros, self.zero = zeros, None
         self._is_displaced = False
         self._nudged.clear()
@@ -280,7 +280,7 @@ class RigDraft:
         if not self.are_zeros_known:
             return
         try:
-            self._set_zero(servo_identification.standing_ticks(self.bench.bench, self.servos))
+            self._set_zero(servo_identification.standing_ticks(self.bench, self.servos))
         except ProcedureStopped:
             raise
         except ServoError as error:  # nothing has turned: the steering can be learnt all the same
@@ -314,7 +314,7 @@ class RigDraft:
         if self._is_displaced:
             raise DeviceError("a step was stopped half way and the wires are where it left them: find the zeros anew")
         with self._moving():
-            learnt = servo_identification.learn_steering(self.bench.bench, self.servos, self.say)
+            learnt = servo_identification.learn_steering(self.bench, self.servos, self.say)
         steering = learnt.steering
         self.steering, self._head_px = steering, learnt.head_px
         self._set_zero(learnt.zero_ticks)
@@ -324,7 +324,7 @@ class RigDraft:
     def nudge(self, name: str, way_mm: float) -> None:
         """Tighten one tendon by so much, or let it go (negative), for somebody who watches."""
         with self._moving():  # a wire that strains lets all of them go
-            servo_identification.nudge(self.bench.bench, self.servos, name, way_mm)
+            servo_identification.nudge(self.bench, self.servos, name, way_mm)
             self.zero = None
             self._nudged.add(name)
         self._keep_zero()

@@ -1,4 +1,4 @@
-"""What is found out about servos by moving them a little and watching: who is who, where wires are taut, where the head goes.
+"""What moving servos a little shows: which servo is which, where the wires are taut, in which direction each tendon bends the head.
 
 The procedures know neither window nor command line. Every motion is a probe's (one servo, bounded) or a robot's (all seven,
 zeroed); both go through driver and gate, and STOP ends every procedure within one period.
@@ -21,7 +21,6 @@ from core.calibration.servos import (
     ServoFinding,
     TautReading,
     Wiggle,
-    assign,
     classify,
     head_move,
     is_begun,
@@ -33,7 +32,7 @@ from core.config.calibration import SteeringConfig
 from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
 from core.devices import DeviceError
 from core.types import Command, Point
-from hardware.calibration.servo_probe import MAX_CURRENT_MA, ProbeLimits, StopSwitch
+from hardware.calibration.servo_probe import ProbeLimits
 from hardware.servos.dynamixel_port import ServoError
 
 _AMPLITUDES_MM = (0.75, 1.5, 3.0)
@@ -66,28 +65,17 @@ class Steered(Protocol):
     def ticks(self) -> tuple[int, ...]: ...
 
 
-class RobotObserver(Protocol):
-    """Looks at the robot while it stands still; `alive` is called meanwhile. Raises HeadNotSeen, DeviceError."""
+class ServoBench(Protocol):
+    """What the procedures work with: observes the robot and moves its servos. `alive` is called while it observes.
 
-    def look(self, alive: Callable[[], None]) -> Look: ...
+    ``observe`` raises HeadNotSeen, DeviceError; ``probe`` (one servo) and ``steer`` (all seven) raise ServoError.
+    """
 
-
-class ServoMover(Protocol):
-    """Moves servos. Raises ServoError."""
-
+    def observe(self, alive: Callable[[], None]) -> Look: ...
     def probe(
         self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
     ) -> AbstractContextManager[Probe]: ...
-    def steered(self, servos: ServosConfig) -> AbstractContextManager[Steered]: ...
-
-
-@dataclass(frozen=True, slots=True)
-class Bench:
-    """What the procedures work with."""
-
-    eyes: RobotObserver
-    hands: ServoMover
-    stop: StopSwitch
+    def steer(self, servos: ServosConfig) -> AbstractContextManager[Steered]: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +86,9 @@ class Zeros:
     problems: tuple[str, ...] = ()
 
 
-def wiggle(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, amplitude_mm: float = 1.5) -> None:
-    """Turn one servo a little both ways and back, for somebody who watches."""
-    with bench.hands.probe(servos, servo_id, ProbeLimits(-amplitude_mm, amplitude_mm), 1, ids) as probe:
+def wiggle(bench: ServoBench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, amplitude_mm: float = 1.5) -> None:
+    """Turn one servo a little both ways and back, for the operator to watch."""
+    with bench.probe(servos, servo_id, ProbeLimits(-amplitude_mm, amplitude_mm), 1, ids) as probe:
         for target_mm in (amplitude_mm, 0.0, -amplitude_mm, 0.0):
             probe.move_to(target_mm)
             probe.pause(_SETTLE_S / 2)
@@ -108,9 +96,9 @@ def wiggle(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: i
 
 @contextmanager
 def _or_back(back: Callable[[], None]) -> Iterator[None]:
-    """A look that fails, or a camera that is lost, in the middle of a step leaves nothing turned: a retry would go on from there.
+    """Go back when the head is not seen or the camera is lost in the middle of a step: a retry would go on from there.
 
-    Whatever is wrong with the servos themselves, STOP included, moves nothing more.
+    After an error of the servos themselves, STOP included, nothing moves any more.
     """
     try:
         yield
@@ -121,23 +109,25 @@ def _or_back(back: Callable[[], None]) -> Iterator[None]:
         raise
 
 
-def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, say: Say) -> ServoFinding | None:
-    """What one servo does; None when nothing clear was seen. It is turned no farther than it needs.
+def identify_servo(bench: ServoBench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, say: Say) -> ServoFinding | None:
+    """What one servo does; None when nothing clear was seen. It is turned no farther than needed.
 
-    Raises
-    ------
-    ServoError, DeviceError, HeadNotSeen
+    Raises ServoError, DeviceError, HeadNotSeen.
     """
     most_mm = _AMPLITUDES_MM[-1]
     limits = ProbeLimits(-most_mm, most_mm)
-    with bench.hands.probe(servos, servo_id, limits, 1, ids) as probe, _or_back(lambda: probe.move_to(0.0)):
+    with bench.probe(servos, servo_id, limits, 1, ids) as probe, _or_back(lambda: probe.move_to(0.0)):
         for amplitude_mm in _AMPLITUDES_MM:
             say(f"servo {servo_id}: {amplitude_mm:g} mm both ways")
             finding = classify(_wiggled(bench, probe, amplitude_mm))
             if finding is not None and finding.function is Function.ADVANCE and amplitude_mm < most_mm:
-                # It is clear who this is; how far it goes is clear only after a longer way.
+                # How far it feeds is clear only after a longer way.
                 say(f"servo {servo_id}: {most_mm:g} mm both ways")
-                farther = _farther(bench, probe, most_mm)
+                try:
+                    farther = classify(_wiggled(bench, probe, most_mm))
+                except HeadNotSeen:  # the head leaves the picture there
+                    farther = None
+                    probe.move_to(0.0)
                 if farther is not None and (farther.function, farther.sign) == (finding.function, finding.sign):
                     finding = farther
             if finding is not None:
@@ -147,16 +137,7 @@ def identify_servo(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], ser
     return None
 
 
-def _farther(bench: Bench, probe: Probe, amplitude_mm: float) -> ServoFinding | None:
-    """What is seen over a longer way; None, and the servo where it stood, when the head leaves the picture there."""
-    try:
-        return classify(_wiggled(bench, probe, amplitude_mm))
-    except HeadNotSeen:
-        probe.move_to(0.0)
-        return None
-
-
-def _wiggled(bench: Bench, probe: Probe, amplitude_mm: float) -> Wiggle:
+def _wiggled(bench: ServoBench, probe: Probe, amplitude_mm: float) -> Wiggle:
     """What is seen at rest, so far one way and so far the other; the servo stands where it stood then."""
     rest = _look(bench, probe)
     seen = []
@@ -165,18 +146,6 @@ def _wiggled(bench: Bench, probe: Probe, amplitude_mm: float) -> Wiggle:
         seen.append(_look(bench, probe))
     probe.move_to(0.0)
     return Wiggle(amplitude_mm, rest, *seen)
-
-
-def identify_servos(bench: Bench, servos: ServosConfig, ids: tuple[int, ...], say: Say) -> tuple[Assignment, ...]:
-    """Who is who, of seven servos.
-
-    Raises
-    ------
-    NotIdentified
-        With what is missing.
-    """
-    found = {servo_id: identify_servo(bench, servos, ids, servo_id, say) for servo_id in ids}
-    return assign({servo_id: finding for servo_id, finding in found.items() if finding is not None})
 
 
 def identified(servos: ServosConfig, assignments: Sequence[Assignment]) -> ServosConfig:
@@ -189,7 +158,7 @@ def identified(servos: ServosConfig, assignments: Sequence[Assignment]) -> Servo
     return ServosConfig.model_validate({**servos.model_dump(), "joints": joints})
 
 
-def find_zeros(bench: Bench, servos: ServosConfig, say: Say, max_current_ma: float = MAX_CURRENT_MA) -> Zeros:
+def find_zeros(bench: ServoBench, servos: ServosConfig, say: Say) -> Zeros:
     """Let each tendon go slack, pull it until the head follows, and leave it where it just became taut.
 
     A tendon that cannot be told is left where it was, and named in ``problems``.
@@ -205,44 +174,44 @@ def find_zeros(bench: Bench, servos: ServosConfig, say: Say, max_current_ma: flo
     problems = []
     for first, second in _PAIRS:
         # Two taut wires share every pull: while one is looked at the other hangs slack.
-        _move(bench, servos, second, -_PARK_MM, max_current_ma)
+        _move(bench, servos, second, -_PARK_MM)
         for name, hangs_mm, then_mm in ((first, 0.0, -_PARK_MM), (second, _PARK_MM, 0.0)):
             try:
-                taut_mm = _find_zero(bench, servos, name, then_mm, max_current_ma)
+                taut_mm = _find_zero(bench, servos, name, then_mm)
             except ServoError:
                 raise
             except DeviceError:
                 for hanging in (second, first)[: 1 if name == first else 2]:
-                    _move(bench, servos, hanging, _PARK_MM, max_current_ma)
+                    _move(bench, servos, hanging, _PARK_MM)
                 raise
             except (NeverTaut, HeadNotSeen) as error:
                 problems.append(f"{name}: {error}")
                 say(problems[-1])
-                _move(bench, servos, name, hangs_mm + then_mm, max_current_ma)
+                _move(bench, servos, name, hangs_mm + then_mm)
             else:
                 slack[name] = taut_mm - hangs_mm
                 say(f"{name}: taut {abs(slack[name]):.2f} mm {'farther' if slack[name] >= 0 else 'back'}")
-        _move(bench, servos, first, _PARK_MM, max_current_ma)
+        _move(bench, servos, first, _PARK_MM)
     return Zeros((slack["right"], slack["left"], slack["up"], slack["down"]), tuple(problems))
 
 
-def _move(bench: Bench, servos: ServosConfig, name: str, way_mm: float, max_current_ma: float = MAX_CURRENT_MA) -> None:
+def _move(bench: ServoBench, servos: ServosConfig, name: str, way_mm: float) -> None:
     joint = servos.joints[JOINT_NAMES.index(name)]
-    limits = ProbeLimits(-_PARK_MM, _PARK_MM, max_current_ma=max_current_ma)
-    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe:
+    limits = ProbeLimits(-_PARK_MM, _PARK_MM)
+    with bench.probe(servos, joint.id, limits, joint.sign) as probe:
         probe.move_to(way_mm)
         probe.pause(_SETTLE_S / 2)
 
 
-def _find_zero(bench: Bench, servos: ServosConfig, name: str, then_mm: float, max_current_ma: float) -> float:
+def _find_zero(bench: ServoBench, servos: ServosConfig, name: str, then_mm: float) -> float:
     """Where a tendon becomes taut, from where it stands; it is left `then_mm` from there.
 
     Raises NeverTaut, HeadNotSeen, DeviceError: it is where it was.
     """
     joint = servos.joints[JOINT_NAMES.index(name)]
     # A wire that stood too tight is taut below where it was let go to, and hangs lower still: a probe stops at its limits.
-    limits = ProbeLimits(-_SLACK_MM - 2.0 * _PARK_MM, _REACH_MM, max_current_ma=max_current_ma)
-    with bench.hands.probe(servos, joint.id, limits, joint.sign) as probe, _or_back(lambda: probe.move_to(0.0)):
+    limits = ProbeLimits(-_SLACK_MM - 2.0 * _PARK_MM, _REACH_MM)
+    with bench.probe(servos, joint.id, limits, joint.sign) as probe, _or_back(lambda: probe.move_to(0.0)):
         probe.move_to(-_SLACK_MM)
         rest = _look(bench, probe)
         begun = _steps(bench, probe, rest, -_SLACK_MM, _STEP_MM, is_begun)[-1].position_mm
@@ -264,7 +233,7 @@ def _find_zero(bench: Bench, servos: ServosConfig, name: str, then_mm: float, ma
 
 
 def _steps(
-    bench: Bench, probe: Probe, rest: Look, from_mm: float, step_mm: float, ends: Callable[[TautReading], bool]
+    bench: ServoBench, probe: Probe, rest: Look, from_mm: float, step_mm: float, ends: Callable[[TautReading], bool]
 ) -> list[TautReading]:
     """Tighten step by step, until one of them ends it or there is no room left."""
     steps: list[TautReading] = []
@@ -276,14 +245,14 @@ def _steps(
     return steps
 
 
-def nudge(bench: Bench, servos: ServosConfig, name: str, way_mm: float) -> None:
+def nudge(bench: ServoBench, servos: ServosConfig, name: str, way_mm: float) -> None:
     """Tighten one tendon by `way_mm`, 1 mm at most, or let it go (negative); it stays there."""
     _move(bench, servos, name, way_mm)
 
 
-def standing_ticks(bench: Bench, servos: ServosConfig) -> tuple[int, ...]:
+def standing_ticks(bench: ServoBench, servos: ServosConfig) -> tuple[int, ...]:
     """Position registers of the seven joints, armed for a moment where they stand; nothing turns. Raises ServoError."""
-    with bench.hands.steered(servos.model_copy(update={"pretension_mm": 0.0})) as robot:
+    with bench.steer(servos.model_copy(update={"pretension_mm": 0.0})) as robot:
         return robot.ticks()
 
 
@@ -296,15 +265,13 @@ class LearnedSteering:
     zero_ticks: tuple[int, ...]
 
 
-def learn_steering(bench: Bench, servos: ServosConfig, say: Say) -> LearnedSteering:
+def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say) -> LearnedSteering:
     """Pull each tendon a little, as far as the head needs to show its way.
 
-    The tendons must be taut and without tension where they stand: that becomes zero, and there they are in the end. Whoever drives
-    pulls them by their pretension; here that would be kept, and be added once more with each time this is done.
+    The tendons must be taut and without tension where they stand: that becomes zero, and there they are in the end. Without the
+    pretension, which would be kept and be added once more each time this is done.
 
-    Raises
-    ------
-    SteeringNotSeen, HeadNotSeen, ServoError, DeviceError
+    Raises SteeringNotSeen, HeadNotSeen, ServoError, DeviceError.
     """
     pulls: dict[str, Pull] = {}
     ways: Mapping[str, Callable[[float], Command]] = {
@@ -315,7 +282,7 @@ def learn_steering(bench: Bench, servos: ServosConfig, say: Say) -> LearnedSteer
     }
     first: Look | None = None
     slack = servos.model_copy(update={"pretension_mm": 0.0})
-    with bench.hands.steered(slack) as robot, _or_back(lambda: robot.bend_to(Command())):
+    with bench.steer(slack) as robot, _or_back(lambda: robot.bend_to(Command())):
         ticks = robot.ticks()
         for name in TENDONS:
             for pull_mm in _PULLS_MM:
@@ -332,6 +299,6 @@ def learn_steering(bench: Bench, servos: ServosConfig, say: Say) -> LearnedSteer
     return LearnedSteering(learn(pulls, first.heading), first.head, ticks)
 
 
-def _look(bench: Bench, mover: Probe | Steered) -> Look:
+def _look(bench: ServoBench, mover: Probe | Steered) -> Look:
     mover.pause(_SETTLE_S)
-    return bench.eyes.look(mover.alive)
+    return bench.observe(mover.alive)

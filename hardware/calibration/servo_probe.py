@@ -1,8 +1,7 @@
-"""One servo moved by itself, for finding out what it does: through the same process, gate and driver as every other motion.
+"""Servos moved for a calibration, one by itself or all seven, through the same process, gate and driver as every other motion.
 
-The servo under test plays the part of the joint "advance", whose envelope is what it may do at most; the six others hold where they
-stand. So its bounds are enforced where all bounds are, in a process of its own that holds when this program falls silent, and there
-is no second way to the servos.
+A servo under test plays the part of the joint "advance", whose envelope is what it may do at most; the six others hold where they
+stand. So its bounds are enforced where all bounds are, in a process of its own that holds when this program falls silent.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
-from core.control.faults import Cause, Fault
+from core.control.faults import Cause
 from core.system import SLEPT_S, slept_s
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
@@ -37,11 +36,12 @@ _EXTRA_S = 3.0
 _SILENCE_S = 1.0
 _GAIN_PER_S = 10.0
 _MARGIN_MM = 0.3
-_OF_THE_LINE = frozenset({Cause.SERVO_SILENT, Cause.BUS_NOISE, Cause.WATCHDOG, Cause.WORKER_DEAD})
-_HICCUPS, _BREATH_S = 3, 0.5
+_LINE_FAULTS = frozenset({Cause.SERVO_SILENT, Cause.BUS_NOISE, Cause.WATCHDOG, Cause.WORKER_DEAD})
+_TRIES, _RETRY_PAUSE_S = 3, 0.5
 _CALM_HZ, _CALM_WATCHDOG_S, _CALM_HEARTBEAT_S = 20.0, 0.4, 1.5
 _STRAINED_CYCLES = 4
 """Starting a motor takes more current than moving it: strain lasts."""
+_BEND_S = 0.6
 
 
 class ProcedureStopped(ServoError):
@@ -56,12 +56,6 @@ class ProbeFailed(ServoError):
     """The servo did not do what it was told."""
 
 
-class Stoppable(Protocol):
-    """What STOP reaches."""
-
-    def stop(self) -> None: ...
-
-
 class StopSwitch:
     """STOP for a procedure that moves servos: reaches whatever is moving now, and everything that would move next.
 
@@ -71,14 +65,13 @@ class StopSwitch:
     def __init__(self) -> None:
         self._pressed = threading.Event()
         self._lock = threading.Lock()
-        self._robot: Stoppable | None = None
+        self._robot: ServoRobot | None = None
 
     @property
     def is_pressed(self) -> bool:
         return self._pressed.is_set()
 
     def press(self) -> None:
-        """Stop."""
         self._pressed.set()
         with self._lock:
             robot = self._robot
@@ -90,17 +83,17 @@ class StopSwitch:
         self._pressed.clear()
 
     def check(self) -> None:
-        """Raise Stopped after a STOP that was not released."""
+        """Raise ProcedureStopped after a STOP that was not released."""
         if self._pressed.is_set():
             raise ProcedureStopped("stopped: nothing moves before you go on")
 
     def sleep(self, seconds: float) -> None:
-        """Wait; raise Stopped as soon as STOP comes."""
+        """Wait; raise ProcedureStopped as soon as STOP comes."""
         self._pressed.wait(seconds)
         self.check()
 
     @contextmanager
-    def guarding(self, robot: Stoppable) -> Iterator[None]:
+    def guarding(self, robot: ServoRobot) -> Iterator[None]:
         """While inside, STOP reaches `robot`."""
         with self._lock:
             self._robot = robot
@@ -114,7 +107,7 @@ class StopSwitch:
 
 @dataclass(frozen=True, slots=True)
 class ProbeLimits:
-    """What a servo may do while nobody knows yet what hangs on it."""
+    """What a servo may do while it is unknown what hangs on it."""
 
     low_mm: float = -3.0
     high_mm: float = 3.0
@@ -131,17 +124,14 @@ def probe_config(
     ----------
     servos : port, speed, model, millimetres per turn.
     sign : the servo's direction that counts as positive.
-    ids : all seven on the line while nobody knows which is which; default those of `servos`, which are known by their joints.
+    ids : all seven on the line while it is unknown which is which; default those of `servos`, which are known by their joints.
 
     Notes
     -----
-    A servo that is known turns its own joint's millimetres per turn. One that is not may drive any of the seven: with the largest
-    of theirs its wire or screw never moves farther, nor faster, than it is asked to.
+    A known servo turns its own joint's millimetres per turn. An unknown one may drive any of the seven: with the largest of theirs
+    its wire or screw never moves farther, nor faster, than it is asked to.
 
-    Raises
-    ------
-    ProbeFailed
-        There are not seven, or `servo_id` is not among them.
+    Raises ProbeFailed when there are not seven, or `servo_id` is not among them.
     """
     every = list(ids if ids is not None else (joint.id for joint in servos.joints))
     if len(every) != len(JOINT_NAMES) or servo_id not in every:
@@ -150,15 +140,25 @@ def probe_config(
     every.insert(_PLACE, servo_id)
     known = {} if ids is not None else {joint.id: joint.mm_per_turn for joint in servos.joints}
     largest = max(joint.mm_per_turn for joint in servos.joints)
+    bounds = {
+        "low_mm": limits.low_mm - _MARGIN_MM,
+        "high_mm": limits.high_mm + _MARGIN_MM,
+        "warn_margin_mm": _MARGIN_MM / 2,
+        "max_speed_mm_s": limits.speed_mm_s,
+        "max_acceleration_mm_s2": 25.0 * limits.speed_mm_s,
+        "max_step_mm": 0.6,
+    }
     joints = tuple(
-        _joint(joint, one, sign if one == servo_id else 1, known.get(one, largest), limits)
+        joint.model_copy(
+            update={"id": one, "sign": sign if one == servo_id else 1, "mm_per_turn": known.get(one, largest), **bounds}
+        )
         for joint, one in zip(servos.joints, every, strict=True)
     )
     return patient(servos).model_copy(update={"joints": joints, "pretension_mm": 0.0})
 
 
 def patient(servos: ServosConfig) -> ServosConfig:
-    """The bus as a slow procedure needs it, beside a network and a window: fewer turns, and a pause of the program is no fault.
+    """The bus as a slow procedure needs it, beside a network and a window: fewer cycles, and a pause of the program is no fault.
 
     A goal is at most one step away all the same, so a longer watchdog lets nothing run farther.
     """
@@ -170,33 +170,14 @@ def patient(servos: ServosConfig) -> ServosConfig:
     return servos.model_copy(update=calm)
 
 
-def _joint(joint: JointConfig, servo_id: int, sign: Literal[-1, 1], mm_per_turn: float, limits: ProbeLimits) -> JointConfig:
-    return joint.model_copy(
-        update={
-            "id": servo_id,
-            "sign": sign,
-            "mm_per_turn": mm_per_turn,
-            "low_mm": limits.low_mm - _MARGIN_MM,
-            "high_mm": limits.high_mm + _MARGIN_MM,
-            "warn_margin_mm": _MARGIN_MM / 2,
-            "max_speed_mm_s": limits.speed_mm_s,
-            "max_acceleration_mm_s2": 25.0 * limits.speed_mm_s,
-            "max_step_mm": 0.6,
-        }
-    )
-
-
 @contextmanager
 def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
-    """Connect, zero where the servos stand, arm; in the end hold and let go. A line that hiccups meanwhile is tried again.
+    """Connect, zero where the servos stand, arm; in the end hold and close. A servo without an answer is tried again.
 
-    Raises
-    ------
-    ServoError
-        Port or servos are not in order, or STOP came.
+    Raises ServoError when port or servos are not in order, or STOP came.
     """
     with stop.guarding(robot):
-        for attempt in range(_HICCUPS):
+        for attempt in range(_TRIES):
             try:
                 robot.connect()
                 robot.zero()
@@ -205,9 +186,9 @@ def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
                 break
             except NoAnswer:
                 robot.close()
-                if attempt + 1 == _HICCUPS:
+                if attempt + 1 == _TRIES:
                     raise
-                stop.sleep(_BREATH_S)
+                stop.sleep(_RETRY_PAUSE_S)
             except ServoError:
                 robot.close()
                 raise
@@ -225,37 +206,36 @@ def _by_id(text: str, config: ServosConfig) -> str:
     return text
 
 
-class Hiccups:
-    """What to do when the bus process has ended a motion.
+class LineFaultRetry:
+    """Arms again when the bus process has ended a motion for a fault of the line.
 
     The operator who started the procedure has asked for all its motions, one after the other. A line that was silent or a machine
     that was busy for a moment is tried again, three times at most, after a full check; STOP, a jam, a strain or a hardware error
     never is, and nothing after the computer has slept, which is a moment to all clocks but one.
     """
 
-    def __init__(self, robot: ServoRobot, stop: StopSwitch, who: str) -> None:
-        self._robot, self._stop, self._who = robot, stop, who
+    def __init__(self, robot: ServoRobot, stop: StopSwitch, title: str) -> None:
+        self._robot, self._stop, self._title = robot, stop, title
         self._count = 0
         self._slept_s = slept_s()
 
-    def settle(self, status: BusStatus) -> None:
-        """Return when the servos are armed, again or still; raise ProbeFailed, ServoError or Stopped when they are not to be."""
-        if status.latched is not None:
-            self._again(status.latched)
-        elif not status.armed:
-            raise ProbeFailed(f"{self._who}: the servos are no longer armed, try again")
-
-    def _again(self, fault: Fault) -> None:
+    def ensure_armed(self, status: BusStatus) -> None:
+        """Return when the servos are armed, again or still; raise ServoError when they must not be."""
+        fault = status.latched
+        if fault is None and not status.armed:
+            raise ProbeFailed(f"{self._title}: the servos are no longer armed, try again")
+        if fault is None:
+            return
         self._count += 1
         if slept_s() - self._slept_s > SLEPT_S:
-            raise ProbeFailed(f"{self._who} was stopped, as the computer slept: look at the robot, then try again")
-        if fault.cause not in _OF_THE_LINE or self._count > _HICCUPS:
+            raise ProbeFailed(f"{self._title} was stopped, as the computer slept: look at the robot, then try again")
+        if fault.cause not in _LINE_FAULTS or self._count > _TRIES:
             why = f"{fault.cause}: {fault.detail}".rstrip(": ")
-            raise ProbeFailed(f"{self._who} was stopped ({why}): find the cause, then try again")
-        _log.warning("%s: %s, trying again", self._who, fault.cause)
-        self._stop.sleep(_BREATH_S)
+            raise ProbeFailed(f"{self._title} was stopped ({why}): find the cause, then try again")
+        _log.warning("%s: %s, trying again", self._title, fault.cause)
+        self._stop.sleep(_RETRY_PAUSE_S)
         self._robot.status()  # a sign of life: only then is the line looked at
-        self._stop.sleep(_BREATH_S)
+        self._stop.sleep(_RETRY_PAUSE_S)
         self._robot.acknowledge()
         self._stop.check()
         self._robot.arm()
@@ -269,19 +249,13 @@ class ServoProbe:
         self._robot, self.servo_id, self._limits, self._stop = robot, servo_id, limits, stop
         self._strained = 0
         self._strain_seen_s = 0.0
-        self._hiccups = Hiccups(robot, stop, f"servo {servo_id}")
+        self._retry = LineFaultRetry(robot, stop, f"servo {servo_id}")
         self._last: ServoState | None = None
 
     @classmethod
     @contextmanager
     def opened(cls, config: ServosConfig, safety: SafetyConfig, limits: ProbeLimits, stop: StopSwitch) -> Iterator[ServoProbe]:
-        """Connect and arm, with ``probe_config``'s bus; where the servo stands now is 0. At the end it holds, disarmed.
-
-        Raises
-        ------
-        ServoError
-            Port or servos are not in order, or STOP came.
-        """
+        """Connect and arm, with ``probe_config``'s bus; where the servo stands now is 0. At the end it holds, disarmed."""
         servo_id = config.joints[_PLACE].id
         robot = ServoRobot(config, safety, name=f"servo {servo_id}")
         try:
@@ -293,19 +267,7 @@ class ServoProbe:
     @property
     def position_mm(self) -> float:
         """Where the servo is, from where it was when the probe was opened."""
-        state = self._checked()
-        return state.position_mm or 0.0
-
-    @property
-    def current_ma(self) -> float | None:
-        """The motor's current now; None for models that tell none."""
-        return self._checked().current_ma
-
-    def ticks(self) -> dict[int, int]:
-        """Position registers by id, of those that answered last."""
-        status = self._robot.bus_status()
-        readings = () if status is None else status.servos
-        return {reading.id: reading.ticks for reading in readings if isinstance(reading, ServoState)}
+        return self._checked().position_mm or 0.0
 
     def alive(self) -> None:
         """A sign of life while nothing is to move; raises what is wrong."""
@@ -317,7 +279,7 @@ class ServoProbe:
 
         Raises
         ------
-        Stopped
+        ProcedureStopped
             STOP came; the servos hold.
         Strained
             Too much current; the torque is off.
@@ -329,7 +291,9 @@ class ServoProbe:
         while time.monotonic() < until_s:
             state = self._checked()
             at_mm = state.position_mm or 0.0
-            goal_mm = self._goal_mm(at_mm)
+            status, goal_mm = self._robot.bus_status(), at_mm
+            if status is not None and status.sent is not None and status.rejection is None:
+                goal_mm = status.sent.goals_mm[_PLACE]  # where it was sent last
             left_mm = target_mm - goal_mm
             if abs(left_mm) <= _ARRIVED_MM and abs(at_mm - goal_mm) <= _SETTLED_MM:
                 self._robot.hold()
@@ -346,13 +310,6 @@ class ServoProbe:
             self.alive()
             self._stop.sleep(_PERIOD_S)
 
-    def _goal_mm(self, at_mm: float) -> float:
-        """Where it was sent last; where it is, before it was sent anywhere."""
-        status = self._robot.bus_status()
-        if status is None or status.sent is None or status.rejection is not None:
-            return at_mm
-        return status.sent.goals_mm[_PLACE]
-
     def _checked(self) -> ServoState:
         """The servo's newest state; raises when anything forbids to go on."""
         self._stop.check()
@@ -361,7 +318,7 @@ class ServoProbe:
             raise ProbeFailed(failure)
         if status is None or time.monotonic() - status.time_s > _SILENCE_S:
             raise ProbeFailed("the servo bus is silent: check port and supply")
-        self._hiccups.settle(status)
+        self._retry.ensure_armed(status)
         state = self._newest(status)
         self._watch_current(state)
         return state
@@ -397,3 +354,72 @@ class ServoProbe:
                 f"servo {self.servo_id} drew {drawn_ma:.0f} mA (at most {self._limits.max_current_ma:.0f} mA) and was let go: "
                 "something holds its wire"
             )
+
+
+class SteeredRobot:
+    """The robot with all its servos, zeroed where they stood: bends and holds it, and stops when a servo strains."""
+
+    def __init__(
+        self, robot: ServoRobot, joints: tuple[JointConfig, ...], stop: StopSwitch, max_current_ma: float = MAX_CURRENT_MA
+    ) -> None:
+        self._robot, self._joints, self._stop, self._max_current_ma = robot, joints, stop, max_current_ma
+        self._strained = 0
+        self._cycle = -1
+        self._retry = LineFaultRetry(robot, stop, "the robot")
+        self._command = Command()
+
+    @classmethod
+    @contextmanager
+    def opened(cls, servos: ServosConfig, safety: SafetyConfig, stop: StopSwitch) -> Iterator[SteeredRobot]:
+        """Connect, zero where the servos stand, and arm; at the end they hold, disarmed."""
+        config = patient(servos)
+        robot = ServoRobot(config, safety, name="robot")
+        with armed(robot, stop):
+            yield cls(robot, config.joints, stop)
+
+    def bend_to(self, command: Command) -> None:
+        """Bend at the gate's own pace, and wait until it has stopped."""
+        self._command = command
+        self.pause(_BEND_S)
+
+    def pause(self, seconds: float) -> None:
+        """Keep the bend for a while."""
+        until_s = time.monotonic() + seconds
+        while time.monotonic() < until_s:
+            self.alive()
+            self._stop.sleep(_PERIOD_S)
+
+    def alive(self) -> None:
+        """Keep the bend; raises what is wrong."""
+        self._stop.check()
+        status = self._robot.bus_status()
+        if (failure := self._robot.failure) is not None:
+            raise ProbeFailed(failure)
+        if status is not None:
+            self._retry.ensure_armed(status)
+        if status is not None and status.cycle != self._cycle:
+            self._cycle = status.cycle
+            self._watch_current([reading for reading in status.servos if isinstance(reading, ServoState)])
+        self._robot.send(self._command)
+
+    def ticks(self) -> tuple[int, ...]:
+        """Position registers of the seven, as they told last."""
+        until_s = time.monotonic() + 1.0
+        while time.monotonic() < until_s:
+            status = self._robot.bus_status()
+            readings = () if status is None else status.servos
+            states = [reading for reading in readings if isinstance(reading, ServoState)]
+            if len(states) == len(self._joints):
+                return tuple(state.ticks for state in states)
+            self.alive()
+            self._stop.sleep(_PERIOD_S)
+        raise ServoError("not all servos tell where they are: check cables and supply")
+
+    def _watch_current(self, states: list[ServoState]) -> None:
+        strained = [state for state in states if state.current_ma is not None and abs(state.current_ma) > self._max_current_ma]
+        self._strained = self._strained + 1 if strained else 0
+        if self._strained >= _STRAINED_CYCLES:
+            self._robot.hold()
+            self._robot.torque_off()
+            names = ", ".join(f"{state.name} ({abs(state.current_ma or 0.0):.0f} mA)" for state in strained)
+            raise Strained(f"too much current: {names}; the servos were let go: something holds the wires")

@@ -320,7 +320,7 @@ class CameraFeed:
         with self._lock:
             return self._frames[-1] if self._frames else None
 
-    def take(self, count: int, timeout_s: float, alive: Callable[[], object] = lambda: None) -> list[Frame]:
+    def next_frames(self, count: int, timeout_s: float, alive: Callable[[], object] = lambda: None) -> list[Frame]:
         """The next `count` pictures that are captured from now on.
 
         Parameters

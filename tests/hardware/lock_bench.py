@@ -14,7 +14,6 @@ from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.gate import Source
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.types import Command, Points
-from hardware.calibration.servo_identification import Bench
 from hardware.calibration.servo_probe import ProbeLimits, StopSwitch, probe_config
 from hardware.servos.lockstep import LockStepServos
 from hardware.twin.process import JointsToTwin, wired
@@ -110,30 +109,17 @@ class LockSteered(_Mover):
         return (0,) * len(JOINT_NAMES)
 
 
-class LockHands:
-    def __init__(self, twin: LockTwin, stop: StopSwitch) -> None:
-        self._twin, self._stop = twin, stop
-
-    @contextmanager
-    def probe(
-        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
-    ) -> Iterator[LockProbe]:
-        yield LockProbe(self._twin, probe_config(servos, servo_id, limits, sign, ids), self._stop)
-
-    @contextmanager
-    def steered(self, servos: ServosConfig) -> Iterator[LockSteered]:
-        yield LockSteered(self._twin, servos, self._stop)
-
-
-class LockEyes:
-    """Looks with the real network."""
+class LockBench:
+    """A ``ServoBench`` on the twin's clock, which observes with the real network."""
 
     def __init__(self, twin: LockTwin) -> None:
-        self._twin = twin
-        plain = twin.config.perception.segmentation.model_copy(update={"mirrored": "never"})
-        self._pipeline: Pipeline = open_pipeline(twin.config.perception.model_copy(update={"segmentation": plain}))
+        self._twin, self.stop = twin, StopSwitch()
+        self._pipeline: Pipeline | None = None
 
-    def look(self, alive: Callable[[], None]) -> Look:
+    def observe(self, alive: Callable[[], None]) -> Look:
+        if self._pipeline is None:
+            plain = self._twin.config.perception.segmentation.model_copy(update={"mirrored": "never"})
+            self._pipeline = open_pipeline(self._twin.config.perception.model_copy(update={"segmentation": plain}))
         paths, images = [], []
         for _ in range(_FRAMES):
             alive()
@@ -145,7 +131,17 @@ class LockEyes:
                 paths.append(scene.points_to_source(scene.path.points))
         return Look(tuple(paths), np.round(np.mean(images, axis=0)).astype(np.uint8))
 
+    @contextmanager
+    def probe(
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
+    ) -> Iterator[LockProbe]:
+        yield LockProbe(self._twin, probe_config(servos, servo_id, limits, sign, ids), self.stop)
 
-def lock_bench(config: Config) -> tuple[LockTwin, Bench]:
-    twin, stop = LockTwin(config), StopSwitch()
-    return twin, Bench(LockEyes(twin), LockHands(twin, stop), stop)
+    @contextmanager
+    def steer(self, servos: ServosConfig) -> Iterator[LockSteered]:
+        yield LockSteered(self._twin, servos, self.stop)
+
+
+def lock_bench(config: Config) -> tuple[LockTwin, LockBench]:
+    twin = LockTwin(config)
+    return twin, LockBench(twin)

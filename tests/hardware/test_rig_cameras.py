@@ -93,7 +93,7 @@ def test_a_feed_gives_only_pictures_of_after_the_question() -> None:
     camera = ScriptedCamera()
     feed = CameraFeed(camera)
     asked_s = time.monotonic()
-    frames = feed.take(3, 5.0)
+    frames = feed.next_frames(3, 5.0)
     assert all(frame.captured_s > asked_s for frame in frames)
     feed.close()
     feed.close()
@@ -112,9 +112,9 @@ def test_a_lost_camera_is_told_and_found_again() -> None:
     feed = CameraFeed(Flaky())
     try:
         with pytest.raises(DeviceError, match="check its cable"):
-            feed.take(1, 0.3)
+            feed.next_frames(1, 0.3)
         back.set()
-        assert feed.take(1, 5.0)
+        assert feed.next_frames(1, 5.0)
         assert feed.problem is None
     finally:
         feed.close()
@@ -123,7 +123,7 @@ def test_a_lost_camera_is_told_and_found_again() -> None:
 def test_a_camera_that_is_gone_for_good_ends_the_feed() -> None:
     feed = CameraFeed(ScriptedCamera(DeviceError("unplugged")))
     with pytest.raises(DeviceError, match="unplugged"):
-        feed.take(1, 0.3)
+        feed.next_frames(1, 0.3)
     feed.close()
 
 

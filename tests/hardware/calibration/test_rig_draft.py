@@ -27,8 +27,6 @@ TICKS = (2048, 2049, 2050, 2051, 0, 1, 2)
 class Bench:
     """No camera and no servos: the wizard's steps are told what happens."""
 
-    bench = None
-
     def __init__(self) -> None:
         self.stop = StopSwitch()
         self.pictures: Iterator[Image] = iter(())

@@ -8,17 +8,16 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 
-from core.calibration.servos import Function, HeadMove, HeadNotSeen, Look, NotIdentified, angle_deg, turn_deg
+from core.calibration.servos import Assignment, Function, HeadMove, HeadNotSeen, Look, NotIdentified, angle_deg, assign, turn_deg
 from core.config.models import Config
 from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
 from core.devices import DeviceError
 from core.types import Command
 from hardware.calibration import servo_identification
-from hardware.calibration.servo_identification import Bench
-from hardware.calibration.servo_probe import ProbeFailed, ProbeLimits, ProcedureStopped, StopSwitch, probe_config
+from hardware.calibration.servo_probe import ProbeFailed, ProbeLimits, ProcedureStopped, probe_config
 from hardware.servos import registers
 from hardware.twin.rendering.appearance import default_appearance
-from tests.hardware.lock_bench import LockTwin, lock_bench
+from tests.hardware.lock_bench import LockBench, LockTwin, lock_bench
 
 WIRING = "3,-7,1,-12,-5,2,-4"  # tendons right, left, up, down; advance; two of the catheter
 IDS = (1, 2, 3, 4, 5, 7, 12)
@@ -28,22 +27,27 @@ def _config(**twin: object) -> Config:
     return Config.model_validate({"twin": {"phantom": "tree", "wiring": WIRING, **twin}})
 
 
+def _identify(bench: LockBench, say: Callable[[str], object] = lambda _: None) -> tuple[Assignment, ...]:
+    found = {servo_id: servo_identification.identify_servo(bench, ServosConfig(), IDS, servo_id, say) for servo_id in IDS}
+    return assign({servo_id: finding for servo_id, finding in found.items() if finding is not None})
+
+
 def _tendon_mm(twin: LockTwin) -> np.ndarray:
     return np.array(twin.joints_mm()[:4])
 
 
 @pytest.fixture(scope="module")
-def straight() -> tuple[LockTwin, Bench]:
+def straight() -> tuple[LockTwin, LockBench]:
     return lock_bench(_config())
 
 
 @pytest.mark.slow
-def test_seven_servos_are_told_apart_whatever_their_ids_and_directions(straight: tuple[LockTwin, Bench]) -> None:
+def test_seven_servos_are_told_apart_whatever_their_ids_and_directions(straight: tuple[LockTwin, LockBench]) -> None:
     twin, bench = straight
     said: list[str] = []
     start = dict(twin.turned_mm)
     twin.moved.clear()
-    found = servo_identification.identify_servos(bench, ServosConfig(), IDS, said.append)
+    found = _identify(bench, said.append)
     assert [(one.name, one.sign * one.id) for one in found] == list(zip(JOINT_NAMES, map(int, WIRING.split(",")), strict=True))
     assert {one.name for one in found if one.assumed} == {"up", "down"}
     assert max(abs(at_mm - start[servo_id]) for servo_id, at_mm in twin.moved) <= 3.0 + 1e-6
@@ -53,7 +57,7 @@ def test_seven_servos_are_told_apart_whatever_their_ids_and_directions(straight:
     assert [(joint.id, joint.sign) for joint in identified.joints] == [(joint.id, joint.sign) for joint in twin.wiring.joints]
 
 
-def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[LockTwin, Bench]) -> None:
+def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[LockTwin, LockBench]) -> None:
     twin, bench = straight
     feed = twin.wiring.joints[JOINT_NAMES.index("advance")]
     start = dict(twin.turned_mm)
@@ -68,26 +72,24 @@ def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[
 
 def test_a_feed_that_leaves_the_picture_on_its_longest_way_is_a_feed_all_the_same() -> None:
     """It was clear who it is: the longer way only tells how far it goes. All seven had to be identified again."""
-    twin, bench = lock_bench(_config())
+    twin = LockTwin(_config())
     feed = twin.wiring.joints[JOINT_NAMES.index("advance")]
     start = dict(twin.turned_mm)
 
-    class EyesThatLoseIt:
-        def look(self, alive: Callable[[], None]) -> Look:
+    class LosesIt(LockBench):
+        def observe(self, alive: Callable[[], None]) -> Look:
             if any(abs(at_mm) > 2.0 for _, at_mm in twin.moved):
                 raise HeadNotSeen("the robot's head is not seen")
-            return bench.eyes.look(alive)
+            return super().observe(alive)
 
-    finding = servo_identification.identify_servo(
-        Bench(EyesThatLoseIt(), bench.hands, bench.stop), ServosConfig(), IDS, feed.id, lambda _: None
-    )
+    finding = servo_identification.identify_servo(LosesIt(twin), ServosConfig(), IDS, feed.id, lambda _: None)
     assert finding is not None
     assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
     assert twin.turned_mm == pytest.approx(start, abs=0.05)
 
 
 @pytest.mark.slow
-def test_wires_are_left_where_they_just_become_taut(straight: tuple[LockTwin, Bench]) -> None:
+def test_wires_are_left_where_they_just_become_taut(straight: tuple[LockTwin, LockBench]) -> None:
     twin, bench = straight
     slack_mm = np.array([0.8, 0.3, -0.2, 0.5])
     for joint, one_mm in zip(twin.wiring.joints[:4], slack_mm, strict=True):
@@ -122,10 +124,10 @@ def test_the_steering_is_learnt_to_three_degrees(roll_deg: float) -> None:
     assert np.hypot(*(np.array(learnt.head_px) - twin.head_px())) < 15.0
 
 
-def _true_direction(twin: LockTwin, bench: Bench, axis: str) -> float:
+def _true_direction(twin: LockTwin, bench: LockBench, axis: str) -> float:
     """From the twin's own head: by how much it moves between a small bend to one side and to the other."""
     heads = []
-    with bench.hands.steered(twin.wiring) as robot:
+    with bench.steer(twin.wiring) as robot:
         for share in (0.15, -0.15):
             robot.bend_to(Command(**{axis: share}))
             robot.pause(0.5)
@@ -144,7 +146,7 @@ def test_stop_in_the_middle_ends_it_at_once() -> None:
         bench.stop.press()
 
     with pytest.raises(ProcedureStopped):
-        servo_identification.identify_servos(bench, ServosConfig(), IDS, stop_at_the_first_motion)
+        _identify(bench, stop_at_the_first_motion)
     assert len(said) == 1
     assert twin.moved == []
     with pytest.raises(ProcedureStopped):  # and nothing else begins before somebody goes on
@@ -159,18 +161,19 @@ def test_a_head_that_is_not_seen_moves_nothing() -> None:
     twin, bench = lock_bench(_config())
     twin.world.physics.reset()  # the robot is out of the vessel
     with pytest.raises(HeadNotSeen):
-        servo_identification.identify_servos(bench, ServosConfig(), IDS, lambda _: None)
+        _identify(bench)
     assert twin.moved == []
 
 
-class _TrueEyes:
-    """See the robot as it is, in no time; after `looks` more looks they see nothing."""
+class _TrueBench(LockBench):
+    """Observes the robot as it is, in no time; after `looks` more looks it sees nothing."""
 
     def __init__(self, twin: LockTwin, looks: int = 10_000, error: Exception | None = None) -> None:
-        self._twin, self.looks = twin, looks
+        super().__init__(twin)
+        self.looks = looks
         self._error = error or HeadNotSeen("the robot's head is not seen")
 
-    def look(self, alive: Callable[[], None]) -> Look:
+    def observe(self, alive: Callable[[], None]) -> Look:
         alive()
         self.looks -= 1
         if self.looks < 0:
@@ -179,14 +182,10 @@ class _TrueEyes:
         return Look((points,) * 3, np.zeros((480, 640, 3), np.uint8))
 
 
-def _bench_that_sees(twin: LockTwin, bench: Bench, looks: int = 10_000, error: Exception | None = None) -> Bench:
-    return Bench(_TrueEyes(twin, looks, error), bench.hands, bench.stop)
-
-
 def test_learning_the_steering_again_and_again_pulls_no_wire() -> None:
-    twin, bench = lock_bench(_config())
+    twin = LockTwin(_config())
     for _ in range(2):
-        servo_identification.learn_steering(_bench_that_sees(twin, bench), twin.wiring, lambda _: None)
+        servo_identification.learn_steering(_TrueBench(twin), twin.wiring, lambda _: None)
         assert _tendon_mm(twin) == pytest.approx([0.0] * 4, abs=0.02)
 
 
@@ -204,7 +203,7 @@ _UNSEEN, _LOST = HeadNotSeen("the robot's head is not seen"), DeviceError("webca
 )
 def test_a_step_that_loses_sight_leaves_nothing_turned(looks: int, error: Exception) -> None:
     """Otherwise a retry would go on from there."""
-    twin, bench = lock_bench(_config())
+    twin = LockTwin(_config())
     before = dict(twin.turned_mm)
     steps = (
         lambda blind: servo_identification.identify_servo(blind, ServosConfig(), IDS, 3, lambda _: None),
@@ -213,7 +212,7 @@ def test_a_step_that_loses_sight_leaves_nothing_turned(looks: int, error: Except
     )
     for step in steps:
         with suppress(HeadNotSeen, DeviceError):
-            step(_bench_that_sees(twin, bench, looks, error))
+            step(_TrueBench(twin, looks, error))
         assert twin.turned_mm == pytest.approx(before, abs=0.05)
 
 
@@ -228,19 +227,15 @@ def test_a_wiggle_goes_both_ways_and_comes_back() -> None:
 
 @pytest.mark.slow
 def test_servos_that_show_nothing_are_named() -> None:
-    class _Still:
-        """Eyes that always see the same."""
+    class Still(LockBench):
+        look: Look | None = None
 
-        def __init__(self, eyes: servo_identification.RobotObserver) -> None:
-            self._look = eyes.look(lambda: None)
+        def observe(self, alive: Callable[[], None]) -> Look:
+            self.look = self.look or super().observe(alive)
+            return self.look
 
-        def look(self, alive: object) -> object:
-            return self._look
-
-    _twin, bench = lock_bench(_config())
-    blind = Bench(_Still(bench.eyes), bench.hands, bench.stop)  # type: ignore[arg-type]
     with pytest.raises(NotIdentified, match=r"1 that pulls the head to the right \(found: none\)"):
-        servo_identification.identify_servos(blind, ServosConfig(), IDS, lambda _: None)
+        _identify(Still(LockTwin(_config())))
 
 
 def test_the_servo_under_test_has_bounds_and_the_others_stand() -> None:
@@ -320,7 +315,7 @@ class _Wires:
         yield _WireProbe(self.at_mm, servo_id, limits)
 
     def find(self) -> servo_identification.Zeros:
-        return servo_identification.find_zeros(Bench(None, self, StopSwitch()), self.servos, lambda _: None)  # type: ignore[arg-type]
+        return servo_identification.find_zeros(self, self.servos, lambda _: None)  # type: ignore[arg-type]
 
     def too_tight_mm(self) -> list[float]:
         return [self.at_mm[servo_id] - taut for servo_id, taut in self.taut_mm.items()]

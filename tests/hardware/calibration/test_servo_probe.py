@@ -186,4 +186,4 @@ def test_stop_ends_the_search(servos: SoftServoBus) -> None:
     stop = StopSwitch()
     stop.press()
     with pytest.raises(ServoError, match="stopped"):
-        find_servos(servos.port, stopped=stop.check)
+        find_servos(servos.port, check_stop=stop.check)
