@@ -1,7 +1,4 @@
-"""How well raters agree with themselves and with each other; and their common answer, which the algorithm is judged by.
-
-Drawn lines measured anew, so that all angles of a report were fitted alike, whatever the settings were when they were drawn.
-"""
+"""How well raters agree with themselves and with each other; and their common answer, which the algorithm is judged by."""
 
 from __future__ import annotations
 
@@ -24,7 +21,6 @@ from core.config.models import PerceptionConfig
 from core.evaluation.evaluation import Measurement
 from core.evaluation.metrics import (
     LIMITS_SD,
-    Floats,
     are_too_few,
     icc_absolute,
     kappa,
@@ -41,7 +37,8 @@ _Table = Mapping[tuple[str, str, int], StoredAnnotation]
 
 def finished(annotations: Iterable[StoredAnnotation]) -> list[StoredAnnotation]:
     """Those with both lines and a state, and those of whom could not tell."""
-    return [one for one in annotations if _status(one) in (Status.DONE, Status.CANNOT_TELL)]
+    is_done = (Status.DONE, Status.CANNOT_TELL)
+    return [one for one in annotations if status_of(one.content, measured=one.theta_deg is not None) in is_done]
 
 
 def studies_of(annotations: Iterable[StoredAnnotation]) -> list[str]:
@@ -77,10 +74,10 @@ def agreement_report(
     Returns
     -------
     dict
-        ``raters``: each rater's first against his second measure (``angle`` with limits of agreement and ICC, ``state`` with
-        kappa), and the SD of one measure of his, over all his repeats. ``within``: that SD over all raters. ``pairs``: two raters'
-        first measures of the same images, likewise. ``between``: over all raters that measured the same images, SD of a rater's
-        measure about the image's mean, and ICC(2,1). Undefined figures are None.
+        ``raters``: each rater's first against second measure (``angle`` with limits of agreement and ICC, ``state`` with kappa),
+        and the SD of one measure, over all repeats. ``within``: that SD over all raters. ``pairs``: two raters' first measures of
+        the same images, likewise. ``between``: over all raters that measured the same images, SD of a rater's measure about the
+        image's mean, and ICC(2,1). Undefined figures are None.
     """
     draw = _Draw(seed, groups or {})
     table = {(one.key.rater, one.key.sha256, one.key.repeat): one for one in annotations}
@@ -115,8 +112,16 @@ def _within(table: _Table, rater: str, draw: _Draw) -> dict[str, Any]:
         "annotations": len(own),
         "cannot_tell": sum(one.content.cannot_tell for one in own.values()),
         "median_time_s": median(times) if times else None,
-        "sd_deg": _pooled_sd(_grouped_by_image(own)),
+        "sd_deg": _pooled_sd(list(_angles_by_image(table, rater).values())),
     } | _compare(both, draw)
+
+
+def _angles_by_image(table: _Table, rater: str) -> dict[str, list[float]]:
+    angles: dict[str, list[float]] = {}
+    for (who, image, _), one in table.items():
+        if who == rater and one.theta_deg is not None and not one.content.cannot_tell:
+            angles.setdefault(image, []).append(one.theta_deg)
+    return angles
 
 
 def _all_within(table: _Table, draw: _Draw) -> dict[str, Any]:
@@ -126,14 +131,6 @@ def _all_within(table: _Table, draw: _Draw) -> dict[str, Any]:
         if one.theta_deg is not None and not one.content.cannot_tell:
             measures.setdefault(image, {}).setdefault(who, []).append(one.theta_deg)
     return within_subject([list(raters.values()) for raters in measures.values()], draw.seed, draw.members(list(measures)))
-
-
-def _grouped_by_image(own: Mapping[tuple[str, int], StoredAnnotation]) -> list[list[float]]:
-    groups: dict[str, list[float]] = {}
-    for (image, _), one in own.items():
-        if one.theta_deg is not None and not one.content.cannot_tell:
-            groups.setdefault(image, []).append(one.theta_deg)
-    return list(groups.values())
 
 
 def _pooled_sd(groups: Iterable[Sequence[float]]) -> float | None:
@@ -154,36 +151,26 @@ def _compare(both: Sequence[tuple[StoredAnnotation, StoredAnnotation]], draw: _D
     measured = [(a, b) for a, b in telling if a.theta_deg is not None and b.theta_deg is not None]
     known = np.array([(a.theta_deg, b.theta_deg) for a, b in measured], np.float64).reshape(-1, 2)
     angle = repeat_metrics(known[:, 0], known[:, 1], draw.seed, draw.members([a.key.sha256 for a, _ in measured]))
-    # The SD of one measure is a rater's own, over all his repeats, and stands in one place: of two raters it would be none.
+    # The SD of one measure is a rater's own, over all repeats, and stands in one place; between two raters it means nothing.
     del angle["repeatability_sd_deg"], angle["ci95"]["repeatability_sd_deg"]
-    angle |= _limits(known)
-    return {"angle": angle, "state": _states(both, telling)}
-
-
-_Pairs = Sequence[tuple[StoredAnnotation, StoredAnnotation]]
-
-
-def _states(both: _Pairs, telling: _Pairs) -> dict[str, Any]:
-    """States where both gave one. "Can't tell" is none: to say it of the same images is no agreement about a state."""
+    # Bland and Altman's limits of agreement of the second measure against the first.
+    angle |= {"loa_low_deg": None, "loa_high_deg": None}
+    if len(known) > 1:
+        difference = known[:, 1] - known[:, 0]
+        mean, reach = float(difference.mean()), LIMITS_SD * float(difference.std(ddof=1))
+        angle |= {"loa_low_deg": mean - reach, "loa_high_deg": mean + reach}
+    # "Can't tell" is no state: to say it of the same images is no agreement about a state.
     given = [(str(a.content.state), str(b.content.state)) for a, b in telling if a.content.state and b.content.state]
     first, second = [a for a, _ in given], [b for _, b in given]
     neither = sum(a.content.cannot_tell and b.content.cannot_tell for a, b in both)
-    return {
+    state = {
         "n": len(given),
         "equal": sum(a == b for a, b in given) / len(given) if given else None,
         "kappa": kappa(first, second) if given else None,
         "one_cannot_tell": len(both) - len(telling) - neither,
         "neither_can_tell": neither,
     }
-
-
-def _limits(known: Floats) -> dict[str, float | None]:
-    """Bland and Altman's limits of agreement of the second measure against the first."""
-    if len(known) < 2:
-        return {"loa_low_deg": None, "loa_high_deg": None}
-    difference = known[:, 1] - known[:, 0]
-    mean, reach = float(difference.mean()), LIMITS_SD * float(difference.std(ddof=1))
-    return {"loa_low_deg": mean - reach, "loa_high_deg": mean + reach}
+    return {"angle": angle, "state": state}
 
 
 def _between(table: _Table, raters: Sequence[str]) -> dict[str, Any]:
@@ -225,9 +212,9 @@ def write_measures(path: Path, measures: Sequence[Mapping[str, Any]]) -> None:
 def manual_measurements(annotations: Iterable[StoredAnnotation], names: Mapping[str, str]) -> list[Measurement]:
     """One row per image for ``evaluate``; the algorithm's columns are still empty.
 
-    ``angle_1`` is the mean of the raters' first measures and ``angle_2`` that of their later ones. Where nobody measured twice but
+    ``angle_1`` is the mean of the raters' first measures, ``angle_2`` that of their later ones. Where no rater measured twice but
     several raters did, they are the first rater's and the mean of the others'. The state is the one given most often, of equals the
-    first rater's. Who could not tell says nothing here.
+    first rater's. "Can't tell" does not count here.
     """
     by_image: dict[str, list[StoredAnnotation]] = {}
     for one in sorted(annotations, key=lambda one: (one.key.rater, one.key.repeat)):
@@ -250,25 +237,23 @@ def group_notes(annotations: Iterable[StoredAnnotation], groups: Mapping[str, st
 
 def second_measure_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:
     """Where the second of ``manual_measurements`` is a rater's own on some images and another rater's on others."""
-    by_image: dict[str, list[StoredAnnotation]] = {}
+    by_image: dict[str, list[int]] = {}
     for one in annotations:
-        by_image.setdefault(one.key.sha256, []).append(one)
-    kinds = Counter(kind for group in by_image.values() if (kind := _second_measure(group)) is not None)
+        if one.theta_deg is not None and not one.content.cannot_tell:
+            by_image.setdefault(one.key.sha256, []).append(one.key.repeat)
+    kinds: Counter[str] = Counter()
+    for repeats in by_image.values():
+        later = sum(repeat > 1 for repeat in repeats)
+        if 0 < later < len(repeats):
+            kinds["repeat"] += 1
+        elif not later and len(repeats) > 1:
+            kinds["rater"] += 1
     if len(kinds) < 2:
         return []
     return [
         f"The second manual measure is a rater's later one on {kinds['repeat']} images and another rater's on {kinds['rater']}; "
         "figures of two manual measures (ICC, repeatability) mix what one rater and what several are uncertain by."
     ]
-
-
-def _second_measure(group: Sequence[StoredAnnotation]) -> str | None:
-    """Whose ``angle_2`` of ``manual_measurements`` is: of a "repeat", of another "rater", or None where there is none."""
-    repeats = [one.key.repeat for one in group if one.theta_deg is not None and not one.content.cannot_tell]
-    later = sum(repeat > 1 for repeat in repeats)
-    if later:
-        return "repeat" if later < len(repeats) else None
-    return "rater" if len(repeats) > 1 else None
 
 
 def undecided(annotations: Iterable[StoredAnnotation]) -> int:
@@ -292,12 +277,7 @@ def _common(name: str, group: Sequence[StoredAnnotation]) -> Measurement:
     return Measurement(name, fmean(first) if first else None, fmean(later) if later else None, state, None, None, counts=counts)
 
 
-def _status(one: StoredAnnotation) -> Status:
-    return status_of(one.content, measured=one.theta_deg is not None)
-
-
-_SAME_DEG = 0.005
-"""As fine as an angle is ever told."""
+_SAME_DEG = 0.005  # angles are shown no finer
 
 
 def measured_alike(

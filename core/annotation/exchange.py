@@ -1,10 +1,6 @@
-"""From labelme and COCO files to annotations. A damaged file or shape is named in one line, and the others are read.
+"""Annotations out of and into other forms: labelme and COCO files, training sets, and the algorithm's proposal.
 
-From annotations to what others read: a training set, a COCO file.
-
-From masks drawn by hand to two sets: one to train on, and one that stays out and says whether it helped.
-
-What the algorithm would have drawn: shown and taken over on demand, never in a blind study.
+A damaged file or shape is named in one line, and the others are read.
 """
 
 from __future__ import annotations
@@ -32,11 +28,11 @@ from core.learning.dataset import IMAGE_ENDINGS, UNMEASURED, write_mask, write_p
 from core.types import Mask, Points, Pose, Refusal, Scene, Vector
 
 _MAX_BYTES = 500_000_000
+# Labels that are understood, in lower case.
 _LABELS = {
     **dict.fromkeys(("vessel", "vessels", "lumen", "blood vessel", "artery"), MaskTarget.VESSEL),
     **dict.fromkeys(("robot", "interventional robot", "catheter", "guidewire", "device"), MaskTarget.ROBOT),
 }
-"""Labels that are understood, in lower case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,30 +64,24 @@ def read_files(paths: Iterable[Path], images: Iterable[FoundImage]) -> tuple[lis
     problems: list[str] = []
     for path in paths:
         try:
-            content = _read_json(path)
+            if path.stat().st_size > _MAX_BYTES:
+                raise AnnotationError(f"{path}: larger than {_MAX_BYTES // 1_000_000} MB; left out")
+            content = json.loads(path.read_text(encoding="utf-8-sig"))
+            if not isinstance(content, dict):
+                raise AnnotationError(f"{path}: neither labelme nor COCO; left out")
             if "shapes" in content:
                 found += _labelme(path, content, by_name, problems)
             elif "annotations" in content and "images" in content:
                 found += _coco(path, content, by_name, problems)
             else:
                 problems.append(f"{path}: neither labelme (shapes) nor COCO (images, annotations); left out")
+        except OSError as error:
+            problems.append(f"{path}: cannot be read ({error.strerror}); left out")
         except AnnotationError as error:
             problems.append(str(error))
+        except (ValueError, RecursionError):
+            problems.append(f"{path}: damaged, not valid JSON; left out")
     return found, problems
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise AnnotationError(f"{path}: larger than {_MAX_BYTES // 1_000_000} MB; left out")
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise AnnotationError(f"{path}: cannot be read ({error.strerror}); left out") from None
-    except (ValueError, RecursionError):
-        raise AnnotationError(f"{path}: damaged, not valid JSON; left out") from None
-    if not isinstance(content, dict):
-        raise AnnotationError(f"{path}: neither labelme nor COCO; left out")
-    return content
 
 
 def _image_of(
@@ -189,7 +179,12 @@ def _segmentation(segmentation: Any, target: MaskTarget, size: tuple[int, int]) 
     if isinstance(segmentation, dict):
         if not isinstance(segmentation.get("counts"), list):
             raise ValueError("compressed run lengths are not read: write polygons or plain run lengths")
-        return list(polygons_of(_from_run_lengths(segmentation, size), target, 0.0))
+        width, height = size
+        counts = np.array(segmentation["counts"], np.int64)
+        if list(segmentation["size"]) != [height, width] or counts.min(initial=0) < 0 or int(counts.sum()) != width * height:
+            raise ValueError("run lengths of another size")
+        mask = np.repeat(np.arange(len(counts)) % 2 == 1, counts).reshape((height, width), order="F")
+        return list(polygons_of(mask, target, 0.0))
     polygons: list[MaskPolygon] = []
     for flat in segmentation:
         points = line_from(list(zip(flat[::2], flat[1::2], strict=True)))
@@ -199,15 +194,6 @@ def _segmentation(segmentation: Any, target: MaskTarget, size: tuple[int, int]) 
     if not polygons:
         raise ValueError("covers no pixel")
     return polygons
-
-
-def _from_run_lengths(segmentation: Mapping[str, Any], size: tuple[int, int]) -> Mask:
-    width, height = size
-    counts = np.array(segmentation["counts"], np.int64)
-    if list(segmentation["size"]) != [height, width] or counts.min(initial=0) < 0 or int(counts.sum()) != width * height:
-        raise ValueError("run lengths of another size")
-    values = np.arange(len(counts)) % 2 == 1
-    return np.repeat(values, counts).reshape((height, width), order="F")
 
 
 def _target(where: str, label: Any, problems: list[str]) -> MaskTarget | None:
@@ -263,7 +249,10 @@ def export_training_set(
     """
     sources = mask_source(annotations)
     here = {image.sha256: image for image in images}
-    stems = _stems([here[sha256] for sha256 in sources if sha256 in here])
+    stems: dict[str, str] = {}
+    for sha256 in filter(here.__contains__, sources):
+        stem = here[sha256].path.stem  # equal ones get a piece of the hash
+        stems[sha256] = stem if stem not in stems.values() else f"{stem}_{sha256[:8]}"
     problems = [f"image {sha256[:12]}: is not among the given images; left out" for sha256 in sources if sha256 not in here]
     complete: dict[str, StoredAnnotation] = {}
     for sha256, one in sources.items():
@@ -288,39 +277,22 @@ def export_training_set(
             if not go_on():
                 raise AnnotationError(f"{out}: given up half-way; it is no whole set")
             image, stem = here[sha256], stems[sha256]
-            _put_image(image.path, out / "images", stem)
+            ending = image.path.suffix.lower()
+            if ending in IMAGE_ENDINGS:
+                shutil.copyfile(image.path, out / "images" / f"{stem}{ending}")
+            else:  # a kind that training does not look for
+                write_png(out / "images" / f"{stem}.png", read_image(image.path))
             for target in MaskTarget:
                 mask = fill(one.content.masks, target, image.record.size)
                 write_mask(out / "masks" / f"{stem}_{target.value}.png", mask)
         rows = [json.dumps(row, allow_nan=False) for row in _truth_rows(measured, complete, here, stems)]
         (out / "truth.jsonl").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    except ImageError as error:
+        raise AnnotationError(str(error)) from None
     except OSError as error:
         where = error.filename2 or error.filename or out  # a copy that fails names first what was to be copied
         raise AnnotationError(f"{where}: cannot be written ({error.strerror}); choose another --out") from None
     return len(complete), problems
-
-
-def _put_image(path: Path, folder: Path, stem: str) -> None:
-    """The file as it is, or as PNG where it is of a kind that training does not look for. Raises OSError, AnnotationError."""
-    ending = path.suffix.lower()
-    if ending in IMAGE_ENDINGS:
-        shutil.copyfile(path, folder / f"{stem}{ending}")
-        return
-    try:
-        write_png(folder / f"{stem}.png", read_image(path))
-    except ImageError as error:
-        raise AnnotationError(str(error)) from None
-
-
-def _stems(images: Sequence[FoundImage]) -> dict[str, str]:
-    """A file name without ending for each image; equal ones get a piece of the hash."""
-    used: set[str] = set()
-    stems = {}
-    for image in images:
-        stem = image.path.stem if image.path.stem not in used else f"{image.path.stem}_{image.sha256[:8]}"
-        used.add(stem)
-        stems[image.sha256] = stem
-    return stems
 
 
 def _truth_rows(
@@ -352,14 +324,6 @@ def _truth_rows(
     return rows
 
 
-def _names_of(images: Sequence[FoundImage]) -> dict[Path, str]:
-    """What files call the images: their names, or, where several have one, their places below the folder that has all of them."""
-    if len({image.path.name for image in images}) == len(images):
-        return {image.path: image.path.name for image in images}
-    common = Path(os.path.commonpath([image.path.absolute().parent for image in images]))
-    return {image.path: image.path.absolute().relative_to(common).as_posix() for image in images}
-
-
 def _vector(vector: Vector | None) -> dict[str, list[float]] | None:
     return None if vector is None else {name: list(getattr(vector, name)) for name in ("start", "center", "end")}
 
@@ -371,7 +335,11 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
     """
     categories = {target: number for number, target in enumerate(MaskTarget, 1)}
     here = {image.sha256: image for image in images}
-    names = _names_of(images)
+    # Files name the images; where several have one name, by their places below the folder that has all of them.
+    names = {image.path: image.path.name for image in images}
+    if len(set(names.values())) < len(images):
+        common = Path(os.path.commonpath([image.path.absolute().parent for image in images]))
+        names = {image.path: image.path.absolute().relative_to(common).as_posix() for image in images}
     content: dict[str, list[dict[str, Any]]] = {
         "images": [],
         "annotations": [],
@@ -383,10 +351,15 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
         image, number = here[sha256], len(content["images"]) + 1
         width, height = image.record.size
         content["images"].append({"id": number, "file_name": names[image.path], "width": width, "height": height})
-        for piece in _pieces(one.content.masks):
-            row = _coco_piece(piece, image.record.size)
+        pieces: list[list[MaskPolygon]] = []  # each outer polygon with the holes that follow it
+        for polygon in one.content.masks:
+            if not polygon.is_hole:
+                pieces.append([polygon])
+            elif pieces and pieces[-1][0].target is polygon.target:
+                pieces[-1].append(polygon)
+        for piece in pieces:
             ids = {"id": len(content["annotations"]) + 1, "image_id": number, "category_id": categories[piece[0].target]}
-            content["annotations"].append(ids | row)
+            content["annotations"].append(ids | _coco_piece(piece, image.record.size))
     if not content["images"]:
         raise AnnotationError("no image has a mask; draw them, or take the model's over, in annotate")
     if out.exists():
@@ -396,17 +369,6 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
     except OSError as error:
         raise AnnotationError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
     return len(content["images"])
-
-
-def _pieces(masks: Sequence[MaskPolygon]) -> list[list[MaskPolygon]]:
-    """Each outer polygon with the holes that follow it."""
-    pieces: list[list[MaskPolygon]] = []
-    for mask in masks:
-        if not mask.is_hole:
-            pieces.append([mask])
-        elif pieces and pieces[-1][0].target is mask.target:
-            pieces[-1].append(mask)
-    return pieces
 
 
 def _coco_piece(piece: Sequence[MaskPolygon], size: tuple[int, int]) -> dict[str, Any]:
@@ -432,8 +394,7 @@ def run_lengths(mask: Mask) -> list[int]:
 
 FEWEST = 6
 """Images with both masks below which nothing is trained: four to learn from and two to judge by."""
-_ONE_IN = 5
-_FEWEST_HELD_OUT = 2
+_HELD_OUT_SHARE, _FEWEST_HELD_OUT = 5, 2  # one image in five is held out, two at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -458,10 +419,10 @@ def split_own_frames(
     out: Path,
     go_on: Callable[[], bool] = lambda: True,
 ) -> OwnFrames:
-    """Write both sets below `out`: a fifth of the images, two at least, is held out.
+    """Write a set to train on and one to judge by below `out`: a fifth of the images, two at least, is held out.
 
-    These are neighbours in the order of the images' names: pictures of one video or session are alike, and one between two that are
-    learnt from would tell of its neighbours only. Angles and states go along where they are of one study; masks are what is learnt.
+    The held-out images are neighbours in the order of names: pictures of one video are alike, and one between two that are trained
+    on would not be independent. Angles and states go along where they are of one study.
 
     Raises
     ------
@@ -475,7 +436,7 @@ def split_own_frames(
         have = f"{len(complete)} {'image has' if len(complete) == 1 else 'images have'} both a vessel and a robot mask"
         how = "draw them with keys 3 and 4, or take over and correct the model's with G"
         raise AnnotationError(f"{have}, and training needs {FEWEST}: {missing} more ({how})")
-    count = max(_FEWEST_HELD_OUT, len(complete) // _ONE_IN)
+    count = max(_FEWEST_HELD_OUT, len(complete) // _HELD_OUT_SHARE)
     begin = (len(complete) - count) // 2
     held_out = set(complete[begin : begin + count])
     measured = finished(annotations)
@@ -495,9 +456,8 @@ def _complete(annotations: Sequence[StoredAnnotation]) -> list[str]:
     return [sha256 for sha256, one in mask_source(annotations).items() if one.content.drawn.issuperset(MaskTarget)]
 
 
-_LINE_PX = 60.0
-"""Length of the proposed robot line: the 40 px that count, and some to see where it comes from. Working pixels."""
-_TOLERANCE_PX = 0.4
+_LINE_PX = 60.0  # length of the proposed robot line, working px: the 40 px that count and some before
+_TOLERANCE_PX = 0.4  # by which a proposed line may leave the perceived one
 
 
 @dataclass(frozen=True, slots=True)
@@ -521,12 +481,8 @@ def proposal_of(scene: Scene) -> Proposal:
         vessel = _line(scene, scene.centerline.piece)
     masks: tuple[MaskPolygon, ...] = ()
     if scene.masks is not None:
-        width, height = scene.source_size
-        masks = tuple(
-            polygon
-            for target, mask in ((MaskTarget.VESSEL, scene.masks.vessel), (MaskTarget.ROBOT, scene.masks.robot))
-            for polygon in polygons_of(_enlarged(mask, width, height), target)
-        )
+        pairs = (MaskTarget.VESSEL, scene.masks.vessel), (MaskTarget.ROBOT, scene.masks.robot)
+        masks = tuple(polygon for target, mask in pairs for polygon in polygons_of(_enlarged(mask, *scene.source_size), target))
     state = scene.pose.state if scene.pose is not None else None
     confidence = scene.pose.confidence if scene.pose is not None else 0.0
     return Proposal(Annotation(robot, vessel, state, masks=masks), scene.pose, confidence, scene.refusal)

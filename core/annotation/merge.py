@@ -1,11 +1,8 @@
-"""Files of raters who annotated at several computers become one: all of them, or none, and a second time changes nothing.
+"""Annotation files of several computers become one, and what is readable of a damaged one goes into a new file.
 
-Each answer comes with all its edits, as its record lies in its file, damage included. What is here stays: an answer that went on at
-the other computer goes on here, one that went on differently at both is told and left as it is here.
-
-Who the raters of one file are in another: a name alone does not tell, since two computers may both call theirs "user".
-
-What is readable of a damaged annotation file, written into a new one; the damaged file is never touched.
+Joining takes all files or none, and a second time changes nothing. Each answer comes with all its edits, as its record lies in its
+file, damage included. Nothing here is overwritten: an answer that went on at the other computer goes on here, one that went on
+differently at both is reported and left as it is here.
 """
 
 from __future__ import annotations
@@ -22,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from core.annotation.model import AnnotationError
-from core.annotation.store import DEFAULT_NAME, AnnotationStore, KeptAnnotation, check_sum, has_table, read_kept
+from core.annotation.store import ADD_LOOK, ADDED, DEFAULT_NAME, AnnotationStore, KeptAnnotation, check_sum, read_kept
 from core.annotation.study import StudySettings, settings_from
 
 
@@ -160,8 +157,10 @@ def _take(database: sqlite3.Connection, theirs: sqlite3.Connection, ask: _Ask, j
         _take_study(database, theirs, name, ask.where)
     _take_images(database, theirs, {one.sha256 for one in wanted}, ask.where)
     _take_answers(database, theirs, (wanted, here), persons, ask.where, joined)
-    if has_table(theirs, "looks"):
-        _take_looks(database, theirs, ask.study, persons)
+    looks = "SELECT l.study, l.rater, l.repeat, l.after, i.sha256 FROM looks l JOIN images i ON i.id = l.image_id"
+    for name, rater, *look in theirs.execute(looks).fetchall():
+        if ask.study in (None, name):
+            database.execute(ADD_LOOK, (name, persons.names.get(rater, rater), *look))
     joined.persons[ask.where] = dict(persons.names)
 
 
@@ -282,20 +281,8 @@ def _add_edits(database: sqlite3.Connection, theirs: sqlite3.Connection, one: Ke
     )
 
 
-def _take_looks(database: sqlite3.Connection, theirs: sqlite3.Connection, study: str | None, persons: Persons) -> None:
-    query = "SELECT i.sha256, l.study, l.rater, l.repeat, l.after FROM looks l JOIN images i ON i.id = l.image_id"
-    for sha256, name, rater, repeat, after in theirs.execute(query).fetchall():
-        if study is None or name == study:
-            database.execute(
-                "INSERT INTO looks (image_id, study, rater, repeat, after) SELECT id, ?, ?, ?, ? FROM images WHERE sha256 = ?"
-                " ON CONFLICT (image_id, study, rater, repeat) DO UPDATE SET after = min(after, excluded.after)",
-                (name, persons.names.get(rater, rater), repeat, after, sha256),
-            )
-
-
 _MAX_ROW = 1_000_000
-_MISSES = 2_000
-"""After so many rows in a row that cannot be read, nothing more is expected."""
+_MISSES = 2_000  # after so many row numbers on end that cannot be read, nothing more is expected
 _TABLES = ("images", "studies", "annotations", "journal", "origins", "looks")
 
 
@@ -319,13 +306,11 @@ def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:
     found = _read(damaged)
     if not found.rows:
         raise AnnotationError(f"{damaged}: nothing in it can be read{f' ({found.why})' if found.why else ''}")
-    columns, tables, problems = found.columns, found.tables, found.problems
     with AnnotationStore(target) as store:
-        store.take_rows(columns, tables, problems)
+        store.insert_rows(found.columns, found.tables, found.problems)
     with AnnotationStore(target, read_only=True) as store:
         kept = len(store.annotations())
-        problems += store.problems
-    return kept, problems
+        return kept, found.problems + store.problems
 
 
 @dataclass(slots=True)
@@ -381,7 +366,7 @@ def _read_copy(path: Path) -> _Found:
 def _readable(source: sqlite3.Connection, table: str, problems: list[str]) -> tuple[list[str], list[tuple[Any, ...]]]:
     try:
         names = [str(row[1]) for row in source.execute(f"PRAGMA table_info({table})")]
-        if not names and table in ("origins", "looks"):  # a file of an earlier version
+        if not names and table in ADDED:  # a file of an earlier version
             return [], []
         lost = _astray(source, table)
         rows = [row for row in _rows(source, table, problems) if row[0] not in lost]
@@ -423,7 +408,9 @@ def _rows(source: sqlite3.Connection, table: str, problems: list[str]) -> Iterat
                     raise sqlite3.DatabaseError("rows out of order")
                 number = int(row[0])
                 if misses:
-                    problems.append(f"{_numbers(whole + 1, number - 1)} of {table} cannot be read")
+                    first, last = whole + 1, number - 1
+                    rows = f"row {first}" if first == last else f"rows {first} to {last}"
+                    problems.append(f"{rows} of {table} cannot be read")
                 misses, whole = 0, number
                 yield row[1:]
             break
@@ -431,7 +418,3 @@ def _rows(source: sqlite3.Connection, table: str, problems: list[str]) -> Iterat
             number, misses = number + 1, misses + 1
     if misses:
         problems.append(f"the rows of {table} after number {whole} cannot be read")
-
-
-def _numbers(first: int, last: int) -> str:
-    return f"row {first}" if first == last else f"rows {first} to {last}"

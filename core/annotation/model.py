@@ -1,22 +1,20 @@
-"""What a rater draws and says about one image, and what is measured from it by the rule of METHOD section 5.
+"""What a rater draws and says about one image, what is measured from it (METHOD section 5), and the journal of edits for undo.
 
-Everything a rater draws is kept in source pixels of the image as it is on disk, however it was shown to him.
-
-Edits of lines and outlines, as functions from one annotation to the next; and what a place on the screen touches.
-
-Undo without limit as a journal: every edit, undo and redo is an entry, and none is ever taken away.
+Everything a rater draws is kept in source pixels of the image as it is on disk, however it was shown.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Literal
+from itertools import takewhile
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter, ValidationError
 
 from core import geometry
 from core.config.models import PerceptionConfig
@@ -26,8 +24,8 @@ from core.perception.pose import measure
 from core.perception.vectors import MIN_LENGTH_PX, fit_robot_vector, fit_vessel_vector
 from core.types import GraphEdge, Image, Point, Points, Pose, PoseState, Vector, VesselGraph
 
-Line = tuple[Point, ...]
-_MAX_COORDINATE_PX = 1e6
+_Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]  # beyond it a point lies outside every picture
+Line = tuple[tuple[_Coordinate, _Coordinate], ...]
 
 
 class AnnotationError(UserError):
@@ -79,41 +77,27 @@ class Annotation:
 
     def to_json(self) -> str:
         """One line of JSON; ``annotation_from_json`` reads it."""
-        content = {
-            "robot": self.robot,
-            "vessel": self.vessel,
-            "state": self.state,
-            "cannot_tell": self.cannot_tell,
-            "masks": [{"target": m.target, "points": m.points, "is_hole": m.is_hole} for m in self.masks],
-            "note": self.note,
-        }
+        content = _ANNOTATION.dump_python(self, mode="json")
         return json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+
+
+_ANNOTATION, _LINE = TypeAdapter(Annotation), TypeAdapter(Line)
 
 
 def annotation_from_json(text: str) -> Annotation:
     """The annotation in one line of JSON; raises ValueError when it is damaged or makes no sense."""
     try:
-        row = json.loads(text)
-        masks = tuple(MaskPolygon(MaskTarget(m["target"]), line_from(m["points"]), m["is_hole"] is True) for m in row["masks"])
-        state = None if row["state"] is None else PoseState(row["state"])
-        return Annotation(
-            line_from(row["robot"]), line_from(row["vessel"]), state, row["cannot_tell"] is True, masks, str(row["note"])
-        )
-    except (TypeError, KeyError, RecursionError, AttributeError) as error:
-        raise ValueError(f"not an annotation ({type(error).__name__})") from None
+        return _ANNOTATION.validate_json(text)
+    except ValidationError as error:
+        raise ValueError(f"not an annotation ({error.errors()[0]['msg']})") from None
 
 
 def line_from(values: Any) -> Line:
     """A list of [x, y] as points; raises ValueError unless all are finite and of a picture's size."""
-    points = []
-    for value in values:
-        if not isinstance(value, list | tuple) or len(value) != 2:
-            raise ValueError("a point is not [x, y]")
-        x, y = float(value[0]), float(value[1])
-        if not (abs(x) <= _MAX_COORDINATE_PX and abs(y) <= _MAX_COORDINATE_PX):
-            raise ValueError("a point lies outside every picture")
-        points.append((x, y))
-    return tuple(points)
+    try:
+        return _LINE.validate_python(values)
+    except ValidationError as error:
+        raise ValueError(f"no line of points [x, y] ({error.errors()[0]['msg']})") from None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,6 +136,13 @@ def measure_lines(annotation: Annotation, size: tuple[int, int], config: Percept
     config : lengths, thresholds and working resolution.
     """
     scale = np.array(working_scale(size, config.working_size_px))
+
+    def to_source(points: Points) -> Points:
+        return np.asarray((points + 0.5) / scale - 0.5, np.float64)
+
+    def vector_to_source(vector: Vector) -> Vector:
+        return Vector(*map(tuple, to_source(np.array([vector.start, vector.center, vector.end])).tolist()))
+
     robot, vessel = (_to_working(line, scale) for line in (annotation.robot, annotation.vessel))
     vectors = config.vectors
     robot_vector = fit_robot_vector(robot, vectors.robot_length_px, vectors.line_fit)
@@ -161,33 +152,26 @@ def measure_lines(annotation: Annotation, size: tuple[int, int], config: Percept
     total = float(geometry.arc_length(robot)[-1])
     piece = geometry.cut(robot, total - vectors.robot_length_px, total)
     found = Readout(
-        robot_piece=_to_source(piece, scale),
-        robot_vector=_vector_to_source(robot_vector, scale),
+        robot_piece=to_source(piece),
+        robot_vector=vector_to_source(robot_vector),
         robot_length_px=min(total, vectors.robot_length_px),
     )
     if len(vessel) < 2:
         return replace(found, missing="draw the vessel's centerline beside the head")
-    beside = centerline_at(_graph(vessel), annotation_head(robot), robot_vector.direction, vectors.vessel_half_length_px)
+    # The drawn line as a vessel graph of one edge, so that perception's own rule cuts and directs it.
+    graph = VesselGraph(vessel[[0, -1]], (GraphEdge(0, 1, vessel, np.zeros(len(vessel))),))
+    head = float(robot[-1, 0]), float(robot[-1, 1])
+    beside = centerline_at(graph, head, robot_vector.direction, vectors.vessel_half_length_px)
     vessel_vector = fit_vessel_vector(beside, vectors.line_fit) if beside is not None else None
     if beside is None or vessel_vector is None:
         return replace(found, missing="the vessel line ends too soon beside the head: draw it farther")
     return replace(
         found,
-        vessel_piece=_to_source(beside.piece, scale),
-        vessel_vector=_vector_to_source(vessel_vector, scale),
+        vessel_piece=to_source(beside.piece),
+        vessel_vector=vector_to_source(vessel_vector),
         vessel_length_px=float(geometry.arc_length(beside.piece)[-1]),
         pose=measure(robot_vector, vessel_vector, config.pose),
     )
-
-
-def annotation_head(robot: Points) -> Point:
-    """The last point of the robot's line."""
-    return float(robot[-1, 0]), float(robot[-1, 1])
-
-
-def _graph(vessel: Points) -> VesselGraph:
-    """The drawn line as a vessel graph of one edge, so that perception's own rule cuts and directs it."""
-    return VesselGraph(vessel[[0, -1]], (GraphEdge(0, 1, vessel, np.zeros(len(vessel))),))
 
 
 def _to_working(line: Line, scale: Points) -> Points:
@@ -196,15 +180,6 @@ def _to_working(line: Line, scale: Points) -> Points:
     apart = np.ones(len(points), bool)
     apart[1:] = np.any(np.diff(points, axis=0) != 0.0, axis=1)
     return np.asarray((points[apart] + 0.5) * scale - 0.5, np.float64)
-
-
-def _to_source(points: Points, scale: Points) -> Points:
-    return np.asarray((points + 0.5) / scale - 0.5, np.float64)
-
-
-def _vector_to_source(vector: Vector, scale: Points) -> Vector:
-    start, center, end = _to_source(np.array([vector.start, vector.center, vector.end]), scale).tolist()
-    return Vector(tuple(start), tuple(center), tuple(end))
 
 
 def turn_point(point: Point, view: ImageView, size: tuple[int, int]) -> Point:
@@ -244,7 +219,7 @@ class Status(StrEnum):
 
 
 def status_of(annotation: Annotation | None, *, measured: bool) -> Status:
-    """Done is who has both lines, so that an angle is `measured`, and a state; "can't tell" is an answer too."""
+    """Done is an image with both lines, so that an angle is `measured`, and a state; "can't tell" is an answer too."""
     if annotation is None or annotation == Annotation():
         return Status.NEW
     if annotation.cannot_tell:
@@ -277,8 +252,11 @@ def line_of(annotation: Annotation, line: int) -> Line:
 
 
 def with_line(annotation: Annotation, line: int, points: Line) -> Annotation:
-    """The annotation with other points on a line. A drawn line takes "can't tell" back; a polygon of fewer than three is gone, and
-    with an outline the holes in it."""
+    """The annotation with other points on a line, which takes "can't tell" back.
+
+    A polygon of fewer than three points is removed, an outline with the holes in it: those that follow before the next outline of
+    the same mask.
+    """
     if line == ROBOT:
         return replace(annotation, robot=points, cannot_tell=False)
     if line == VESSEL:
@@ -287,18 +265,11 @@ def with_line(annotation: Annotation, line: int, points: Line) -> Annotation:
     if len(points) >= 3:
         masks[line] = replace(masks[line], points=points)
     else:
-        doomed = {line} if masks[line].is_hole else {line, *_holes_of(masks, line)}
-        masks = [mask for place, mask in enumerate(masks) if place not in doomed]
+        removed = masks.pop(line)
+        same = [place for place in range(line, len(masks)) if masks[place].target is removed.target]
+        holes = list(takewhile(lambda place: masks[place].is_hole, same)) if not removed.is_hole else []
+        masks = [mask for place, mask in enumerate(masks) if place not in holes]
     return replace(annotation, masks=tuple(masks))
-
-
-def _holes_of(masks: Sequence[MaskPolygon], outline: int) -> Iterator[int]:
-    """Places of the holes in an outline: those that follow it, before the next outline of the same mask."""
-    for place in range(outline + 1, len(masks)):
-        if masks[place].target is masks[outline].target:
-            if not masks[place].is_hole:
-                return
-            yield place
 
 
 def put(annotation: Annotation, line: int, place: int, point: Point) -> Annotation:
@@ -385,7 +356,7 @@ class History:
         self._now = self._tip = 0
         self._last = last
         for entry in entries:
-            self._take(entry)
+            self._follow(entry)
 
     @property
     def current(self) -> Annotation:
@@ -411,21 +382,15 @@ class History:
 
     def edit(self, action: str, content: Annotation) -> JournalEntry | None:
         """Put `content` in force; None when it changes nothing."""
-        if content == self.current:
-            return None
-        return self._taken(JournalEntry(self._last + 1, "edit", self._now, action, content))
+        return self._add("edit", self._now, action, content) if content != self.current else None
 
     def renewed(self, action: str) -> JournalEntry | None:
         """What is in force once more, because its record was lost; None where nothing was ever said."""
-        if self.current == Annotation():
-            return None
-        return self._taken(JournalEntry(self._last + 1, "edit", self._now, action, self.current))
+        return self._add("edit", self._now, action, self.current) if self.current != Annotation() else None
 
     def undo(self) -> JournalEntry | None:
         """Back to before the last edit; None when there is none."""
-        if not self.can_undo:
-            return None
-        return self._taken(JournalEntry(self._last + 1, "undo", self._bases[self._now], self._actions[self._now]))
+        return self._add("undo", self._bases[self._now], self._actions[self._now]) if self.can_undo else None
 
     def redo(self) -> JournalEntry | None:
         """Forward again; None when nothing was undone."""
@@ -434,13 +399,14 @@ class History:
         step = self._tip
         while self._bases[step] != self._now:
             step = self._bases[step]
-        return self._taken(JournalEntry(self._last + 1, "redo", step, self._actions[step]))
+        return self._add("redo", step, self._actions[step])
 
-    def _taken(self, entry: JournalEntry) -> JournalEntry:
-        self._take(entry)
+    def _add(self, kind: Kind, base: int, action: str, content: Annotation | None = None) -> JournalEntry:
+        entry = JournalEntry(self._last + 1, kind, base, action, content)
+        self._follow(entry)
         return entry
 
-    def _take(self, entry: JournalEntry) -> None:
+    def _follow(self, entry: JournalEntry) -> None:
         """Follow an entry; one that refers to an edit that is not there (its record was damaged) changes nothing."""
         if entry.base >= entry.number or entry.number in self._contents:
             return

@@ -1,14 +1,9 @@
 """Annotations on disk: one SQLite file, one commit per edit, and every edit kept.
 
 Not in WAL mode: its newest edits lie in a second file, which is lost when only the first is copied to another computer, and it does
-not work on network drives. A commit takes some milliseconds, and hands make a few edits a second. The file is locked while it is
-open for writing, so that a second window cannot write over it; the lock dies with its process.
-
-The records of an annotation file: its tables, and how a row is checked and read.
-
-The records of an annotation file as they lie in it, damage included, and when two of them are one answer in two files.
-
-The images that are annotated, known by their content: a file that was renamed or moved finds its annotations again.
+not work on network drives. A commit takes some milliseconds, and raters make a few edits a second. The file is locked while it is
+open for writing, so that a second window cannot overwrite it; the lock ends with its process. Images are known by their content:
+a file that was renamed or moved finds its annotations again.
 """
 
 from __future__ import annotations
@@ -28,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from core.annotation.model import Annotation, AnnotationError, History, ImageView, JournalEntry, Readout, annotation_from_json
-from core.files import ImageError, read_image
+from core.files import ImageError, name_as_text, read_image
 
 SCHEMA_VERSION = 1
 APPLICATION_ID = 0x4C50414E  # "LPAN"
@@ -46,15 +41,15 @@ CREATE TABLE journal (id INTEGER PRIMARY KEY, annotation_id INTEGER NOT NULL REF
     kind TEXT NOT NULL, base INTEGER NOT NULL, action TEXT NOT NULL, content TEXT, check_sum INTEGER NOT NULL,
     made_utc TEXT NOT NULL, UNIQUE (annotation_id, number));
 """
-EXTRAS = """
-CREATE TABLE IF NOT EXISTS origins (annotation_id INTEGER PRIMARY KEY REFERENCES annotations(id), origin TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS looks (image_id INTEGER NOT NULL REFERENCES images(id), study TEXT NOT NULL, rater TEXT NOT NULL,
-    repeat INTEGER NOT NULL, after INTEGER NOT NULL, UNIQUE (image_id, study, rater, repeat));
-"""
-"""What files of earlier versions lack, and these leave alone.
+ADDED = {
+    "origins": "(annotation_id INTEGER PRIMARY KEY REFERENCES annotations(id), origin TEXT NOT NULL)",
+    "looks": "(image_id INTEGER NOT NULL REFERENCES images(id), study TEXT NOT NULL, rater TEXT NOT NULL, repeat INTEGER NOT NULL,"
+    " after INTEGER NOT NULL, UNIQUE (image_id, study, rater, repeat))",
+}
+"""Tables that files of earlier versions lack, and those versions ignore.
 
-``origins``: a random number that an annotation gets when it is begun, and keeps in every copy: it tells whose it is.
-``looks``: who was shown the algorithm's answer, and after which of his own edits.
+``origins``: a random number that an annotation gets when it is begun, and keeps in every copy: it tells which ones are the same.
+``looks``: who was shown the algorithm's answer, and after which of their own edits.
 """
 ANNOTATION_COLUMNS = (
     "sha256, study, rater, repeat, view, content, check_sum, theta_deg, theta_signed_deg, d_head_px, d_tail_px, crossed,"
@@ -88,7 +83,7 @@ class ItemKey:
 
 
 TAKES_LINES = "take the algorithm's lines"
-"""The edit by which a rater begins with the algorithm's answer."""
+"""Action of the edit by which a rater begins with the algorithm's answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +148,7 @@ _Edit = tuple[str, int, int, object, str]
 
 @dataclass(frozen=True, slots=True)
 class KeptAnnotation:
-    """One record of the table of annotations with its edits by number; ``origin``: see ``annotation_records.EXTRAS``."""
+    """A row of the table of annotations as it lies there, damage included, with its edits by number; ``origin``: see ``ADDED``."""
 
     row_id: int
     sha256: str
@@ -177,8 +172,8 @@ class KeptAnnotation:
     def is_same_as(self, other: KeptAnnotation) -> bool:
         """Whether both began as one, so that they are one person's: in a copy of the file, or in one that was joined before.
 
-        Two people may begin in the same millisecond, and say the same at first: where records of older versions have no origin, the
-        beginning must be the same edits, not only the same moment.
+        Two people may begin in the same millisecond with the same answer: where records of older versions have no origin, the
+        first edits must be the same, not only the moment.
         """
         if self.origin is not None and other.origin is not None:
             return self.origin == other.origin
@@ -208,25 +203,18 @@ def read_kept(database: sqlite3.Connection) -> list[KeptAnnotation]:
     journal = "SELECT annotation_id, number, kind, base, check_sum, content, made_utc FROM journal"
     for row_id, number, *edit in database.execute(journal).fetchall():
         edits.setdefault(row_id, {})[number] = tuple(edit)
-    has_origins = has_table(database, "origins")
-    origin, beside = ("o.origin", "LEFT JOIN origins o ON o.annotation_id = a.id") if has_origins else ("NULL", "")
     rows = database.execute(
-        f"SELECT a.id, i.sha256, a.study, a.rater, a.repeat, a.content, a.check_sum, a.begun_utc, {origin} FROM annotations a"
-        f" JOIN images i ON i.id = a.image_id {beside} ORDER BY a.id"
+        "SELECT a.id, i.sha256, a.study, a.rater, a.repeat, a.content, a.check_sum, a.begun_utc, o.origin FROM annotations a"
+        " JOIN images i ON i.id = a.image_id LEFT JOIN origins o ON o.annotation_id = a.id ORDER BY a.id"
     )
-    found: list[KeptAnnotation] = []
-    for row_id, sha256, study, rater, repeat, content, check_sum, begun_utc, came_from in rows.fetchall():
-        kept = edits.get(row_id, {})
-        found.append(KeptAnnotation(row_id, sha256, study, rater, repeat, content, check_sum, begun_utc, came_from, kept))
-    return found
+    return [KeptAnnotation(*(*row, edits.get(row[0], {}))) for row in rows.fetchall()]
 
 
-def has_table(database: sqlite3.Connection, name: str) -> bool:
-    """Files of older versions lack some."""
-    found = database.execute("SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (name,)).fetchone()
-    return bool(found[0])
-
-
+ADD_LOOK = (
+    "INSERT INTO looks (image_id, study, rater, repeat, after) SELECT id, ?, ?, ?, ? FROM images WHERE sha256 = ?"
+    " ON CONFLICT (image_id, study, rater, repeat) DO UPDATE SET after = min(after, excluded.after)"
+)
+"""Values: study, rater, repeat, after, SHA-256."""
 DEFAULT_NAME = "annotations.lumenpilot.sqlite"
 
 
@@ -382,7 +370,7 @@ class AnnotationStore:
             )
 
     def save_time(self, key: ItemKey, time_spent_s: float) -> None:
-        """Keep how long the rater has looked at an image; nothing when he has not annotated it."""
+        """Keep how long the rater has looked at an image; nothing when it is not annotated."""
         with self.transaction() as database:
             database.execute(
                 "UPDATE annotations SET time_spent_s = ? WHERE study = ? AND rater = ? AND repeat = ?"
@@ -425,39 +413,30 @@ class AnnotationStore:
         return History(entries, last=max((row[0] for row in rows if isinstance(row[0], int)), default=0))
 
     def taken_over(self) -> set[ItemKey]:
-        """Annotations whose lines were the algorithm's at some time: what became of them agrees with it the more for that."""
-        rows = self._rows(
-            "SELECT DISTINCT i.sha256, a.study, a.rater, a.repeat FROM journal j JOIN annotations a ON a.id = j.annotation_id"
-            " JOIN images i ON i.id = a.image_id WHERE j.action = ?",
-            (TAKES_LINES,),
-        )
-        return {ItemKey(str(sha256), str(study), str(rater), int(repeat)) for sha256, study, rater, repeat in rows}
+        """Annotations whose lines were the algorithm's at some time, which makes them agree with it more."""
+        return self._keys("journal j JOIN annotations a ON a.id = j.annotation_id AND j.action = ?", TAKES_LINES)
 
     def keep_look(self, key: ItemKey, after: int) -> None:
-        """Keep that the rater was shown the algorithm's answer, after his own edit of that number (0: before all).
+        """Keep that the rater was shown the algorithm's answer, after their own edit of that number (0: before all).
 
         The first look counts.
         """
         with self.transaction() as database:
-            database.execute(
-                "INSERT INTO looks (image_id, study, rater, repeat, after) SELECT id, ?, ?, ?, ? FROM images WHERE sha256 = ?"
-                " ON CONFLICT (image_id, study, rater, repeat) DO UPDATE SET after = min(after, excluded.after)",
-                (key.study, key.rater, key.repeat, after, key.sha256),
-            )
+            database.execute(ADD_LOOK, (key.study, key.rater, key.repeat, after, key.sha256))
 
     def given_after_look(self) -> set[ItemKey]:
         """Annotations that were edited after their rater had been shown the algorithm's answer; older files tell none."""
-        with self.transaction(writing=False) as database:
-            if not has_table(database, "looks"):
-                return set()
-        rows = self._rows(
-            "SELECT DISTINCT i.sha256, a.study, a.rater, a.repeat FROM looks l JOIN images i ON i.id = l.image_id"
-            " JOIN annotations a ON a.image_id = l.image_id AND a.study = l.study AND a.rater = l.rater AND a.repeat = l.repeat"
+        return self._keys(
+            "looks l JOIN annotations a USING (image_id, study, rater, repeat)"
             " JOIN journal j ON j.annotation_id = a.id AND j.number > l.after"
         )
+
+    def _keys(self, tables: str, *values: str) -> set[ItemKey]:
+        columns = "i.sha256, a.study, a.rater, a.repeat"
+        rows = self._rows(f"SELECT DISTINCT {columns} FROM {tables} JOIN images i ON i.id = a.image_id", values)
         return {ItemKey(str(sha256), str(study), str(rater), int(repeat)) for sha256, study, rater, repeat in rows}
 
-    def take_rows(
+    def insert_rows(
         self, columns: Mapping[str, Sequence[str]], tables: Mapping[str, Sequence[Sequence[Any]]], problems: list[str]
     ) -> None:
         """Rows as they lay in a damaged file, each by itself: what does not fit is named in `problems`.
@@ -492,13 +471,13 @@ class AnnotationStore:
 
     @contextmanager
     def transaction(self, *, writing: bool = True) -> Iterator[sqlite3.Connection]:
-        """The database, for all or nothing: whatever raises before the end takes everything back."""
+        """The database in one transaction: an exception before the end takes everything back."""
         with self._lock, self._named_errors():
             self._database.execute("BEGIN IMMEDIATE" if writing else "BEGIN")
             try:
                 yield self._database
                 self._database.execute("COMMIT")
-            finally:  # whatever ended it before the commit
+            finally:
                 if self._database.in_transaction:
                     self._database.execute("ROLLBACK")
 
@@ -528,8 +507,7 @@ class AnnotationStore:
         (verdict,) = database.execute("PRAGMA integrity_check(1)").fetchone()
         if verdict != "ok":
             raise sqlite3.DatabaseError("malformed")
-        if not read_only:
-            database.executescript(f"BEGIN; {EXTRAS} COMMIT;")
+        _upgrade(database, read_only)
 
     def _rows(self, query: str, values: Sequence[Any] = ()) -> list[Any]:
         with self._lock, self._named_errors(), closing(self._database.execute(query, values)) as cursor:
@@ -545,6 +523,14 @@ class AnnotationStore:
             yield
         except (sqlite3.Error, UnicodeError) as error:  # damage can reach SQLite's own messages
             raise AnnotationError(f"{self.path}: {_advice(error)}") from None
+
+
+def _upgrade(database: sqlite3.Connection, read_only: bool) -> None:
+    """Give a file of an earlier version what it lacks; one that may only be read gets empty tables in memory."""
+    there = {row[0] for row in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    for name, columns in ADDED.items():
+        if name not in there:
+            database.execute(f"CREATE {'TEMP' if read_only else ''} TABLE {name} {columns}")
 
 
 def _advice(error: Exception) -> str:
@@ -564,12 +550,12 @@ def _advice(error: Exception) -> str:
     return f"cannot be used ({text})"
 
 
-def _vector_json(vector: Any) -> str | None:
-    return None if vector is None else json.dumps([vector.start, vector.center, vector.end], allow_nan=False)
-
-
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def _vector_json(vector: Any) -> str | None:
+    return None if vector is None else json.dumps([vector.start, vector.center, vector.end], allow_nan=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -614,8 +600,7 @@ def _identified(path: Path, store: AnnotationStore) -> FoundImage:
         state = path.stat()
     except OSError as error:
         raise ImageError(f"{path}: cannot be read ({error.strerror})") from None
-    # A name that is no UTF-8, as old archives have them, is kept in a form that a file can hold.
-    name = os.fsencode(os.path.relpath(path.resolve(), store.path.parent.resolve())).decode("utf-8", "backslashreplace")
+    name = name_as_text(os.path.relpath(path.resolve(), store.path.parent.resolve()))
     record = store.image_as_last_seen(name, state.st_size, state.st_mtime_ns)
     if record is None:
         sha256 = image_sha256(path)

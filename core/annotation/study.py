@@ -1,4 +1,4 @@
-"""Who annotates what in which order: several raters, every image several times, repeats turned so that nobody knows them again."""
+"""Studies: who annotates what in which order; several raters, every image several times, repeats turned against recognition."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field, TypeAdapter, ValidationError
 
 from core.annotation.model import AnnotationError, ImageView
 
@@ -26,12 +27,12 @@ class QueueOrder(StrEnum):
 class StudySettings:
     """What all raters of a study share; it is fixed when the study begins.
 
-    ``images`` are SHA-256 in the order of the queue; with ``Order.RANDOM`` each rater gets an order of his own.
+    ``images`` are SHA-256 in the order of the queue; with ``QueueOrder.RANDOM`` each rater gets another order.
     ``views`` are those of the first, second, ... repeat.
     """
 
-    images: tuple[str, ...]
-    views: tuple[ImageView, ...] = (ImageView.AS_IS,)
+    images: Annotated[tuple[str, ...], Field(min_length=1)]
+    views: Annotated[tuple[ImageView, ...], Field(min_length=1)] = (ImageView.AS_IS,)
     order: QueueOrder = QueueOrder.RANDOM
     seed: int = 0
 
@@ -40,21 +41,18 @@ class StudySettings:
         return len(self.views)
 
     def to_json(self) -> dict[str, Any]:
-        views = [view.value for view in self.views]
-        return {"images": list(self.images), "views": views, "order": self.order.value, "seed": self.seed}
+        return _SETTINGS.dump_python(self, mode="json")  # type: ignore[no-any-return]
+
+
+_SETTINGS = TypeAdapter(StudySettings)
 
 
 def settings_from(row: Mapping[str, Any], where: str) -> StudySettings:
     """The settings as they were kept; raises AnnotationError."""
     try:
-        views = tuple(ImageView(view) for view in row["views"])
-        images = tuple(str(image) for image in row["images"])
-        settings = StudySettings(images, views, QueueOrder(row["order"]), int(row["seed"]))
-    except (KeyError, TypeError, ValueError):
+        return _SETTINGS.validate_python(row)
+    except ValidationError:
         raise AnnotationError(f"{where}: the settings of the study are damaged; begin a study of another name") from None
-    if not settings.views or not settings.images:
-        raise AnnotationError(f"{where}: the settings of the study are damaged; begin a study of another name")
-    return settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,24 +71,20 @@ def repeat_views(repeats: int, *, mirror: bool, turn: bool) -> tuple[ImageView, 
 
 
 def queue_order(images: Sequence[str], order: QueueOrder, confidence: Mapping[str, float] | None = None) -> tuple[str, ...]:
-    """Images in the order in which they are best annotated; ``Order.RANDOM`` is left to ``tasks``.
+    """Images in the order in which they are best annotated; ``QueueOrder.RANDOM`` is left to ``tasks``.
 
     ``WORST`` puts the least `confidence` first (0 for what was refused). ``EVEN`` goes through the images, taken as a sequence in
-    time, ever more finely: wherever a rater stops, what he did is spread evenly.
+    time, ever more finely: wherever a rater stops, the answers are spread evenly.
     """
     if order is QueueOrder.WORST:
         known = confidence or {}
         return tuple(sorted(images, key=lambda image: known.get(image, 0.0)))
     if order is QueueOrder.EVEN:
-        return tuple(images[place] for place in _ever_finer(len(images)))
+        # By bit reversal: 0, 1/2, 1/4, 3/4, 1/8, ... of the way.
+        bits = max(len(images) - 1, 1).bit_length()
+        places = (int(f"{place:0{bits}b}"[::-1], 2) for place in range(1 << bits))
+        return tuple(images[place] for place in places if place < len(images))
     return tuple(images)
-
-
-def _ever_finer(count: int) -> list[int]:
-    """0 .. count - 1 by bit reversal: 0, 1/2, 1/4, 3/4, 1/8, ... of the way."""
-    bits = max(count - 1, 1).bit_length()
-    places = (int(f"{place:0{bits}b}"[::-1], 2) for place in range(1 << bits))
-    return [place for place in places if place < count]
 
 
 def tasks(settings: StudySettings, rater: str) -> list[Task]:
