@@ -15,9 +15,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLayout,
-    QListView,
     QSplitter,
-    QTableView,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -231,55 +229,38 @@ SCROLL_KEYS = frozenset({Key.Key_Up, Key.Key_Down, Key.Key_PageUp, Key.Key_PageD
 """Keys that a list keeps for itself while it has the focus, so that none of them reaches the robot by way of its parent."""
 
 
-class ScrolledList(QListView):
-    """A list without selection, which the arrow keys scroll."""
+class ScrollKeys(QObject):
+    """Makes `view` a list or table without selection, which the arrow keys scroll by a row, a page or to an end.
 
-    def __init__(self, row_px: int) -> None:
-        super().__init__()
-        self._row_px = row_px
-        _set_scrolled(self)
+    It takes the focus by Tab only: a click into the list must not take the arrows from the robot. All other keys are the parent's.
+    """
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        _scroll(self, event, self._row_px)
+    def __init__(self, view: QAbstractItemView, row_px: int) -> None:
+        super().__init__(view)
+        self._bar, self._row_px = view.verticalScrollBar(), row_px
+        view.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        view.setTabKeyNavigation(False)
+        view.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        view.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        view.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        view.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        view.installEventFilter(self)
 
-
-class ScrolledTable(QTableView):
-    """A table without selection, which the arrow keys scroll."""
-
-    def __init__(self, row_px: int) -> None:
-        super().__init__()
-        self._row_px = row_px
-        self.setTabKeyNavigation(False)
-        _set_scrolled(self)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        _scroll(self, event, self._row_px)
-
-
-def _set_scrolled(view: QAbstractItemView) -> None:
-    view.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click into the list must not take the arrows from the robot
-    view.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-    view.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-    view.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-
-
-def _scroll(view: QAbstractItemView, event: QKeyEvent, row_px: int) -> None:
-    """Scroll by a row, a page or to an end; any other key is left to the parent."""
-    bar = view.verticalScrollBar()
-    positions = {
-        Key.Key_Up: bar.value() - row_px,
-        Key.Key_Down: bar.value() + row_px,
-        Key.Key_PageUp: bar.value() - bar.pageStep(),
-        Key.Key_PageDown: bar.value() + bar.pageStep(),
-        Key.Key_Home: bar.minimum(),
-        Key.Key_End: bar.maximum(),
-    }
-    position = positions.get(Key(event.key()))
-    if position is None:
-        event.ignore()
-        return
-    bar.setValue(position)
-    event.accept()
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent):
+            return False
+        bar, key = self._bar, Qt.Key(event.key())
+        positions = {
+            Key.Key_Up: bar.value() - self._row_px,
+            Key.Key_Down: bar.value() + self._row_px,
+            Key.Key_PageUp: bar.value() - bar.pageStep(),
+            Key.Key_PageDown: bar.value() + bar.pageStep(),
+            Key.Key_Home: bar.minimum(),
+            Key.Key_End: bar.maximum(),
+        }
+        event.setAccepted(key in positions)
+        bar.setValue(positions.get(key, bar.value()))
+        return True
 
 
 class StillWheel(QObject):

@@ -7,16 +7,16 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
-from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QVBoxLayout, QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import SPEED_WORD, side, tip
 from app.ui.workers import Pace
-from app.widgets.basics import ScrolledTable, card_note
-from app.widgets.painting import NONE, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
+from app.widgets.basics import ScrollKeys, card_note
+from app.widgets.painting import LEFT, NONE, RIGHT, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
 from app.widgets.servo_table import TONE_ROLE, Cell, Tone
 from core.control.gate import RejectReason, Source
 from core.control.pilot import DriveView
@@ -284,8 +284,6 @@ QTableView { background: @PANEL; border: 1px solid @PANEL; font-size: 12px; }
 QTableView:focus { border: 1px solid @SKY; }
 """
 
-_Index = QModelIndex | QPersistentModelIndex
-
 
 class CommandPanel(QWidget):
     """Advised, asked, commanded and sent in one table; below it what the gate limited and rejected, newest first.
@@ -307,17 +305,15 @@ class CommandPanel(QWidget):
         self._time_of_day = time_of_day
         self._pace = Pace(_SHOW_EVERY_S, clock)
         self._provenance = Provenance()
-        self._log = ClampLog()
         self._known = False
         self._table = ProvenanceTable()
         self._heading = card_note(_heading(None))
         self._heading.setFixedHeight(16)
-        self._model = ClampModel(self._log, self)
-        self._view = self._make_view()
+        self.log = ClampTable()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(3)
-        for widget, stretch in ((self._table, 3), (self._heading, 0), (self._view, 2)):
+        for widget, stretch in ((self._table, 3), (self._heading, 0), (self.log, 2)):
             column.addWidget(widget, stretch)
         self.setAccessibleName(tr("Commands"))
 
@@ -326,105 +322,83 @@ class CommandPanel(QWidget):
         """The provenance table and the log's heading as lines."""
         return f"{self._table.text}\n{self._heading.text()}"
 
-    @property
-    def log(self) -> ClampModel:
-        return self._model
-
     def show_view(self, view: DriveView | None, status: BusStatus | None) -> None:
         """The newest state of driving, and of the bus; None where there is none."""
         if status is not None:
-            self._log.add_status(status, self._time_of_day())
+            self.log.log.add_status(status, self._time_of_day())
         known = view is not None
         if not self._pace.due() and known is self._known:
             return
         self._known = known
         latency_ms = 1000.0 * view.latency_s if view is not None and view.latency_s is not None else None
         self._table.show_rows(self._provenance.rows(view), latency_ms, view.follow_share if view is not None else None)
-        self._model.update_rows()
+        self.log.update_rows()
         heading = _heading(status)
         if heading != self._heading.text():
             self._heading.setText(heading)
 
-    def _make_view(self) -> QTableView:
-        view = ScrolledTable(_ROW)
-        view.setModel(self._model)
-        theme.set_sheet(view, _LOG_STYLE)
-        view.setShowGrid(False)
-        view.setWordWrap(False)
-        rows = view.verticalHeader()
+
+class ClampTable(QTableWidget):
+    """What the gate limited and rejected, newest first."""
+
+    def __init__(self) -> None:
+        super().__init__(0, len(_WIDTHS))
+        ScrollKeys(self, _ROW)
+        self.log = ClampLog()
+        self._shown: list[LogEntry] = []
+        theme.set_sheet(self, _LOG_STYLE)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        rows = self.verticalHeader()
         rows.hide()
         rows.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         rows.setMinimumSectionSize(_ROW)
         rows.setDefaultSectionSize(_ROW)
-        header = view.horizontalHeader()
+        header = self.horizontalHeader()
         header.hide()
         header.setMinimumSectionSize(20)
+        self.setHorizontalHeaderLabels([tr(name) for name in _WIDTHS])
         for place, width in enumerate(_WIDTHS.values()):
             header.setSectionResizeMode(place, QHeaderView.ResizeMode.Fixed if width else QHeaderView.ResizeMode.Stretch)
             if width:
-                view.setColumnWidth(place, width)
-        view.setMinimumHeight(3 * _ROW)
-        view.setAccessibleName(tr("What the gate limited and rejected"))
-        return view
-
-
-class ClampModel(QAbstractTableModel):
-    """The log as a Qt model."""
-
-    def __init__(self, log: ClampLog, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._log = log
-        self._shown: list[LogEntry] = []
+                self.setColumnWidth(place, width)
+        self.setMinimumHeight(3 * _ROW)
+        self.setAccessibleName(tr("What the gate limited and rejected"))
 
     def update_rows(self) -> None:
-        """Announce what has changed in the log since the last time."""
-        entries, newest = self._log.entries, self._shown[0].serial if self._shown else 0
+        """Show what has changed in the log since the last time."""
+        entries, newest = self.log.entries, self._shown[0].serial if self._shown else 0
         added = sum(entry.serial > newest for entry in entries)
-        cut = len(self._shown) + added - len(entries)
-        if cut > 0:
-            self.beginRemoveRows(QModelIndex(), len(self._shown) - cut, len(self._shown) - 1)
-            del self._shown[-cut:]
-            self.endRemoveRows()
-        if added:
-            self.beginInsertRows(QModelIndex(), 0, added - 1)
-            self._shown[:0] = entries[:added]
-            self.endInsertRows()
-        for row in range(added, len(entries)):
-            if self._shown[row] is not entries[row]:
-                self._shown[row] = entries[row]
-                self.dataChanged.emit(self.index(row, 0), self.index(row, len(_WIDTHS) - 1))
+        for _ in range(added):
+            self.insertRow(0)
+        self.setRowCount(len(entries))
+        for row, entry in enumerate(entries):
+            if row < added or self._shown[row - added] is not entry:
+                self._show_entry(row, entry)
+        self._shown = list(entries)
 
-    def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
-        return 0 if parent.isValid() else len(self._shown)
+    def follow_theme(self) -> None:
+        for row, entry in enumerate(self._shown):
+            self._show_entry(row, entry)
 
-    def columnCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
-        return 0 if parent.isValid() else len(_WIDTHS)
-
-    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        entry, column = self._shown[index.row()], index.column()
-        texts = (
-            entry.clock,
-            tr("rejected") if entry.is_rejection else tr_text(entry.joint),
-            entry.text,
-            f"\N{MULTIPLICATION SIGN}{entry.count}" if entry.count > 1 else "",
+    def _show_entry(self, row: int, entry: LogEntry) -> None:
+        what = tr("rejected") if entry.is_rejection else tr_text(entry.joint)
+        count = f"\N{MULTIPLICATION SIGN}{entry.count}" if entry.count > 1 else ""
+        plain, strong = theme.font(12), theme.semi_bold(12)
+        name, text, faint = (theme.FAULT,) * 3 if entry.is_rejection else (theme.TEXT, theme.TEXT_DIM, theme.TEXT_FAINT)
+        cells = (
+            (entry.clock, plain, theme.TEXT_FAINT, LEFT),
+            (what, strong, name, LEFT),
+            (entry.text, plain, text, LEFT),
+            (count, plain, faint, RIGHT),
         )
-        if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole):
-            return texts[column]
-        if role == Qt.ItemDataRole.ToolTipRole:
-            return " ".join(text for text in texts if text)
-        if role == Qt.ItemDataRole.ForegroundRole:
-            plain = theme.TEXT_FAINT if column in (0, 3) else theme.TEXT_DIM if column == 2 else theme.TEXT
-            return QColor(theme.FAULT if entry.is_rejection and column else plain)
-        if role == Qt.ItemDataRole.FontRole:
-            return theme.semi_bold(12) if column == 1 else theme.font(12)
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return Qt.AlignmentFlag.AlignVCenter | (Qt.AlignmentFlag.AlignRight if column == 3 else Qt.AlignmentFlag.AlignLeft)
-        return None
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        if orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
-            return tr(tuple(_WIDTHS)[section])
-        return None
+        for column, (shown, font, colour, align) in enumerate(cells):
+            item = QTableWidgetItem(shown)
+            item.setFont(font)
+            item.setForeground(QColor(colour))
+            item.setTextAlignment(align)
+            item.setToolTip(" ".join(part for part in (entry.clock, what, entry.text, count) if part))
+            self.setItem(row, column, item)
 
 
 def _heading(status: BusStatus | None) -> str:

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from enum import Enum
 
-from PySide6.QtCore import QAbstractListModel, QModelIndex, QObject, QPersistentModelIndex, QPoint, QRectF, QSize, Qt, Slot
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt, Slot
 from PySide6.QtGui import QColor, QGuiApplication, QPainter
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QMenu,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.widgets.basics import QuietCombo, ScrolledList
+from app.widgets.basics import QuietCombo, ScrollKeys
 from app.widgets.painting import RIGHT, draw_box, draw_text, text_width
 
 MOST_ROWS = 2000  # events that are kept
@@ -60,71 +70,14 @@ class LoggedEvent:
         return f"{self.at:%H:%M:%S}  {tr(self.kind.value.word):<8}  {self.text}{times}"
 
 
-class EventModel(QAbstractListModel):
-    """All events, and those that the filter lets through, both newest first."""
-
-    def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._all: deque[LoggedEvent] = deque()
-        self._kind: LogKind | None = None
-        self.shown: list[LoggedEvent] = []
-
-    @property
-    def newest(self) -> LoggedEvent | None:
-        return self._all[0] if self._all else None
-
-    def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own default, never changed
-        return 0 if parent.isValid() else len(self.shown)
-
-    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        if not index.isValid() or index.row() >= len(self.shown):
-            return None
-        event = self.shown[index.row()]
-        if role == Qt.ItemDataRole.UserRole:
-            return event
-        if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole):
-            return event.line
-        return event.text if role == Qt.ItemDataRole.ToolTipRole else None
-
-    def add(self, event: LoggedEvent) -> bool:
-        """Put `event` in front; the oldest one goes when there are too many. False when the filter hides it."""
-        self._all.appendleft(event)
-        passes = self._passes(event)
-        if passes:
-            self.beginInsertRows(QModelIndex(), 0, 0)
-            self.shown.insert(0, event)
-            self.endInsertRows()
-        if len(self._all) > MOST_ROWS and self._passes(self._all.pop()):
-            last = len(self.shown) - 1
-            self.beginRemoveRows(QModelIndex(), last, last)
-            self.shown.pop()
-            self.endRemoveRows()
-        return passes
-
-    def replace_newest(self, event: LoggedEvent) -> None:
-        self._all[0] = event
-        if self._passes(event):
-            self.shown[0] = event
-            self.dataChanged.emit(self.index(0), self.index(0))
-
-    def show_kind(self, kind: LogKind | None) -> None:
-        self.beginResetModel()
-        self._kind = kind
-        self.shown = [event for event in self._all if self._passes(event)]
-        self.endResetModel()
-
-    def _passes(self, event: LoggedEvent) -> bool:
-        return self._kind is None or event.kind is self._kind
-
-
 class EventLog(QWidget):
     """A list of events with a filter by their kind."""
 
     def __init__(self, now: Callable[[], datetime] = datetime.now) -> None:
         super().__init__()
         self._now = now
-        self._model = EventModel(self)
-        self._view = _EventList(self._model)
+        self._newest: LoggedEvent | None = None
+        self._view = _EventList()
         self._view.customContextMenuRequested.connect(self._open_menu)
         self._filter = QuietCombo(tr("Kind of events shown"))
         self._filter.setToolTip(tr("Which events are listed"))
@@ -148,15 +101,18 @@ class EventLog(QWidget):
     @property
     def lines(self) -> list[str]:
         """What the filter lets through, newest first."""
-        return [event.line for event in self._model.shown]
+        items = (self._view.item(row) for row in range(self._view.count()))
+        return [item.text() for item in items if not item.isHidden()]
 
     def add(self, kind: LogKind, text: str) -> None:
         """Something happened now; a repetition of the newest event within two seconds raises its count instead."""
-        event, newest = LoggedEvent(self._now(), kind, tr_text(" ".join(text.split()))), self._model.newest
+        event, newest = LoggedEvent(self._now(), kind, tr_text(" ".join(text.split()))), self._newest
         if newest is not None and (newest.kind, newest.text) == (kind, event.text) and abs(event.at - newest.at) <= SAME_WITHIN:
-            self._model.replace_newest(replace(event, times=newest.times + 1))
-        elif self._model.add(event):
-            self._view.keep_place()
+            self._newest = replace(event, times=newest.times + 1)
+            self._view.replace_newest(self._newest)
+        else:
+            self._newest = event
+            self._view.add(event)
 
     def show_kind(self, kind: LogKind | None) -> None:
         """Show one kind only; None shows everything."""
@@ -170,8 +126,7 @@ class EventLog(QWidget):
 
     @Slot()
     def _on_filter(self) -> None:
-        self._model.show_kind(self._filter.currentData())
-        self._view.scrollToTop()
+        self._view.show_kind(self._filter.currentData())
 
     @Slot(QPoint)
     def _open_menu(self, place: QPoint) -> None:
@@ -181,12 +136,13 @@ class EventLog(QWidget):
         menu.popup(self._view.viewport().mapToGlobal(place))
 
 
-class _EventList(ScrolledList):
+class _EventList(QListWidget):
     """Rows of equal height. A list that was scrolled down keeps its lines in place."""
 
-    def __init__(self, model: EventModel) -> None:
-        super().__init__(_ROW_HEIGHT)
-        self.setModel(model)
+    def __init__(self) -> None:
+        super().__init__()
+        ScrollKeys(self, _ROW_HEIGHT)
+        self._kind: LogKind | None = None
         self.setItemDelegate(_EventPainter(self))
         self.setUniformItemSizes(True)
         theme.set_sheet(self, _STYLE)
@@ -194,12 +150,29 @@ class _EventList(ScrolledList):
         self.setMinimumHeight(2 * _ROW_HEIGHT)
         self.setAccessibleName(tr("Events, newest first"))
 
-    def keep_place(self) -> None:
-        """A line was put in above."""
-        bar = self.verticalScrollBar()
-        if bar.value() > 0:
+    def add(self, event: LoggedEvent) -> None:
+        """Put `event` in front; the oldest one goes when there are too many."""
+        item, bar = QListWidgetItem(), self.verticalScrollBar()
+        self.insertItem(0, item)
+        self.replace_newest(event)
+        item.setHidden(self._kind not in (None, event.kind))
+        self.takeItem(MOST_ROWS)
+        if bar.value() > 0 and not item.isHidden():
             self.executeDelayedItemsLayout()
             bar.setValue(bar.value() + _ROW_HEIGHT)
+
+    def replace_newest(self, event: LoggedEvent) -> None:
+        item = self.item(0)
+        item.setText(event.line)
+        item.setToolTip(event.text)
+        item.setData(Qt.ItemDataRole.UserRole, event)
+
+    def show_kind(self, kind: LogKind | None) -> None:
+        self._kind = kind
+        for row in range(self.count()):
+            item = self.item(row)
+            item.setHidden(kind not in (None, item.data(Qt.ItemDataRole.UserRole).kind))
+        self.scrollToTop()
 
 
 class _EventPainter(QStyledItemDelegate):

@@ -148,68 +148,49 @@ class ImageCanvas(QWidget):
         super().__init__()
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setCursor(Qt.CursorShape.CrossCursor)
-        self._levels: tuple[Image, ...] = ()
-        self._view = Viewport((1, 1), (1, 1), 1.0, (0.0, 0.0))
+        self.levels: tuple[Image, ...] = ()  # the image and its halvings; empty: nothing is shown
+        self.view = Viewport((1, 1), (1, 1), 1.0, (0.0, 0.0))
+        self.light = (1.0, 0.0)  # contrast and brightness
+        self.is_pannable = False  # a key is held with which any click moves the picture
         self._picture: QImage | None = None
-        self._light = (1.0, 0.0)
         self._pan_from: QPointF | None = None
-        self._is_pannable = False
-
-    @property
-    def view(self) -> Viewport:
-        return self._view
-
-    @property
-    def levels(self) -> tuple[Image, ...]:
-        """The image and its halvings; none: nothing is shown."""
-        return self._levels
-
-    @property
-    def light(self) -> tuple[float, float]:
-        """Contrast and brightness."""
-        return self._light
 
     @property
     def is_panning(self) -> bool:
         return self._pan_from is not None
 
-    @property
-    def is_pannable(self) -> bool:
-        """Whether a key is held with which any click moves the picture."""
-        return self._is_pannable
-
     def show_levels(self, levels: tuple[Image, ...]) -> None:
         """Another image, the whole of it; none: nothing."""
         if levels:
             size = levels[0].shape[1], levels[0].shape[0]
-            self._view = Viewport.fitted(size, self._room)
-        self._levels = levels
+            self.view = Viewport.fitted(size, self._room)
+        self.levels = levels
         self._pan_from = None
         self._renew_picture()
 
     def set_light(self, contrast: float, brightness: float) -> None:
         """How greys are shown; the image itself is not changed."""
-        self._light = (contrast, brightness)
+        self.light = (contrast, brightness)
         self._renew_picture()
 
     def fit(self) -> None:
         """The whole image."""
-        self._set_view(Viewport.fitted(self._view.size, self._view.room))
+        self._set_view(Viewport.fitted(self.view.size, self.view.room))
 
     def zoom_at(self, factor: float, at: Point) -> None:
         """Zoom by a factor; the widget's place `at` stays over the same place of the image."""
-        self._set_view(self._view.zoomed(factor, at))
+        self._set_view(self.view.zoomed(factor, at))
 
     def close_up_at(self, middle: Point) -> None:
         """A place of the image several times as large; once more: the whole image."""
-        whole = Viewport.fitted(self._view.size, self._view.room)
+        whole = Viewport.fitted(self.view.size, self.view.room)
         near = replace(whole, zoom=whole.zoom * _CLOSE_UP, center=middle).inside()
-        self._set_view(whole if self._view == near else near)
+        self._set_view(whole if self.view == near else near)
 
     def scroll_to(self, point: Point) -> None:
         """Bring a place of the image into sight."""
-        if not self._view.shows(point, 20.0):
-            self._set_view(replace(self._view, center=point).inside())
+        if not self.view.shows(point, 20.0):
+            self._set_view(replace(self.view, center=point).inside())
 
     # ---- panning
 
@@ -221,36 +202,36 @@ class ImageCanvas(QWidget):
             step = position - self._pan_from
             self._pan_from = position
             self._renew_cursor()  # only now, as a click may mean something else
-            self._set_view(self._view.panned(step.x(), step.y()))
+            self._set_view(self.view.panned(step.x(), step.y()))
 
     def end_pan(self) -> None:
         self._pan_from = None
         self._renew_cursor()
 
     def set_pannable(self, on: bool) -> None:
-        self._is_pannable = on
+        self.is_pannable = on
         self._renew_cursor()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         turns = event.angleDelta().y() / 120.0
-        if turns and self._levels:
+        if turns and self.levels:
             self.zoom_at(_WHEEL_FACTOR**turns, (event.position().x(), event.position().y()))
         event.accept()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        self._view = self._view.in_room(self._room)
+        self.view = self.view.in_room(self._room)
         self._renew_picture()
 
     # ---- painting
 
     def paint_picture(self, painter: QPainter) -> bool:
         """The visible part, or a dark ground and False where there is no image."""
-        if not self._levels:
+        if not self.levels:
             painter.fillRect(self.rect(), QColor(ON_PICTURE.INK))
             return False
         ratio = self.devicePixelRatioF()
         if self._picture is None or self._picture.devicePixelRatio() != ratio:  # also on a screen of another density
-            self._picture = render(self._levels, self._view, ratio, *self._light)
+            self._picture = render(self.levels, self.view, ratio, *self.light)
         painter.drawImage(QPointF(0, 0), self._picture)
         return True
 
@@ -259,8 +240,8 @@ class ImageCanvas(QWidget):
         return max(1, self.width()), max(1, self.height())
 
     def _set_view(self, view: Viewport) -> None:
-        if view != self._view:
-            self._view = view
+        if view != self.view:
+            self.view = view
             self._renew_picture()
 
     def _renew_picture(self) -> None:
@@ -271,7 +252,7 @@ class ImageCanvas(QWidget):
         if self._pan_from is not None:
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
         else:
-            self.setCursor(Qt.CursorShape.OpenHandCursor if self._is_pannable else Qt.CursorShape.CrossCursor)
+            self.setCursor(Qt.CursorShape.OpenHandCursor if self.is_pannable else Qt.CursorShape.CrossCursor)
 
 
 _STEP = 10

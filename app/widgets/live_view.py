@@ -246,10 +246,10 @@ class LiveView(QWidget):
         self.setAccessibleName(tr("Live picture"))
         self.setAccessibleDescription(tr("Click sets the target, right click clears it"))
         self._size: tuple[int, int] | None = None
-        self._scene: Scene | None = None
+        self.scene: Scene | None = None
         self._target: Point | None = None
         self._image: Image | None = None
-        self._ghost: Points | None = None
+        self.ghost: Points | None = None  # the head's predicted path if the shown advice is followed, working px
         self._view = pg.GraphicsView()
         self._view.setBackground(ON_PICTURE.INK)
         self._view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -277,15 +277,6 @@ class LiveView(QWidget):
         """Widgets that lie over the picture at times; the loupe keeps clear of them."""
         self._covers = widgets
 
-    @property
-    def scene(self) -> Scene | None:
-        return self._scene
-
-    @property
-    def ghost(self) -> Points | None:
-        """The head's predicted path if the shown advice is followed, working px; None without advice."""
-        return self._ghost
-
     def set_scale(self, pixels_per_mm: float) -> None:
         self._pixels_per_mm = pixels_per_mm
 
@@ -293,8 +284,8 @@ class LiveView(QWidget):
         """Show a frame with its scene, and where `advice` leads; None: no ghost."""
         is_first = self._size is None
         self._show_picture(frame.image)
-        self._scene = scene
-        self._ghost = predict(scene, advice, _GHOST_S, self._pixels_per_mm) if advice is not None else None
+        self.scene = scene
+        self.ghost = predict(scene, advice, _GHOST_S, self._pixels_per_mm) if advice is not None else None
         self._image = frame.image
         if is_first:  # no older picture is on the screen, so what is drawn over it may come a moment later
             QTimer.singleShot(0, self, self._draw_over)
@@ -304,7 +295,7 @@ class LiveView(QWidget):
     def _draw_over(self) -> None:
         self._show_labels()
         self._show_marks()
-        if self._scene is None or self._scene.path is None or self._loupe_pace.due():
+        if self.scene is None or self.scene.path is None or self._loupe_pace.due():
             self._show_loupe()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -313,14 +304,14 @@ class LiveView(QWidget):
 
     def drop_ghost(self) -> None:
         """Remove the predicted path: the advice has ended."""
-        if self._ghost is not None:
-            self._ghost = None
+        if self.ghost is not None:
+            self.ghost = None
             self._draw_over()
 
     def blank_overlays(self) -> None:
         """Remove everything that was perceived. The last picture and the target stay."""
-        if self._scene is not None:
-            self._scene = None
+        if self.scene is not None:
+            self.scene = None
             self._show_labels()
             self._show_marks()
             self._show_loupe()
@@ -360,7 +351,7 @@ class LiveView(QWidget):
 
     def _show_labels(self) -> None:
         """Masks, and skeletons where there is no graph or path to draw as lines, as one image of label bits."""
-        scene = self._scene
+        scene = self.scene
         if scene is None or scene.masks is None:
             self._labels.setVisible(False)
             return
@@ -379,8 +370,8 @@ class LiveView(QWidget):
         self._labels.setVisible(True)
 
     def _show_marks(self) -> None:
-        scene = self._scene
-        shapes = scene_shapes(scene, self._ghost) if scene is not None else None
+        scene = self.scene
+        shapes = scene_shapes(scene, self.ghost) if scene is not None else None
         note = target_note(scene) if scene is not None and self._target is not None else ""
         self._marks.set_scene(shapes, scene.pose if scene is not None else None, self._target, note)
         self._draw_marks()
@@ -398,7 +389,7 @@ class LiveView(QWidget):
         return to_view
 
     def _show_loupe(self) -> None:
-        scene, image = self._scene, self._image
+        scene, image = self.scene, self._image
         if not self._marks.is_on(Layer.LOUPE) or scene is None or image is None or scene.path is None:
             self._loupe.hide()
             return

@@ -56,7 +56,20 @@ _ROLE = {
 DOUBLE_PRESS_S = 0.4
 
 
-class StepButton(Painted, QAbstractButton):
+class _BarButton(Painted, QAbstractButton):
+    def __init__(self, hint: tuple[int, int], least: tuple[int, int], horizontal: QSizePolicy.Policy) -> None:
+        super().__init__()
+        self._hint = QSize(*hint)
+        self.setMinimumSize(*least)
+        self.setSizePolicy(horizontal, QSizePolicy.Policy.Expanding)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def sizeHint(self) -> QSize:
+        return self._hint
+
+
+class StepButton(_BarButton):
     """A button for a step of the operator, with its key: subdued when the step would be refused, but still usable.
 
     ``asked`` carries the step that was on the button when it was pressed. A second press within ``DOUBLE_PRESS_S`` does not count
@@ -66,22 +79,15 @@ class StepButton(Painted, QAbstractButton):
     asked = Signal(object)
 
     def __init__(self, *, filled: bool, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__()
+        super().__init__((120, 54), (60, 44), QSizePolicy.Policy.Expanding)
         self._filled = filled
         self._clock = clock
         self.step: OperatorStep | None = None
         self.is_granted = False
         self._pressed: tuple[OperatorStep | None, float] = (None, -float("inf"))
         self._counts = False
-        self.setMinimumSize(60, 44)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.pressed.connect(self._on_pressed)
         self.clicked.connect(self._on_clicked)
-
-    def sizeHint(self) -> QSize:
-        return QSize(120, 54)
 
     def show_step(self, step: OperatorStep, granted: bool, why: str) -> None:
         """The step, whether it would be granted, and the reasons or what happens."""
@@ -133,18 +139,14 @@ _DOWN = (QEvent.Type.MouseButtonPress, QEvent.Type.MouseButtonDblClick)
 _UP = (QEvent.Type.MouseButtonRelease, QEvent.Type.Hide, QEvent.Type.UngrabMouse)
 
 
-class StopButton(Painted, QAbstractButton):
+class StopButton(_BarButton):
     """STOP. ``asked`` comes when any mouse button goes down, again at each press, and even when it is disabled."""
 
     asked = Signal()
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__((112, 54), (88, 44), QSizePolicy.Policy.Fixed)
         self.setText(tr("STOP"))
-        self.setMinimumSize(88, 44)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
-        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setAccessibleName(tr("STOP"))
         self.setAccessibleDescription(tr("Stops the robot at once. Key {key}.", key=STOP_KEY))
         self.setToolTip(
@@ -156,9 +158,6 @@ class StopButton(Painted, QAbstractButton):
             )
         )
         self.clicked.connect(self.asked)  # by keyboard or screen reader: a mouse never gets so far
-
-    def sizeHint(self) -> QSize:
-        return QSize(112, 54)
 
     def event(self, event: QEvent) -> bool:
         # before QWidget looks whether it is enabled, and before QAbstractButton waits for the release

@@ -33,31 +33,34 @@ class PhantomPicker(QWidget):
         self._combo.setMaxVisibleItems(16)
         self._combo.setToolTip(tip("phantom") + "\n" + tr("Ctrl+P opens the list; so does Enter when Tab has come here"))
         self._seed = _SeedBox()
-        self._roll = QPushButton(tr("New"))
-        self._roll.setToolTip(tr("Another random phantom (key R)"))
-        self._roll.setAccessibleName(tr("Another random phantom"))
-        self._roll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        roll = QPushButton(tr("New"))
+        roll.setToolTip(tr("Another random phantom (key R)"))
+        roll.setAccessibleName(tr("Another random phantom"))
+        roll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
         label = QLabel(tr("Phantom"))
         label.setObjectName("card_title")
-        for widget in (label, self._combo, self._seed, self._roll):
+        for widget in (label, self._combo, self._seed, roll):
             row.addWidget(widget)
         self.show_name(current)
         self._combo.activated.connect(self._on_choice)
         self._seed.committed.connect(self._on_choice)
-        self._roll.clicked.connect(self.roll)
+        roll.clicked.connect(self.roll)
 
     @property
     def name(self) -> str:
         """The phantom as the configuration writes it."""
-        data = str(self._combo.currentData())
-        return f"{_RANDOM}:{self._seed.value()}" if data == _RANDOM else data
+        return f"{_RANDOM}:{self._seed.value()}" if self._is_random else str(self._combo.currentData())
 
     @property
     def title(self) -> str:
-        return tr("random {seed}", seed=self._seed.value()) if self._combo.currentData() == _RANDOM else self._combo.currentText()
+        return tr("random {seed}", seed=self._seed.value()) if self._is_random else self._combo.currentText()
+
+    @property
+    def _is_random(self) -> bool:
+        return bool(self._combo.currentData() == _RANDOM)
 
     def show_name(self, name: str) -> None:
         """Show `name` without choosing it again."""
@@ -66,7 +69,7 @@ class PhantomPicker(QWidget):
             self._combo.setCurrentIndex(self._combo.findData(kind if kind == _RANDOM else name))
         if kind == _RANDOM and seed.isdecimal():
             self._seed.show_seed(int(seed))
-        self._show_seed()
+        self._enable_seed()
 
     def menu_entries(self) -> tuple[MenuEntry, ...]:
         """The same by menu and key."""
@@ -84,7 +87,7 @@ class PhantomPicker(QWidget):
         self._combo.showPopup()
 
     def abandon(self) -> None:
-        """Forget a seed that was typed and not confirmed."""
+        """Drop a seed that was typed and not confirmed."""
         self._seed.abandon()
 
     @Slot()
@@ -92,7 +95,7 @@ class PhantomPicker(QWidget):
         """The random phantom of the next seed; nothing while a rig without phantoms is open."""
         if not self.isEnabled():
             return
-        if self._combo.currentData() == _RANDOM:
+        if self._is_random:
             self._seed.show_seed(self._seed.value() % _SEED_MAX + 1)
         with QSignalBlocker(self._combo):
             self._combo.setCurrentIndex(self._combo.findData(_RANDOM))
@@ -100,19 +103,15 @@ class PhantomPicker(QWidget):
 
     @Slot()
     def _on_choice(self) -> None:
-        self._show_seed()
+        self._enable_seed()
         self.chosen.emit(self.name)
 
-    def _show_seed(self) -> None:
-        # kept in place when unused, so that the row does not jump
-        self._seed.setEnabled(self._combo.currentData() == _RANDOM)
+    def _enable_seed(self) -> None:
+        self._seed.setEnabled(self._is_random)  # kept in place when unused, so that the row does not jump
 
 
 class _SeedBox(QSpinBox):
-    """A seed that counts when it is confirmed, not at each digit.
-
-    Enter confirms, Escape takes back what was typed; both give the keys back to the robot.
-    """
+    """A seed that counts when it is confirmed: Enter confirms, Escape drops what was typed; both give the keys to the robot."""
 
     committed = Signal()
 
@@ -143,13 +142,13 @@ class _SeedBox(QSpinBox):
         event.ignore()
 
     def show_seed(self, seed: int) -> None:
-        """Show a seed that nobody has to confirm; the one before it, typed again, is another one from here on."""
+        """Show a seed that counts already; the one before it, typed again, counts as a new one."""
         with QSignalBlocker(self):
             self.setValue(seed)
         self._last = self.value()
 
     def abandon(self) -> None:
-        """Show the value again instead of what was typed; leaving the field would count it otherwise."""
+        """Show the value again instead of what was typed, which leaving the field would confirm."""
         self.lineEdit().setText(self.prefix() + self.textFromValue(self.value()))
 
     def focusInEvent(self, event: QFocusEvent) -> None:

@@ -2,99 +2,89 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtCore import QPoint, QRectF, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen
 from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
 
 from app.operator.preflight import Preflight, PreflightFinding, PreflightModel
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.widgets.basics import takes_enter
-from app.widgets.painting import Sign, paint_sign
+from app.widgets.basics import card_note, takes_enter
+from app.widgets.painting import PaintedWidget, Sign, draw_text, paint_sign, polygon, set_colours
 from hardware.preflight.preflight import Level
 
 _SIZE = QSize(780, 560)
-_LEAST_PX, _ABOVE_PX, _TITLE_PX = 300, 8, 40
-"""The last one is what the desktop's title bar takes, about."""
-_RENEW_MS = 1000
-_TICK = QPolygonF([QPointF(4.0, 12.0), QPointF(9.0, 17.0), QPointF(18.0, 6.0)])
+_LEAST_PX, _ABOVE_PX = 300, 8
+_TITLE_PX = 40  # about what the desktop's title bar takes
+_UPDATE_MS = 1000
+_TICK = polygon([(4.0, 12.0), (9.0, 17.0), (18.0, 6.0)])
 _LOOK: dict[Level, tuple[Sign | None, str, str]] = {
     Level.GOOD: (None, "ALLOWED", mark("good")),
     Level.WARNING: (Sign.WARNING, "ORANGE", mark("notice")),
     Level.BAD: (Sign.BARRED, "FAULT", mark("NOT READY")),
 }
+"""Sign, colour and word; the good ones have a tick."""
 
 
-class _Badge(QWidget):
-    """Sign and word of a level: colour alone says nothing to some."""
+class _Badge(PaintedWidget):
+    """Sign and word of a level, as some operators see no difference in colour."""
 
     def __init__(self, level: Level) -> None:
-        super().__init__()
+        super().__init__(tr(_LOOK[level][2]))
         self._level = level
         self.setFixedSize(112, 22)
-        self.setAccessibleName(tr(_LOOK[level][2]))
 
-    def paintEvent(self, event: QPaintEvent) -> None:
+    def paint(self, painter: QPainter) -> None:
         sign, role, word = _LOOK[self._level]
-        colour = QColor(getattr(theme, role))
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colour = QColor(theme.of(role))
         if sign is None:
-            painter.setPen(QPen(colour, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
+            pen = QPen(colour, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+            set_colours(painter, None, pen)
             painter.drawPolyline(_TICK)
         else:
             paint_sign(painter, QRectF(2, 2, 18, 18), sign, colour)
-        painter.setPen(colour)
-        painter.setFont(theme.semi_bold(13))
-        painter.drawText(QRectF(28, 0, 84, 20), Qt.AlignmentFlag.AlignVCenter, tr(word))
-        painter.end()
+        draw_text(painter, QRectF(28, 0, 84, 20), tr(word), theme.semi_bold(13), colour)
 
 
 class PreflightList(QDialog):
-    """Shows what the desk knows. ``arm_asked`` is the operator's wish; nothing here decides.
+    """Shows the findings of `model`. ``arm_asked`` is a request; nothing here decides.
 
-    It opens above `kept_clear` (STOP) in its parent's window: it comes by itself, too, when arming is refused.
+    It opens above `kept_clear` (STOP) in its parent's window, also by itself when arming is refused.
     """
 
     arm_asked = Signal()
 
-    def __init__(self, desk: PreflightModel, parent: QWidget | None = None, kept_clear: QWidget | None = None) -> None:
+    def __init__(self, model: PreflightModel, parent: QWidget | None = None, kept_clear: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._desk = desk
+        self._model = model
         self._kept_clear = kept_clear
         self._shown: tuple[PreflightFinding, ...] = ()
         self.setWindowTitle(tr("Before driving"))
         self.setModal(False)
         self.resize(_SIZE)
-        self._headline = QLabel()
-        self._headline.setWordWrap(True)
+        self._headline = QLabel(wordWrap=True)
         self._headline.setFont(theme.bold(18))
-        self._note = QLabel()
-        self._note.setObjectName("card_note")
-        self._list = QWidget()
-        self._rows = QGridLayout(self._list)
+        self._note = card_note("")
+        content = QWidget()
+        self._rows = QGridLayout(content)
         self._rows.setContentsMargins(8, 6, 8, 6)
         self._rows.setColumnStretch(2, 1)
         self._rows.setHorizontalSpacing(14)
         self._rows.setVerticalSpacing(8)
-        scroll = QScrollArea()
-        scroll.setWidgetResizable(True)
+        scroll = QScrollArea(widgetResizable=True)
         scroll.setFrameShape(QFrame.Shape.NoFrame)
         scroll.setObjectName("checks")
         scroll.setAccessibleName(tr("Checks before driving"))
-        scroll.setWidget(self._list)
-        self.again = QPushButton(tr("Check &again"))
-        self.arm = QPushButton(tr("A&rm  (F6)"))
-        self.leave = QPushButton(tr("&Close"))
-        self.again.clicked.connect(desk.begin)
+        scroll.setWidget(content)
+        self.again, self.arm, self.leave = QPushButton(tr("Check &again")), QPushButton(tr("A&rm  (F6)")), QPushButton(tr("&Close"))
+        self.again.clicked.connect(model.begin)
         self.arm.clicked.connect(self._on_arm)
         self.leave.clicked.connect(self.close)
         self.arm.setObjectName("main_button")
-        for button in (self.again, self.arm, self.leave):
-            button.setAutoDefault(False)
         buttons = QHBoxLayout()
         buttons.addWidget(self._note, 1)
         for button in (self.again, self.arm, self.leave):
+            button.setAutoDefault(False)
             buttons.addWidget(button)
         column = QVBoxLayout(self)
         column.setContentsMargins(18, 14, 18, 14)
@@ -102,11 +92,10 @@ class PreflightList(QDialog):
         column.addWidget(self._headline)
         column.addWidget(scroll, 1)
         column.addLayout(buttons)
-        self._timer = QTimer(self)
-        self._timer.setInterval(_RENEW_MS)
-        self._timer.timeout.connect(self.renew)  # what the open rig says changes by itself
+        self._timer = QTimer(self, interval=_UPDATE_MS)
+        self._timer.timeout.connect(self.renew)  # the state of the open rig changes without a signal
         self.finished.connect(self._timer.stop)
-        desk.changed.connect(self.renew)
+        model.changed.connect(self.renew)
         self.renew()
 
     @property
@@ -126,12 +115,12 @@ class PreflightList(QDialog):
         self.renew()
         self._timer.start()
         if not self.isVisible():
-            self._stand_clear()
+            self._place()
         self.show()
         self.raise_()
         self.activateWindow()
 
-    def _stand_clear(self) -> None:
+    def _place(self) -> None:
         window, clear = self.parentWidget(), self._kept_clear
         if window is None or clear is None:
             return
@@ -142,13 +131,13 @@ class PreflightList(QDialog):
 
     def renew(self) -> None:
         """Show what is known now."""
-        now = self._desk.preflight
+        now = self._model.preflight
         self._headline.setText(now.headline)
         self._note.setText(_note(now))
         self.again.setEnabled(not now.is_running)
         self.again.setText(tr("Check &again") if now.age_s is not None else tr("Check &now"))
-        self.arm.setEnabled(self._desk.has_robot and now.is_fresh and not now.against and not now.is_running)
-        self.arm.setToolTip("" if self.arm.isEnabled() else _why_not(now, self._desk.has_robot))
+        self.arm.setEnabled(self._model.has_robot and now.is_fresh and not now.against and not now.is_running)
+        self.arm.setToolTip("" if self.arm.isEnabled() else _why_not(now, self._model.has_robot))
         if now.findings != self._shown:
             self._shown = now.findings
             self._fill()

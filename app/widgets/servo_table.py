@@ -12,7 +12,7 @@ from enum import Enum, IntEnum
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QPoint, QRectF, Qt, Signal, Slot
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, Qt, Signal, Slot
 from PySide6.QtGui import QColor, QHideEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -24,7 +24,8 @@ from PySide6.QtWidgets import (
     QStackedLayout,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QTableView,
+    QTableWidget,
+    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -364,62 +365,22 @@ _NUMBER_PX = 48.0
 _Index = QModelIndex | QPersistentModelIndex
 
 
-class ServoModel(QAbstractTableModel):
-    """Seven rows of cells; only cells that changed are announced, so only they are painted again."""
+class ServoView(QTableWidget):
+    """All seven rows and all columns at any size; no scroll bars, no keyboard focus. Only changed cells are painted again."""
 
-    def __init__(self, rows: tuple[Row, ...], parent: QObject | None = None) -> None:
-        super().__init__(parent)
-        self._rows = rows
-
-    def show_rows(self, rows: tuple[Row, ...]) -> None:
-        """Replace the cells; the number of rows stays."""
-        old, self._rows = self._rows, rows
-        for row, (before, after) in enumerate(zip(old, rows, strict=True)):
-            for column, (was, now) in enumerate(zip(before, after, strict=True)):
-                if was != now:
-                    index = self.index(row, column)
-                    self.dataChanged.emit(index, index)
-
-    def cell(self, row: int, column: Column) -> Cell:
-        return self._rows[row][_COLUMNS.index(column)]
-
-    def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
-        return 0 if parent.isValid() else len(self._rows)
-
-    def columnCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
-        return 0 if parent.isValid() else len(_COLUMNS)
-
-    def data(self, index: _Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        cell = self._rows[index.row()][index.column()]
-        if role == Qt.ItemDataRole.DisplayRole:
-            return cell.text
-        if role == Qt.ItemDataRole.ToolTipRole:
-            return cell.tip or None
-        if role == Qt.ItemDataRole.AccessibleTextRole:
-            return f"{tr(_COLUMNS[index.column()].value[0])} {cell.text}"
-        if role == Qt.ItemDataRole.UserRole:
-            return cell
-        return None
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> object:
-        if orientation == Qt.Orientation.Horizontal:
-            heading, meaning = (tr(text) for text in _COLUMNS[section].value)
-            if role == Qt.ItemDataRole.DisplayRole:
-                return f"  {heading}" if _COLUMNS[section] is Column.ERROR else heading
-            if role == Qt.ItemDataRole.ToolTipRole:
-                return meaning
-            if role == Qt.ItemDataRole.TextAlignmentRole:
-                side = Qt.AlignmentFlag.AlignLeft if _COLUMNS[section] in _LEFT else Qt.AlignmentFlag.AlignRight
-                return side | Qt.AlignmentFlag.AlignVCenter
-        return None
-
-
-class ServoView(QTableView):
-    """All seven rows and all columns, whatever the size; no scroll bars, no keyboard focus."""
-
-    def __init__(self, model: ServoModel) -> None:
-        super().__init__()
-        self.setModel(model)
+    def __init__(self, rows: tuple[Row, ...]) -> None:
+        super().__init__(len(rows), len(_COLUMNS))
+        self._rows: tuple[Row, ...] = ()
+        self._items = [[QTableWidgetItem() for _ in _COLUMNS] for _ in rows]
+        for place, column in enumerate(_COLUMNS):
+            heading, meaning = (tr(text) for text in column.value)
+            item = QTableWidgetItem(f"  {heading}" if column is Column.ERROR else heading)
+            item.setToolTip(meaning)
+            item.setTextAlignment(LEFT if column in _LEFT else RIGHT)
+            self.setHorizontalHeaderItem(place, item)
+            for row in range(len(rows)):
+                self.setItem(row, place, self._items[row][place])
+        self.show_rows(rows)
         self.setItemDelegate(ServoDelegate(self))
         theme.set_sheet(self, _STYLE)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -439,6 +400,20 @@ class ServoView(QTableView):
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setMinimumHeight(_HEADER + 7 * _ROW[0])
         self.setAccessibleName(tr("Servos"))
+
+    def show_rows(self, rows: tuple[Row, ...]) -> None:
+        for row, cells in enumerate(rows):
+            for place, cell in enumerate(cells):
+                if not self._rows or self._rows[row][place] != cell:
+                    item = self._items[row][place]
+                    item.setText(cell.text)
+                    item.setData(Qt.ItemDataRole.ToolTipRole, cell.tip or None)
+                    item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{tr(_COLUMNS[place].value[0])} {cell.text}")
+                    item.setData(Qt.ItemDataRole.UserRole, cell)
+        self._rows = rows
+
+    def cell(self, row: int, column: Column) -> Cell:
+        return self._rows[row][_COLUMNS.index(column)]
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -575,9 +550,8 @@ class ServoTable(QWidget):
         self._servos = ServosConfig()
         self._kind: object = None
         self._armed = self._reachable = False
-        self._model = ServoModel(servo_rows(None, self._servos, self._safety), self)
-        self._table = ServoView(self._model)
-        self._table.customContextMenuRequested.connect(self._open_context_menu)
+        self.table = ServoView(servo_rows(None, self._servos, self._safety))
+        self.table.customContextMenuRequested.connect(self._open_context_menu)
         self._balance = TendonBalance()
         self._bus = QLabel()
         self._bus.setFixedHeight(16)
@@ -590,10 +564,6 @@ class ServoTable(QWidget):
         self._lay_out()
         self.setAccessibleName(tr("Servos"))
         self._show(None, None)
-
-    @property
-    def model(self) -> ServoModel:
-        return self._model
 
     @property
     def bus_text(self) -> str:
@@ -658,14 +628,14 @@ class ServoTable(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(2)
-        for widget, stretch in ((self._table, 1), (self._balance, 0), (self._bus, 0), (strip, 0)):
+        for widget, stretch in ((self.table, 1), (self._balance, 0), (self._bus, 0), (strip, 0)):
             column.addWidget(widget, stretch)
 
     # ---- showing
 
     def _show(self, status: BusStatus | None, silence_s: float | None) -> None:
         believed = status if silence_s is None else None
-        self._model.show_rows(servo_rows(believed, self._servos, self._safety))
+        self.table.show_rows(servo_rows(believed, self._servos, self._safety))
         self._balance.show_pairs(pair_balances(believed, self._servos))
         line = bus_line(status, silence_s)
         if line.text != self._bus.text():
@@ -694,8 +664,8 @@ class ServoTable(QWidget):
     # ---- asking
 
     def _open_context_menu(self, at: QPoint) -> None:
-        place = self._table.indexAt(at).row()
-        self.menu_for(self._servos.joints[place] if place >= 0 else None).popup(self._table.viewport().mapToGlobal(at))
+        place = self.table.indexAt(at).row()
+        self.menu_for(self._servos.joints[place] if place >= 0 else None).popup(self.table.viewport().mapToGlobal(at))
 
     def _open_restart_menu(self) -> None:
         menu = self._make_menu()

@@ -6,16 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen, QRegion
+from PySide6.QtGui import QKeyEvent, QPainter, QPainterPath, QRegion
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QHBoxLayout, QLabel, QPushButton, QTabWidget, QVBoxLayout, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr
+from app.widgets.basics import card_note
+from app.widgets.painting import PaintedWidget, draw_box, set_colours
 
 _CARD_WIDTH = 380
-_MARGIN, _AROUND, _CORNER = 14, 5, 9.0
+_MARGIN, _AROUND, _CORNER = 14, 5, 9.0  # of the card; of the light, and the radius of its corners
 _SHADE = 0.5
-_LOOK_EVERY_MS = 150
+_FOLLOW_EVERY_MS = 150
 _FORWARD, _BACK = (Qt.Key.Key_Return, Qt.Key.Key_Enter), (Qt.Key.Key_Backspace,)
 
 
@@ -29,10 +31,10 @@ class TourStop:
 
 
 class TourOverlay(QObject):
-    """Leads over `parent` from stop to stop. ``ended`` comes when it is over, in whichever way.
+    """Leads over `parent` from stop to stop. ``ended`` comes when it is over.
 
-    The shade lets every click through, and neither shade nor card ever lies over the widgets to be `kept_clear`. The keys are
-    Enter and Backspace, where nothing else has a use for them; all others go where they always go.
+    The shade lets every click through, and neither shade nor card ever lies over the widgets `kept_clear`. The keys are Enter and
+    Backspace, where the window has no other use for them.
     """
 
     ended = Signal()
@@ -42,24 +44,18 @@ class TourOverlay(QObject):
         self._parent = parent
         self._kept_clear = tuple(kept_clear)
         self._stops: tuple[TourStop, ...] = ()
-        self._place = -1
+        self.place = -1  # which stop, from 0; -1: none
         self._shade = _Shade(parent)
         self.card = _TourCard(parent)
         self.card.forward.clicked.connect(self.forward)
         self.card.back.clicked.connect(self.back)
         self.card.skip.clicked.connect(self.end)
-        self._look = QTimer(self)
-        self._look.setInterval(_LOOK_EVERY_MS)
-        self._look.timeout.connect(self._follow)
+        self._timer = QTimer(self, interval=_FOLLOW_EVERY_MS)
+        self._timer.timeout.connect(self._follow)
 
     @property
     def is_running(self) -> bool:
-        return self._place >= 0
-
-    @property
-    def place(self) -> int:
-        """Which stop, from 0; -1: none."""
-        return self._place
+        return self.place >= 0
 
     @property
     def light(self) -> QRect:
@@ -74,27 +70,27 @@ class TourOverlay(QObject):
             self._parent.installEventFilter(self)
             self._parent.window().installEventFilter(self)
         self._stops = tuple(stops)
-        self._look.start()
-        self._go(0)
+        self._timer.start()
+        self._show_stop(0)
 
     @Slot()
     def forward(self) -> None:
         """The next stop; after the last one it is over."""
-        if self._place + 1 < len(self._stops):
-            self._go(self._place + 1)
+        if self.place + 1 < len(self._stops):
+            self._show_stop(self.place + 1)
         else:
             self.end()
 
     @Slot()
     def back(self) -> None:
-        self._go(max(0, self._place - 1))
+        self._show_stop(max(0, self.place - 1))
 
     @Slot()
     def end(self) -> None:
         if not self.is_running:
             return
-        self._place = -1
-        self._look.stop()
+        self.place = -1
+        self._timer.stop()
         self._parent.removeEventFilter(self)
         self._parent.window().removeEventFilter(self)
         self.card.hide()
@@ -109,7 +105,7 @@ class TourOverlay(QObject):
         return False
 
     def _on_key(self, event: QKeyEvent) -> bool:
-        """Keys that nobody else took, on their way to the window; it may have a use for Enter on a control."""
+        """A key that no widget has used, on its way to the window, which may have a use for Enter on a control."""
         focus = self._parent.window().focusWidget()
         if event.key() in _FORWARD and isinstance(focus, QAbstractButton | QComboBox):
             return False
@@ -121,13 +117,11 @@ class TourOverlay(QObject):
             self.forward()
         return True
 
-    # ---- places
-
-    def _go(self, place: int) -> None:
-        self._place = place
+    def _show_stop(self, place: int) -> None:
+        self.place = place
         stop = self._stops[place]
         for widget in stop.widgets:
-            _bring_forward(widget)
+            _turn_to_page_of(widget)
         self.card.show_stop(stop, place, len(self._stops))
         self._shade.light = QRect()
         self._follow()
@@ -138,11 +132,11 @@ class TourOverlay(QObject):
 
     @Slot()
     def _follow(self) -> None:
-        """The window's parts may move at any time."""
+        """Light and card keep up with the window's parts, which may move at any time."""
         if not self.is_running:
             return
         light = QRect()
-        for widget in self._stops[self._place].widgets:
+        for widget in self._stops[self.place].widgets:
             if widget.isVisible():
                 light = light.united(self._rect_of(widget))
         light = light.adjusted(-_AROUND, -_AROUND, _AROUND, _AROUND) if light.isValid() else light
@@ -164,52 +158,40 @@ def place_card(size: QSize, room: QRect, light: QRect, clear: Sequence[QRect]) -
     """
     inner = room.adjusted(_MARGIN, _MARGIN, -_MARGIN, -_MARGIN)
     width, height = size.width(), size.height()
-    xs = [inner.left(), inner.right() - width + 1]
-    ys = [inner.top(), inner.bottom() - height + 1]
+    last_x, last_y = max(inner.left(), inner.right() - width + 1), max(inner.top(), inner.bottom() - height + 1)
+    xs, ys = [inner.left(), inner.right() - width + 1], [inner.top(), inner.bottom() - height + 1]
     if light.isValid():
         xs += [light.right() + _MARGIN, light.left() - width - _MARGIN, light.center().x() - width // 2, light.left()]
         ys += [light.bottom() + _MARGIN, light.top() - height - _MARGIN, light.center().y() - height // 2, light.top()]
-    best: tuple[tuple[bool, int, int], QRect] | None = None
-    for x in xs:
-        for y in ys:
-            card = QRect(
-                min(max(x, inner.left()), max(inner.left(), inner.right() - width + 1)),
-                min(max(y, inner.top()), max(inner.top(), inner.bottom() - height + 1)),
-                width,
-                height,
-            )
-            away = (card.center() - light.center()).manhattanLength() if light.isValid() else 0
-            cost = (any(card.intersects(rect) for rect in clear), _area(card & light), away)
-            if best is None or cost < best[0]:
-                best = cost, card
-    assert best is not None
-    return best[1]
+    cards = [QRect(min(max(x, inner.left()), last_x), min(max(y, inner.top()), last_y), width, height) for x in xs for y in ys]
+
+    def cost(card: QRect) -> tuple[bool, int, int]:
+        both = card & light
+        covered = both.width() * both.height() if both.isValid() else 0
+        away = (card.center() - light.center()).manhattanLength() if light.isValid() else 0
+        return any(card.intersects(rect) for rect in clear), covered, away
+
+    return min(cards, key=cost)
 
 
-def _area(rect: QRect) -> int:
-    return rect.width() * rect.height() if rect.isValid() else 0
-
-
-def _bring_forward(widget: QWidget) -> None:
-    """Turn to the page that it is on."""
+def _turn_to_page_of(widget: QWidget) -> None:
     child: QWidget | None = widget
     while child is not None:
-        pages = child.parentWidget()
-        pages = pages.parentWidget() if pages is not None else None
+        stack = child.parentWidget()
+        pages = stack.parentWidget() if stack is not None else None
         if isinstance(pages, QTabWidget) and pages.indexOf(child) >= 0:
             pages.setCurrentWidget(child)
-        child = child.parentWidget()
+        child = stack
 
 
-class _Shade(QWidget):
-    """Darkens all but the light; no click ends here."""
+class _Shade(PaintedWidget):
+    """Darkens all but the light; every click goes through it."""
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(tr("Tour"), parent=parent)
         self.light = QRect()
         self._clear: list[QRect] = []
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.setAccessibleName(tr("Tour"))
         self.hide()
 
     def cover(self, room: QRect, light: QRect, clear: list[QRect]) -> None:
@@ -223,29 +205,23 @@ class _Shade(QWidget):
         self.setMask(region)
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        dark = QPainterPath()
+    def paint(self, painter: QPainter) -> None:
+        dark, lit = QPainterPath(), QPainterPath()
         dark.addRect(QRectF(self.rect()))
-        lit = QPainterPath()
         if self.light.isValid():
             lit.addRoundedRect(QRectF(self.light), _CORNER, _CORNER)
         painter.fillPath(dark.subtracted(lit), theme.colour(theme.ON_PICTURE.INK, _SHADE))
-        painter.setPen(QPen(QColor(theme.ON_PICTURE.SKY), 2.5))
+        set_colours(painter, None, theme.ON_PICTURE.SKY, 2.5)
         painter.drawPath(lit)
-        painter.end()
 
 
-class _TourCard(QWidget):
-    """Title, text, and the way on."""
+class _TourCard(PaintedWidget):
+    """Title, text, and the buttons."""
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
-        self._title, self._text, self._count = QLabel(), QLabel(), QLabel()
+        super().__init__(parent=parent)
+        self._title, self._text, self._count = QLabel(), QLabel(wordWrap=True), card_note("")
         self._title.setFont(theme.bold(18))
-        self._text.setWordWrap(True)
-        self._count.setObjectName("card_note")
         for label in (self._title, self._text, self._count):
             label.setTextFormat(Qt.TextFormat.PlainText)
         self.back = _button(tr("Back"), tr("The stop before  (Backspace)"))
@@ -257,12 +233,12 @@ class _TourCard(QWidget):
         row.addStretch(1)
         for button in (self.skip, self.back, self.forward):
             row.addWidget(button)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(18, 14, 18, 14)
-        column.setSpacing(9)
-        column.addWidget(self._title)
-        column.addWidget(self._text)
-        column.addLayout(row)
+        self._rows = QVBoxLayout(self)
+        self._rows.setContentsMargins(18, 14, 18, 14)
+        self._rows.setSpacing(9)
+        self._rows.addWidget(self._title)
+        self._rows.addWidget(self._text)
+        self._rows.addLayout(row)
         self.setFixedWidth(_CARD_WIDTH)
         self.setCursor(Qt.CursorShape.ArrowCursor)
         self.hide()
@@ -287,18 +263,11 @@ class _TourCard(QWidget):
 
     def wanted_size(self) -> QSize:
         """As high as its text needs."""
-        layout = self.layout()
-        assert layout is not None
-        layout.activate()
-        return QSize(_CARD_WIDTH, layout.totalHeightForWidth(_CARD_WIDTH))
+        self._rows.activate()
+        return QSize(_CARD_WIDTH, self._rows.totalHeightForWidth(_CARD_WIDTH))
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(QPen(QColor(theme.SKY), 1.5))
-        painter.setBrush(QColor(theme.PANEL))
-        painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 11, 11)
-        painter.end()
+    def paint(self, painter: QPainter) -> None:
+        draw_box(painter, QRectF(self.rect()).adjusted(1, 1, -1, -1), 11, theme.PANEL, theme.SKY, 1.5)
 
 
 def _button(text: str, tip: str) -> QPushButton:

@@ -16,11 +16,11 @@ from core.config.models import PoseConfig
 from core.types import PoseState, Scene
 
 SPAN_S = 30.0
-_CAPACITY = 1024
+_CAPACITY = 1024  # of the buffers
 _DRAW_EVERY_S = 0.1
-_CELL_S = 0.1
+_CELL_S = 0.1  # of the band of states
 _HOLD_S = 0.6  # a slow camera leaves no holes in the band, a silent one does
-_ROOM_FOR_TICKS = 44.0
+_ROOM_FOR_TICKS = 44.0  # height of a chart with three ticks
 _ROOM_FOR_BOTH_PX = 130  # below this height two charts would be too low to be read
 _UNLIMITED_PX = 16_777_215.0
 _STATES: tuple[PoseState | None, ...] = (None, *PoseState)
@@ -29,10 +29,10 @@ _DISTANCE_RANGES = (15.0, 30.0, 60.0, 120.0, 640.0)
 
 
 class TrendPlot(QWidget):
-    """Curves over fixed buffers; frames without a pose are gaps. Drawn ten times a second, however fast ticks come.
+    """Curves over fixed buffers, drawn ten times a second; frames without a pose are gaps.
 
     The scales change in a few steps only, so that a curve can be compared with what it was a second ago. In a low window only theta
-    is drawn, and ``distances_shown`` says so.
+    is drawn (``distances_shown``).
     """
 
     distances_shown = Signal(bool)
@@ -44,7 +44,7 @@ class TrendPlot(QWidget):
         self._states = np.zeros(_CAPACITY, np.uint8)
         self._pace = Pace(_DRAW_EVERY_S)
         self.setMinimumHeight(78)
-        self._has_distances = True
+        self.has_distances = True  # there is room for the chart of both distances
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(tr("Trends of theta, d_head and d_tail over the last 30 seconds"))
         self.setToolTip(tip("trends"))
@@ -59,7 +59,7 @@ class TrendPlot(QWidget):
         column.addWidget(view)
         self._angle = _Chart(view, 0, _ANGLE_RANGES, is_signed=True, allowed=limits.theta_allow_deg)
         self._distance = _Chart(view, 1, _DISTANCE_RANGES, is_signed=False, allowed=limits.d_allow_px)
-        self._curves = (self._angle.add_curve(), self._distance.add_curve(), self._distance.add_curve())
+        self.curves = (self._angle.add_curve(), self._distance.add_curve(), self._distance.add_curve())  # theta, d_head, d_tail
         self._band = _StateBand(view, 2)
         self._view = view
         self.follow_theme()
@@ -69,22 +69,15 @@ class TrendPlot(QWidget):
         self._view.setBackground(theme.PANEL)
         solid = Qt.PenStyle.SolidLine
         looks = ((theme.THETA, solid), (theme.D_HEAD, solid), (theme.D_TAIL, Qt.PenStyle.DotLine))
-        for curve, (name, style) in zip(self._curves, looks, strict=True):
-            pen = QPen(QColor(name), 1.5, style)
-            pen.setCosmetic(True)
-            curve.setPen(pen)
+        for curve, (name, style) in zip(self.curves, looks, strict=True):
+            curve.setPen(pg.mkPen(name, width=1.5, style=style))
         for part in (self._angle, self._distance, self._band):
-            part.take_colours()
+            part.follow_theme()
 
     def set_limits(self, limits: PoseConfig) -> None:
         """Other limits for the bands of what is allowed."""
         self._angle.set_allowed(limits.theta_allow_deg)
         self._distance.set_allowed(limits.d_allow_px)
-
-    @property
-    def has_distances(self) -> bool:
-        """Whether there is room for the chart of both distances."""
-        return self._has_distances
 
     def minimumSizeHint(self) -> QSize:
         return QSize(200, 78)
@@ -92,15 +85,10 @@ class TrendPlot(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         fits = self.height() >= _ROOM_FOR_BOTH_PX
-        if fits is not self._has_distances:
-            self._has_distances = fits
+        if fits is not self.has_distances:
+            self.has_distances = fits
             self._distance.set_visible(fits)
             self.distances_shown.emit(fits)
-
-    @property
-    def curves(self) -> tuple[pg.PlotCurveItem, ...]:
-        """theta, d_head, d_tail."""
-        return self._curves
 
     def add(self, scene: Scene) -> None:
         """Append one frame's values; a clock that jumps back (a recording that starts again) clears the plot."""
@@ -116,7 +104,7 @@ class TrendPlot(QWidget):
             self._draw()
 
     def show_silence(self, age_s: float) -> None:
-        """Nothing has come for so long: the curves go on to the left, and where now is they have no value."""
+        """No picture for so long: the curves move on to the left and end before now."""
         if self._pace.due():
             self._draw(age_s)
 
@@ -132,7 +120,7 @@ class TrendPlot(QWidget):
         first = int(np.searchsorted(self._times_s, now_s - SPAN_S)) if np.isfinite(now_s) else _CAPACITY
         ago_s = self._times_s[first:] - now_s
         values = self._values[:, first:]
-        for curve, series in zip(self._curves, values, strict=True):
+        for curve, series in zip(self.curves, values, strict=True):
             curve.setData(ago_s, series, connect="finite")
         self._angle.fit(values[:1])
         self._distance.fit(values[1:])
@@ -140,7 +128,7 @@ class TrendPlot(QWidget):
 
 
 def _add_box(view: pg.GraphicsLayoutWidget, row: int) -> pg.ViewBox:
-    """A view of the last 30 s. A ``PlotItem`` would bring menus and buttons that nobody needs here."""
+    """A view of the last 30 s, without the menus and buttons of a ``PlotItem``."""
     box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0.0)
     box.setXRange(-SPAN_S, 0.0, padding=0)
     view.addItem(box, row, 1)
@@ -180,7 +168,7 @@ class _Chart:
         self.set_allowed(allowed)
         self.fit(np.full((1, 1), np.nan))
 
-    def take_colours(self) -> None:
+    def follow_theme(self) -> None:
         _colour_axis(self._axis)
         self._band.setBrush(theme.colour(theme.ALLOWED, 0.16))
 
@@ -229,9 +217,9 @@ class _StateBand:
         self._image = pg.ImageItem(axisOrder="row-major")
         box.addItem(self._image, ignoreBounds=True)
         self._cells = np.zeros(len(self._cells_s), np.uint8)
-        self.take_colours()
+        self.follow_theme()
 
-    def take_colours(self) -> None:
+    def follow_theme(self) -> None:
         _colour_axis(self._axis)
         colours = [theme.colour(theme.LINE, 0.6)] + [QColor(theme.STATE_COLOUR[state]) for state in PoseState]
         self._table = np.array([[c.red(), c.green(), c.blue(), c.alpha()] for c in colours], np.uint8)
