@@ -1,4 +1,4 @@
-"""Sounds by a player of the system: a fake one writes down what it is asked to play."""
+"""Alerts over the picture, and their sounds by a player of the system."""
 
 from __future__ import annotations
 
@@ -13,17 +13,199 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shiboken6
-from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QMouseEvent
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.widgets.alerts import SOUNDS, AlertSounds
+from app.widgets.alerts import BRIEF_S, LINGER_S, LOOK, SOUNDS, AlertSounds, AlertStrip
 from core.config.models import RESOURCES
-from core.control.alerts import ALERTS
+from core.control.alerts import ALERTS, Alert, AlertKey, Priority
+from core.control.faults import Cause, Fault
+from core.control.gate import RejectReason, Source
+from core.control.modes import Hindrance, Mode
+from core.control.pilot import DriveView
+from tests.app.hand_clock import Clock
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+OFF = DriveView(0.0)
+
+
+ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
+
+
+STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
+
+
+def words(key: AlertKey) -> str:
+    """What is the matter and what to do, from the table, as two sentences."""
+    text, what_to_do = ALERTS[key].text, ALERTS[key].what_to_do
+    return f"{text}. {what_to_do[0].upper()}{what_to_do[1:]}."
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
+    return Alert(key, ALERTS[key], detail, repeats)
+
+
+@pytest.fixture
+def picture(qtbot: QtBot) -> QWidget:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    widget.resize(775, 408)
+    widget.show()
+    return widget
+
+
+@pytest.fixture
+def strip(picture: QWidget, clock: Clock) -> Iterator[AlertStrip]:
+    yield AlertStrip(picture, clock)
+
+
+def test_alerts_say_what_is_the_matter_how_much_how_often_and_what_to_do(strip: AlertStrip) -> None:
+    assert strip.isHidden()
+    strip.show_alerts([alert(Cause.WARM, "pull left: 66 °C", repeats=2)])
+    name, what_to_do = words(Cause.WARM).split(". ")
+    assert strip.texts == [f"{name} (pull left: 66 °C) ×3. {what_to_do}"]
+    assert strip.isVisible()
+    assert strip.accessibleName().startswith(f"Alerts: {name}")
+
+
+def test_the_most_urgent_three_are_shown_newest_first_among_equals(strip: AlertStrip) -> None:
+    keys = [Hindrance.NO_DESTINATION, Cause.HOT, Cause.WARM, Cause.CONFIDENCE_LOW, Cause.STOP_PRESSED, Cause.VOLTAGE_LOW]
+    strip.show_alerts([alert(key) for key in keys])
+    assert strip.texts == [words(key) for key in (Cause.STOP_PRESSED, Cause.VOLTAGE_LOW, Cause.HOT)]
+
+
+def test_the_same_alert_again_is_counted(strip: AlertStrip) -> None:
+    for _ in range(2):
+        strip.show_alerts([alert(Hindrance.NO_DESTINATION)])
+    assert strip.texts == [words(Hindrance.NO_DESTINATION).replace(".", " ×2.", 1)]
+
+
+@pytest.mark.parametrize("key", [Hindrance.NO_DESTINATION, RejectReason.OVER_RATE, Cause.WARM])
+def test_hints_and_warnings_go_away_by_themselves(strip: AlertStrip, clock: Clock, key: AlertKey) -> None:
+    strip.show_alerts([alert(key)])
+    clock.now_s += BRIEF_S[ALERTS[key].priority] - 0.1
+    strip._expire()
+    assert strip.texts
+    clock.now_s += 0.1
+    strip._expire()
+    assert strip.texts == [] and strip.isHidden()
+    assert not strip._timer.isActive()
+
+
+def test_a_latched_fault_stays_until_it_is_acknowledged(strip: AlertStrip, clock: Clock) -> None:
+    strip.show_alerts([alert(Cause.STOP_PRESSED)])
+    stopped = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.STOP_PRESSED))
+    for _ in range(10):
+        strip.show_view(stopped)
+        clock.now_s += 10.0
+    strip.show_view(stopped)
+    assert strip.texts
+    strip.show_view(OFF)
+    assert strip.texts == []
+
+
+def test_acknowledging_takes_the_consequences_along_but_not_what_is_still_true(strip: AlertStrip) -> None:
+    strip.show_alerts([alert(Cause.TRACKING), alert(Cause.BUS_NOISE), alert(Cause.CAMERA_LOST)])
+    active = (Fault(Cause.CAMERA_LOST),)
+    strip.show_view(DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING), active=active))
+    assert len(strip.texts) == 3
+    strip.show_view(DriveView(0.0, active=active))
+    assert strip.texts == [words(Cause.CAMERA_LOST)]
+
+
+def test_what_was_never_latched_lingers_after_it_is_over(strip: AlertStrip, clock: Clock) -> None:
+    strip.show_alerts([alert(Cause.HEAD_LOST)])
+    clock.now_s += 60.0
+    strip.show_view(DriveView(0.0, Mode.HOLD, active=(Fault(Cause.HEAD_LOST),)))
+    assert strip.texts
+    clock.now_s += LINGER_S - 0.1
+    strip.show_view(ARMED)
+    assert strip.texts
+    clock.now_s += 0.1
+    strip.show_view(ARMED)
+    assert strip.texts == []
+
+
+def test_a_click_dismisses_one_and_the_next_in_line_takes_its_place(qtbot: QtBot, strip: AlertStrip) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.HOT, Cause.TRACKING, Cause.DISK_LOW)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert strip.texts == [words(key) for key in (Cause.HOT, Cause.DISK_LOW, Cause.WARM)]
+    strip.clear()
+    assert strip.isHidden()
+
+
+def test_a_double_click_dismisses_one_alert_and_not_the_next_that_nobody_has_read(qtbot: QtBot, strip: AlertStrip) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.TRACKING)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    qtbot.mouseDClick(strip._rows[0], LEFT)
+    qtbot.mouseRelease(strip._rows[0], LEFT)
+    assert strip.texts == [words(Cause.WARM)]
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert strip.texts == []
+
+
+def test_a_click_on_an_alert_sets_no_destination_behind_it(qtbot: QtBot, clock: Clock) -> None:
+    class Picture(QWidget):
+        pressed = 0
+
+        def mousePressEvent(self, event: QMouseEvent) -> None:
+            self.pressed += 1
+
+    picture = Picture()
+    qtbot.addWidget(picture)
+    picture.resize(775, 408)
+    picture.show()
+    strip = AlertStrip(picture, clock)
+    strip.show_alerts([alert(Cause.WARM)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert picture.pressed == 0
+
+
+@pytest.mark.parametrize("size", [(480, 320), (600, 348), (775, 408), (1230, 768)])
+def test_alerts_leave_three_quarters_of_the_picture_free(picture: QWidget, strip: AlertStrip, size: tuple[int, int]) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.HOT, Cause.TRACKING, Cause.DISK_LOW)])
+    picture.resize(*size)
+    assert 1 <= len(strip.texts) <= 3
+    assert strip.height() <= 0.26 * picture.height()
+    assert picture.rect().contains(strip.geometry())
+    assert strip.texts[0] == words(Cause.TRACKING)
+
+
+def test_screen_readers_are_told_once_and_urgently_what_interrupts(strip: AlertStrip, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[tuple[str, QAccessible.AnnouncementPoliteness]] = []
+
+    def listen(event: QAccessibleAnnouncementEvent) -> None:
+        told.append((event.message(), event.politeness()))
+
+    monkeypatch.setattr(QAccessible, "updateAccessibility", listen)
+    for _ in range(2):
+        strip.show_alerts([alert(Cause.WARM), alert(Cause.TRACKING)])
+    assert [message for message, _ in told] == [words(Cause.WARM), words(Cause.TRACKING)]
+    polite, assertive = QAccessible.AnnouncementPoliteness.Polite, QAccessible.AnnouncementPoliteness.Assertive
+    assert [politeness for _, politeness in told] == [polite, assertive]
+
+
+def test_priorities_differ_in_sign() -> None:
+    assert len({LOOK[priority].sign for priority in Priority}) == len(Priority)
+
 
 FOLDER = RESOURCES / "sounds"
+
+
 SCRIPT = Path(__file__).resolve().parents[3] / "tools" / "make_sounds.py"
+
+
 posix_only = pytest.mark.skipif(sys.platform == "win32", reason="the fake player is a shell script")
+
 
 Install = Callable[..., Path]
 
@@ -73,9 +255,6 @@ def quiet(qtbot: QtBot, sounds: AlertSounds) -> None:
     qtbot.waitUntil(lambda: sounds.playing is None)
 
 
-# ---- the files
-
-
 @pytest.mark.parametrize("name", SOUNDS)
 def test_sounds_are_short_small_and_plain(name: str) -> None:
     path = FOLDER / f"{name}.wav"
@@ -112,9 +291,6 @@ def test_sounds_are_told_apart_by_rhythm() -> None:
         loud = loudness > 0.1 * loudness.max()
         counts[name] = int(np.count_nonzero(np.diff(loud.astype(int)) == 1) + loud[0])
     assert counts == {"hold": 2, "disarm": 3, "stop": 6}
-
-
-# ---- playing
 
 
 @posix_only

@@ -1,37 +1,49 @@
-"""The widgets that show who drives and let the operator decide: badge, bar with STOP and deadman, alerts, event log."""
+"""Who drives, the next step and why not, STOP and deadman."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from datetime import datetime, timedelta
 from itertools import combinations
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QGuiApplication, QImage, QMouseEvent
+from PySide6.QtGui import QImage, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMenu, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.ui.texts import STOP_KEY, OperatorStep, Undriven, next_step, who_drives
-from app.widgets.alerts import BRIEF_S, LINGER_S, LOOK, AlertStrip
-from app.widgets.event_log import MOST_ROWS, EventLog, LogKind
 from app.widgets.mode_bar import DOUBLE_PRESS_S, HEIGHT, MODE_LOOK, REASON_DWELL_S, ModeBadge, ModeBar
-from core.control.alerts import ALERTS, Alert, AlertKey, Priority
+from core.control.alerts import ALERTS, AlertKey
 from core.control.faults import CAUSES, Cause, Fault
-from core.control.gate import RejectReason, Source
+from core.control.gate import Source
 from core.control.modes import Hindrance, Mode
 from core.control.pilot import DriveView
 from tests.app.hand_clock import Clock
 
 LEFT = Qt.MouseButton.LeftButton
+
+
 NARROWEST_AT_720 = 760
+
+
 OFF = DriveView(0.0)
+
+
 READY = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True)
+
+
 ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
+
+
 DRIVING = DriveView(0.0, Mode.AUTONOMOUS, Source.PROGRAM, servos_on=True, deadman=True)
+
+
 HELD = DriveView(0.0, Mode.HOLD, servos_on=True, deadman=False, active=(Fault(Cause.DEADMAN),))
+
+
 STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
+
+
 VIEWS = (OFF, READY, ARMED, DRIVING, HELD, STOPPED)
 
 
@@ -65,9 +77,6 @@ def asked(bar: ModeBar) -> list[str]:
     for name in ("servos_on", "acknowledge", "arm", "hand_over", "take_back", "disarm", "stop"):
         getattr(bar, f"{name}_asked").connect(lambda name=name: heard.append(name))
     return heard
-
-
-# ---- badge
 
 
 @pytest.mark.parametrize(
@@ -133,9 +142,6 @@ def test_badge_repaints_only_for_something_new(qtbot: QtBot, monkeypatch: pytest
     for time_s in range(5):
         badge.show_view(DriveView(float(time_s), Mode.ARMED, Source.OPERATOR))
     assert len(painted) == 1
-
-
-# ---- the next step, and why not
 
 
 @pytest.mark.parametrize(
@@ -209,9 +215,6 @@ def test_every_mode_has_a_step_that_can_be_pressed_and_no_two_steps_share_a_key(
 def test_disarming_is_offered_while_armed(mode: Mode) -> None:
     assert next_step(DriveView(0.0, mode, servos_on=True)).other is OperatorStep.DISARM
     assert next_step(READY).other is None
-
-
-# ---- bar
 
 
 @pytest.mark.parametrize(
@@ -329,9 +332,6 @@ def test_the_bar_speaks(bar: ModeBar) -> None:
         assert widget.accessibleName() and widget.accessibleDescription() and widget.toolTip()
 
 
-# ---- STOP
-
-
 def test_stop_fires_when_the_mouse_goes_down_and_not_again_when_it_comes_up(qtbot: QtBot, bar: ModeBar) -> None:
     heard = asked(bar)
     qtbot.mousePress(bar.stop, LEFT)
@@ -356,9 +356,6 @@ def test_stop_works_by_keyboard_and_when_somebody_disabled_it(qtbot: QtBot, bar:
     bar.setEnabled(False)
     qtbot.mousePress(bar.stop, LEFT)
     assert heard == ["stop", "stop"]
-
-
-# ---- deadman
 
 
 @pytest.fixture
@@ -432,265 +429,3 @@ def test_deadman_shows_what_the_program_sees(bar: ModeBar) -> None:
     bar.show_view(DRIVING)
     assert (bar.deadman.word, bar.deadman.is_lit) == ("held", True)
     assert bar.deadman.accessibleDescription() == "held"
-
-
-# ---- alerts
-
-
-def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
-    return Alert(key, ALERTS[key], detail, repeats)
-
-
-@pytest.fixture
-def picture(qtbot: QtBot) -> QWidget:
-    widget = QWidget()
-    qtbot.addWidget(widget)
-    widget.resize(775, 408)
-    widget.show()
-    return widget
-
-
-@pytest.fixture
-def strip(picture: QWidget, clock: Clock) -> Iterator[AlertStrip]:
-    yield AlertStrip(picture, clock)
-
-
-def test_alerts_say_what_is_the_matter_how_much_how_often_and_what_to_do(strip: AlertStrip) -> None:
-    assert strip.isHidden()
-    strip.show_alerts([alert(Cause.WARM, "pull left: 66 °C", repeats=2)])
-    name, what_to_do = words(Cause.WARM).split(". ")
-    assert strip.texts == [f"{name} (pull left: 66 °C) ×3. {what_to_do}"]
-    assert strip.isVisible()
-    assert strip.accessibleName().startswith(f"Alerts: {name}")
-
-
-def test_the_most_urgent_three_are_shown_newest_first_among_equals(strip: AlertStrip) -> None:
-    keys = [Hindrance.NO_DESTINATION, Cause.HOT, Cause.WARM, Cause.CONFIDENCE_LOW, Cause.STOP_PRESSED, Cause.VOLTAGE_LOW]
-    strip.show_alerts([alert(key) for key in keys])
-    assert strip.texts == [words(key) for key in (Cause.STOP_PRESSED, Cause.VOLTAGE_LOW, Cause.HOT)]
-
-
-def test_the_same_alert_again_is_counted(strip: AlertStrip) -> None:
-    for _ in range(2):
-        strip.show_alerts([alert(Hindrance.NO_DESTINATION)])
-    assert strip.texts == [words(Hindrance.NO_DESTINATION).replace(".", " ×2.", 1)]
-
-
-@pytest.mark.parametrize("key", [Hindrance.NO_DESTINATION, RejectReason.OVER_RATE, Cause.WARM])
-def test_hints_and_warnings_go_away_by_themselves(strip: AlertStrip, clock: Clock, key: AlertKey) -> None:
-    strip.show_alerts([alert(key)])
-    clock.now_s += BRIEF_S[ALERTS[key].priority] - 0.1
-    strip._expire()
-    assert strip.texts
-    clock.now_s += 0.1
-    strip._expire()
-    assert strip.texts == [] and strip.isHidden()
-    assert not strip._timer.isActive()
-
-
-def test_a_latched_fault_stays_until_it_is_acknowledged(strip: AlertStrip, clock: Clock) -> None:
-    strip.show_alerts([alert(Cause.STOP_PRESSED)])
-    stopped = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.STOP_PRESSED))
-    for _ in range(10):
-        strip.show_view(stopped)
-        clock.now_s += 10.0
-    strip.show_view(stopped)
-    assert strip.texts
-    strip.show_view(OFF)
-    assert strip.texts == []
-
-
-def test_acknowledging_takes_the_consequences_along_but_not_what_is_still_true(strip: AlertStrip) -> None:
-    strip.show_alerts([alert(Cause.TRACKING), alert(Cause.BUS_NOISE), alert(Cause.CAMERA_LOST)])
-    active = (Fault(Cause.CAMERA_LOST),)
-    strip.show_view(DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING), active=active))
-    assert len(strip.texts) == 3
-    strip.show_view(DriveView(0.0, active=active))
-    assert strip.texts == [words(Cause.CAMERA_LOST)]
-
-
-def test_what_was_never_latched_lingers_after_it_is_over(strip: AlertStrip, clock: Clock) -> None:
-    strip.show_alerts([alert(Cause.HEAD_LOST)])
-    clock.now_s += 60.0
-    strip.show_view(DriveView(0.0, Mode.HOLD, active=(Fault(Cause.HEAD_LOST),)))
-    assert strip.texts
-    clock.now_s += LINGER_S - 0.1
-    strip.show_view(ARMED)
-    assert strip.texts
-    clock.now_s += 0.1
-    strip.show_view(ARMED)
-    assert strip.texts == []
-
-
-def test_a_click_dismisses_one_and_the_next_in_line_takes_its_place(qtbot: QtBot, strip: AlertStrip) -> None:
-    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.HOT, Cause.TRACKING, Cause.DISK_LOW)])
-    qtbot.mouseClick(strip._rows[0], LEFT)
-    assert strip.texts == [words(key) for key in (Cause.HOT, Cause.DISK_LOW, Cause.WARM)]
-    strip.clear()
-    assert strip.isHidden()
-
-
-def test_a_double_click_dismisses_one_alert_and_not_the_next_that_nobody_has_read(qtbot: QtBot, strip: AlertStrip) -> None:
-    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.TRACKING)])
-    qtbot.mouseClick(strip._rows[0], LEFT)
-    qtbot.mouseDClick(strip._rows[0], LEFT)
-    qtbot.mouseRelease(strip._rows[0], LEFT)
-    assert strip.texts == [words(Cause.WARM)]
-    qtbot.mouseClick(strip._rows[0], LEFT)
-    assert strip.texts == []
-
-
-def test_a_click_on_an_alert_sets_no_destination_behind_it(qtbot: QtBot, clock: Clock) -> None:
-    class Picture(QWidget):
-        pressed = 0
-
-        def mousePressEvent(self, event: QMouseEvent) -> None:
-            self.pressed += 1
-
-    picture = Picture()
-    qtbot.addWidget(picture)
-    picture.resize(775, 408)
-    picture.show()
-    strip = AlertStrip(picture, clock)
-    strip.show_alerts([alert(Cause.WARM)])
-    qtbot.mouseClick(strip._rows[0], LEFT)
-    assert picture.pressed == 0
-
-
-@pytest.mark.parametrize("size", [(480, 320), (600, 348), (775, 408), (1230, 768)])
-def test_alerts_leave_three_quarters_of_the_picture_free(picture: QWidget, strip: AlertStrip, size: tuple[int, int]) -> None:
-    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.HOT, Cause.TRACKING, Cause.DISK_LOW)])
-    picture.resize(*size)
-    assert 1 <= len(strip.texts) <= 3
-    assert strip.height() <= 0.26 * picture.height()
-    assert picture.rect().contains(strip.geometry())
-    assert strip.texts[0] == words(Cause.TRACKING)
-
-
-def test_screen_readers_are_told_once_and_urgently_what_interrupts(strip: AlertStrip, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[tuple[str, QAccessible.AnnouncementPoliteness]] = []
-
-    def listen(event: QAccessibleAnnouncementEvent) -> None:
-        told.append((event.message(), event.politeness()))
-
-    monkeypatch.setattr(QAccessible, "updateAccessibility", listen)
-    for _ in range(2):
-        strip.show_alerts([alert(Cause.WARM), alert(Cause.TRACKING)])
-    assert [message for message, _ in told] == [words(Cause.WARM), words(Cause.TRACKING)]
-    polite, assertive = QAccessible.AnnouncementPoliteness.Polite, QAccessible.AnnouncementPoliteness.Assertive
-    assert [politeness for _, politeness in told] == [polite, assertive]
-
-
-def test_priorities_differ_in_sign() -> None:
-    assert len({LOOK[priority].sign for priority in Priority}) == len(Priority)
-
-
-# ---- event log
-
-
-class WallClock:
-    def __init__(self) -> None:
-        self.now = datetime(2026, 3, 4, 14, 2, 0)
-
-    def __call__(self) -> datetime:
-        return self.now
-
-    def wait(self, seconds: float) -> None:
-        self.now += timedelta(seconds=seconds)
-
-
-@pytest.fixture
-def wall() -> WallClock:
-    return WallClock()
-
-
-@pytest.fixture
-def log(qtbot: QtBot, wall: WallClock) -> EventLog:
-    widget = EventLog(wall)
-    qtbot.addWidget(widget)
-    widget.resize(470, 200)
-    return widget
-
-
-@pytest.mark.parametrize("visible", [True, False])
-def test_log_lists_the_newest_first_with_time_and_kind(log: EventLog, wall: WallClock, visible: bool) -> None:
-    log.setVisible(visible)
-    log.add(LogKind.MODE, "ADVISORY to ARMED")
-    wall.wait(65)
-    log.add(LogKind.OPERATOR, "hand\nover")
-    assert log.lines == ["14:03:05  operator  hand over", "14:02:00  mode      ADVISORY to ARMED"]
-
-
-@pytest.mark.parametrize("visible", [True, False])
-def test_a_repetition_within_two_seconds_is_counted(log: EventLog, wall: WallClock, visible: bool) -> None:
-    log.setVisible(visible)
-    for _ in range(3):
-        log.add(LogKind.GATE, "clamped")
-        wall.wait(2.0)
-    wall.wait(0.1)
-    log.add(LogKind.GATE, "clamped")
-    log.add(LogKind.ALERT, "clamped")
-    assert [line[10:] for line in log.lines] == ["alert     clamped", "gate      clamped", "gate      clamped ×3"]
-    log.add(LogKind.ALERT, "clamped")
-    assert log.lines[0].endswith("×2"), "also after the list was read"
-
-
-@pytest.mark.parametrize("visible", [True, False])
-def test_log_keeps_the_newest_two_thousand(log: EventLog, visible: bool) -> None:
-    log.setVisible(visible)
-    for k in range(MOST_ROWS + 7):
-        log.add(LogKind.NOTE, str(k))
-    assert len(log.lines) == MOST_ROWS == log._model.rowCount()
-    assert log.lines[-1].endswith("  7")
-
-
-def test_filter_shows_one_kind_also_of_what_comes_later(log: EventLog, wall: WallClock) -> None:
-    log.show()
-    log.add(LogKind.NOTE, "a")
-    log.add(LogKind.ALERT, "b")
-    log.show_kind(LogKind.ALERT)
-    log.add(LogKind.NOTE, "c")
-    log.add(LogKind.NOTE, "c")
-    log.add(LogKind.ALERT, "d")
-    assert [line[-1] for line in log.lines] == ["d", "b"]
-    log.show_kind(None)
-    assert [line.split("  ")[-1].strip() for line in log.lines] == ["d", "c ×2", "b", "a"]
-
-
-def test_copy_all_takes_what_is_shown(log: EventLog) -> None:
-    log.add(LogKind.NOTE, "a")
-    log.add(LogKind.ALERT, "b")
-    log.copy_all()
-    assert QGuiApplication.clipboard().text() == "14:02:00  alert     b\n14:02:00  note      a"
-
-
-def test_context_menu_offers_to_copy(qtbot: QtBot, log: EventLog) -> None:
-    log.show()
-    log.add(LogKind.NOTE, "a")
-    log._view.customContextMenuRequested.emit(QPoint(5, 5))
-    menu = log.findChild(QMenu)
-    assert [action.text() for action in menu.actions()] == ["Copy all"]
-    menu.close()
-
-
-def test_whoever_scrolled_down_keeps_his_place(log: EventLog) -> None:
-    log.show()
-    for k in range(60):
-        log.add(LogKind.NOTE, str(k))
-    QApplication.processEvents()
-    view, bar = log._view, log._view.verticalScrollBar()
-    bar.setValue(240)
-    before = view.indexAt(QPoint(5, 5)).data()
-    log.add(LogKind.NOTE, "new")
-    assert view.indexAt(QPoint(5, 5)).data() == before
-    bar.setValue(0)
-    log.add(LogKind.NOTE, "newer")
-    assert bar.value() == 0 and view.indexAt(QPoint(5, 5)).data().endswith("newer")
-
-
-def test_log_paints_every_kind(log: EventLog) -> None:
-    log.show()
-    for kind in LogKind:
-        log.add(kind, "a long text " * 30)
-        log.add(kind, "a long text " * 30)
-    assert not log.grab().isNull()

@@ -1,0 +1,166 @@
+"""What happened, with counts and a filter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timedelta
+
+import pytest
+from PySide6.QtCore import QPoint
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication, QMenu, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.widgets.alerts import AlertStrip
+from app.widgets.event_log import MOST_ROWS, EventLog, LogKind
+from app.widgets.mode_bar import HEIGHT, ModeBar
+from core.control.alerts import ALERTS, Alert, AlertKey
+from core.control.gate import Source
+from core.control.modes import Mode
+from core.control.pilot import DriveView
+from tests.app.hand_clock import Clock
+
+NARROWEST_AT_720 = 760
+
+
+ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def bar(qtbot: QtBot, clock: Clock) -> ModeBar:
+    widget = ModeBar(clock)
+    qtbot.addWidget(widget)
+    widget.resize(NARROWEST_AT_720, HEIGHT)
+    widget.show()
+    return widget
+
+
+def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
+    return Alert(key, ALERTS[key], detail, repeats)
+
+
+@pytest.fixture
+def picture(qtbot: QtBot) -> QWidget:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    widget.resize(775, 408)
+    widget.show()
+    return widget
+
+
+@pytest.fixture
+def strip(picture: QWidget, clock: Clock) -> Iterator[AlertStrip]:
+    yield AlertStrip(picture, clock)
+
+
+class WallClock:
+    def __init__(self) -> None:
+        self.now = datetime(2026, 3, 4, 14, 2, 0)
+
+    def __call__(self) -> datetime:
+        return self.now
+
+    def wait(self, seconds: float) -> None:
+        self.now += timedelta(seconds=seconds)
+
+
+@pytest.fixture
+def wall() -> WallClock:
+    return WallClock()
+
+
+@pytest.fixture
+def log(qtbot: QtBot, wall: WallClock) -> EventLog:
+    widget = EventLog(wall)
+    qtbot.addWidget(widget)
+    widget.resize(470, 200)
+    return widget
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_log_lists_the_newest_first_with_time_and_kind(log: EventLog, wall: WallClock, visible: bool) -> None:
+    log.setVisible(visible)
+    log.add(LogKind.MODE, "ADVISORY to ARMED")
+    wall.wait(65)
+    log.add(LogKind.OPERATOR, "hand\nover")
+    assert log.lines == ["14:03:05  operator  hand over", "14:02:00  mode      ADVISORY to ARMED"]
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_a_repetition_within_two_seconds_is_counted(log: EventLog, wall: WallClock, visible: bool) -> None:
+    log.setVisible(visible)
+    for _ in range(3):
+        log.add(LogKind.GATE, "clamped")
+        wall.wait(2.0)
+    wall.wait(0.1)
+    log.add(LogKind.GATE, "clamped")
+    log.add(LogKind.ALERT, "clamped")
+    assert [line[10:] for line in log.lines] == ["alert     clamped", "gate      clamped", "gate      clamped ×3"]
+    log.add(LogKind.ALERT, "clamped")
+    assert log.lines[0].endswith("×2"), "also after the list was read"
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_log_keeps_the_newest_two_thousand(log: EventLog, visible: bool) -> None:
+    log.setVisible(visible)
+    for k in range(MOST_ROWS + 7):
+        log.add(LogKind.NOTE, str(k))
+    assert len(log.lines) == MOST_ROWS
+    assert log.lines[-1].endswith("  7")
+
+
+def test_filter_shows_one_kind_also_of_what_comes_later(log: EventLog, wall: WallClock) -> None:
+    log.show()
+    log.add(LogKind.NOTE, "a")
+    log.add(LogKind.ALERT, "b")
+    log.show_kind(LogKind.ALERT)
+    log.add(LogKind.NOTE, "c")
+    log.add(LogKind.NOTE, "c")
+    log.add(LogKind.ALERT, "d")
+    assert [line[-1] for line in log.lines] == ["d", "b"]
+    log.show_kind(None)
+    assert [line.split("  ")[-1].strip() for line in log.lines] == ["d", "c ×2", "b", "a"]
+
+
+def test_copy_all_takes_what_is_shown(log: EventLog) -> None:
+    log.add(LogKind.NOTE, "a")
+    log.add(LogKind.ALERT, "b")
+    log.copy_all()
+    assert QGuiApplication.clipboard().text() == "14:02:00  alert     b\n14:02:00  note      a"
+
+
+def test_context_menu_offers_to_copy(qtbot: QtBot, log: EventLog) -> None:
+    log.show()
+    log.add(LogKind.NOTE, "a")
+    log._view.customContextMenuRequested.emit(QPoint(5, 5))
+    menu = log.findChild(QMenu)
+    assert [action.text() for action in menu.actions()] == ["Copy all"]
+    menu.close()
+
+
+def test_whoever_scrolled_down_keeps_his_place(log: EventLog) -> None:
+    log.show()
+    for k in range(60):
+        log.add(LogKind.NOTE, str(k))
+    QApplication.processEvents()
+    view, bar = log._view, log._view.verticalScrollBar()
+    bar.setValue(240)
+    before = view.indexAt(QPoint(5, 5)).data()
+    log.add(LogKind.NOTE, "new")
+    assert view.indexAt(QPoint(5, 5)).data() == before
+    bar.setValue(0)
+    log.add(LogKind.NOTE, "newer")
+    assert bar.value() == 0 and view.indexAt(QPoint(5, 5)).data().endswith("newer")
+
+
+def test_log_paints_every_kind(log: EventLog) -> None:
+    log.show()
+    for kind in LogKind:
+        log.add(kind, "a long text " * 30)
+        log.add(kind, "a long text " * 30)
+    assert not log.grab().isNull()

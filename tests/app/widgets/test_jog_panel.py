@@ -1,0 +1,117 @@
+"""The keys on the screen, and how far they have moved the robot."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMenu
+from pytestqt.qtbot import QtBot
+
+from app.operator.manual_drive import Motion
+from app.widgets.jog_panel import JogPanel
+from app.widgets.mode_bar import MouseHeld
+from core.config.models import JogConfig
+from core.config.safety import ServosConfig
+from core.types import RobotStatus
+
+
+def test_a_motion_held_with_the_mouse_ends_with_a_release_that_a_menu_got(qtbot: QtBot) -> None:
+    panel, menu = JogPanel(2.0), QMenu()
+    qtbot.addWidget(panel)
+    qtbot.addWidget(menu)
+    menu.addAction("Open")
+    panel.show()
+    heard: list[tuple[str, Motion]] = []
+    panel.pressed.connect(lambda motion: heard.append(("down", motion)))
+    panel.released.connect(lambda motion: heard.append(("up", motion)))
+    cap = next(cap for cap in panel.findChildren(MouseHeld) if cap.accessibleName().startswith("advance"))
+    QTest.mousePress(cap, Qt.MouseButton.LeftButton)
+    menu.popup(panel.mapToGlobal(panel.rect().topLeft()))
+    QTest.mouseRelease(menu, Qt.MouseButton.RightButton)
+    assert heard == [("down", Motion.ADVANCE)]
+    QTest.mouseRelease(menu, Qt.MouseButton.LeftButton)
+    assert heard == [("down", Motion.ADVANCE), ("up", Motion.ADVANCE)]
+    menu.close()
+
+
+def test_jog_panel_says_aloud_what_it_shows(qtbot: QtBot) -> None:
+    panel = JogPanel(max_pull_mm=2.0)
+    qtbot.addWidget(panel)
+    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (1.3, -0.7, 0.3, 0.3), (0.0,) * 4))
+    assert panel.readout == "bend 0.50, pitch 0.00, in 84 mm"
+    assert panel._readout.accessibleName()
+    assert panel._readout.accessibleDescription() == panel.readout
+    panel.set_enabled(False, "Fault")
+    assert panel.accessibleDescription() == "Fault"
+
+
+def test_jog_panel_says_what_a_held_key_makes(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    assert panel.speeds == "", "no rig is known"
+    panel.set_speeds(JogConfig(bend_rate_per_s=1.2, advance_mm_s=10.0, delivery_mm_s=8.0), ServosConfig(max_pull_mm=2.0))
+    assert panel.speeds == "feed 10, sheath 8, wires 2.4 mm/s"
+    assert panel.speeds in panel._readout.accessibleDescription()
+    assert panel._caps[Motion.WITHDRAW].toolTip() == "sheath back: hold to move, release to stop; 8 mm/s"
+    assert panel._caps[Motion.PITCH_UP].toolTip().endswith("the tendons are pulled 2.4 mm/s")
+    heard: list[float] = []
+    panel.speed_changed.connect(heard.append)
+    panel._speed.setCurrentIndex(1)
+    assert heard == [0.5]
+    assert panel.speeds == "feed 5, sheath 4, wires 1.2 mm/s"
+    panel.set_speeds(JogConfig(), ServosConfig(max_pull_mm=1.0))
+    assert panel.speeds == "feed 5, sheath 5, wires 0.6 mm/s", "another rig has the chosen share, too"
+
+
+def test_pitch_is_seen_and_not_only_said(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    panel.resize(203, 170)
+    panel.show()
+    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (0.3, 0.3, 0.3, 0.3), (0.0,) * 4))
+    before = panel._readout.grab().toImage()
+    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (0.3, 0.3, 1.7, -1.1), (0.0,) * 4))
+    assert panel._readout.grab().toImage() != before
+
+
+def test_key_caps_light_up_and_can_be_held_with_the_mouse(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    panel.resize(280, 140)
+    panel.show()
+    events: list[tuple[str, Motion]] = []
+    panel.pressed.connect(lambda motion: events.append(("down", motion)))
+    panel.released.connect(lambda motion: events.append(("up", motion)))
+    panel.show_held(frozenset({Motion.ADVANCE}))
+    lit = [motion for motion, cap in panel._caps.items() if cap.is_lit]
+    assert lit == [Motion.ADVANCE]
+    cap = panel._caps[Motion.STEER_LEFT]
+    qtbot.mousePress(cap, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
+    qtbot.mouseRelease(cap, Qt.MouseButton.LeftButton, pos=QPoint(500, 5))
+    assert events == [("down", Motion.STEER_LEFT), ("up", Motion.STEER_LEFT)]
+    qtbot.mousePress(cap, Qt.MouseButton.LeftButton)
+    panel.hide()
+    assert events[-1] == ("up", Motion.STEER_LEFT), "a hidden cap holds nothing"
+
+
+def test_readout_shows_how_far_the_robot_is_in(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    panel.show_status(RobotStatus(0.0, 84.2, 0.0, (-1.0, 1.0, 0, 0), (0, 0, 0, 0)))
+    assert panel.readout == "bend -0.50, pitch 0.00, in 84 mm"
+    panel.show_status(None)
+    assert panel.readout == "bend –, pitch –, in – mm", "a straight head would be something that is known"
+
+
+def test_readout_shows_nothing_of_joints_of_which_nobody_knows_where_they_are(qtbot: QtBot) -> None:
+    panel = JogPanel(2.0)
+    qtbot.addWidget(panel)
+    panel.show_known((False,) * 7)
+    panel.show_status(RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4))
+    assert panel.readout == "bend –, pitch –, in – mm"
+    unknown = panel._readout.grab().toImage()
+    panel.show_known((True, True, False, True, True, True, True))
+    assert panel.readout == "bend 0.00, pitch –, in 0 mm"
+    assert panel._readout.grab().toImage() != unknown, "a bar without a mark is no straight head"
+    panel.show_known((True,) * 4 + (False, True, True))
+    assert panel.readout == "bend 0.00, pitch 0.00, in – mm"

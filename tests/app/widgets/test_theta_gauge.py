@@ -1,0 +1,47 @@
+"""The angle on its dial."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.ui import theme
+from app.widgets.theta_gauge import ThetaGauge
+from tests.app.fakes import make_pose
+
+
+def test_gauge_shows_sign_number_and_side(qtbot: QtBot) -> None:
+    gauge = ThetaGauge(10.0)
+    qtbot.addWidget(gauge)
+    assert (gauge.text, gauge.direction) == ("–", "")
+    gauge.show_pose(make_pose(theta=18.44))
+    assert (gauge.text, gauge.direction) == ("+18.4°", "right")
+    gauge.show_pose(make_pose(theta=-132.0))
+    assert (gauge.text, gauge.direction) == ("−132.0°", "left")
+    gauge.show_pose(None)
+    assert gauge.text == "–"
+
+
+@pytest.mark.parametrize(("theta", "side"), [(60.0, 1), (-60.0, -1), (170.0, 1), (-170.0, -1)])
+def test_needle_points_to_the_side_of_the_sign(qtbot: QtBot, theta: float, side: int) -> None:
+    gauge = ThetaGauge(10.0)
+    qtbot.addWidget(gauge)
+    gauge.resize(300, 200)
+    gauge.show_pose(make_pose(theta=theta))
+    image = gauge.grab().toImage()
+    needle = [
+        x for x in range(image.width()) for y in range(image.height()) if image.pixelColor(x, y).name().upper() == theme.THETA
+    ]
+    assert needle
+    assert (np.mean(needle) - image.width() / 2) * side > 5
+
+
+def test_needle_follows_at_once_the_number_when_texts_are_renewed(qtbot: QtBot) -> None:
+    gauge = ThetaGauge(10.0)
+    qtbot.addWidget(gauge)
+    gauge.show_pose(make_pose(theta=10.0))
+    gauge.show_pose(make_pose(theta=20.0), renew_text=False)
+    assert gauge.text == "+10.0°"
+    gauge.show_pose(make_pose(theta=20.0))
+    assert gauge.text == "+20.0°"

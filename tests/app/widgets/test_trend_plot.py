@@ -1,0 +1,57 @@
+"""The last thirty seconds as curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.widgets.trend_plot import SPAN_S, TrendPlot
+from core.config.models import PoseConfig
+from tests.app.fakes import make_pose, make_scene
+
+LIMITS = PoseConfig()
+
+
+def test_frames_without_a_pose_are_gaps(qtbot: QtBot) -> None:
+    plot = TrendPlot(LIMITS)
+    qtbot.addWidget(plot)
+    for k in range(5):
+        plot.add(make_scene(None if k == 2 else make_pose(theta=float(k)), captured_s=k * 0.1))
+    plot._draw()
+    ago, theta = plot.curves[0].getData()
+    np.testing.assert_allclose(ago, [-0.4, -0.3, -0.2, -0.1, 0.0], atol=1e-9)
+    np.testing.assert_array_equal(theta, [0.0, 1.0, np.nan, 3.0, 4.0])
+
+
+def test_trends_go_on_to_the_left_while_nothing_comes(qtbot: QtBot) -> None:
+    """Where now is there is no value: the newest one is not taken for it."""
+    plot = TrendPlot(LIMITS)
+    qtbot.addWidget(plot)
+    for k in range(50):
+        plot._pace.reset()
+        plot.add(make_scene(make_pose(theta=5.0), index=k, captured_s=100.0 + 0.1 * k))
+    newest_s = plot.curves[0].xData[-1]
+    assert newest_s == 0.0
+    plot._pace.reset()
+    plot.show_silence(12.0)
+    assert plot.curves[0].xData[-1] == pytest.approx(-12.0)
+    plot._pace.reset()
+    plot.show_silence(SPAN_S + 1.0)
+    assert len(plot.curves[0].xData) == 0
+    plot._pace.reset()
+    plot.add(make_scene(make_pose(theta=5.0), index=50, captured_s=120.0))
+    assert plot.curves[0].xData[-1] == 0.0
+
+
+def test_trends_hold_thirty_seconds_and_restart_when_the_clock_jumps_back(qtbot: QtBot) -> None:
+    plot = TrendPlot(LIMITS)
+    qtbot.addWidget(plot)
+    for k in range(1200):
+        plot.add(make_scene(make_pose(), captured_s=k / 30))
+    plot._draw()
+    ago, _ = plot.curves[0].getData()
+    assert ago[0] == pytest.approx(-SPAN_S, abs=0.04)
+    plot.add(make_scene(make_pose(), captured_s=0.0))
+    plot._draw()
+    assert len(plot.curves[0].getData()[0]) == 1
