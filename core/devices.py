@@ -8,9 +8,10 @@ One-slot hand-over between threads: the newest value wins, the older one is coun
 from __future__ import annotations
 
 import threading
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from core.types import Command, Frame, RobotStatus
+if TYPE_CHECKING:
+    from core.types import Command, Frame, RobotStatus
 
 
 class UserError(Exception):

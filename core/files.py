@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.devices import UserError
+from core.system import MAX_PIXELS
 from core.types import Image
 
 VIDEO_ENDINGS = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v")
@@ -98,18 +99,6 @@ def name_as_text(name: str | Path) -> str:
 def name_of(path: Path) -> str:
     """What a file or folder is called, however it was given: "." and ".." have names, too. A link keeps its own."""
     return os.path.basename(os.path.abspath(path))
-
-
-MAX_PIXELS = 120_000_000
-"""8k (33 million pixels) passes easily; far beyond it a file is rather damaged or hostile than a photograph."""
-
-
-def limit_pictures() -> None:
-    """Let OpenCV refuse larger pictures before it decodes them: a small file may say that it is huge, and takes gigabytes.
-
-    To be called before OpenCV is loaded; the program's other processes inherit it.
-    """
-    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MAX_PIXELS))
 
 
 _AS_SEEN = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR

@@ -113,3 +113,15 @@ def let_the_window_first() -> None:
         thread = threading.get_native_id()
         with contextlib.suppress(OSError):  # where it is not to be had the window waits a little longer
             os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + _BEHIND)
+
+
+MAX_PIXELS = 120_000_000
+"""8k (33 million pixels) passes easily; far beyond it a file is rather damaged or hostile than a photograph."""
+
+
+def limit_pictures() -> None:
+    """Let OpenCV refuse larger pictures before it decodes them: a small file may say that it is huge, and takes gigabytes.
+
+    To be called before OpenCV is loaded; the program's other processes inherit it.
+    """
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MAX_PIXELS))

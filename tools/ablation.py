@@ -24,13 +24,15 @@ import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from app.commands.options import ConfigOption, JsonOption, ModelOption, check_masks
 from app.commands.perceive import LeftOut
 from app.commands.progress import progress_bar
 from core.config.models import PerceptionConfig, TwinConfig, choose_model, load_config
@@ -949,3 +951,27 @@ def _write_frames(path: Path, rows: list[dict[str, Any]]) -> None:
             writer.writerows(row | {"stem": name_as_text(row["stem"])} for row in rows)
     except OSError as error:
         raise AblationError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
+
+
+def main(
+    labelled: Annotated[Path | None, typer.Argument(metavar="SET", help="labelled set as synth writes it")] = None,
+    json: JsonOption = False,
+    out: Annotated[Path | None, typer.Option(help="folder for ablation.json, ablation.md and ablation_frames.csv")] = None,
+    true_masks: Annotated[bool, typer.Option("--true-masks", help="the true masks instead of the network's")] = False,
+    sequence: Annotated[int, typer.Option(min=0, max=100_000, help="also measure streams, of so many frames of the twin")] = 0,
+    phantom: Annotated[list[str] | None, typer.Option(help="named phantom of these frames; default: all, in turn")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="of the bootstrap and of the twin")] = 0,
+    model: ModelOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """What each step is worth: from the paper taken literally to ours, on the same masks of the same frames.
+
+    And, in streams, perception as the window has it, which looks for itself.
+    """
+    check_masks(model, true_masks=true_masks)
+    plan = Plan(labelled, model, config, true_masks, sequence, tuple(phantom or ()), seed, out)
+    run_ablation(plan, as_json=json)
+
+
+if __name__ == "__main__":
+    typer.run(main)

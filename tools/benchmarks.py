@@ -1,11 +1,4 @@
-"""``benchmark --player``: how fast the player opens a long session and seeks in it, and what it needs of memory.
-
-``benchmark --recording``: how much a recording slows perception down, measured in turns in one run.
-
-``benchmark --window``: the operator window as it runs, with a robot that is being driven: pace, blocking, memory.
-
-An operator without a person, for ``benchmark --window``: moves the robot to and fro by hand, then hands over to the program.
-"""
+"""``python -m tools.benchmarks window|player|recording``: pace, blocking and memory of the windows, and what a recording costs."""
 
 from __future__ import annotations
 
@@ -19,19 +12,21 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import psutil
+import typer
 from PySide6.QtCore import QObject, QTimer
 
-from app.commands.benchmark import quantiles
+from app.commands.benchmark import print_figures, quantiles, stream_config, use_offscreen
+from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption
 from app.commands.progress import progress_bar
 from app.operator.manual_drive import REPEAT_MS
 from app.operator.rig_engine import leaving_a_core
 from app.operator.window import OperatorWindow
 from app.ui.texts import OperatorStep
-from core.config.models import Config, PursuitConfig, TwinConfig
+from core.config.models import Config, PursuitConfig, TwinConfig, choose_model, load_config
 from core.control.modes import DRIVING_MODES, Mode
 from core.control.motion import AT_REST, Jog
 from core.control.pursuit import look_ahead
@@ -455,3 +450,47 @@ def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     elif watch.ended_early:
         sys.stderr.write(f"note: closed before its {seconds:g} s; the figures are of the time until then\n")
     return watch.result()
+
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+
+@app.command("window")
+def run_window_pace(
+    seconds: Annotated[float, typer.Argument(min=5.0, max=3600.0, help="from the first picture on")],
+    json: JsonOption = False,
+    config: ConfigOption = None,
+) -> None:
+    """Run the operator window and measure its pace (offscreen when there is no display)."""
+    use_offscreen(os.environ)
+    print_figures(measure_window(seconds, config), json, "window")
+
+
+@app.command("player")
+def run_player(
+    minutes: Annotated[float, typer.Argument(min=0.5, max=600.0, help="length of the session")],
+    json: JsonOption = False,
+    model: ModelOption = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Open a session of so many minutes in the player and seek in it (offscreen when there is no display)."""
+    use_offscreen(os.environ)
+    print_figures(measure_player(load_config(config, preset, choose_model(model)), minutes), json, "player")
+
+
+@app.command("recording")
+def run_recording(
+    frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
+    json: JsonOption = False,
+    model: ModelOption = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """How much a recording slows perception down, in turns."""
+    settings = stream_config(load_config(config, preset, choose_model(model)))
+    print_figures(measure_recording(settings, frames), json, "recording")
+
+
+if __name__ == "__main__":
+    app()

@@ -29,10 +29,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import cv2
 import numpy as np
+import typer
 from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtSvg import QSvgRenderer
@@ -41,7 +42,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
 from app.commands.evaluate import LikePaper, run_evaluate
-from app.commands.train import run_synth
+from app.commands.options import ConfigOption
+from app.commands.synth import make_set
 from app.operator.preflight import PreflightModel
 from app.operator.startup import WindowServices
 from app.operator.window import OperatorWindow
@@ -850,7 +852,7 @@ def study_figures(studio: Studio) -> None:
     """The figures of an evaluation like the paper's, on frames of the twin; none of them was trained on."""
     labelled, result = studio.folder / "labelled", studio.folder / "result"
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        run_synth(labelled, _STUDY_FRAMES, _STUDY_SEED, (640, 480), None, None)
+        make_set(labelled, _STUDY_FRAMES, _STUDY_SEED)
         run_evaluate(
             labelled,
             None,
@@ -877,3 +879,16 @@ def study_figures(studio: Studio) -> None:
     painter.end()
     if not page.save(str(studio.out / "study_figures.png")):
         raise UserError(f"{studio.out}: cannot be written")
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="folder of the pictures")],
+    only: Annotated[list[str] | None, typer.Option(help="only this picture; may be repeated")] = None,
+    config: ConfigOption = None,
+) -> None:
+    """The pictures of the documents, from the running program with fixed seeds. No screen is needed."""
+    run_screenshots(out, only or (), config)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -29,10 +29,12 @@ from dataclasses import asdict, dataclass, field, replace
 from io import FileIO
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
+from app.commands.options import JsonOption
 from app.commands.progress import Interrupt, progress_bar
 from app.operator.rig_engine import EngineMaker, RigEngine
 from core.config.models import Config, PerceptionConfig
@@ -883,3 +885,20 @@ def _text(summary: dict[str, Any]) -> str:
         f"faults: {sum(summary['faults'].values())}; requests: {sum(summary['operator'].values())}",
     ]
     return "\n".join([*lines, *(f"problem: {text}" for text in (*summary["unsafe_texts"], *summary["problems"]))])
+
+
+def main(
+    hours: Annotated[float, typer.Option(min=0.005, max=1000.0, help="Ctrl-C ends it sooner and tells the figures so far")] = 2.0,
+    seed: Annotated[int, typer.Option(min=0, help="of faults and operator")] = 0,
+    out: Annotated[Path | None, typer.Option(help="file for the samples and the summary, one JSON object a line")] = None,
+    true_masks: Annotated[
+        bool, typer.Option("--true-masks", help="the twin's own masks instead of the network's: lighter")
+    ] = False,
+    json: JsonOption = False,
+) -> None:
+    """Hours of twin under random faults and operator input: memory, threads, files, records, and every goal on the wire."""
+    sys.exit(run_soak(hours, seed, out, true_masks=true_masks, as_json=json))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -13,7 +13,9 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from app.annotator.sources import (
     AnnotateOptions,
@@ -26,6 +28,7 @@ from app.annotator.sources import (
     rater_name,
     read_annotated,
 )
+from app.commands.options import ConfigOption, JsonOption, ModelOption
 from app.commands.progress import check_can_write, progress_bar
 from app.ui.i18n import tr
 from core.annotation.model import AnnotationError, ImageView, measure_lines
@@ -33,6 +36,7 @@ from core.annotation.store import AnnotationStore, FoundImage, ItemKey
 from core.annotation.study import QueueOrder, StudySettings, Task, queue_order, repeat_views, settings_from, tasks
 from core.config.files import own_config
 from core.config.models import Config, choose_model, load_config
+from core.devices import UserError
 from core.perception import compiled
 from core.types import Frame
 
@@ -260,6 +264,62 @@ def salvage_annotations(store_path: Path, out: Path | None) -> int:
 
 _KEPT = (("loupe", "L"), ("masks", "K"))
 """Switches of the window that are as they were left, and their keys."""
+
+
+def annotate(
+    paths: Annotated[list[Path] | None, typer.Argument(help="folders, pictures, videos or sessions; default: this folder")] = None,
+    store: Annotated[Path | None, typer.Option(help="annotation file; default: annotations.lumenpilot.sqlite there")] = None,
+    rater: Annotated[str | None, typer.Option(help="who annotates; default: the user's name")] = None,
+    study: Annotated[
+        str | None,
+        typer.Option(
+            help='blind study of this name: begun at the first call, gone on with at later ones; --report, --export: "" outside any'
+        ),
+    ] = None,
+    repeats: Annotated[int | None, typer.Option(min=1, max=20, help="how often a study shows each image; default: 2")] = None,
+    mirror: Annotated[bool, typer.Option("--mirror", help="repeats of a study are shown mirrored")] = False,
+    turn: Annotated[bool, typer.Option("--turn", help="repeats of a study are shown turned by 180 degrees")] = False,
+    order: Annotated[str | None, typer.Option(help="listed, random, worst (least sure first) or even (evenly over time)")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="of the shuffled order")] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(min=1, max=100_000, help="pictures taken of each video, evenly; default: those taken before, or 48"),
+    ] = None,
+    report: Annotated[bool, typer.Option("--report", help="agreement within and between raters, instead of the window")] = False,
+    export: Annotated[str | None, typer.Option(help="dataset (for train), csv (for evaluate) or coco, to --out")] = None,
+    import_: Annotated[list[Path] | None, typer.Option("--import", help="labelme or COCO file or folder; may be repeated")] = None,
+    join: Annotated[
+        list[Path] | None, typer.Option("--join", help="take in the answers of another annotation file; may be repeated")
+    ] = None,
+    as_: Annotated[
+        list[str] | None, typer.Option("--as", metavar="THERE=HERE", help="what a rater of joined files is called here")
+    ] = None,
+    salvage: Annotated[bool, typer.Option("--salvage", help="copy what is readable of a damaged annotation file")] = False,
+    out: Annotated[Path | None, typer.Option(help="where report or export go")] = None,
+    as_json: JsonOption = False,
+    model: ModelOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Measure angles and states by hand, draw masks; as a study with several raters, blind and repeated."""
+    if study == "" and not report and export is None:  # without a name it would not be blind
+        raise UserError("--study is empty: give it a value, or leave it out (is a variable of a script not set?)")
+    options = AnnotateOptions(
+        paths=tuple(paths or ()),
+        store=store,
+        study=StudyOptions(study, rater, repeats, mirror, turn, seed, order),
+        frames=frames,
+        report=report,
+        export=export,
+        imports=tuple(import_ or ()),
+        joins=tuple(join or ()),
+        names=tuple(as_ or ()),
+        salvage=salvage,
+        out=out,
+        as_json=as_json,
+        model=model,
+        config_path=config,
+    )
+    sys.exit(run_annotate(options))
 
 
 def run_annotate(options: AnnotateOptions) -> int:

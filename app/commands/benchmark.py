@@ -1,4 +1,4 @@
-"""``benchmark``: speed against the paper-literal baseline in the same run, accuracy on a labelled set, the window's pace."""
+"""``benchmark``: speed against the paper-literal baseline in the same run, or accuracy on a labelled set."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import tempfile
 import time
 from collections.abc import Iterator, MutableMapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 from rich.console import Console
 from rich.table import Table
 
+from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption, check_masks
 from app.commands.perceive import LeftOut
 from app.commands.progress import progress_bar
 from core.config.models import Config, TwinConfig, choose_model, load_config
@@ -29,16 +31,48 @@ if TYPE_CHECKING:
     from core.perception.pipeline import Pipeline
 
 
+_FRAMES = 120
 _BASELINE_EVERY = 8
+"""Frames from one frame of the baseline to the next."""
 _WARM_UP = 3
+"""Frames that are not timed."""
 
 
-def _config(model: str | None, preset: str | None, config_path: Path | None) -> Config:
-    return load_config(config_path, preset, choose_model(model))
+def benchmark(
+    json: JsonOption = False,
+    accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
+    window: Annotated[float | None, typer.Option(hidden=True)] = None,
+    recording: Annotated[bool, typer.Option("--recording", hidden=True)] = False,
+    player: Annotated[float | None, typer.Option(hidden=True)] = None,
+    true_masks: Annotated[bool, typer.Option("--true-masks", help="accuracy of the geometry alone, without the network")] = False,
+    store: Annotated[bool, typer.Option("--store", help="keep the accuracy in the model's model.json")] = False,
+    frames: Annotated[int | None, typer.Option(min=3, max=10_000, help="frames to time; default: 120")] = None,
+    model: ModelOption = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Latency per stage, throughput, memory and start-up, against the paper-literal baseline in the same run; or accuracy."""
+    for name, given in {"window": window is not None, "player": player is not None, "recording": recording}.items():
+        if given:
+            raise UserError(f"benchmark --{name} is a development tool now: .venv/bin/python -m tools.benchmarks {name}")
+    if accuracy is None and (store or true_masks):
+        raise UserError(f"{'--store' if store else '--true-masks'} is for --accuracy SET")
+    if store and (true_masks or preset is not None or config is not None):
+        raise UserError("--store keeps figures of the model as it is shipped: leave --true-masks, --preset and --config out")
+    check_masks(model, true_masks=true_masks)
+    if frames is not None and accuracy is not None:
+        raise UserError("--frames is for speed: leave it out with --accuracy")
+    settings = load_config(config, preset, choose_model(model))
+    if accuracy is None:
+        # The window takes the configuration's model: start-up with another one is not measured.
+        first_frame_s = _first_frame_s(config) if model is None and preset is None else None
+        print_figures(measure_speed(settings, frames or _FRAMES, first_frame_s), json, "speed")
+    else:
+        measure_accuracy(accuracy, settings, as_json=json, store=store, true_masks=true_masks)
 
 
-def _as_in_a_stream(config: Config) -> Config:
-    """What is timed frame by frame is what a stream would cost: there a frame is seen in all orientations only on request."""
+def stream_config(config: Config) -> Config:
+    """With frames segmented once, as in a stream, where the configuration has single pictures segmented in all orientations."""
     segmentation = config.perception.segmentation
     if segmentation.mirrored != "pictures":
         return config
@@ -51,14 +85,11 @@ def quantiles(values: Sequence[float]) -> dict[str, float]:
     return {"p50": round(float(np.median(values)), 3), "p95": round(float(np.percentile(values, 95)), 3)}
 
 
-def run_speed(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
-    """Time perception frame by frame on twin pictures, with a baseline frame in between every eighth; raises UserError."""
+def measure_speed(config: Config, frames: int, first_frame_s: float | None = None) -> dict[str, Any]:
+    """Time perception frame by frame on twin pictures, with a frame of the baseline after every eighth; raises UserError."""
     from core.perception.pipeline import open_pipeline
 
-    config = _as_in_a_stream(_config(model, preset, config_path))
-    pipeline = open_pipeline(config.perception)
-    # The window takes the configuration's model: how long it needs for another one is not asked.
-    first_frame_s = _first_frame_s(config_path) if model is None and preset is None else None
+    pipeline = open_pipeline(stream_config(config).perception)
     peak_memory_mb, baseline = _warm_up(pipeline)
     scenes: list[Scene] = []
     baseline_ms: list[float] = []
@@ -82,7 +113,7 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
     totals = [scene.latency_ms["total"] for scene in scenes]
     until_seen = [scene.latency_ms.get("prepare", 0.0) + scene.latency_ms.get("network", 0.0) for scene in scenes]
     after = [total - network for total, network in zip(totals, until_seen, strict=True)]
-    result = {
+    return {
         "total_ms": quantiles(totals),
         "after_network_ms": quantiles(after),
         "stages_ms": {stage: quantiles([scene.latency_ms.get(stage, 0.0) for scene in scenes]) for stage in stages},
@@ -97,11 +128,10 @@ def run_speed(frames: int, *, model: str | None, preset: str | None, config_path
         "answered": sum(scene.pose is not None for scene in scenes),
         "seconds": round(time.perf_counter() - started, 1),
     }
-    _print(result, as_json, "speed")
 
 
 def _warm_up(pipeline: Pipeline) -> tuple[float, PaperBaseline]:
-    """Perceive some frames, weigh the process before torch is in it, then load the baseline and run it once cold."""
+    """Perceive some frames, measure the memory before torch is loaded, then load the baseline and run it once cold."""
     for index, image in enumerate(_pictures(_WARM_UP)):
         scene = pipeline.perceive_single(Frame(index, index / 30, image))
     peak_memory_mb = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1)
@@ -131,11 +161,11 @@ def _pictures(count: int) -> Iterator[Image]:
 def _first_frame_s(config_path: Path | None) -> float | None:
     """Seconds from starting ``main.py`` to its first overlaid frame, in a process of its own (offscreen without a display).
 
-    As on the first day: nothing is there that an earlier start has kept.
+    As at the very first start: without caches of earlier ones.
     """
     main = Path(sys.modules["__main__"].__file__ or "main.py").resolve()
     environment = dict(os.environ)
-    _without_display(environment)
+    use_offscreen(environment)
     started = time.monotonic()
     command = [sys.executable, str(main), "gui", "--until-first-frame", "--rig", "twin"]
     command += ["--config", str(config_path)] if config_path is not None else []
@@ -153,56 +183,24 @@ def _first_frame_s(config_path: Path | None) -> float | None:
         return None
 
 
-def run_window_pace(seconds: float, *, config_path: Path | None, as_json: bool) -> None:
-    """Run the operator window and measure it (offscreen when there is no display)."""
-    _without_display(os.environ)
-    from tools.benchmarks import measure_window
-
-    _print(measure_window(seconds, config_path), as_json, "window")
-
-
-def run_player(minutes: float, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
-    """Open a long session in the player window and measure it (offscreen when there is no display)."""
-    _without_display(os.environ)
-    from tools.benchmarks import measure_player
-
-    _print(measure_player(_config(model, preset, config_path), minutes), as_json, "player")
-
-
-def _without_display(environment: MutableMapping[str, str]) -> None:
+def use_offscreen(environment: MutableMapping[str, str]) -> None:
+    """Let Qt draw offscreen where there is no display."""
     if sys.platform.startswith("linux") and not environment.get("DISPLAY") and not environment.get("WAYLAND_DISPLAY"):
         environment.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
-def run_recording(frames: int, *, model: str | None, preset: str | None, config_path: Path | None, as_json: bool) -> None:
-    """How much a recording slows perception down."""
-    from tools.benchmarks import measure_recording
-
-    _print(measure_recording(_as_in_a_stream(_config(model, preset, config_path)), frames), as_json, "recording")
-
-
-def run_accuracy(
-    folder: Path,
-    *,
-    model: str | None,
-    preset: str | None,
-    config_path: Path | None,
-    as_json: bool,
-    store: bool = False,
-    true_masks: bool = False,
-) -> None:
+def measure_accuracy(folder: Path, config: Config, *, as_json: bool, store: bool = False, true_masks: bool = False) -> None:
     """Perceive every frame of a synth set as a single image and compare with its truth.
 
     `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network: not both.
-    An interruption (Ctrl-C) tells the figures of the frames until then, and stores nothing.
+    After an interruption (Ctrl-C) the figures of the frames until then are shown, and nothing is stored.
     """
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_writer import check_can_change, write_figures
     from core.perception.model_file import model_folder, sha256_of, trained_without
 
-    config = _config(model, preset, config_path)
     if store:
-        check_can_change(config.perception.segmentation.model)  # said before anything is looked at
+        check_can_change(config.perception.segmentation.model)
     samples, truth = find_labelled(folder, POSE_KEYS)
 
     from core.evaluation.accuracy import TrueMasks, score_set, summarise, summarise_looks
@@ -235,8 +233,8 @@ def run_accuracy(
         figures |= summarise_looks(scores, looks, without, confident_from)
     part = f", interrupted after {len(scores)} of {len(samples)} frames" if interrupted else ""
     try:
-        _print(figures, as_json, f"accuracy on {folder}{part}")
-    finally:  # neither costs the other
+        print_figures(figures, as_json, f"accuracy on {folder}{part}")
+    finally:  # stored where it cannot be printed, too
         if store and not interrupted:
             described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
             write_figures(model_folder(config.perception.segmentation.model), described | figures)
@@ -244,7 +242,7 @@ def run_accuracy(
         raise KeyboardInterrupt
 
 
-def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
+def print_figures(result: dict[str, Any], as_json: bool, title: str) -> None:
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
         return
@@ -252,15 +250,15 @@ def _print(result: dict[str, Any], as_json: bool, title: str) -> None:
     for key, value in result.items():
         if isinstance(value, dict) and any(isinstance(inner, dict) for inner in value.values()):
             for inner_key, inner in value.items():
-                table.add_row(f"{key}.{inner_key}", _words(inner))
+                table.add_row(f"{key}.{inner_key}", _text(inner))
         else:
-            table.add_row(key, _words(value))
+            table.add_row(key, _text(value))
     Console(markup=False, emoji=False).print(table)
 
 
-def _words(value: Any) -> str:
+def _text(value: Any) -> str:
     if isinstance(value, dict):
-        return ", ".join(f"{key} {_words(inner)}" for key, inner in value.items()) or "-"
+        return ", ".join(f"{key} {_text(inner)}" for key, inner in value.items()) or "-"
     if value is None:
         return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

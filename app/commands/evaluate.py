@@ -9,16 +9,21 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from app.annotator.comparison import print_agreement
 from app.commands.evaluation_report import print_tables, render_report
+from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption, ProgressOption
 from app.commands.perceive import LeftOut
-from app.commands.progress import asked_teller, check_no_input, progress_bar
+from app.commands.progress import check_no_input, progress_bar, progress_writer, report_progress
 from core.annotation.agreement_report import write_measures
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.config.models import Config, choose_model, load_config
-from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
+from core.devices import UserError
+from core.evaluation import evaluation
+from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, read_measurements, write_measurements
 from core.evaluation.paper import PAPER, against_paper, choose_images, measure_twice, wanted_images
 from core.files import name_as_text, name_of, write_whole
 from core.types import Frame
@@ -51,6 +56,52 @@ class _Perceived:
     reasons: Counter[str] = field(default_factory=Counter)
     left_out: LeftOut = field(default_factory=LeftOut)
     interrupted: bool = False
+
+
+def evaluate(
+    out: Annotated[Path, typer.Option(help="folder for metrics.json, measurements.csv, figures and report.html")],
+    labelled: Annotated[
+        Path | None, typer.Argument(metavar="DIR", help="labelled set as synth writes it, or images annotated by hand")
+    ] = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option(help="columns image, angle_1, angle_2, state, algorithm_angle, algorithm_state; blank where not measured"),
+    ] = None,
+    as_json: JsonOption = False,
+    like_paper: Annotated[
+        bool, typer.Option("--like-paper", help="draw a test like the paper's: 48 images, measured twice with an error")
+    ] = False,
+    manual_sd: Annotated[
+        float | None, typer.Option(min=0, max=30, help="SD of one such manual measure, degrees; default: 1.5")
+    ] = None,
+    study: Annotated[
+        str | None, typer.Option(help='this study of images annotated by hand, its raters and repeats too; "": outside studies')
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="of the drawn images, their manual errors and the bootstrap")] = 0,
+    model: ModelOption = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+    progress_json: ProgressOption = False,
+) -> None:
+    """The algorithm against manual measures, with the statistics of the paper beside its own figures."""
+    if manual_sd is not None and not like_paper:
+        raise UserError("--manual-sd is for --like-paper")
+    if as_json and progress_json:
+        raise UserError("--json and --progress-json both write to standard output: give one of them")
+    if progress_json:
+        report_progress()
+    run_evaluate(
+        labelled,
+        csv,
+        out,
+        as_json=as_json,
+        model=model,
+        preset=preset,
+        config_path=config,
+        like_paper=LikePaper(1.5 if manual_sd is None else manual_sd) if like_paper else None,
+        seed=seed,
+        study_name=study,
+    )
 
 
 def run_evaluate(
@@ -96,7 +147,7 @@ def run_evaluate(
             study = _perceive_annotated(annotations, config, preset, model, study_name, seed, as_recorded=as_recorded)
         else:
             study = _perceive_set(folder, truth, config, preset, like_paper, seed)
-    metrics: dict[str, Any] = {"source": study.source, "seed": seed} | evaluate(study.rows, seed)
+    metrics: dict[str, Any] = {"source": study.source, "seed": seed} | evaluation.evaluate(study.rows, seed)
     if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
         raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
     metrics["notes"] = study.notes + metrics["notes"]
@@ -112,8 +163,8 @@ def run_evaluate(
             write_measures(out / "raters.csv", study.agreement["measures"])
     except OSError as error:
         raise EvaluationError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
-    if (teller := asked_teller()) is not None:
-        teller.tell({"report": str(out / "report.html")} | metrics["images"])
+    if (writer := progress_writer()) is not None:
+        writer.write({"report": str(out / "report.html")} | metrics["images"])
     elif as_json:
         sys.stdout.write(json.dumps(metrics, allow_nan=False) + "\n")
     else:

@@ -115,14 +115,11 @@ def summary_against_paper(verdicts: Mapping[str, str | None]) -> str:
 
 def render_report(metrics: Mapping[str, Any], figures: Mapping[str, bytes]) -> str:
     """The report as one HTML page that needs nothing else, inside it the figures, which are SVG files."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(loader=FileSystemLoader(RESOURCES / "report"), autoescape=True, undefined=StrictUndefined)
-    environment.trim_blocks = environment.lstrip_blocks = True
     source, angle, state = metrics["source"], metrics["angle"], metrics["state"]
     verdicts = metrics.get("against_paper")
     notes = [*([summary_against_paper(verdicts)] if verdicts else []), *metrics["notes"]]
-    text = environment.get_template("evaluation.html.j2").render(
+    return render_page(
+        "evaluation.html.j2",
         title=f"Evaluation of {source['name']}",
         lead=_lead(metrics),
         notes=notes,
@@ -138,7 +135,15 @@ def render_report(metrics: Mapping[str, Any], figures: Mapping[str, bytes]) -> s
         drawn=_drawn(metrics["intervals"]),
         seed=metrics["seed"],
     )
-    return re.sub(r"\n\s*\n+", "\n", text) + "\n"
+
+
+def render_page(template: str, **values: Any) -> str:
+    """One of ``resources/report`` filled in, without empty lines."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(loader=FileSystemLoader(RESOURCES / "report"), autoescape=True, undefined=StrictUndefined)
+    environment.trim_blocks = environment.lstrip_blocks = True
+    return re.sub(r"\n\s*\n+", "\n", environment.get_template(template).render(**values)) + "\n"
 
 
 def _drawn(intervals: Mapping[str, Any]) -> str:

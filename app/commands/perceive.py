@@ -15,11 +15,13 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
+import typer
 
+from app.commands.options import ConfigOption, ModelOption, PresetOption
 from app.commands.progress import LineOutput, check_apart, check_no_input, is_same
 from core.config.models import choose_model, load_config
 from core.control.policies import table_policy
@@ -190,6 +192,21 @@ class Outputs:
     jsonl: Path | None
     masks: Path | None
     overlay: Path | None
+
+
+def perceive(
+    images: Annotated[list[Path], typer.Argument(help="pictures, folders of pictures, or videos")],
+    jsonl: Annotated[str, typer.Option(metavar="<path>", help="one JSON object per image; -: standard output")] = "-",
+    masks: Annotated[Path | None, typer.Option(help="folder for <stem>_vessel.png and <stem>_robot.png")] = None,
+    targets: Annotated[Path | None, typer.Option(help='JSON {"stem": [x, y]}: where the operator wants to go')] = None,
+    overlay: Annotated[Path | None, typer.Option(help="folder for pictures with everything drawn in")] = None,
+    model: ModelOption = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Vessel, robot, angle, distances and pose state of pictures or a video."""
+    lines = None if jsonl == "-" else Path(jsonl)  # ./- is a file
+    run_perceive(images, Outputs(lines, masks, overlay), targets_path=targets, model=model, preset=preset, config_path=config)
 
 
 def run_perceive(

@@ -1,11 +1,4 @@
-"""What all long commands share: progress on standard error, and an end at the next good moment when they are asked to stop.
-
-Progress for another program: one JSON object a line on standard output, instead of a bar on a terminal.
-
-JSON lines to a file or to standard output: what cannot be written is one clear error, whenever the system notices.
-
-Where a command writes: never over what it reads, nor over what somebody may still need.
-"""
+"""Progress and output of long commands: bars on standard error or JSON lines for another program, interruption, result files."""
 
 from __future__ import annotations
 
@@ -18,7 +11,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import IO, Any, Self
+from typing import Any, Self
 
 from rich.console import Console
 from rich.progress import (
@@ -36,83 +29,80 @@ from core.devices import UserError
 from core.session.manifest import EVENTS, FRAMES, MANIFEST
 
 _EVERY_S = 0.1
+"""Between two lines for another program, at least."""
 
 
 class ProgressWriter:
-    """Writes the lines. ``is_heard`` becomes False when nobody reads them any more: the window that had asked is gone."""
+    """Writes JSON lines on standard output. ``is_read`` becomes False when the reader has gone: the window that had asked."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self.is_heard = True
+        self.is_read = True
 
-    def tell(self, record: dict[str, Any]) -> None:
-        """Write an object; when it cannot be written, that is remembered and nothing is raised."""
+    def write(self, record: dict[str, Any]) -> None:
+        """Write an object; raises nothing when that fails."""
         with self._lock:
-            if not self.is_heard:
-                return
-            try:
-                sys.stdout.write(json.dumps(record, allow_nan=False) + "\n")
-                sys.stdout.flush()
-            except (BrokenPipeError, ValueError, OSError):
-                self.is_heard = False
+            if self.is_read:
+                try:
+                    sys.stdout.write(json.dumps(record, allow_nan=False) + "\n")
+                    sys.stdout.flush()
+                except (ValueError, OSError):
+                    self.is_read = False
 
 
 class ProgressLines(Progress):
-    """Draws nothing; tells ``{"what", "done", "total", "left_s"}`` ten times a second at most, and at the end of each task."""
+    """Draws nothing; writes ``{"what", "done", "total", "left_s"}`` ten times a second at most, and at the end of each task."""
 
-    def __init__(self, teller: ProgressWriter) -> None:
+    def __init__(self, writer: ProgressWriter) -> None:
         super().__init__(disable=True, auto_refresh=False)
-        self._teller = teller
-        self._told_s = -_EVERY_S
+        self._writer = writer
+        self._written_s = -_EVERY_S
 
     def update(self, task_id: TaskID, **changes: Any) -> None:
         super().update(task_id, **changes)
-        self._tell(task_id)
+        self._write(task_id)
 
     def advance(self, task_id: TaskID, advance: float = 1) -> None:
         super().advance(task_id, advance)
-        self._tell(task_id)
+        self._write(task_id)
 
-    def _tell(self, task_id: TaskID) -> None:
+    def _write(self, task_id: TaskID) -> None:
         task, now_s = self._tasks[task_id], time.monotonic()
-        if now_s - self._told_s < _EVERY_S and not task.finished:
+        if now_s - self._written_s < _EVERY_S and not task.finished:
             return
-        self._told_s = now_s
+        self._written_s = now_s
         left_s = task.time_remaining
         record = {"what": task.description, "done": task.completed, "total": task.total}
-        self._teller.tell(record | {"left_s": None if left_s is None else round(left_s, 1)})
+        self._writer.write(record | {"left_s": None if left_s is None else round(left_s, 1)})
 
 
-_ASKED: list[ProgressWriter] = []
-"""Empty: people look at a terminal. One process has one standard output, so there is one at most."""
-
-
-def tell_progress() -> ProgressWriter:
-    """From now on every progress bar of this process is told as lines."""
-    if not _ASKED:
-        _ASKED.append(ProgressWriter())
-    return _ASKED[0]
-
-
-def asked_teller() -> ProgressWriter | None:
-    """Who tells, when another program asked for lines."""
-    return _ASKED[0] if _ASKED else None
-
-
+_writers: list[ProgressWriter] = []
+"""One at most; empty: progress is a bar on a terminal."""
 console = Console(stderr=True, markup=False, emoji=False)
-"""Where long work says what it has done, beside its bar."""
+"""For what long commands say beside their bar."""
+
+
+def report_progress() -> None:
+    """From now on every progress bar of this process is written as JSON lines."""
+    if not _writers:
+        _writers.append(ProgressWriter())
+
+
+def progress_writer() -> ProgressWriter | None:
+    """The writer of JSON lines, when another program asked for them."""
+    return _writers[0] if _writers else None
 
 
 def progress_bar() -> Progress:
-    """The bar that all long commands show, on standard error; as lines where another program asked for them."""
-    if (teller := asked_teller()) is not None:
-        return ProgressLines(teller)
+    """The bar of all long commands on standard error, or JSON lines."""
+    if (writer := progress_writer()) is not None:
+        return ProgressLines(writer)
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TaskProgressColumn())
     return Progress(*columns, TimeElapsedColumn(), TimeRemainingColumn(), console=console)
 
 
 class Interrupt:
-    """Ctrl-C and a termination request ask the work to stop at the next good moment instead of tearing it down."""
+    """A context in which Ctrl-C and a termination request set ``asked`` and raise nothing."""
 
     def __init__(self) -> None:
         self.asked = False
@@ -132,22 +122,20 @@ class Interrupt:
 
 
 class LineOutput:
-    """Writes every line at once, so that what is done survives an interruption. A context; None is standard output."""
+    """JSON lines, each written at once: what is done survives an interruption. A context; None is standard output."""
 
     def __init__(self, path: Path | None) -> None:
         self._name = str(path) if path is not None else "standard output"
         try:
-            self._file = self._open(path)
+            if path is not None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                self._file = path.open("w", encoding="utf-8", buffering=1)
+            elif sys.__stdout__ is None:  # started with a closed one
+                raise UserError("standard output is closed; name a file with --jsonl")
+            else:
+                self._file = open(sys.stdout.fileno(), "w", encoding="utf-8", buffering=1, closefd=False)
         except OSError as error:
             raise self._error(error) from None
-
-    def _open(self, path: Path | None) -> IO[str]:
-        if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            return path.open("w", encoding="utf-8", buffering=1)
-        if sys.__stdout__ is None:  # started with a closed one
-            raise UserError("standard output is closed; name a file with --jsonl")
-        return open(sys.stdout.fileno(), "w", encoding="utf-8", buffering=1, closefd=False)
 
     def _error(self, error: OSError) -> UserError:
         return UserError(f"{self._name}: cannot be written ({error.strerror}); choose another file")
@@ -165,7 +153,7 @@ class LineOutput:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         try:
             self._file.close()
-        except OSError as failure:  # what a failed write left in the buffer fails again
+        except OSError as failure:  # a failed write fails again when the buffer is written
             if kind is None:
                 raise self._error(failure) from None
 
@@ -191,10 +179,7 @@ def check_apart(output: Path, others: Iterable[Path], option: str, writer: str) 
 
 
 def check_can_write(output: Path, option: str) -> None:
-    """Raise UserError when the file `output`, given by `option`, cannot be written: now, and not after long work.
-
-    One that is not there yet is not made before there is something to write.
-    """
+    """Raise UserError when the file `output`, given by `option`, cannot be written; none is left there that was not."""
     try:
         is_new = not output.exists()
         output.open("a").close()

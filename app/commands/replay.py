@@ -18,13 +18,15 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, nullco
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from app.commands.options import ConfigOption, PresetOption, SchedulerOption
 from app.commands.perceive import _make_folder
 from app.commands.progress import Interrupt, LineOutput, check_apart, check_no_input, check_no_session, progress_bar
 from app.commands.workers import over_cluster, over_processes
@@ -282,6 +284,34 @@ def _rounded(value: float | None) -> float | None:
 _CHANGES = "changes.jsonl"
 _WRITTEN = ("replay.json", _CHANGES, "replay.svg", "replay.pdf")
 """What ``--out`` gets."""
+
+
+def replay(
+    sessions: Annotated[
+        list[Path], typer.Argument(metavar="SESSION", help="folders of recorded sessions, or folders with sessions in them")
+    ],
+    model: Annotated[str | None, typer.Option(help="model name or folder; default: the recorded configuration's")] = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+    jsonl: Annotated[Path | None, typer.Option(help="the new results, one JSON object per frame, as perceive writes them")] = None,
+    diff: Annotated[bool, typer.Option("--diff", help="also the frames that changed most")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="folder for replay.json, changes.jsonl and the figure as SVG and PDF; of several sessions a folder each"),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="processes, which share the sessions")] = 1,
+    scheduler: SchedulerOption = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="one JSON object on standard output, nothing else there; of several sessions a line each")
+    ] = False,
+) -> None:
+    """Perceive recorded sessions again and compare; without --config or --preset in the recorded configuration."""
+    found = sessions_in(sessions)
+    options = ReplayOptions(found[0], model, preset, config, jsonl, diff)
+    if found == sessions and len(found) == 1 and scheduler is None:
+        run_replay(options, out, as_json=as_json)
+    else:
+        run_replays(found, options, out, workers=workers, scheduler=scheduler, as_json=as_json)
 
 
 def run_replay(options: ReplayOptions, out: Path | None = None, *, as_json: bool = False) -> None:

@@ -1,9 +1,4 @@
-"""``trial``: closed-loop campaigns in the twin, over processes or a Dask cluster; they can be interrupted and gone on with.
-
-The folder of a campaign of trials: what was run with which settings, row by row as it is done.
-
-What a campaign of trials shows: tables on the terminal, and ``report.html`` with its figures inside.
-"""
+"""``trial``: closed-loop campaigns in the twin, over processes or a Dask cluster; kept row by row, so that they can go on."""
 
 from __future__ import annotations
 
@@ -17,14 +12,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
-from app.commands.progress import progress_bar
+from app.commands.options import ConfigOption, ModelOption, SchedulerOption, check_masks
+from app.commands.progress import console, progress_bar
 from app.commands.workers import over_cluster, over_processes
-from core.config.models import RESOURCES, PolicyName, choose_model, load_config
+from core.config.models import PolicyName, choose_model, load_config
 from core.control.policies import POLICY_NAMES
 from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
@@ -34,12 +31,95 @@ from hardware.twin.trial import RANDOM_LOOK, TRIAL_LOOKS, TrialPlan
 
 Job = tuple[PolicyName, int]
 """A policy and a seed."""
+Rows = Sequence[Mapping[str, Any]]
 _KEYS = trial_row(TrialLog(), seed=0, policy="", phantom="", outcome="", way_mm=0.0, target_mm=(0.0, 0.0)).keys()
 """What every row has, whatever came of its trial."""
+_MAX_SEEDS = 100_000
+_WORST = 6
+"""Trials whose track is drawn in the report."""
+HEADINGS = ("policy", "seed", "outcome", "time", "path", "offset", "p95 N", "max N", "help")
 
 
 class TrialError(UserError):
     """The campaign cannot be run; the message is one line and says what to do."""
+
+
+def trial(
+    seeds: Annotated[str, typer.Option(help="A:B, phantoms, looks, robots and targets A to B - 1")],
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(help="pursuit, table, push or random; may be repeated to compare; default: the configured one"),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="processes")] = 1,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="one JSON object per trial, then the summary, on standard output")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="folder for trials.jsonl and report.html; trials already there are kept")] = None,
+    true_masks: Annotated[bool, typer.Option("--true-masks", help="the twin's own masks instead of the network's")] = False,
+    max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a trial has failed")] = 120.0,
+    look: Annotated[
+        str, typer.Option(help="random: every trial another picture; bench: the default clear one; or a family, as in synth")
+    ] = "random",
+    scheduler: SchedulerOption = None,
+    model: ModelOption = None,
+    config_path: ConfigOption = None,
+) -> None:
+    """Closed-loop trials in the bench twin: a policy drives the robot to a target that it has never seen."""
+    check_masks(model, true_masks=true_masks)
+    overrides = choose_model(model)
+    config = load_config(config_path, None, overrides)
+    policies = parse_policies(policy or [config.policy.name])
+    if workers > 1 or scheduler is not None:  # one thread each: workers must not fight for the cores
+        overrides.setdefault("perception", {}).setdefault("segmentation", {})["threads"] = 1
+        config = load_config(config_path, None, overrides)
+    if look not in TRIAL_LOOKS:
+        raise TrialError(f"unknown look {look!r}; known: {', '.join(TRIAL_LOOKS)}")
+    plan = TrialPlan(config, true_masks, max_seconds, look)
+    # All policies meet a seed one after the other, so that a part of a campaign can already be compared.
+    jobs: list[Job] = [(name, seed) for seed in parse_seeds(seeds) for name in policies]
+    rows, interrupted = _run(plan, jobs, out, workers, scheduler)
+    by_policy: dict[str, list[Row]] = {name: [row for row in rows if row["policy"] == name] for name in policies}
+    if out is not None:
+        try:
+            write_report(out, by_policy, plan)
+        except OSError as error:
+            raise TrialError(f"{out}: the report cannot be written ({error.strerror}); free some space") from None
+    sums = {name: summarise(own) for name, own in by_policy.items()}
+    if as_json:
+        for row in rows:
+            sys.stdout.write(json.dumps({key: value for key, value in row.items() if key != "track"}, allow_nan=False) + "\n")
+        last: dict[str, Any] = {"summary": {"policy": policies[0]} | sums[policies[0]]}
+        if len(sums) > 1:
+            last["by_policy"] = sums
+        sys.stdout.write(json.dumps(last, allow_nan=False) + "\n")
+    else:
+        print_tables(rows, sums)
+        if out is not None:
+            console.print(f"report: {out / 'report.html'}", soft_wrap=True)
+    if interrupted:
+        kept = f"kept in {out}; the same command goes on" if out is not None else "give --out to keep and go on with a campaign"
+        console.print(f"{len(rows)} of {len(jobs)} trials were done: {kept}", soft_wrap=True)
+        raise KeyboardInterrupt
+
+
+def parse_seeds(text: str) -> range:
+    """``A:B`` is A to B - 1, as in Python; ``A`` alone is one seed. Raises TrialError."""
+    match = re.fullmatch(r"(\d{1,9})(?::(\d{1,9}))?", text.strip())
+    if match is None:
+        raise TrialError(f"--seeds {text!r}: give A:B (A to B - 1), for example 0:100")
+    first = int(match[1])
+    last = int(match[2]) if match[2] is not None else first + 1
+    if not first < last <= first + _MAX_SEEDS:
+        raise TrialError(f"--seeds {text!r}: B must be above A, by at most {_MAX_SEEDS}")
+    return range(first, last)
+
+
+def parse_policies(names: Sequence[str]) -> tuple[PolicyName, ...]:
+    """Known names, each once, in order. Raises TrialError."""
+    for name in names:
+        if name not in POLICY_NAMES:
+            raise TrialError(f"unknown policy {name!r}; known: {', '.join(POLICY_NAMES)}")
+    return cast("tuple[PolicyName, ...]", tuple(dict.fromkeys(names)))
 
 
 class KeptTrials:
@@ -48,13 +128,12 @@ class KeptTrials:
     def __init__(self, out: Path | None, plan: TrialPlan, jobs: Iterable[Job]) -> None:
         self.rows: dict[Job, Row] = {}
         self._wanted = set(jobs)
-        self._file: Path | None = None
+        self._file = out / "trials.jsonl" if out is not None else None
         if out is not None:
-            self._file = out / "trials.jsonl"
             self._open(out, plan)
 
     def add(self, row: Row) -> None:
-        """Take in a row and write it at once. Raises TrialError."""
+        """Add a row and write it at once. Raises TrialError."""
         self.rows[row["policy"], row["seed"]] = row
         if self._file is None:
             return
@@ -79,7 +158,7 @@ class KeptTrials:
             raise TrialError(f"{out}: plan.json or trials.jsonl is damaged; choose another --out") from None
 
     def _read(self) -> None:
-        """Take over what is there; a last line that was cut off by a crash is dropped from the file."""
+        """Read the rows that are there; a last line that was cut off by a crash is dropped from the file."""
         assert self._file is not None
         if not self._file.is_file():
             return
@@ -100,149 +179,52 @@ def _described(plan: TrialPlan) -> dict[str, Any]:
     settings = plan.config.model_dump(mode="json", exclude={"window", "rig", "servos"})
     settings["perception"]["segmentation"].pop("threads")
     settings["policy"].pop("name")
-    settings["twin"].pop("phantom")
-    settings["twin"].pop("appearance_seed")
-    settings["twin"].pop("look")
-    weights = None
+    for key in ("phantom", "appearance_seed", "look"):
+        settings["twin"].pop(key)
+    model_sha256 = None
     if not plan.true_masks:
         from core.perception.model_file import model_folder, read_model_info
 
         info = read_model_info(model_folder(plan.config.perception.segmentation.model), verify=())
-        # What was measured of it decides nothing.
-        weights = hashlib.sha256(info.model_dump_json(exclude={"figures"}).encode()).hexdigest()
-    return {
-        "true_masks": plan.true_masks,
-        "max_seconds": plan.max_seconds,
-        "look": plan.look,
-        "model_sha256": weights,
-        "config": settings,
-    }
+        model_sha256 = hashlib.sha256(info.model_dump_json(exclude={"figures"}).encode()).hexdigest()
+    described = {"true_masks": plan.true_masks, "max_seconds": plan.max_seconds, "look": plan.look}
+    return described | {"model_sha256": model_sha256, "config": settings}
 
 
-_console = Console(stderr=True, markup=False, emoji=False)
-_MAX_SEEDS = 100_000
-
-
-@dataclass(frozen=True, slots=True)
-class Campaign:
-    """What to run. Without `out` nothing is kept; with `scheduler` the trials run on that Dask cluster."""
-
-    plan: TrialPlan
-    policies: tuple[PolicyName, ...]
-    seeds: range
-    workers: int = 1
-    out: Path | None = None
-    scheduler: str | None = None
-
-    @property
-    def jobs(self) -> list[Job]:
-        """All policies meet a seed one after the other, so that a part of a campaign can already be compared."""
-        return [(policy, seed) for seed in self.seeds for policy in self.policies]
-
-
-def parse_seeds(text: str) -> range:
-    """``A:B`` is A to B - 1, as in Python; ``A`` alone is one seed. Raises TrialError."""
-    match = re.fullmatch(r"(\d{1,9})(?::(\d{1,9}))?", text.strip())
-    if match is None:
-        raise TrialError(f"--seeds {text!r}: give A:B (A to B - 1), for example 0:100")
-    first = int(match[1])
-    last = int(match[2]) if match[2] is not None else first + 1
-    if not first < last <= first + _MAX_SEEDS:
-        raise TrialError(f"--seeds {text!r}: B must be above A, by at most {_MAX_SEEDS}")
-    return range(first, last)
-
-
-def parse_policies(names: Sequence[str]) -> tuple[PolicyName, ...]:
-    """Known names, each once, in order. Raises TrialError."""
-    for name in names:
-        if name not in POLICY_NAMES:
-            raise TrialError(f"unknown policy {name!r}; known: {', '.join(POLICY_NAMES)}")
-    return cast("tuple[PolicyName, ...]", tuple(dict.fromkeys(names)))
-
-
-def parse_look(name: str) -> str:
-    """Raises TrialError."""
-    if name not in TRIAL_LOOKS:
-        raise TrialError(f"unknown look {name!r}; known: {', '.join(TRIAL_LOOKS)}")
-    return name
-
-
-def run_trials(
-    seeds: str,
-    policies: Sequence[str],
-    *,
-    workers: int,
-    out: Path | None,
-    model: str | None,
-    config_path: Path | None,
-    true_masks: bool,
-    max_seconds: float,
-    look: str,
-    scheduler: str | None,
-    as_json: bool,
-) -> None:
-    """Run a campaign and tell its results; raises TrialError, ConfigError, ModelError, and KeyboardInterrupt once all is kept."""
-    overrides = choose_model(model)
-    config = load_config(config_path, None, overrides)
-    chosen = parse_policies(policies or [config.policy.name])
-    if workers > 1 or scheduler is not None:  # one thread each: workers must not fight for the cores
-        overrides.setdefault("perception", {}).setdefault("segmentation", {})["threads"] = 1
-        config = load_config(config_path, None, overrides)
-    campaign = Campaign(
-        TrialPlan(config, true_masks, max_seconds, parse_look(look)), chosen, parse_seeds(seeds), workers, out, scheduler
-    )
-    rows, interrupted = _run(campaign)
-    _tell(campaign, rows, as_json)
-    if interrupted:
-        kept = f"kept in {out}; the same command goes on" if out is not None else "give --out to keep and go on with a campaign"
-        _console.print(f"{len(rows)} of {len(campaign.jobs)} trials were done: {kept}", soft_wrap=True)
-        raise KeyboardInterrupt
-
-
-def _run(campaign: Campaign) -> tuple[list[Row], bool]:
+def _run(plan: TrialPlan, jobs: list[Job], out: Path | None, workers: int, scheduler: str | None) -> tuple[list[Row], bool]:
     """The rows of the campaign in the order of its jobs, and whether it was interrupted."""
-    _check(campaign.plan)
-    kept = KeptTrials(campaign.out, campaign.plan, campaign.jobs)
-    missing = [job for job in campaign.jobs if job not in kept.rows]
+    if not plan.true_masks:
+        from core.perception.model_file import check_model
+
+        check_model(plan.config.perception.segmentation.model)  # refused here, not by a worker
+    kept = KeptTrials(out, plan, jobs)
+    missing = [job for job in jobs if job not in kept.rows]
+    results: Iterator[Row] = (run_one(plan, job) for job in missing)
+    if missing and scheduler is not None:
+        results = over_cluster(scheduler, partial(run_one, plan), missing)
+    elif missing and workers > 1:
+        results = over_processes(workers, partial(run_one, plan), missing)
     interrupted = False
     with progress_bar() as bar:
-        task = bar.add_task("trials", total=len(campaign.jobs), completed=len(campaign.jobs) - len(missing))
+        task = bar.add_task("trials", total=len(jobs), completed=len(jobs) - len(missing))
         try:
-            for row in _results(campaign, missing):
+            for row in results:
                 kept.add(row)
                 reached = sum(bool(r["reached"]) for r in kept.rows.values())
                 bar.update(task, advance=1, description=f"trials, {reached} of {len(kept.rows)} reached")
         except KeyboardInterrupt:
             interrupted = True
-    return [kept.rows[job] for job in campaign.jobs if job in kept.rows], interrupted
+    return [kept.rows[job] for job in jobs if job in kept.rows], interrupted
 
 
-def _check(plan: TrialPlan) -> None:
-    """A model that cannot be used is told before anything starts, not by a worker."""
-    if not plan.true_masks:
-        from core.perception.model_file import check_model
-
-        check_model(plan.config.perception.segmentation.model)
-
-
-def _results(campaign: Campaign, jobs: list[Job]) -> Iterator[Row]:
-    if not jobs:
-        return iter(())
-    if campaign.scheduler is not None:
-        return over_cluster(campaign.scheduler, partial(run_one, campaign.plan), jobs)
-    if campaign.workers > 1:
-        return over_processes(campaign.workers, partial(run_one, campaign.plan), jobs)
-    return (run_one(campaign.plan, job) for job in jobs)
-
-
-class _Opened(threading.local):
-    """The perception of this thread, by its settings: loading the network takes over a second, and none serves two at once."""
+class _Pipelines(threading.local):
+    """Pipelines of this thread by their settings: loading the network takes over a second, and none serves two threads at once."""
 
     def __init__(self) -> None:
-        self.pipelines: dict[str, tuple[Any, Any]] = {}
+        self.by_settings: dict[str, tuple[Any, Any]] = {}
 
 
-_opened = _Opened()
+_pipelines = _Pipelines()
 
 
 def run_one(plan: TrialPlan, job: Job) -> Row:
@@ -251,48 +233,21 @@ def run_one(plan: TrialPlan, job: Job) -> Row:
     from core.perception.pipeline import Pipeline, open_pipeline
     from hardware.twin.trial import Trial
 
-    key = f"{plan.true_masks} {plan.config.perception.model_dump_json()}"
-    pipelines = _opened.pipelines
-    if key not in pipelines:
+    opened, key = _pipelines.by_settings, f"{plan.true_masks} {plan.config.perception.model_dump_json()}"
+    if key not in opened:
         masks = TrueMasks() if plan.true_masks else None
-        pipelines[key] = open_pipeline(plan.config.perception) if masks is None else Pipeline(masks, plan.config.perception), masks
-    pipeline, masks = pipelines[key]
+        opened[key] = open_pipeline(plan.config.perception) if masks is None else Pipeline(masks, plan.config.perception), masks
+    pipeline, masks = opened[key]
     return Trial(plan, job[1], job[0], pipeline, masks).run()
 
 
-def _tell(campaign: Campaign, rows: list[Row], as_json: bool) -> None:
-    by_policy: dict[str, list[Row]] = {policy: [row for row in rows if row["policy"] == policy] for policy in campaign.policies}
-    sums = {policy: summarise(own) for policy, own in by_policy.items()}
-    if campaign.out is not None:
-        try:
-            write_report(campaign.out, by_policy, campaign.plan)
-        except OSError as error:
-            raise TrialError(f"{campaign.out}: the report cannot be written ({error.strerror}); free some space") from None
-    if as_json:
-        for row in rows:
-            sys.stdout.write(json.dumps({key: value for key, value in row.items() if key != "track"}, allow_nan=False) + "\n")
-        last: dict[str, Any] = {"summary": {"policy": campaign.policies[0]} | sums[campaign.policies[0]]}
-        if len(sums) > 1:
-            last["by_policy"] = sums
-        sys.stdout.write(json.dumps(last, allow_nan=False) + "\n")
-        return
-
-    print_tables(rows, sums)
-    if campaign.out is not None:
-        _console.print(f"report: {campaign.out / 'report.html'}", soft_wrap=True)
-
-
-Rows = Sequence[Mapping[str, Any]]
-_WORST = 6
-
-
 @dataclass(frozen=True, slots=True)
-class _Figure:
-    """A figure of the summary: how it is called and written, and what it should be."""
+class _SummaryFigure:
+    """A figure of the summary: its key, label and format, and what it should be."""
 
     name: str
     label: str
-    write: Callable[[float], str]
+    format: Callable[[float], str]
     aim: str = ""
     met: Callable[[float], bool] | None = None
 
@@ -301,30 +256,23 @@ def _percent(value: float) -> str:
     return f"{100.0 * value:.0f} %"
 
 
-def _newton(value: float) -> str:
-    return f"{value:.3f} N"
-
-
-def _plain(value: float) -> str:
-    return f"{value:.3g}"
-
-
+_NEWTON, _PLAIN, _SECONDS, _WHOLE = "{:.3f} N".format, "{:.3g}".format, "{:.1f} s".format, "{:.0f}".format
 FIGURES = (
-    _Figure("trials", "Trials", lambda v: f"{v:.0f}"),
-    _Figure("reached_share", "Target reached", _percent, "≥ 95 %", lambda v: v >= 0.95),
-    _Figure("unaided_share", "Reached without help", _percent),
-    _Figure("wall_force_p95_n", "Wall contact force, p95", _newton, "≤ 0.15 N", lambda v: v <= 0.15),
-    _Figure("wall_force_median_n", "Wall contact force, median", _newton),
-    _Figure("wall_force_max_n", "Wall contact force, largest", _newton, "≤ 0.5 N", lambda v: v <= 0.5),
-    _Figure("mean_offset_ratio", "Distance to centerline over lumen radius, mean", _plain, "≤ 0.25", lambda v: v <= 0.25),
-    _Figure("median_offset_ratio", "The same, median", _plain),
-    _Figure("median_path_ratio", "Path over route, median", _plain),
-    _Figure("mean_time_s", "Time to the target, mean", lambda v: f"{v:.1f} s"),
-    _Figure("median_time_s", "Time to the target, median", lambda v: f"{v:.1f} s"),
-    _Figure("mean_interventions", "Interventions per trial", _plain),
-    _Figure("answered_share", "Frames with a pose", _percent),
-    _Figure("theta_error_median_deg", "Error of theta, median", lambda v: f"{v:.2f}°"),
-    _Figure("head_error_median_px", "Error of the head, median", lambda v: f"{v:.2f} px"),
+    _SummaryFigure("trials", "Trials", _WHOLE),
+    _SummaryFigure("reached_share", "Target reached", _percent, "≥ 95 %", lambda v: v >= 0.95),
+    _SummaryFigure("unaided_share", "Reached without help", _percent),
+    _SummaryFigure("wall_force_p95_n", "Wall contact force, p95", _NEWTON, "≤ 0.15 N", lambda v: v <= 0.15),
+    _SummaryFigure("wall_force_median_n", "Wall contact force, median", _NEWTON),
+    _SummaryFigure("wall_force_max_n", "Wall contact force, largest", _NEWTON, "≤ 0.5 N", lambda v: v <= 0.5),
+    _SummaryFigure("mean_offset_ratio", "Distance to centerline over lumen radius, mean", _PLAIN, "≤ 0.25", lambda v: v <= 0.25),
+    _SummaryFigure("median_offset_ratio", "The same, median", _PLAIN),
+    _SummaryFigure("median_path_ratio", "Path over route, median", _PLAIN),
+    _SummaryFigure("mean_time_s", "Time to the target, mean", _SECONDS),
+    _SummaryFigure("median_time_s", "Time to the target, median", _SECONDS),
+    _SummaryFigure("mean_interventions", "Interventions per trial", _PLAIN),
+    _SummaryFigure("answered_share", "Frames with a pose", _percent),
+    _SummaryFigure("theta_error_median_deg", "Error of theta, median", "{:.2f}°".format),
+    _SummaryFigure("head_error_median_px", "Error of the head, median", "{:.2f} px".format),
 )
 
 
@@ -338,44 +286,28 @@ class SummaryRow:
 
 
 def summary_rows(sums: Mapping[str, Mapping[str, Any]]) -> list[SummaryRow]:
-    """The figures of all policies side by side; "–" where there is nothing to tell."""
+    """The figures of all policies side by side; "–" where one has no value."""
     rows = []
     for figure in FIGURES:
         cells = []
         for own in sums.values():
             value = own[figure.name]
             verdict = "" if value is None or figure.met is None else "met" if figure.met(value) else "missed"
-            cells.append(("–" if value is None else figure.write(value), verdict))
+            cells.append(("–" if value is None else figure.format(value), verdict))
         rows.append(SummaryRow(figure.label, figure.aim, tuple(cells)))
     return rows
 
 
 def trial_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
-    """A trial as text: policy, seed, outcome, time, path ratio, offset, force p95 and largest, interventions."""
+    """A trial as text, under ``HEADINGS``."""
     force = row["wall_contact_n"] or {}
-    return (
-        row["policy"],
-        str(row["seed"]),
-        row["outcome"],
-        f"{row['time_s']:.1f} s",
-        _or_dash(row["path_ratio"]),
-        _or_dash(row["offset_ratio"]),
-        _or_dash(force.get("p95")),
-        _or_dash(force.get("max")),
-        str(row["interventions"]),
-    )
-
-
-HEADINGS = ("policy", "seed", "outcome", "time", "path", "offset", "p95 N", "max N", "help")
-
-
-def _or_dash(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f}"
+    ratios = (row["path_ratio"], row["offset_ratio"], force.get("p95"), force.get("max"))
+    shown = ("–" if value is None else f"{value:.2f}" for value in ratios)
+    return row["policy"], str(row["seed"]), row["outcome"], f"{row['time_s']:.1f} s", *shown, str(row["interventions"])
 
 
 def print_tables(rows: Rows, sums: Mapping[str, Mapping[str, Any]]) -> None:
     """Every trial, then the sums, on standard output."""
-    console = Console(markup=False, emoji=False)
     trials = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     for heading in HEADINGS:
         trials.add_column(heading, no_wrap=True)
@@ -388,37 +320,29 @@ def print_tables(rows: Rows, sums: Mapping[str, Mapping[str, Any]]) -> None:
     table.add_column("target", justify="right", no_wrap=True)
     for line in summary_rows(sums):
         table.add_row(line.label, *(f"{text} {'✗' if verdict == 'missed' else ' '}" for text, verdict in line.cells), line.aim)
-    console.print(trials, "", table)
+    Console(markup=False, emoji=False).print(trials, "", table)
 
 
 def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> None:
     """``report.html`` and ``summary.json`` in `out`; raises OSError."""
-    import json
-
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    from app.commands.evaluation_report import inline_svg
+    from app.commands.evaluation_report import inline_svg, render_page
     from app.commands.figures import draw_spreads, draw_track, drawn
-    from core.evaluation.trial import summarise
 
     sums = {policy: summarise(rows) for policy, rows in by_policy.items()}
     everything = [row for rows in by_policy.values() for row in rows]
-    lowest = worst(everything, _WORST)
-    environment = Environment(loader=FileSystemLoader(RESOURCES / "report"), autoescape=True, undefined=StrictUndefined)
-    environment.trim_blocks = environment.lstrip_blocks = True
     looks = {RANDOM_LOOK: "random looks", BENCH_LOOK: "the default look"}.get(plan.look, f"looks: {plan.look}")
     seen = "true masks instead of the network" if plan.true_masks else f"model {plan.config.perception.segmentation.model}"
-    text = environment.get_template("trial.html.j2").render(
+    lowest = enumerate(worst(everything, _WORST))
+    text = render_page(
+        "trial.html.j2",
         title="Closed-loop trials in the bench twin",
         lead=f"{len(everything)} trials · {looks} · {seen} · {time.strftime('%Y-%m-%d', time.gmtime())}",
         policies=list(sums),
         summary=summary_rows(sums),
         spreads=inline_svg(drawn(draw_spreads(by_policy), ".svg"), "spreads") if everything else "",
-        tracks=[
-            (trial_cells(row), inline_svg(drawn(draw_track(row), ".svg"), f"track{place}")) for place, row in enumerate(lowest)
-        ],
+        tracks=[(trial_cells(row), inline_svg(drawn(draw_track(row), ".svg"), f"track{place}")) for place, row in lowest],
         headings=HEADINGS,
         trials=[trial_cells(row) for row in everything],
     )
-    (out / "report.html").write_text(re.sub(r"\n\s*\n+", "\n", text) + "\n", encoding="utf-8")
+    (out / "report.html").write_text(text, encoding="utf-8")
     (out / "summary.json").write_text(json.dumps(sums, indent=1, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,7 +1,4 @@
-"""Random changes of labelled frames during training: geometry for image and masks alike, looks for the image alone.
-
-What a network is shown in training: cut-outs of labelled frames, changed at random.
-"""
+"""Training crops: cut-outs of labelled frames, changed at random; geometry for image and masks alike, looks for the image alone."""
 
 from __future__ import annotations
 
@@ -27,19 +24,24 @@ from core.types import Image, Mask, Point
 def random_crop(image: Image, vessel: Mask, robot: Mask, size: tuple[int, int], rng: Generator) -> tuple[Image, Mask, Mask]:
     """A turned, scaled, perhaps mirrored cut-out of `size` (height, width), in one warp so that nothing is blurred twice.
 
-    Most cuts are centred near the robot's ends or body: the robot is one or two percent of the pixels.
+    Two of three are centred on the robot, which is one or two percent of the pixels.
     """
     height, width = size
-    center = _center(robot, rng)
+    rows, columns = np.nonzero(robot) if rng.random() < 0.65 else ((), ())
+    if len(rows):
+        pick = int(rng.integers(len(rows)))
+        center = float(columns[pick]), float(rows[pick])
+    else:
+        center = float(rng.uniform(0.2, 0.8) * robot.shape[1]), float(rng.uniform(0.2, 0.8) * robot.shape[0])
     scale = float(np.exp(rng.uniform(np.log(0.75), np.log(1.35))))
     angle = rng.choice((0.0, 90.0, 180.0, 270.0)) + (rng.uniform(-45, 45) if rng.random() < 0.5 else 0.0)
-    matrix = cv2.getRotationMatrix2D((float(center[0]), float(center[1])), angle, scale)
+    matrix = cv2.getRotationMatrix2D(center, angle, scale)
     if rng.random() < 0.5:
         matrix[0, :2] = -matrix[0, :2]  # the shift is set below
     target = np.array([width, height]) * (0.5 + rng.uniform(-0.25, 0.25, 2))
     moved = matrix @ np.array([center[0], center[1], 1.0])
     matrix[:, 2] += target - moved
-    # What lies beyond the picture is one colour without labels; mirrored, robots would meet their own reflection.
+    # Beyond the picture lies one colour without labels; mirrored, robots would meet their own reflection.
     fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1]))])
     cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
     masks = [
@@ -48,20 +50,10 @@ def random_crop(image: Image, vessel: Mask, robot: Mask, size: tuple[int, int], 
     return np.asarray(cut, np.uint8), np.asarray(masks[0]), np.asarray(masks[1])
 
 
-def _center(robot: Mask, rng: Generator) -> tuple[float, float]:
-    height, width = robot.shape
-    if rng.random() < 0.65:
-        rows, columns = np.nonzero(robot)
-        if len(rows):
-            pick = int(rng.integers(len(rows)))
-            return float(columns[pick]), float(rows[pick])
-    return float(rng.uniform(0.2, 0.8) * width), float(rng.uniform(0.2, 0.8) * height)
-
-
 def with_strips(image: Image, vessel: Mask, robot: Mask, rng: Generator) -> Image:
     """`image` with one or two clips across the lumen, most of them over the robot and more often near its ends than on its body.
 
-    The labels stay: robot and lumen go on beneath. Of the twin's own clips few lie where the robot happens to be.
+    The labels stay: robot and lumen continue under the clips.
     """
     painted = image.copy()
     for _ in range(int(rng.integers(1, 3))):
@@ -125,7 +117,8 @@ def random_look(image: Image, rng: Generator) -> Image:
     if rng.random() < 0.4:
         pixels = np.clip(pixels, 0, 1) ** np.float32(np.exp(rng.uniform(-0.5, 0.5)))
     if rng.random() < 0.3:
-        pixels = pixels * _uneven_light(pixels.shape[:2], rng)[:, :, None]
+        light = rng.uniform(0.6, 1.3, (4, 4)).astype(np.float32)
+        pixels = pixels * cv2.resize(light, pixels.shape[1::-1], interpolation=cv2.INTER_CUBIC)[:, :, None]
     if rng.random() < 0.25:
         pixels = cv2.GaussianBlur(pixels, (0, 0), float(rng.uniform(0.4, 1.3)))
     if rng.random() < 0.35:
@@ -135,11 +128,6 @@ def random_look(image: Image, rng: Generator) -> Image:
         data = cv2.imencode(".jpg", result, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(35, 90))])[1]
         result = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
     return result
-
-
-def _uneven_light(shape: tuple[int, int], rng: Generator) -> np.ndarray:
-    coarse = rng.uniform(0.6, 1.3, (4, 4)).astype(np.float32)
-    return np.asarray(cv2.resize(coarse, (shape[1], shape[0]), interpolation=cv2.INTER_CUBIC))
 
 
 def random_clutter(size: tuple[int, int], rng: Generator) -> Image:
@@ -175,57 +163,64 @@ def random_clutter(size: tuple[int, int], rng: Generator) -> Image:
 
 
 MISSED_SHARE = 0.35
-"""Of the second look's windows: as many show a pixel that the first look got wrong. The others show what it would look at."""
+"""Share of the tip windows that show a pixel that the first pass got wrong; the others show what the refinement would look at."""
 LAST_SHARE = 0.5
+"""Share of the tip windows that come with the masks after refinement: a refinement may be followed by another one."""
 JITTER_PX = 10.0
-EDGE_PX = 4
-"""What is wrong farther than this from the robot's outline is no blur of it: a piece was missed or invented."""
-WALL_PX = 3
-"""Nor is what of a vessel is wrong farther than this from its wall: the line between the walls may lie more than a pixel aside."""
-WALL_REACH_PX = 60.0
-"""So near to the robot's ends: the vessel's vector is fitted to 20 px to each side of the head."""
-_WRONG_PLACES = 32
+"""Standard deviation of a window's centre around the place that it shows."""
 WRONG_JITTER_PX = 30.0
+"""The same for windows that show a piece that was missed or invented."""
+EDGE_PX = 4
+"""Pixels that are wrong at a larger distance than this from the robot's outline are no blur of it."""
+WALL_PX = 3
+"""The same for a vessel's wall, where the line between the walls may lie more than a pixel aside."""
+WALL_REACH_PX = 60.0
+"""Distance from the robot's ends within which walls count: the vessel's vector is fitted to 20 px to each side of the head."""
+_WRONG_PLACES = 32
+"""About so many places are kept of the pixels that were wrong."""
 END_REACH_PX = 20.0
 """Standard deviation of what counts as near to a robot's end: half of the 40 px that its vector and the vessel's are fitted to."""
 BORDER_PX = 8.0
+"""Distance from a crop's border within which thinning may have drawn back an end, at least."""
 
 Crop = tuple[Tensor, Tensor]
 """uint8 (planes, h, w) and its labels uint8 (2 or 3, h, w): vessel, robot (0, 1), and where the plan weighs the robot's ends, how
 near they are (0..255)."""
 
 
-class _Order:
-    """Epochs without repetition: a place in a permutation that is drawn anew for every pass."""
+class CropDataset(Dataset[Crop]):
+    """Crops of labelled frames in epochs without repetition.
 
-    def __init__(self, seed: int, count: int) -> None:
-        self._seed, self._count = seed, count
-        self._drawn: tuple[int, NDArray[np.int64]] | None = None
-
-    def __getitem__(self, index: int) -> int:
-        epoch, place = divmod(index, self._count)
-        if self._drawn is None or self._drawn[0] != epoch:
-            rng = np.random.default_rng((self._seed, 7919, epoch))
-            self._drawn = (epoch, rng.permutation(self._count))
-        return int(self._drawn[1][place])
-
-
-class FrameCrops(Dataset[Crop]):
-    """For the first look: cut-outs of ``plan.crop``, turned, scaled and mirrored, most of them near the robot.
-
-    Crop `i` depends on the seed and `i` alone, so that a run can be repeated with any number of workers. `difficulty` (one weight
-    > 0 per sample, ``difficulty.py``) says where ``plan.focus_share`` of the crops come from.
+    Crop `i` depends on the seed and `i` alone, so that a run can be repeated with any number of workers.
     """
 
-    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
-        self._plan = plan
-        self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
-        self._samples, self._kept = samples, KeptFrames(len(samples))
-        self._order = _Order(plan.seed, len(samples))
-        _load_for_workers(plan)
+    def __init__(self, samples: list[Sample], plan: TrainingPlan) -> None:
+        self._plan, self._samples, self._kept = plan, samples, KeptFrames(len(samples))
+        self._permutation: tuple[int, NDArray[np.int64]] = (-1, np.zeros(0, np.int64))
+        if plan.end_weight > 0:
+            compiled.load()  # the robot's ends are found with the compiled loops: forked workers inherit them
 
     def __len__(self) -> int:
         return self._plan.steps * self._plan.batch
+
+    def place_of(self, index: int) -> int:
+        """The number of the sample that crop `index` shows, in a permutation that is drawn for every epoch."""
+        count = len(self._samples)
+        epoch, place = divmod(index, count)
+        if self._permutation[0] != epoch:
+            self._permutation = epoch, np.random.default_rng((self._plan.seed, 7919, epoch)).permutation(count)
+        return int(self._permutation[1][place])
+
+
+class FrameCrops(CropDataset):
+    """Crops for the network of whole pictures: of ``plan.crop``, turned, scaled and mirrored, most of them near the robot.
+
+    `difficulty`, one weight > 0 per sample, says where ``plan.focus_share`` of the crops come from.
+    """
+
+    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
+        super().__init__(samples, plan)
+        self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
 
     def __getitem__(self, index: int) -> Crop:
         rng = np.random.default_rng((self._plan.seed, index))
@@ -233,7 +228,7 @@ class FrameCrops(Dataset[Crop]):
         if rng.random() < self._plan.clutter_share:
             image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
         else:
-            place = self._order[index]
+            place = self.place_of(index)
             if self._chances is not None and rng.random() < self._plan.focus_share:
                 place = int(np.searchsorted(self._chances, rng.random(), side="right"))
             image, vessel, robot = random_crop(*self._kept.frame(self._samples[place]), size, rng)
@@ -246,7 +241,7 @@ class FrameCrops(Dataset[Crop]):
 
 @dataclass(frozen=True, slots=True)
 class PriorView:
-    """What a frame was taken for: both probabilities as PNG, 0..255, and the places that a second look would go to then."""
+    """Probabilities of a frame as PNG, 0..255, and the places that a tip refinement would look at."""
 
     vessel_png: bytes
     robot_png: bytes
@@ -265,10 +260,10 @@ class PriorView:
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
-    """What a model saw in a frame at its first look, and in the end, where it has a second one.
+class PriorViews:
+    """Probabilities of a frame after the first pass, and the last ones: after tip refinement, where the model has one.
 
-    ``wrong`` are places on pieces of robot, and of vessel beside the robot's ends, that it missed or invented in the end.
+    ``wrong`` are places on pieces of robot, and of vessel beside the robot's ends, that the last ones miss or invent.
     """
 
     first: PriorView
@@ -276,8 +271,8 @@ class Looks:
     wrong: tuple[Point, ...] = ()
 
     @classmethod
-    def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> Looks:
-        """Look at a frame, with a second look by `near`; raises DatasetError."""
+    def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> PriorViews:
+        """Segment a frame, and refine it with `near`; raises DatasetError."""
         image, vessel, robot = sample.load(WORKING_SIZE_PX)
         probabilities = segment(image)
         first = last = PriorView.of(*probabilities)
@@ -289,36 +284,33 @@ class Looks:
         return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, EDGE_PX)) + _some_of(shifted)))
 
 
-class NearCrops(Dataset[Crop]):
-    """For the second look: windows as it is shown them, with what the first look (`looks`, one per sample) says there.
+class TipCrops(CropDataset):
+    """Windows for the network of the tip refinement, with the probabilities there; `views` has one entry per sample.
 
-    Half of them come with what was seen in the end instead: a second look may be followed by another one (``SecondLook``).
     ``plan.focus_share`` of them show a piece that was missed or invented, of any frame with one.
     """
 
-    def __init__(self, samples: list[Sample], looks: list[Looks], plan: TrainingPlan) -> None:
-        self._plan, self._looks = plan, looks
-        self._failed = [place for place, look in enumerate(looks) if look.wrong]
-        self._samples, self._kept = samples, KeptFrames(len(samples))
-        self._order = _Order(plan.seed, len(samples))
-        _load_for_workers(plan)
-
-    def __len__(self) -> int:
-        return self._plan.steps * self._plan.batch
+    def __init__(self, samples: list[Sample], views: list[PriorViews], plan: TrainingPlan) -> None:
+        super().__init__(samples, plan)
+        self._views = views
+        self._failed = [place for place, view in enumerate(views) if view.wrong]
 
     def __getitem__(self, index: int) -> Crop:
         rng = np.random.default_rng((self._plan.seed, index))
         focused = self._plan.focus_share > 0 and bool(self._failed) and rng.random() < self._plan.focus_share
-        place = self._failed[int(rng.integers(len(self._failed)))] if focused else self._order[index]
-        sample, looks = self._samples[place], self._looks[place]
+        place = self._failed[int(rng.integers(len(self._failed)))] if focused else self.place_of(index)
+        sample, views = self._samples[place], self._views[place]
         image, vessel, robot = self._kept.frame(sample)
-        seen = looks.last if rng.random() < LAST_SHARE else looks.first
-        seen_vessel, seen_robot = self._kept.get((sample.image, seen is not looks.first), seen.probabilities)
-        center = _beside(looks.wrong, WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
+        seen = views.last if rng.random() < LAST_SHARE else views.first
+        seen_vessel, seen_robot = self._kept.get((sample.image, seen is not views.first), seen.probabilities)
+        center = _beside(views.wrong, WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
         x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
-        cut = _filled(np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]]))
-        # Quarter turns and mirror images cost no sharpness; the first look has seen all other angles and sizes.
+        cut = np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]])
+        down, right = WINDOW_PX - height, WINDOW_PX - width
+        if down or right:
+            cut = np.pad(cut, ((0, down), (0, right), (0, 0)), mode="edge")
+        # Quarter turns and mirror images cost no sharpness; the first pass was trained on all other angles and sizes.
         cut = np.rot90(cut, int(rng.integers(4)))
         cut = cut[:, ::-1] if rng.random() < 0.5 else cut
         cut = np.ascontiguousarray(cut)
@@ -327,14 +319,8 @@ class NearCrops(Dataset[Crop]):
         return _tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0, self._plan)
 
 
-def _load_for_workers(plan: TrainingPlan) -> None:
-    """The robot's ends are found with the compiled loops, which workers that are forked from here need not load each."""
-    if plan.end_weight > 0:
-        compiled.load()
-
-
 def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:
-    """Where the first look went wrong, or where the second one would look, a bit beside it."""
+    """A pixel that is wrong, or beside a place that the refinement would look at."""
     if rng.random() < MISSED_SHARE:
         rows, columns = np.nonzero((seen_robot > 127) != robot)
         if len(rows):
@@ -352,7 +338,7 @@ def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Gener
 
 
 def _wrong(found: Mask, true: Mask, edge_px: int) -> Mask:
-    """What was missed farther than `edge_px` from all that was found, or invented farther than that from all that is true."""
+    """Pixels missed at more than `edge_px` from all that was found, or invented at more than that from all that is true."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * edge_px + 1, 2 * edge_px + 1))
     near_found, near_true = (cv2.dilate(mask.view(np.uint8), disc) > 0 for mask in (found, true))
     return np.asarray((true & ~near_found) | (found & ~near_true))
@@ -365,35 +351,29 @@ def _some_of(mask: Mask) -> list[Point]:
     return list(zip(columns[::step].astype(float).tolist(), rows[::step].astype(float).tolist(), strict=True))
 
 
-def _filled(cut: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A window of a small picture brought to full size, its edge going on."""
-    down, right = WINDOW_PX - cut.shape[0], WINDOW_PX - cut.shape[1]
-    return np.pad(cut, ((0, down), (0, right), (0, 0)), mode="edge") if down or right else cut
-
-
 def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask, plan: TrainingPlan) -> Crop:
     labels = [vessel.astype(np.uint8), robot.astype(np.uint8)]
     if plan.end_weight > 0:
-        labels.append(_nearness(robot))
+        labels.append(end_nearness(robot))
     return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(np.stack(labels))
 
 
-def _nearness(robot: Mask) -> NDArray[np.uint8]:
-    """How near each pixel is to an end of the true robot, 255 there; where the cut-out's border cuts it off it does not end."""
+def end_nearness(robot: Mask) -> NDArray[np.uint8]:
+    """How near each pixel is to an end of the true robot, 255 there; where the crop's border cuts it off it does not end."""
     return np.asarray(np.rint(255 * np.exp(-0.5 * (_end_distances(robot) / np.float32(END_REACH_PX)) ** 2)), np.uint8)
 
 
 def _end_distances(robot: Mask) -> NDArray[np.float32]:
-    """How far each pixel is from the nearest end of the true robot; infinite where it has none."""
+    """Distance of each pixel from the nearest end of the true robot; infinite where it has none."""
     rows, columns = np.ogrid[: robot.shape[0], : robot.shape[1]]
     nearest = np.full(robot.shape, np.inf, np.float32)
-    for x, y in true_ends(robot):
+    for x, y in _true_ends(robot):
         np.minimum(nearest, (rows - y) ** 2 + (columns - x) ** 2, out=nearest)
     return np.sqrt(nearest)
 
 
-def true_ends(robot: Mask) -> list[tuple[int, int]]:
-    """Ends (x, y) of a true mask's skeleton inside the cut-out: farther from its border than thinning draws back an end."""
+def _true_ends(robot: Mask) -> list[tuple[int, int]]:
+    """Ends (x, y) of a true mask's skeleton inside the crop: not nearer to its border than thinning draws back an end."""
     left, top, across, down = cv2.boundingRect(robot.view(np.uint8))
     if not across:
         return []

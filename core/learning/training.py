@@ -1,12 +1,7 @@
 """Training of the dual-decoder U-Net: cross entropy + Dice for both tasks, Muon and AdamW at a falling rate, averaged weights.
 
-Muon, momentum whose direction is orthogonalised, for the kernels of convolutions, and AdamW for everything else.
-
-K. Jordan et al., "Muon: an optimizer for hidden layers in neural networks", 2024. It learns in 2 minutes what takes AdamW alone
-several times as long (docs/method.md). Our own instead of ``torch.optim.Muon``: that one takes matrices only and computes in bf16,
-which is slow on processors without it.
-
-How well a network does on labelled frames that it is not trained on, while it is being trained.
+Muon is K. Jordan et al., "Muon: an optimizer for hidden layers in neural networks", 2024. ``torch.optim.Muon`` takes matrices only
+and computes in bf16, which is slow on processors without it.
 """
 
 from __future__ import annotations
@@ -15,28 +10,32 @@ import copy
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch.utils.data import DataLoader, Dataset, IterableDataset
+from torch.utils.data import DataLoader, Dataset
 
+from core.learning.augmentation import Crop
 from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
 from core.learning.training_plan import TrainingPlan
-from core.perception.inference import padded
+from core.perception.inference import cores, padded
 from core.perception.unet import DualUNet
 from core.types import Image, Mask
 
 _QUINTIC = (3.4445, -4.7750, 2.0315)
 """Coefficients of the Newton-Schulz iteration that drives all singular values into 0.7..1.2 within five rounds."""
+_SMALL_AREA_PX = 50.0
+"""Added to areas in a crop's Dice: in a crop with a smaller robot, a few pixels do not decide it."""
+_MOST_LOADERS = 8
+"""Processes that make the crops for a GPU, at most."""
 
 
 def orthogonalised(matrix: Tensor, rounds: int = 5) -> Tensor:
     """The (rows, columns) matrix with its singular values brought near 1, by a Newton-Schulz iteration.
 
-    Every round multiplies by a polynomial of the Gram matrix, and all of these commute. So they are gathered in matrices of the
-    shorter side, and the long one is multiplied once instead of twice a round: a third of the work for the kernels here.
+    Every round multiplies by a polynomial of the Gram matrix, and these commute: they are multiplied at the size of the shorter
+    side, and the long matrix once instead of twice a round.
     """
     a, b, c = _QUINTIC
     x: Tensor = matrix / (matrix.norm() + 1e-7)
@@ -56,7 +55,7 @@ def orthogonalised(matrix: Tensor, rounds: int = 5) -> Tensor:
 
 
 class Muon(torch.optim.Optimizer):
-    """Steps of the same root mean square as AdamW's (0.2 of the learning rate), whatever the size of the kernel."""
+    """Momentum with orthogonalised direction; steps of AdamW's root mean square (0.2 of the learning rate) for any kernel size."""
 
     def __init__(self, parameters: Iterable[Tensor], lr: float, momentum: float = 0.95, weight_decay: float = 0.01) -> None:
         super().__init__(parameters, {"lr": lr, "momentum": momentum, "weight_decay": weight_decay})
@@ -64,59 +63,30 @@ class Muon(torch.optim.Optimizer):
     @torch.no_grad()
     def step(self, closure: Callable[[], float] | None = None) -> None:  # type: ignore[override]
         """One step along the orthogonalised Nesterov momentum of every parameter that has a gradient."""
-        assert closure is None, "Muon needs no second look at the loss"
         for group in self.param_groups:
             for parameter in group["params"]:
-                if parameter.grad is not None:
-                    self._step_of(parameter, group)
-
-    def _step_of(self, parameter: Tensor, group: dict[str, Any]) -> None:
-        assert parameter.grad is not None
-        state = self.state[parameter]
-        if "momentum" not in state:
-            state["momentum"] = torch.zeros_like(parameter)
-        state["momentum"].lerp_(parameter.grad, 1 - group["momentum"])
-        direction = parameter.grad.lerp(state["momentum"], group["momentum"]).flatten(1)
-        scale = 0.2 * max(direction.shape) ** 0.5
-        parameter.mul_(1 - group["lr"] * group["weight_decay"])
-        parameter.sub_(orthogonalised(direction).view_as(parameter), alpha=group["lr"] * scale)
+                if parameter.grad is None:
+                    continue
+                state = self.state[parameter]
+                if "momentum" not in state:
+                    state["momentum"] = torch.zeros_like(parameter)
+                state["momentum"].lerp_(parameter.grad, 1 - group["momentum"])
+                direction = parameter.grad.lerp(state["momentum"], group["momentum"]).flatten(1)
+                scale = 0.2 * max(direction.shape) ** 0.5
+                parameter.mul_(1 - group["lr"] * group["weight_decay"])
+                parameter.sub_(orthogonalised(direction).view_as(parameter), alpha=group["lr"] * scale)
 
 
 def make_optimizers(network: nn.Module, learning_rate: float, weight_decay: float) -> list[torch.optim.Optimizer]:
-    """Muon for the 3x3 kernels, AdamW at 0.3 of its learning rate for what is left: outputs, up-samplings, scales and offsets."""
+    """Muon for the 3x3 kernels, AdamW at 0.3 of its learning rate for outputs, up-samplings, scales and offsets."""
     kernels = [m.weight for m in network.modules() if isinstance(m, nn.Conv2d) and m.kernel_size != (1, 1)]
     taken = {id(parameter) for parameter in kernels}
     rest = [parameter for parameter in network.parameters() if id(parameter) not in taken]
     return [Muon(kernels, learning_rate), torch.optim.AdamW(rest, learning_rate * 0.3, weight_decay=weight_decay)]
 
 
-Crop = tuple[Tensor, Tensor]
-"""Planes and labels, as ``crops.py`` cuts them."""
-
-_SMALL_AREA_PX = 50.0
-"""Of a crop whose robot is smaller than this, a few pixels more or less do not decide the Dice."""
-
-
-@runtime_checkable
-class Attentive(Protocol):
-    """Crops that are made where the network learns, and follow how that goes: what it finds hard they show more often."""
-
-    device: torch.device
-
-    def note(self, lost: Tensor) -> None:
-        """What was lost, (n,), of each crop that was shown last, on their device."""
-
-
-@runtime_checkable
-class Watching(Protocol):
-    """Crops that ask the network, as it is then, what it sees."""
-
-    def watch(self, network: torch.nn.Module) -> None:
-        """Which network that is, in evaluation mode."""
-
-
 @dataclass(frozen=True, slots=True)
-class Progress:
+class TrainingProgress:
     """State of a running training: ``loss`` smoothed, ``images_per_s`` since the last report."""
 
     step: int
@@ -127,13 +97,11 @@ class Progress:
     images_per_s: float
 
 
-def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: float = 0.0) -> tuple[Tensor, Tensor, Tensor]:
-    """Cross entropy + Dice of both tasks, the plain soft Dice (2,) of both over the batch, and what each crop lost (N,).
-
-    That is, much as in ``difficulty.py``, what a crop's soft Dice of the robot lacks, and half of what that of the vessel does.
+def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: float = 0.0) -> tuple[Tensor, Tensor]:
+    """Cross entropy + Dice of both tasks, and the plain soft Dice (2,) of both over the batch.
 
     ``target`` (N, 2 or 3, H, W) are vessel, robot, and how near a pixel is to an end of the robot (0..1): in the loss it counts
-    ``1 + end_weight`` times there, so that losses of different weights do not compare.
+    ``1 + end_weight`` times there.
 
     Half of the Dice is taken over the batch, half over every crop by itself: over the batch alone, a crop whose robot is short or
     faint weighs next to nothing, and those are the crops in which a tip gets lost.
@@ -150,12 +118,10 @@ def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: flo
         both, either = both * counts, either * counts
     overlap, size = both.sum(dim=(2, 3)), either.sum(dim=(2, 3))
     dice = (2 * overlap.sum(dim=0) + 1) / (size.sum(dim=0) + 1)
-    of_each = (2 * overlap + _SMALL_AREA_PX) / (size + _SMALL_AREA_PX)
-    each = of_each.mean(dim=0)
-    lost = ((1 - of_each.detach()) * weights.new_tensor([0.5, 1.0])).sum(dim=1)
+    each = ((2 * overlap + _SMALL_AREA_PX) / (size + _SMALL_AREA_PX)).mean(dim=0)
     # The robot is some 2 % of the pixels: unweighted, its entropy would drown in the background's.
     entropy = entropy * logits.new_tensor([1.0, 5.0])
-    return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), plain.detach(), lost
+    return ((entropy + 1 - 0.5 * (dice + each)) * weights).sum(), plain.detach()
 
 
 def computes_in_bf16(device: torch.device) -> bool:
@@ -166,34 +132,23 @@ def computes_in_bf16(device: torch.device) -> bool:
     return bool(able.get("avx512_bf16") or able.get("amx_bf16"))
 
 
-def _learning_rate(plan: TrainingPlan, step: int) -> float:
-    if step < plan.warmup_steps:
-        return plan.learning_rate * (step + 1) / plan.warmup_steps
-    share = (step - plan.warmup_steps) / max(1, plan.steps - plan.warmup_steps)
-    return plan.learning_rate * max(0.01, 1.0 - share)
+class LoaderLost(DatasetError):
+    """The process that reads the frames was ended; no frame is at fault."""
 
 
-def _batches(
-    crops: Dataset[tuple[Tensor, Tensor]], plan: TrainingPlan, failed: list[DatasetError]
-) -> Iterator[tuple[Tensor, Tensor]]:
-    """All of them, or until a frame cannot be read, or the process that reads them has gone: that goes into `failed`."""
-    if isinstance(crops, IterableDataset):  # it makes whole batches, where the network is
-        yield from crops
-        return
+def _batches(crops: Dataset[Crop], plan: TrainingPlan, device: torch.device, failed: list[DatasetError]) -> Iterator[Crop]:
+    """All batches, or those until a frame cannot be read or the process that reads them has ended: that goes into `failed`."""
+    workers = min(cores(), _MOST_LOADERS) if device.type == "cuda" and plan.workers else plan.workers
     try:
-        yield from DataLoader(crops, plan.batch, num_workers=plan.workers, prefetch_factor=4 if plan.workers else None)
+        yield from DataLoader(crops, plan.batch, num_workers=workers, prefetch_factor=4 if workers else None)
     except DatasetError as error:
-        # A worker's error comes with all of its traceback; the last line is what it says.
-        said = str(error).strip().splitlines()[-1].removeprefix(f"{DatasetError.__module__}.DatasetError: ")
-        failed.append(DatasetError(said))
+        # A worker's error comes with its traceback; the last line is its message.
+        message = str(error).strip().splitlines()[-1].removeprefix(f"{DatasetError.__module__}.DatasetError: ")
+        failed.append(DatasetError(message))
     except RuntimeError as error:
         if "DataLoader worker" not in str(error):
             raise
         failed.append(LoaderLost("the process that reads the frames was ended from outside; is there too little memory?"))
-
-
-class LoaderLost(DatasetError):
-    """No frame is at fault: the process that reads them has gone."""
 
 
 def train(
@@ -201,7 +156,7 @@ def train(
     crops: Dataset[Crop],
     plan: TrainingPlan,
     *,
-    on_progress: Callable[[Progress], None] = lambda _: None,
+    on_progress: Callable[[TrainingProgress], None] = lambda _: None,
     on_checkpoint: Callable[[DualUNet, int], None] = lambda _network, _step: None,
     on_last: Callable[[DualUNet, int], None] = lambda _network, _step: None,
     should_stop: Callable[[], bool] = lambda: False,
@@ -210,45 +165,46 @@ def train(
 ) -> tuple[DualUNet, int]:
     """Train `network` in place; returns the network with averaged weights and the number of steps done.
 
-    `crops` gives ``plan.steps * plan.batch`` crops with their labels (``crops.py``), or whole batches of them without end
-    (``device_crops.py``, ``device_windows.py``).
-    `should_stop` is asked after every step; what was learnt until then is returned. `on_last` is given it first, while the crops'
-    workers still run: processes have broken down when these ended. Both it and `on_checkpoint` are given a network on the CPU.
-    Where the device computes in bf16, autocast is used.
-    Raises DatasetError for a frame that cannot be read, after `on_last` was given what was learnt until then.
+    Parameters
+    ----------
+    crops : ``plan.steps * plan.batch`` crops with their labels.
+    should_stop : asked after every step; what was learnt until then is returned.
+    on_last : gets the network while the crops' workers still run: processes have broken down when these ended. It and
+        `on_checkpoint` are given a network on the CPU.
+
+    Raises
+    ------
+    DatasetError
+        A frame cannot be read; `on_last` was given what was learnt until then.
     """
     torch.manual_seed(plan.seed)
     if plan.threads:
         torch.set_num_threads(plan.threads)
-    device = crops.device if isinstance(crops, Attentive) else torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = network.to(device, memory_format=torch.channels_last).train()  # type: ignore[call-overload]
     if plan.keeps_statistics:
         for module in network.modules():
             if isinstance(module, torch.nn.BatchNorm2d):
                 module.eval()
     average = copy.deepcopy(network).eval()
-    if isinstance(crops, Watching):
-        crops.watch(average)
     in_bf16 = computes_in_bf16(device)
     optimizers = make_optimizers(network, plan.learning_rate, plan.weight_decay)
-    shares = [[group["lr"] / plan.learning_rate for group in optimizer.param_groups] for optimizer in optimizers]
-    averaged = [(kept, new) for kept, new in zip(average.state_dict().values(), network.state_dict().values(), strict=True)]
+    groups = [(group, group["lr"] / plan.learning_rate) for optimizer in optimizers for group in optimizer.param_groups]
+    averaged = list(zip(average.state_dict().values(), network.state_dict().values(), strict=True))
     smooth_loss, smooth_dice = torch.zeros((), device=device), torch.zeros(2, device=device)
     done, mark, marked = 0, time.monotonic(), 0
     failed: list[DatasetError] = []
-    for image, target in _batches(crops, plan, failed):
-        for optimizer, parts in zip(optimizers, shares, strict=True):
-            for group, part in zip(optimizer.param_groups, parts, strict=True):
-                group["lr"] = part * _learning_rate(plan, done)
+    for image, target in _batches(crops, plan, device, failed):
+        rate = plan.learning_rate_at(done)
+        for group, share in groups:
+            group["lr"] = share * rate
         batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
         with torch.autocast(device.type, torch.bfloat16, enabled=in_bf16):
             logits = network(batch)
         labels = target.to(device).float()
         if labels.shape[1] > 2:
             labels[:, 2] /= 255
-        loss, dice, lost = loss_of(logits.float(), labels, plan.robot_weight, plan.end_weight)
-        if isinstance(crops, Attentive):
-            crops.note(lost)
+        loss, dice = loss_of(logits.float(), labels, plan.robot_weight, plan.end_weight)
         for optimizer in optimizers:
             optimizer.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
@@ -256,31 +212,28 @@ def train(
         for optimizer in optimizers:
             optimizer.step()
         _average(averaged, min(plan.average_decay, (1 + done) / (10 + done)))
-        # Kept where they are: asked for after every step, a GPU would wait for the processor.
+        # Kept on the device: read after every step, a GPU would wait for the processor.
         blend = max(0.02, 1 / (done + 1))
         smooth_loss.lerp_(loss.detach(), blend)
         smooth_dice.lerp_(dice, blend)
         done += 1
         if done % report_every == 0 or done == plan.steps:
             now = time.monotonic()
-            rate = (done - marked) * plan.batch / max(now - mark, 1e-9)
-            on_progress(Progress(done, plan.steps, float(smooth_loss), float(smooth_dice[0]), float(smooth_dice[1]), rate))
+            speed = (done - marked) * plan.batch / max(now - mark, 1e-9)
+            vessel, robot = smooth_dice.tolist()
+            on_progress(TrainingProgress(done, plan.steps, float(smooth_loss), vessel, robot, speed))
             mark, marked = now, done
         if done % checkpoint_every == 0 and done < plan.steps:
-            on_checkpoint(_on_cpu(average), done)
+            # A network on a GPU is copied: the original learns on there.
+            on_checkpoint(average if device.type == "cpu" else copy.deepcopy(average).to("cpu"), done)
         if should_stop() or done in (plan.steps, plan.stop_after):
             on_last(average.to("cpu"), done)
             break
-    if failed and done:
-        on_last(average.to("cpu"), done)
-    for error in failed:
-        raise error
+    if failed:
+        if done:
+            on_last(average.to("cpu"), done)
+        raise failed[0]
     return average.to("cpu"), done
-
-
-def _on_cpu(network: DualUNet) -> DualUNet:
-    """The network, or a copy where it is on another device: it is led on there."""
-    return network if next(network.parameters()).device.type == "cpu" else copy.deepcopy(network).to("cpu")
 
 
 @torch.no_grad()
@@ -294,7 +247,7 @@ def _average(averaged: list[tuple[Tensor, Tensor]], decay: float) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOutFrame:
-    """A frame as the network sees it: picture and true masks at working size, and the masks that it finds."""
+    """Picture and true masks of a frame at working size, and the masks that the network finds."""
 
     stem: str
     image: Image
@@ -305,25 +258,32 @@ class HeldOutFrame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HeldOut:
-    """All frames, and Dice coefficients over the pixels of all of them together."""
+class HeldOutResult:
+    """Frames that are not trained on, and Dice coefficients over the pixels of all of them together."""
 
     frames: tuple[HeldOutFrame, ...]
     vessel_dice: float
     robot_dice: float
 
 
-def measure_held_out(network: DualUNet, samples: Sequence[Sample]) -> HeldOut:
+@torch.no_grad()
+def measure_held_out(network: DualUNet, samples: Sequence[Sample]) -> HeldOutResult:
     """Run the network, as it is, on whole frames; its mode is left as it was. Raises DatasetError."""
+    device, frames = next(network.parameters()).device, []
     was_training = network.training
     network.eval()
     try:
-        frames = tuple(_see(network, sample) for sample in samples)
+        for sample in samples:
+            image, vessel, robot = sample.load(WORKING_SIZE_PX)
+            height, width = image.shape[:2]
+            whole = padded(image, network.shape.stride)  # as perception does it, and cut back
+            batch = torch.from_numpy(np.ascontiguousarray(whole.transpose(2, 0, 1)))[None].to(device).float() / 255
+            found = (network(batch)[0] > 0).cpu().numpy()[:, :height, :width]
+            frames.append(HeldOutFrame(sample.stem, image, vessel, robot, found[0], found[1]))
     finally:
         network.train(was_training)
-    vessel = dice([(frame.vessel, frame.true_vessel) for frame in frames])
-    robot = dice([(frame.robot, frame.true_robot) for frame in frames])
-    return HeldOut(frames, vessel, robot)
+    vessel_dice = dice([(frame.vessel, frame.true_vessel) for frame in frames])
+    return HeldOutResult(tuple(frames), vessel_dice, dice([(frame.robot, frame.true_robot) for frame in frames]))
 
 
 def dice(pairs: Sequence[tuple[Mask, Mask]]) -> float:
@@ -331,14 +291,3 @@ def dice(pairs: Sequence[tuple[Mask, Mask]]) -> float:
     both = sum(int((found & true).sum()) for found, true in pairs)
     total = sum(int(found.sum()) + int(true.sum()) for found, true in pairs)
     return 2.0 * both / total if total else 1.0
-
-
-@torch.no_grad()
-def _see(network: DualUNet, sample: Sample) -> HeldOutFrame:
-    image, vessel, robot = sample.load(WORKING_SIZE_PX)
-    height, width = image.shape[:2]
-    whole = padded(image, network.shape.stride)  # as perception does it, and cut back
-    device = next(network.parameters()).device
-    batch = torch.from_numpy(np.ascontiguousarray(whole.transpose(2, 0, 1)))[None].to(device).float() / 255
-    found = (network(batch)[0] > 0).cpu().numpy()[:, :height, :width]
-    return HeldOutFrame(sample.stem, image, vessel, robot, found[0], found[1])

@@ -1,4 +1,4 @@
-"""How a network is to be trained. Apart from the training, so that a command line that makes no sense need not wait for it."""
+"""How a network is to be trained. Imports no torch, so that a command line that makes no sense is refused at once."""
 
 from __future__ import annotations
 
@@ -8,12 +8,21 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
-    """How to train. ``crop`` is (height, width) in working pixels; ``clutter_share`` of the samples show nothing of ours,
-    ``look_share`` of them are changed in exposure, colour, sharpness and noise, and in ``strip_share`` of the first look's ones
-    clips lie over the robot. ``stop_after`` ends before the learning rate has come down: for a run that another one goes on from.
-    ``focus_share`` of the samples are drawn by difficulty. The robot's loss counts ``robot_weight`` times the vessel's, and around
-    the robot's true ends a pixel ``1 + end_weight`` times: theta and state are measured there. With ``keeps_statistics`` the
-    normalisation stays as it was learnt: that of a few frames alike would ruin it for all others."""
+    """Options of a training.
+
+    Attributes
+    ----------
+    crop : (height, width) in working pixels.
+    clutter_share : share of the crops that show neither vessel nor robot.
+    look_share : share of the crops that are changed in exposure, colour, sharpness and noise.
+    strip_share : share of the whole frames' crops in which clips lie over the robot.
+    focus_share : share of the crops that are drawn by difficulty.
+    robot_weight : weight of the robot's loss beside the vessel's.
+    end_weight : around the robot's true ends a pixel counts ``1 + end_weight`` times: theta and state are measured there.
+    keeps_statistics : the normalisation stays as it was learnt: statistics of a few frames alike would ruin it for all others.
+    stop_after : step at which to end, before the learning rate has come down, for a run that another one continues.
+    workers : processes that make the crops; 0: this one. For a GPU it is as many as there are cores, up to eight.
+    """
 
     steps: int = 6000
     batch: int = 12
@@ -33,6 +42,13 @@ class TrainingPlan:
     seed: int = 0
     workers: int = 1
     threads: int = 0
+
+    def learning_rate_at(self, step: int) -> float:
+        """Rises over the warm-up steps, then falls linearly to a hundredth."""
+        if step < self.warmup_steps:
+            return self.learning_rate * (step + 1) / self.warmup_steps
+        share = (step - self.warmup_steps) / max(1, self.steps - self.warmup_steps)
+        return self.learning_rate * max(0.01, 1.0 - share)
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

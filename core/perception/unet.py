@@ -8,7 +8,7 @@ apart; and the decoders may be narrower than the encoder. ``UNetShape(base=64, f
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import torch
@@ -140,6 +140,25 @@ class DualUNet(nn.Module):
 
     def _unfolded(self, output: Tensor) -> Tensor:
         return nn.functional.pixel_shuffle(output, self.shape.fold) if self.shape.fold > 1 else output
+
+
+def with_prior_planes(network: DualUNet) -> DualUNet:
+    """A copy of `network` that also takes probabilities (5 planes), with weights of 0 for them.
+
+    Raises
+    ------
+    ValueError
+        The network takes them already.
+    """
+    if network.shape.inputs != 3:
+        raise ValueError("the network takes probabilities already")
+    wider = DualUNet(replace(network.shape, inputs=5)).eval()
+    state, name = network.state_dict(), "encoder.0.0.weight"
+    kernel = wider.state_dict()[name].zero_()
+    # Folding keeps the pixels of a plane together: the planes of the picture come first as before.
+    kernel[:, : state[name].shape[1]] = state[name]
+    wider.load_state_dict(state | {name: kernel})
+    return wider
 
 
 class Probabilities(nn.Module):

@@ -12,15 +12,15 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app, main
-from app.commands import train
+from app.commands import synth
 from core.session.manifest import read_manifest
 from hardware.twin.rendering.presets import RARE
 from tests.core.session_data import record, tick_of
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
-    "gui", "perceive", "synth", "train", "average", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
-    "play", "ablation", "screenshots", "faults", "soak", "doctor", "session", "rig",
+    "gui", "perceive", "synth", "train", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
+    "play", "doctor", "session", "rig",
 )  # fmt: skip
 INNER = {"session": ("info", "recover", "export"), "rig": ("list", "show", "calibrate", "board")}
 SLOW = ("PySide6", "numpy", "torch", "openvino", "cv2", "scipy", "mujoco", "pydantic", "rich")
@@ -112,7 +112,7 @@ def test_an_interrupted_command_ends_with_130(capsys: pytest.CaptureFixture[str]
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(train, "run_synth", interrupted)
+    monkeypatch.setattr(synth, "make_set", interrupted)
     monkeypatch.setattr(sys, "argv", ["main.py", "synth", "--out", "x", "--count", "4"])
     with pytest.raises(SystemExit) as left:
         main()

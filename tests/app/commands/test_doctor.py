@@ -10,12 +10,19 @@ from pathlib import Path
 
 import pytest
 
-from app.commands.rig import run_doctor
+from app.commands.doctor import doctor
 from core.config.models import Config
 from core.config.rig_file import RigFileError
 from hardware.preflight import checks as program
 from hardware.preflight.checks import Check
 from hardware.rig import RigKind, rig_config
+
+
+def _exit_code(*, as_json: bool) -> object:
+    with pytest.raises(SystemExit) as left:
+        doctor(as_json)
+    return left.value.code
+
 
 MAIN = Path(__file__).resolve().parents[3] / "main.py"
 
@@ -60,13 +67,13 @@ def test_people_get_a_table_and_what_to_do(monkeypatch: pytest.MonkeyPatch, caps
     long = "echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer   # and so on, far beyond the width of a terminal"
     checks = [Check("clock", True, "monotonic"), Check("adapter latency", False, "16 ms", long)]
     monkeypatch.setattr("hardware.preflight.preflight.run_checks", lambda _config: iter(checks))
-    assert run_doctor(None, None, as_json=False) == 1
+    assert _exit_code(as_json=False) == 1
     lines = capsys.readouterr().out.splitlines()
     assert any(line.split() == ["NOT", "OK", "adapter", "latency", "16", "ms"] for line in lines)
     assert any(line.split() == ["ok", "clock", "monotonic"] for line in lines)
     assert lines[-2:] == ["What to do:", f"  adapter latency: {long}"]
     checks.pop()
-    assert run_doctor(None, None, as_json=False) == 0
+    assert _exit_code(as_json=False) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "All is well."
 
 
@@ -77,7 +84,7 @@ def test_an_opencv_that_ends_its_process_is_told_without_it(
     (tmp_path / "cv2.so").write_bytes(b"\x7fELF but no more")
     monkeypatch.setattr(program, "_binaries", lambda: [*binaries, (program.OPENCV, tmp_path / "cv2.so")])
     monkeypatch.setattr("hardware.preflight.preflight.run_checks", None)
-    assert run_doctor(None, None, as_json=True) == 1
+    assert _exit_code(as_json=True) == 1
     checks = json.loads(capsys.readouterr().out)["checks"]
     assert [check["name"] for check in checks[:4]] == ["python", "packages", "system libraries", "vendor libraries"]
     assert "OpenCV: " in checks[3]["detail"]
@@ -90,7 +97,7 @@ def test_a_package_that_does_not_load_is_told_without_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "hardware.preflight.preflight", None)
-    assert run_doctor(None, None, as_json=False) == 1
+    assert _exit_code(as_json=False) == 1
     told = " ".join(capsys.readouterr().out.split())
     assert "NOT OK all others not made, since the program does not load: import of hardware.preflight.preflight halted" in told
 

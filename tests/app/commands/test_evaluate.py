@@ -19,7 +19,6 @@ import cv2
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tests.core.test_classification import label_pairs
 
 from app.commands.evaluate import LikePaper, run_evaluate
 from app.commands.figures import save_figure
@@ -31,6 +30,7 @@ from core.learning.dataset import write_png
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
 from tests.app.commands import MAIN, run, run_apart
+from tests.core.evaluation.test_classification import label_pairs
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
 

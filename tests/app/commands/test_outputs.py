@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer import TyperException
 
 from app.cli import app
 from app.commands.perceive import Outputs, _check_keeps_inputs, _written_names, run_perceive
 from app.commands.progress import check_no_input, is_same
-from app.commands.session import run_export, run_info
-from app.commands.train import TrainInputs, TrainOutputs, run_train
+from app.commands.session import export, info
+from app.commands.train import TrainOptions, run_train
 from core.devices import UserError
 from core.learning.dataset import write_mask, write_png
 from core.learning.training_plan import TrainingPlan
@@ -150,16 +149,15 @@ def test_frames_made_for_a_training_name_the_options_that_they_hang_on(tmp_path:
     with pytest.raises(SynthError, match=r"other settings .*; choose another folder"):
         write_set(plan)
     with pytest.raises(UserError, match=r"m_frames: holds a set with other .*: give --seed, .*, or choose another --out$"):
-        run_train(TrainOutputs(tmp_path / "m"), TrainInputs(synthetic=4), None, 4, TrainingPlan(steps=1, seed=3))
+        run_train(TrainOptions(tmp_path / "m", synthetic=4, base=4), TrainingPlan(steps=1, seed=3))
 
 
 def test_a_folder_without_frames_to_judge_by_is_told_before_frames_are_made(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("app.commands.train.run_synth", lambda *_: pytest.fail("frames are made"))
+    monkeypatch.setattr("app.commands.train.make_set", lambda *_: pytest.fail("frames are made"))
     with pytest.raises(UserError, match="nothing here: no labelled frames; needs images"):
-        outputs = TrainOutputs(tmp_path / "m", tmp_path / "nothing here")
-        run_train(outputs, TrainInputs(synthetic=4), None, 4, TrainingPlan(steps=1))
+        run_train(TrainOptions(tmp_path / "m", synthetic=4, held_out=tmp_path / "nothing here"), TrainingPlan(steps=1))
 
 
 def test_frames_within_the_model_that_is_trained_are_not_learnt_from(labelled: Path, tmp_path: Path) -> None:
@@ -177,15 +175,15 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
     (tmp_path / "model").mkdir()
     (tmp_path / "model" / "model.json").write_text("{}")
     with pytest.raises(UserError, match="is a model already; choose another --out"):
-        run_train(TrainOutputs(tmp_path / "model"), TrainInputs([labelled]), None, 4, TrainingPlan(steps=1))
+        run_train(TrainOptions(tmp_path / "model", [labelled]), TrainingPlan(steps=1))
     assert (tmp_path / "model" / "model.json").read_text() == "{}"
     model = str(tmp_path / "model")
     with pytest.raises(UserError, match="lies within a model that is read for it"):
-        run_train(TrainOutputs(tmp_path / "model" / "newer"), TrainInputs([labelled]), model, None, TrainingPlan(steps=1))
+        run_train(TrainOptions(tmp_path / "model" / "newer", [labelled], init=model), TrainingPlan(steps=1))
     assert [path.name for path in (tmp_path / "model").iterdir()] == ["model.json"]
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(UserError, match="leads nowhere but to itself"):
-        run_train(TrainOutputs(tmp_path / "loop"), TrainInputs([labelled]), None, 4, TrainingPlan(steps=1))
+        run_train(TrainOptions(tmp_path / "loop", [labelled]), TrainingPlan(steps=1))
 
 
 @pytest.mark.parametrize(
@@ -194,13 +192,7 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
         (("--base", "8", "--shallow"), "--base and --shallow contradict each other"),
         (("--init", "default", "--shallow"), "--shallow shapes a new network; the one of --init default has its shape"),
         (("--init", "default", "--second-look", "--shallow"), "--shallow is for the first look"),
-        (("--init", "default", "--second-look", "--deepen"), "the second look of default is as deep already"),
-        (("--init", "default", "--second-look", "--widen"), "the second look of default is as wide already"),
-        (("--deepen",), "--deepen needs --init MODEL"),
-        (("--init", "default", "--widen"), "--widen is for the second look; give --second-look too"),
-        (("--init", "default", "--second-look", "--widen", "--remember", "4"), "--widen needs the normalisation that --remember"),
         (("--focus", "0.5"), "--focus needs --init MODEL"),
-        (("--init", "default", "--deepen"), "default is as deep already; leave --deepen out"),
         (("--init", "default", "--second-look", "--strips", "0.2"), "--strips is for whole pictures"),
         (("--init", "default", "--second-look", "--crop", "384"), "--crop is for whole pictures"),
         (("--steps", "10", "--stop-after", "10"), "--stop-after 10 is no earlier than the end, --steps 10"),
@@ -216,22 +208,20 @@ def test_training_refuses_what_could_have_no_effect(labelled: Path, tmp_path: Pa
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (("benchmark", "--window", "5", "--accuracy", "set"), "--window, --accuracy are different things"),
+        (("benchmark", "--window", "5"), "benchmark --window is a development tool now: .* -m tools.benchmarks window"),
+        (("benchmark", "--recording"), "tools.benchmarks recording"),
+        (("benchmark", "--player", "2"), "tools.benchmarks player"),
+        (("average", "a", "b", "--out", "c"), "average is gone"),
+        (("soak", "--hours", "2"), "soak is a development tool now: .* -m tools.soak"),
         (("benchmark", "--store"), "--store is for --accuracy"),
         (("benchmark", "--accuracy", "set", "--store", "--true-masks"), "--store keeps figures of the model as it is shipped"),
         (("benchmark", "--accuracy", "set", "--store", "--preset", "paper"), "--store keeps figures of the model as it is shipped"),
-        (("benchmark", "--window", "5", "--model", "x"), "leave --model and --preset out"),
-        (("benchmark", "--window", "5", "--frames", "5"), "--frames is for speed and --recording: leave it out with --window"),
-        (("benchmark", "--player", "5", "--frames", "120"), "leave it out with --player"),
         (("benchmark", "--accuracy", "set", "--frames", "5"), "leave it out with --accuracy"),
         (("benchmark", "--accuracy", "set", "--true-masks", "--model", "x"), "--true-masks looks through no network"),
         (("trial", "--seeds", "0:2", "--true-masks", "--model", "x"), "--true-masks looks through no network"),
-        (("ablation", "set", "--true-masks", "--model", "x"), "--true-masks looks through no network"),
         (("gui", "--rig", "twin", "--source", "photo.png"), "--source is looked at instead of a rig's camera: leave --rig out"),
         (("evaluate", "set", "--out", "out", "--manual-sd", "3"), "--manual-sd is for --like-paper"),
         (("evaluate", "set", "--out", "out", "--json", "--progress-json"), "both write to standard output"),
-        (("faults", "--only", "40", "--quick"), "fault 40 needs a line, a process or a window"),
-        (("faults", "--out", "/nowhere/at/all.md"), "/nowhere/at/all.md: cannot be written"),
         (("annotate", "set", "--export", "csv", "--out", "o.csv", "--json"), "--json is for --report"),
         (("--rig", "twin", "record", "--out", "x"), "--rig before record is for the window alone"),
         (("rig", "show", "twin"), "twin: is built in and has no file"),
@@ -240,11 +230,6 @@ def test_training_refuses_what_could_have_no_effect(labelled: Path, tmp_path: Pa
 def test_options_that_contradict_each_other_are_refused(arguments: tuple[str, ...], why: str) -> None:
     with pytest.raises(UserError, match=why):
         call(*arguments)
-
-
-def test_a_window_is_not_measured_for_ever() -> None:
-    with pytest.raises(TyperException, match="less than or equal to 3600"):
-        call("benchmark", "--window", "inf")
 
 
 def test_what_a_recovered_copy_loses_later_is_told_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -265,30 +250,30 @@ def test_what_a_recovered_copy_loses_later_is_told_too(tmp_path: Path, capsys: p
 def test_what_a_closed_session_has_lost_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(6)])
 
-    def info() -> dict[str, object]:
-        run_info(session, as_json=True)
+    def found() -> dict[str, object]:
+        info(session, as_json=True)
         return json.loads(capsys.readouterr().out)
 
-    assert (info()["problems"], info()["missing_rows"]) == ([], 0)
+    assert (found()["problems"], found()["missing_rows"]) == ([], 0)
     lines = (session / FRAMES).read_bytes().splitlines(keepends=True)
     (session / FRAMES).write_bytes(b"".join(lines[:4]))
-    assert (info()["problems"], info()["missing_rows"]) == ([f"{FRAMES}: the last 2 of 6 rows are lost"], 2)
+    assert (found()["problems"], found()["missing_rows"]) == ([f"{FRAMES}: the last 2 of 6 rows are lost"], 2)
     (session / FRAMES).write_bytes(b"".join(lines))
     events = (session / EVENTS).read_bytes().splitlines(keepends=True)
     (session / EVENTS).write_bytes(b"".join(events[1:]))
     lost_one = [f"{EVENTS}: 1 of {len(events)} events are lost"]
-    assert info()["problems"] == lost_one
+    assert found()["problems"] == lost_one
     add_event(session, Event(1000.2, EventKind.NOTE, "written while it is played"))
-    assert info()["problems"] == lost_one, "a note that was added later does not stand for one that is lost"
+    assert found()["problems"] == lost_one, "a note that was added later does not stand for one that is lost"
     note = (session / EVENTS).read_bytes().splitlines(keepends=True)[-1]
     (session / EVENTS).write_bytes(b"".join([*events, note]))
-    assert info()["problems"] == []
+    assert found()["problems"] == []
     copy = recover(session, tmp_path / "recovered").folder
-    run_info(copy, as_json=True)
+    info(copy, as_json=True)
     assert "events" not in str(json.loads(capsys.readouterr().out)["problems"])
     (session / EVENTS).write_bytes(b"")
-    run_export(session, [tmp_path / "table.csv"], plain=False, as_json=True)
+    export(session, [tmp_path / "table.csv"], as_json=True)
     assert f"{EVENTS}: {len(events)} of {len(events)} events are lost" in json.loads(capsys.readouterr().out)["problems"]
     (session / EVENTS).write_bytes(b"".join(events))
     (session / "video_0000.mkv").unlink()
-    assert "1 of 1 videos are lost" in info()["problems"]  # type: ignore[operator]
+    assert "1 of 1 videos are lost" in found()["problems"]  # type: ignore[operator]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from app.commands import session as record_command
-from app.commands.session import describe, run_record
+from app.commands import record as record_command
+from app.commands.session import describe
 from core.devices import DeviceError
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
@@ -56,7 +56,7 @@ def recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callab
 
     def record(engine: FlakyEngine, seconds: float) -> Path:
         monkeypatch.setattr(record_command, "EngineMaker", lambda: lambda _config: engine)
-        run_record(seconds, tmp_path / "out", rig=None, config_path=config, lossless=False, as_json=True)
+        record_command.record(seconds, tmp_path / "out", as_json=True, config_path=config)
         return only_session(tmp_path)
 
     return record

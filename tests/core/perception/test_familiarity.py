@@ -14,7 +14,6 @@ from core.config.models import PerceptionConfig, TwinConfig
 from core.devices import UserError
 from core.evaluation.confidence import LEAST, KnownPicture, OutOfDistributionError, find_known, fit_familiarity, signatures_in
 from core.learning.dataset import DatasetError, write_png
-from core.learning.growing import with_first_look
 from core.learning.model_writer import save_model, save_with_second_look, write_calibration
 from core.perception.inference import OpenVinoSegmenter, TorchSegmenter
 from core.perception.model_file import INFO, MODELS, ModelError, read_model_info
@@ -23,7 +22,7 @@ from core.perception.pipeline import Pipeline, Sight, open_pipeline, open_sights
 from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures
 from core.perception.segmentation import Recognised, Turned, recognise
 from core.perception.tip_refinement import TipRefinement
-from core.perception.unet import DualUNet, UNetShape
+from core.perception.unet import DualUNet, UNetShape, with_prior_planes
 from core.types import Frame, Image, Reason, Refusal
 from hardware.twin.phantoms import PHANTOM_NAMES
 from hardware.twin.world import TwinWorld
@@ -341,7 +340,7 @@ def test_it_stays_with_a_new_second_look_and_goes_with_a_new_network(model: Path
     zeros = (0.0,) * len(names)
     calibration = ConfidenceCalibration(features=names, mean=zeros, scale=(1.0,) * len(names), weights=zeros, offset=0.0)
     write_calibration(base, calibration, familiarity=fitted(seen))
-    save_with_second_look(base, with_first_look(DualUNet(SHAPE)), tmp_path / "near", training={}, figures={})
+    save_with_second_look(base, with_prior_planes(DualUNet(SHAPE)), tmp_path / "near", training={}, figures={})
     near = read_model_info(tmp_path / "near")
     assert near.calibration is None
     assert near.familiarity == read_model_info(base).familiarity is not None

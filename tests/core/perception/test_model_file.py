@@ -11,7 +11,6 @@ import pytest
 import torch
 
 from core.config.models import SegmentationConfig
-from core.learning.growing import with_first_look
 from core.learning.model_writer import changed, rounded, save_model, save_with_second_look, write_figures
 from core.perception.inference import OpenVinoSegmenter, TorchSegmenter, open_segmenter
 from core.perception.model_file import (
@@ -31,7 +30,7 @@ from core.perception.model_file import (
     sha256_of,
 )
 from core.perception.segmentation import to_working
-from core.perception.unet import DualUNet, UNetShape
+from core.perception.unet import DualUNet, UNetShape, with_prior_planes
 
 TINY = UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)
 
@@ -285,7 +284,7 @@ def test_a_manifest_that_contradicts_itself_is_one_clear_error(model: Path, chan
 
 def test_a_network_of_other_planes_under_a_good_hash_is_one_clear_error(model: Path) -> None:
     torch.manual_seed(3)
-    save_model(with_first_look(DualUNet(TINY).eval()), model.with_name("near"), training={}, figures={})
+    save_model(with_prior_planes(DualUNet(TINY).eval()), model.with_name("near"), training={}, figures={})
     shutil.copyfile(model.with_name("near") / ONNX, model / ONNX)
     info = json.loads((model / INFO).read_text())
     (model / INFO).write_text(json.dumps(info | {"onnx_sha256": sha256_of(model / ONNX)}))

@@ -13,16 +13,15 @@ import pytest
 import torch
 
 from core.config.models import SegmentationConfig
-from core.learning.augmentation import Looks, NearCrops
+from core.learning.augmentation import PriorViews, TipCrops
 from core.learning.dataset import Sample, write_mask, write_png
-from core.learning.growing import with_first_look
 from core.learning.model_writer import save_model, save_with_second_look
 from core.learning.training_plan import TrainingPlan
 from core.perception.inference import OpenVinoSegmenter, open_second_look
 from core.perception.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info
 from core.perception.segmentation import MARGIN_PX, window_around
 from core.perception.tip_refinement import MOST_LOOKS, WINDOW_PX, Planes, TipRefinement, places_to_look, planes_of
-from core.perception.unet import DualUNet, UNetShape
+from core.perception.unet import DualUNet, UNetShape, with_prior_planes
 from core.types import Point
 
 SIZE = (480, 640)
@@ -177,7 +176,7 @@ def test_small_and_empty_pictures_are_no_trouble() -> None:
 def test_a_network_that_is_given_a_first_look_says_at_first_what_it_said() -> None:
     torch.manual_seed(2)
     network = DualUNet(TINY).eval()
-    wider = with_first_look(network)
+    wider = with_prior_planes(network)
     picture = torch.rand(1, 3, 64, 64)
     with torch.no_grad():
         expected = network(picture)
@@ -188,7 +187,7 @@ def test_a_network_that_is_given_a_first_look_says_at_first_what_it_said() -> No
     assert gradient is not None
     assert float(gradient[:, 12:].abs().sum()) > 0, "it can learn to mind it"
     with pytest.raises(ValueError, match="already"):
-        with_first_look(wider)
+        with_prior_planes(wider)
 
 
 def _samples(folder: Path, count: int = 2) -> list[Sample]:
@@ -215,9 +214,9 @@ def sees(robot: np.ndarray) -> First:
 
 def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) -> None:
     samples = _samples(tmp_path)
-    looks = [Looks.at(sample, sees(bar(0, 230))) for sample in samples]
+    looks = [PriorViews.at(sample, sees(bar(0, 230))) for sample in samples]
     plan = TrainingPlan(steps=20, batch=4, crop=(WINDOW_PX, WINDOW_PX), look_share=0.0, seed=3)
-    crops = NearCrops(samples, looks, plan)
+    crops = TipCrops(samples, looks, plan)
     assert len(crops) == 80
     has_end = 0
     for index in range(40):
@@ -226,27 +225,27 @@ def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) 
         assert np.array_equal(planes[0] < 100, target[1] > 0), "picture and label were turned alike"
         has_end += bool((planes[4] > 127).any())
     assert has_end > 30
-    again = pickle.loads(pickle.dumps(NearCrops(samples, looks, plan)))  # as it comes to a loader that was spawned
+    again = pickle.loads(pickle.dumps(TipCrops(samples, looks, plan)))  # as it comes to a loader that was spawned
     assert all(one.equal(other) for one, other in zip(crops[7], again[7], strict=True))
 
 
 def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
     """The first look is blind: without its errors, nobody would know where to look."""
     samples = _samples(tmp_path, 1)
-    looks = [Looks.at(samples[0], sees(np.zeros(SIZE, np.float32)))]
+    looks = [PriorViews.at(samples[0], sees(np.zeros(SIZE, np.float32)))]
     assert looks[0].first.places == ()
-    crops = NearCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0))
+    crops = TipCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0))
     shown = sum(bool(crops[index][1][1].any()) for index in range(100))
     assert shown > 40
 
 
 def test_wrong_are_pieces_missed_or_invented_and_not_the_blur_of_an_edge(tmp_path: Path) -> None:
     sample = _samples(tmp_path, 1)[0]  # the robot ends at 250
-    assert Looks.at(sample, sees(bar(0, 252))).wrong == ()
-    missed = Looks.at(sample, sees(bar(0, 150))).wrong
+    assert PriorViews.at(sample, sees(bar(0, 252))).wrong == ()
+    missed = PriorViews.at(sample, sees(bar(0, 150))).wrong
     assert missed
     assert all(150 < x < 250 and abs(y - 240) <= 4 for x, y in missed)
-    invented = Looks.at(sample, sees(np.maximum(bar(0, 250), bar(400, 460, row=100)))).wrong
+    invented = PriorViews.at(sample, sees(np.maximum(bar(0, 250), bar(400, 460, row=100)))).wrong
     assert invented
     assert all(400 <= x < 460 and abs(y - 100) <= 4 for x, y in invented)
 
@@ -258,7 +257,7 @@ def test_wrong_is_a_vessels_wall_beside_the_robots_end_too(tmp_path: Path) -> No
     def with_wall(shift_px: int, *, until: int = 640) -> tuple[Point, ...]:
         vessel = first.vessel.copy()
         vessel[:, :until] = np.roll(vessel, shift_px, axis=0)[:, :until]
-        return Looks.at(sample, First(bar(0, 250), vessel)).wrong
+        return PriorViews.at(sample, First(bar(0, 250), vessel)).wrong
 
     assert with_wall(0) == () and with_wall(2) == (), "that is the blur of an edge"
     shifted = with_wall(6)
@@ -273,13 +272,13 @@ def test_what_the_second_look_mends_is_not_wrong(tmp_path: Path) -> None:
 
     sample = _samples(tmp_path, 1)[0]
     first = sees(bar(0, 210))
-    assert Looks.at(sample, first).wrong
-    assert Looks.at(sample, first, near).wrong == ()
-    looks = Looks.at(sample, first, near)
-    assert looks.first == Looks.at(sample, first).last
+    assert PriorViews.at(sample, first).wrong
+    assert PriorViews.at(sample, first, near).wrong == ()
+    looks = PriorViews.at(sample, first, near)
+    assert looks.first == PriorViews.at(sample, first).last
     ends = [max(x for x, _ in seen.places) for seen in (looks.first, looks.last)]
     assert ends[0] == pytest.approx(209, abs=3) and ends[1] == pytest.approx(249, abs=3)
-    crops = NearCrops([sample], [looks], TrainingPlan(steps=10, batch=4, look_share=0.0))
+    crops = TipCrops([sample], [looks], TrainingPlan(steps=10, batch=4, look_share=0.0))
     shown = [tuple(part.numpy() for part in crops[index]) for index in range(40)]
     mended = sum(bool(((planes[4] > 127) == (target[1] > 0)).all()) for planes, target in shown)
     assert 8 < mended < 32, "half of the windows come with what was seen in the end"
@@ -288,11 +287,11 @@ def test_what_the_second_look_mends_is_not_wrong(tmp_path: Path) -> None:
 def test_focused_windows_show_what_was_wrong(tmp_path: Path) -> None:
     """Two frames, one of them understood: with focus, the piece that was missed in the other is in nearly every window."""
     samples = _samples(tmp_path)
-    looks = [Looks.at(samples[0], sees(bar(0, 250))), Looks.at(samples[1], sees(bar(0, 200)))]
+    looks = [PriorViews.at(samples[0], sees(bar(0, 250))), PriorViews.at(samples[1], sees(bar(0, 200)))]
     assert looks[0].wrong == () and looks[1].wrong
 
     def missed_shown(focus: float) -> int:
-        crops = NearCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0, focus_share=focus))
+        crops = TipCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0, focus_share=focus))
         shown = (tuple(part.numpy() for part in crops[index]) for index in range(100))
         return sum(bool(((target[1] > 0) & (planes[4] < 128)).any()) for planes, target in shown)
 
@@ -308,7 +307,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     planes = [np.random.default_rng(0).integers(0, 256, (160, 160, 5), np.uint8)]
     base = folder.with_name("base")
     save_model(network, base, training={}, figures={"robot_dice": 0.5}, examples=images)
-    save_with_second_look(base, with_first_look(network), folder, training={"steps_done": 3}, figures={}, examples=planes)
+    save_with_second_look(base, with_prior_planes(network), folder, training={"steps_done": 3}, figures={}, examples=planes)
     return folder
 
 
@@ -325,7 +324,7 @@ def test_what_was_held_out_is_still_known_after_the_second_look(model: Path, tmp
     """Dice on held-out frames is the first network's own, and that one stays; the set's figures were of another model."""
     network, held_out = DualUNet(TINY).eval(), {"held_out": True, "robot_dice": 0.7}
     save_model(network, tmp_path / "tuned", training={}, figures=held_out)
-    save_with_second_look(tmp_path / "tuned", with_first_look(network), tmp_path / "tuned", training={}, figures={})
+    save_with_second_look(tmp_path / "tuned", with_prior_planes(network), tmp_path / "tuned", training={}, figures={})
     assert read_model_info(tmp_path / "tuned").figures == held_out
     assert open_second_look(SegmentationConfig(model=str(tmp_path / "tuned"), precision="fp32")) is not None
 
@@ -421,7 +420,7 @@ def test_a_model_that_has_lost_its_second_look_is_not_taken_for_whole(model: Pat
 def test_a_second_look_of_another_model_is_refused(model: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(model, tmp_path / "copy")
     torch.manual_seed(7)
-    save_model(with_first_look(DualUNet(TINY).eval()), copy / SECOND_LOOK, training={}, figures={})
+    save_model(with_prior_planes(DualUNet(TINY).eval()), copy / SECOND_LOOK, training={}, figures={})
     with pytest.raises(ModelError, match=r"second_look.*another model"):
         open_second_look(SegmentationConfig(model=str(copy)))
 

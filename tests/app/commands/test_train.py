@@ -19,12 +19,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.commands.benchmark import run_accuracy
+from app.commands.benchmark import benchmark
 from app.ui.window_base import check_display
 from core.devices import UserError
 from core.evaluation.accuracy import FrameScore, score_set
-from core.learning.augmentation import _Order
+from core.learning.augmentation import FrameCrops
 from core.learning.dataset import find_samples, read_truth
+from core.learning.training_plan import TrainingPlan
 from core.perception.model_file import read_model_info
 from tests.app.commands import MAIN, run, run_apart
 from tests.app.golden_session import GOLDEN
@@ -34,7 +35,7 @@ from tests.app.golden_session import GOLDEN
 def eight_bits_learn_quickly() -> Iterator[None]:
     """From very few pictures: how well they learn is another test's."""
     with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.setattr("app.commands.train._EXAMPLES", 1)
+        monkeypatch.setattr("app.commands.trainer._EXAMPLES", 1)
         yield
 
 
@@ -142,7 +143,8 @@ def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: P
 def test_a_damaged_frame_is_one_clear_line_and_the_model_until_then_is_there(frames: Path, tmp_path: Path) -> None:
     folder, out = tmp_path / "set", tmp_path / "model"
     shutil.copytree(frames, folder)
-    mask = find_samples([folder])[_Order(0, 6)[5]].robot  # of the frame that is shown last
+    samples = find_samples([folder])
+    mask = samples[FrameCrops(samples, TrainingPlan()).place_of(5)].robot  # of the frame that is shown last
     mask.write_bytes(mask.read_bytes()[:60])
     done = run("train", "--data", folder, "--out", out, "--steps", 60, "--batch", 1, "--crop", 64, "--base", 4, "--threads", 1)
     assert (done.returncode, done.stdout) == (2, "")
@@ -176,7 +178,7 @@ def test_an_interrupted_accuracy_tells_the_frames_until_then_and_stores_nothing(
 
         monkeypatch.setattr("core.evaluation.accuracy.score_set", cut)
         with pytest.raises(KeyboardInterrupt):
-            run_accuracy(frames, model=str(own), preset=None, config_path=None, as_json=as_json, store=True)
+            benchmark(as_json, frames, model=str(own), store=True)
         return capsys.readouterr().out
 
     figures = json.loads(measure(2))
@@ -213,13 +215,12 @@ def test_a_folders_name_is_shown_as_it_is(tmp_path: Path) -> None:
     [
         ("perceive", "no.png"),
         ("benchmark", "--frames", "3"),
-        ("ablation", "--sequence", "3"),
         ("trial", "--seeds", "0:1"),
         ("replay", GOLDEN),
     ],
 )
 def test_an_empty_name_is_no_model(command: tuple[object, ...], tmp_path: Path) -> None:
-    out = ("--out", tmp_path / "out") if command[0] in ("trial", "ablation") else ()
+    out = ("--out", tmp_path / "out") if command[0] == "trial" else ()
     done = run(*command, *out, "--model", "")
     assert done.returncode == 2
     assert "--model is empty" in done.stderr

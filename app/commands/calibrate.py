@@ -1,4 +1,4 @@
-"""``calibrate``: teach a model what its confidence means, on labelled frames that it was not trained on."""
+"""``calibrate``: fit a model's confidence, and the kinds of pictures that it knows, on labelled frames that it has not seen."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import typer
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from app.commands.options import ConfigOption
 from app.commands.perceive import LeftOut
 from app.commands.progress import progress_bar
 from core.config.models import PerceptionConfig, load_config
@@ -28,40 +30,47 @@ _EXAMPLES = 80
 """At most so many frames tell the eight-bit networks' ranges, and how to round their weights."""
 
 
-def run_calibrate(
-    folder: Path, *, model: str, config_path: Path | None, knows: Sequence[Path] = (), eight_bit: bool = False
+def calibrate(
+    folder: Annotated[Path, typer.Argument(help="labelled folder as synth writes it, which training has never seen")],
+    model: Annotated[str, typer.Option(help="model in resources/models, or a folder; its model.json is rewritten")] = "default",
+    knows: Annotated[
+        list[Path] | None, typer.Option("--knows", help="another folder of pictures, labelled or not, of a kind that it knows, too")
+    ] = None,
+    eight_bit: Annotated[
+        bool, typer.Option("--eight-bit", help="first make the networks' eight-bit copies anew, from some of the frames")
+    ] = False,
+    config: ConfigOption = None,
 ) -> None:
-    """Perceive every frame of a labelled set, once and in all orientations; store a calibration of each in the model's manifest.
+    """Teach a model what its confidence means: the share of right answers among those that it is so sure of.
 
-    And what kind of pictures these and those in `knows` are: others are refused from then on. With `eight_bit`, the networks'
-    eight-bit copies are first made anew from some of the frames.
+    And which kinds of pictures it knows: it refuses others from then on (perception.quality.max_novelty).
     """
     from core.evaluation.confidence import check_frames, check_known, find_known
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_writer import changed, check_can_change, renew_eight_bit
     from core.perception.model_file import model_folder
 
-    check_can_change(model)  # said before anything is looked at, as all that follows
+    check_can_change(model)
     samples, truth = find_labelled(folder, POSE_KEYS)
-    pictures = [picture for known in (folder, *knows) for picture in find_known(known)]
+    pictures = [picture for known in (folder, *(knows or ())) for picture in find_known(known)]
     check_frames(len(samples))
     check_known(pictures)
-    shown = _Shown(folder, samples, truth, pictures, [also.name for also in knows])
+    frames = _CalibrationFrames(folder, samples, truth, pictures, [also.name for also in knows or ()])
     target = model_folder(model)
-    # New networks without a calibration of their own would be believed as the old ones were: both come, or none.
+    # New networks must not come with the calibration of the old ones: both are replaced, or neither.
     with progress_bar() as bar, changed(target) if eight_bit else nullcontext(target) as work:
         if eight_bit:
             task = bar.add_task("eight-bit networks", total=100)
-            images = _examples(samples, _configuration(work, config_path, "never"))
+            images = _examples(samples, _configuration(work, config, "never"))
             renew_eight_bit(work, images, lambda share: bar.update(task, completed=round(100 * share)))
-        tables = _calibrated(work, shown, config_path, bar)
+        tables = _calibrated(work, frames, config, bar)
     Console(markup=False, emoji=False).print(*[_table(f"{target}, {title}", *of_it) for title, of_it in tables])
     sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")
 
 
 @dataclass(frozen=True, slots=True)
-class _Shown:
-    """A labelled set and what is true of it; all pictures of kinds that the model knows, and the names of further folders."""
+class _CalibrationFrames:
+    """A labelled set and its truth; all pictures of kinds that the model knows, and the names of further folders."""
 
     folder: Path
     samples: list[Sample]
@@ -71,9 +80,9 @@ class _Shown:
 
 
 def _calibrated(
-    model: Path, shown: _Shown, config_path: Path | None, bar: Progress
+    model: Path, frames: _CalibrationFrames, config_path: Path | None, bar: Progress
 ) -> list[tuple[str, tuple[ConfidenceCalibration, int, float]]]:
-    """Calibrate the model in this folder; returns of each way of looking a title, and what ``_table`` tells of it."""
+    """Calibrate the model in this folder; returns titles and the other arguments of ``_table``, without and with mirroring."""
     from core.evaluation.accuracy import TrueMasks, score_set
     from core.evaluation.confidence import describe_confidence, fit, fit_familiarity, is_right, signatures_in
     from core.learning.model_writer import write_calibration
@@ -82,15 +91,15 @@ def _calibrated(
     from core.perception.pipeline import open_pipeline, open_sights
     from core.perception.tip_refinement import TipRefinement
 
-    folder, samples, pictures = shown.folder, shown.samples, shown.pictures
+    folder, samples, pictures = frames.folder, frames.samples, frames.pictures
     described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
-    told: list[tuple[str, tuple[ConfidenceCalibration, int, float]]] = []
+    tables: list[tuple[str, tuple[ConfidenceCalibration, int, float]]] = []
     left_out = LeftOut()
     config = _configuration(model, config_path, "always")
     for mirrored in ("never", "always"):
         pipeline = open_pipeline(_configuration(model, config_path, mirrored), recalibrating=True)
         title = "frames" if mirrored == "never" else "all orientations"
-        found = score_set(samples, shown.truth, pipeline, TrueMasks(), left_out.add)
+        found = score_set(samples, frames.truth, pipeline, TrueMasks(), left_out.add)
         scores = list(bar.track(found, total=len(samples), description=title))
         if not scores:
             break
@@ -98,20 +107,20 @@ def _calibrated(
         pairs = [(score.evidence, is_right(score)) for score in answered if score.evidence is not None]
         calibration = fit([evidence for evidence, _ in pairs], [right for _, right in pairs], described)
         right, auroc = sum(right for _, right in pairs), describe_confidence(scores)["confidence_auroc"]
-        told.append((f"mirrored {mirrored}: {len(pairs)} answers of {folder.name}", (calibration, right, auroc)))
+        tables.append((f"mirrored {mirrored}: {len(pairs)} answers of {folder.name}", (calibration, right, auroc)))
     looked = signatures_in(pictures, open_segmenter(config.segmentation), config, left_out.add) if scores else iter(())
     signed = [one for one in bar.track(looked, total=len(pictures), description="kinds of pictures") if one is not None]
     left_out.tell(len(pictures) - len(left_out) if scores else 0)
     known, signatures = [picture for picture, _ in signed], np.array([signature for _, signature in signed])
-    familiarity = fit_familiarity(known, signatures, config.working_size_px, described | {"knows": list(shown.knows)})
+    familiarity = fit_familiarity(known, signatures, config.working_size_px, described | {"knows": list(frames.knows)})
     again = open_sights(config, recalibrating=True)[1].segment
     looks = again.looks if isinstance(again, TipRefinement) else 1
-    write_calibration(model, *[calibration for _, (calibration, _, _) in told], second_looks=looks, familiarity=familiarity)
-    return told
+    write_calibration(model, *[calibration for _, (calibration, _, _) in tables], second_looks=looks, familiarity=familiarity)
+    return tables
 
 
 def _examples(samples: Sequence[Sample], config: PerceptionConfig) -> list[Image]:
-    """Pictures from all over the set; one that cannot be read is told when it is perceived."""
+    """Pictures from all over the set; one that cannot be read is reported when it is perceived."""
     from core.learning.dataset import DatasetError
 
     images = []

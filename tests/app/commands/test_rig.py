@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app import cli
-from app.commands.rig import CalibrateOptions, run_calibrate
+from app.commands.rig import calibrate_rig
 from app.rig_wizard.board_print import BoardPrintError, paper_for
 from core.calibration.camera import BoardError, BoardSpec, BoardView, find_board
 from core.config.calibration import CalibrationConfig, ScaleConfig
@@ -187,7 +187,7 @@ def test_an_interruption_keeps_what_was_done_and_tendons_are_kept_with_the_steer
     monkeypatch.setattr(RigDraft, "find_zeros", lambda _: Zeros((0.0,) * 4))
     monkeypatch.setattr(RigDraft, "learn_steering", learn_steering)
     with pytest.raises(KeyboardInterrupt):
-        run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero", "steering")))
+        calibrate_rig("bench 1", auto=True, steps="board,zero,steering")
     assert "board saved in " in (told := capsys.readouterr().err)
     assert told.endswith("--steps zero,steering\n")
     assert find_rig("bench 1")[1].calibration is not None
@@ -201,7 +201,7 @@ def test_a_tendon_without_a_zero_ends_it_before_the_steering(monkeypatch: pytest
     with pytest.raises(
         UserError, match=r"no zero for all tendons: up: the head does not follow the wire; board saved in .*zero,steering"
     ):
-        run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero", "steering")))
+        calibrate_rig("bench 1", auto=True, steps="board,zero,steering")
 
 
 @pytest.mark.parametrize(("kind", "waits"), [(RigKind.LIVE, 1), (RigKind.SIM, 0)])
@@ -212,7 +212,7 @@ def test_nothing_moves_under_a_real_board(bench: _Bench, monkeypatch: pytest.Mon
     monkeypatch.setattr(RigDraft, "wait_for_no_board", lambda _: done.append("waited"))
     monkeypatch.setattr(RigDraft, "search_servos", lambda _: done.append("searched"))
     monkeypatch.setattr(RigDraft, "find_zeros", lambda _: Zeros((0.0,) * 4))
-    run_calibrate(CalibrateOptions("bench 1", None, None, ("board", "zero")))
+    calibrate_rig("bench 1", auto=True, steps="board,zero")
     assert done == ["waited"] * waits + ["searched"]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from app.commands import trial
-from app.commands.trial import TrialError, parse_policies, parse_seeds, run_one, run_trials, summary_rows
+from app.commands.trial import TrialError, parse_policies, parse_seeds, run_one, summary_rows
 from core.config.models import Config
 from core.evaluation.trial import Row, TrialLog, TrialSample, summarise, trial_row
 from core.perception.model_file import model_folder
@@ -50,11 +50,7 @@ def faked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
 
 
 def call(seeds: str = "0:2", policies: tuple[str, ...] = (), **changed: Any) -> None:
-    options: dict[str, Any] = {
-        "workers": 1, "out": None, "model": None, "config_path": None, "true_masks": True, "max_seconds": 5.0,
-        "look": "random", "scheduler": None, "as_json": True,
-    }  # fmt: skip
-    run_trials(seeds, policies, **(options | changed))
+    trial.trial(seeds, list(policies), **({"true_masks": True, "max_seconds": 5.0, "as_json": True} | changed))
 
 
 def test_seeds_are_read_as_a_python_range() -> None:

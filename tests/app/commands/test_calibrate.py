@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.commands import calibrate_model
-from app.commands.benchmark import run_accuracy
-from app.commands.calibrate_model import run_calibrate
+from app.commands import calibrate as calibrate_command
+from app.commands.benchmark import benchmark
+from app.commands.calibrate import calibrate
 from core.config.models import PerceptionConfig
 from core.evaluation import confidence as fitting
 from core.evaluation import confidence as knowing
@@ -75,7 +75,7 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
     more.mkdir()
     for picture in sorted((frames / "images").iterdir())[:3]:
         shutil.copy(picture, more)
-    run_calibrate(frames, model=str(model), config_path=None, knows=[more])
+    calibrate(frames, str(model), knows=[more])
     info = read_model_info(model)
     assert info.mirrored_second_looks == MOST_LOOKS
     assert info.figures == {}
@@ -94,9 +94,9 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
 def test_eight_bit_copies_are_made_anew_with_the_calibration(frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fitting, "_LEAST", 1)
     monkeypatch.setattr(knowing, "LEAST", 4)
-    monkeypatch.setattr(calibrate_model, "_EXAMPLES", 2)
+    monkeypatch.setattr(calibrate_command, "_EXAMPLES", 2)
     olds, near_before = (read_model_info(folder) for folder in (model, model / SECOND_LOOK))
-    run_calibrate(frames, model=str(model), config_path=None, eight_bit=True)
+    calibrate(frames, str(model), eight_bit=True)
     for folder, older in ((model, olds), (model / SECOND_LOOK, near_before)):
         newer = read_model_info(folder, verify=(WEIGHTS, ONNX, ONNX_INT8))
         assert newer.onnx_int8_sha256 not in (None, older.onnx_int8_sha256), "its eight-bit copy is another one, from two frames"
@@ -113,16 +113,16 @@ def test_what_cannot_be_enough_is_said_before_the_work(
     frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch, looked_at: list[object]
 ) -> None:
     with pytest.raises(CalibrationError, match=r"^6 frames: a calibration needs 20 right and 20 wrong answers; give it more"):
-        run_calibrate(frames, model=str(model), config_path=None, knows=[frames])
+        calibrate(frames, str(model), knows=[frames])
     monkeypatch.setattr(fitting, "_LEAST", 1)
     with pytest.raises(knowing.OutOfDistributionError, match=r"^12 pictures; 40 are needed; give it more"):
-        run_calibrate(frames, model=str(model), config_path=None, knows=[frames])
+        calibrate(frames, str(model), knows=[frames])
     assert not looked_at
 
 
 def test_a_folder_without_pictures_is_said_before_anything_else(frames: Path, model: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no pictures"):
-        run_calibrate(frames, model=str(model), config_path=None, knows=[tmp_path])
+        calibrate(frames, str(model), knows=[tmp_path])
 
 
 @pytest.mark.parametrize("eight_bit", [False, True])
@@ -143,7 +143,7 @@ def test_too_few_frames_leave_the_model_as_it_is(
     monkeypatch.setattr(knowing, "check_known", lambda _: None)
     before = _files(model)
     with pytest.raises(CalibrationError, match=r"\d right and \d wrong answers: a calibration needs 20 of each; give it more"):
-        run_calibrate(frames, model=str(model), config_path=None, eight_bit=eight_bit)
+        calibrate(frames, str(model), eight_bit=eight_bit)
     assert _files(model) == before
 
 
@@ -154,7 +154,7 @@ def test_too_few_pictures_of_a_vessel_leave_the_model_as_it_is(frames: Path, mod
     monkeypatch.setattr(knowing, "check_known", lambda _: None)
     before = _files(model)
     with pytest.raises(knowing.OutOfDistributionError, match="pictures show a vessel; 40 are needed"):
-        run_calibrate(frames, model=str(model), config_path=None)
+        calibrate(frames, str(model))
     assert _files(model) == before
 
 
@@ -167,7 +167,7 @@ def test_a_damaged_network_is_said_before_the_work(frames: Path, model: Path) ->
     (model / ONNX).write_bytes(b"cut")
     before = _files(model)
     with pytest.raises(ModelError, match=r"older/network\.onnx: SHA-256 differs"):
-        run_calibrate(frames, model=str(model), config_path=None, eight_bit=True)
+        calibrate(frames, str(model), eight_bit=True)
     assert _files(model) == before
 
 
@@ -177,9 +177,9 @@ def test_any_damaged_file_is_said_before_the_work(frames: Path, model: Path, nam
     (model / name).write_bytes(b"cut")
     told = rf"older/{name}: SHA-256 differs"
     with pytest.raises(ModelError, match=told):
-        run_calibrate(frames, model=str(model), config_path=None)
+        calibrate(frames, str(model))
     with pytest.raises(ModelError, match=told):
-        run_accuracy(frames, model=str(model), preset=None, config_path=None, as_json=False, store=True)
+        benchmark(accuracy=frames, model=str(model), store=True)
     assert not looked_at
 
 
@@ -189,9 +189,9 @@ def test_a_model_that_cannot_be_written_is_said_before_the_work(
     can = os.access
     monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK and can(path, mode))
     with pytest.raises(ModelError, match="cannot be written; copy the model to a folder of yours"):
-        run_calibrate(frames, model=str(model), config_path=None)
+        calibrate(frames, str(model))
     with pytest.raises(ModelError, match="cannot be written; copy the model to a folder of yours"):
-        run_accuracy(frames, model=str(model), preset=None, config_path=None, as_json=False, store=True)
+        benchmark(accuracy=frames, model=str(model), store=True)
     assert not looked_at
 
 

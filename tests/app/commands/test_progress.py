@@ -35,7 +35,7 @@ def test_a_listener_that_is_gone_is_noticed_and_hinders_nothing(monkeypatch: pyt
             raise BrokenPipeError
 
     monkeypatch.setattr(sys, "stdout", Gone())
-    teller = ProgressWriter()
-    teller.tell({"step": 1})
-    assert not teller.is_heard
-    teller.tell({"step": 2})
+    writer = ProgressWriter()
+    writer.write({"step": 1})
+    assert not writer.is_read
+    writer.write({"step": 2})

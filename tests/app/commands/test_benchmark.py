@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.commands import benchmark
-from app.commands.benchmark import _as_in_a_stream, run_speed
+from app.commands.benchmark import measure_speed, stream_config
 from core.config.models import load_config
 from core.devices import UserError
 
@@ -16,15 +16,14 @@ from core.devices import UserError
 @pytest.mark.parametrize(("configured", "timed"), [("pictures", "never"), ("always", "always"), ("never", "never")])
 def test_frames_are_timed_as_often_seen_as_in_a_stream(configured: str, timed: str) -> None:
     config = load_config(None, None, {"perception": {"segmentation": {"mirrored": configured, "threads": 1}}})
-    segmentation = _as_in_a_stream(config).perception.segmentation
+    segmentation = stream_config(config).perception.segmentation
     assert (segmentation.mirrored, segmentation.threads) == (timed, 1)
 
 
 def test_pictures_that_are_all_refused_cannot_be_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(benchmark, "_first_frame_s", lambda _config_path: None)
     monkeypatch.setattr(benchmark, "_pictures", lambda count: iter([np.full((480, 640, 3), 90, np.uint8)] * count))
     (tmp_path / "dark.toml").write_text("[perception.quality]\nblack_level = 255.0\n")
     with pytest.raises(
         UserError, match=r"refused before there are masks to compare \(image black\); change \[perception.quality\]"
     ):
-        run_speed(2, model=None, preset=None, config_path=tmp_path / "dark.toml", as_json=True)
+        measure_speed(load_config(tmp_path / "dark.toml"), 2)

@@ -1,0 +1,196 @@
+"""``record``: a session without a window."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.commands.options import ConfigOption, JsonOption, RigOption
+from app.commands.progress import Interrupt, progress_bar
+from app.operator.rig_engine import EngineMaker
+from core.config.models import Config, sessions_folder
+from core.config.rig_file import as_calibrated
+from core.devices import DeviceError, EndOfStream
+from core.perception.model_file import check_model
+from core.session.files import check_parent
+from core.session.manifest import SessionError, about_rig, event_of_alert
+from core.session.writer import SessionWriter
+from hardware.rig import rig_config
+
+if TYPE_CHECKING:
+    from app.operator.rig_engine import RigEngine
+
+_STEP_S = 0.1
+"""The engine is asked for a frame for so long before the time is looked at."""
+_PICTURE_WITHIN_S = 15.0
+"""Without a picture for so long the camera counts as lost."""
+_GAP_S = 2.0
+"""A slow machine may take so long from picture to picture; longer gaps are reported."""
+
+
+def record(
+    seconds: Annotated[float, typer.Option(min=0.1, max=86_400.0, help="length of the recording; Ctrl-C ends it sooner")],
+    out: Annotated[Path | None, typer.Option(help="folder in which the session is made; default: the configured one")] = None,
+    rig: RigOption = None,
+    lossless: Annotated[bool, typer.Option("--lossless", help="keep every pixel as it is; a hundred times the size")] = False,
+    as_json: JsonOption = False,
+    config_path: ConfigOption = None,
+) -> None:
+    """Record a session without a window."""
+    # A camera that is lost meanwhile is waited for until the time is over; one that is still away then is an error.
+    config, kind = rig_config(rig, config_path, None)
+    settings = config.record.model_copy(update={"ring_s": 0.0} | ({"codec": "lossless"} if lossless else {}))
+    config = config.model_copy(update={"record": settings})
+    folder = out if out is not None else sessions_folder(settings.folder)
+    check_parent(folder)
+    check_model(config.perception.segmentation.model)  # a window opens without a model and shows it; here it is refused
+    engine = EngineMaker()(config)
+    writer: SessionWriter | None = None
+    try:
+        writer = SessionWriter(settings, about_rig(as_calibrated(config), kind.value, config.rig.name), folder=folder)
+        done = _record(engine, writer, seconds)
+        length_s = done.seconds
+    finally:
+        try:
+            is_whole = writer.close() if writer is not None else True
+        finally:
+            engine.close()
+    status = writer.status()
+    kept = f"; what was written is in {status.folder}" if status.folder else ""
+    if status.problem:
+        raise SessionError(f"{status.problem}{kept}")
+    if done.failed:
+        raise DeviceError(f"{done.failed}{kept}")
+    if status.folder is None:
+        raise SessionError(f"nothing was recorded: {done.ended} before the first picture")
+    if not is_whole:
+        raise SessionError(f"{folder}: the disk does not answer; the session was not closed")
+    result = {
+        "session": str(status.folder),
+        "ended": done.ended,
+        "seconds": round(length_s, 3),
+        "frames": status.frames,
+        "dropped": status.dropped,
+        "camera_dropped": done.camera_dropped,
+        "camera_lost": done.camera_lost,
+        "without_picture_s": round(done.without_picture_s, 3),
+        "bytes": sum(path.stat().st_size for path in status.folder.iterdir()),
+    }
+    if as_json:
+        sys.stdout.write(json.dumps(result) + "\n")
+    else:
+        _print(result, config)
+
+
+@dataclass(slots=True)
+class _RecordProgress:
+    """Since the first frame: why it ended, why it failed, and the frames and time that the camera lost."""
+
+    started_s: float | None = None
+    ended: str = "all recorded"
+    failed: str = ""
+    camera_dropped: int = 0
+    camera_lost: int = 0
+    without_picture_s: float = 0.0
+    picture_s: float = 0.0
+    """Time of the last picture."""
+    lost_until: int | None = None
+    """The camera's count of lost frames at the last picture."""
+
+    @property
+    def seconds(self) -> float:
+        return 0.0 if self.started_s is None else time.monotonic() - self.started_s
+
+    def count_gap(self) -> None:
+        """Count the time since the last picture if it was long."""
+        if (away_s := time.monotonic() - self.picture_s) > _GAP_S:
+            self.without_picture_s += away_s
+        self.picture_s = time.monotonic()
+
+    def count_lost(self, lost: int) -> None:
+        """Count what was lost since the last picture; a camera that was opened again counts from 0."""
+        if self.lost_until is not None:
+            self.camera_lost += max(0, lost - self.lost_until)
+        self.lost_until = lost
+
+
+def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _RecordProgress:
+    done = _RecordProgress()
+    try:
+        _record_into(engine, writer, seconds, done)
+    except DeviceError as error:
+        done.ended = done.failed = str(error)
+    away_s = time.monotonic() - done.picture_s
+    if not done.failed and done.started_s is not None and (engine.problem or away_s > _PICTURE_WITHIN_S):
+        done.ended = done.failed = engine.problem or f"no picture from the camera for {away_s:.0f} s; check its cable"
+    if done.started_s is not None:
+        done.count_gap()
+    writer.stop(done.ended)
+    return done
+
+
+def _record_into(engine: RigEngine, writer: SessionWriter, seconds: float, done: _RecordProgress) -> None:
+    began_s = time.monotonic()
+    is_warm, dropped_before = False, 0
+    writer.start()
+    with Interrupt() as interrupt, progress_bar() as bar:
+        task = bar.add_task("seconds recorded", total=round(seconds))
+        while done.seconds < seconds:
+            if interrupt.asked:
+                done.ended = "interrupted"
+                break
+            try:
+                tick = engine.step(_STEP_S)
+            except EndOfStream as error:
+                done.ended = str(error)
+                break
+            pilot = engine.pilot
+            if pilot is not None:
+                pilot.window_alive()  # the pilot stops a robot whose window hangs; there is none here
+                news = pilot.news()
+                for view in news.changes:
+                    writer.drive(view)
+                for alert in news.alerts:
+                    writer.add_event(event_of_alert(alert, news.view.time_s))
+            if tick is None:
+                if done.started_s is None and time.monotonic() - began_s > _PICTURE_WITHIN_S:
+                    no_picture = f"no picture from the camera for {_PICTURE_WITHIN_S:.0f} s; check its cable"
+                    raise DeviceError(engine.problem or no_picture)
+                if done.started_s is not None and engine.problem:
+                    bar.update(task, completed=int(done.seconds), description=f"seconds, no picture: {engine.problem}")
+                continue
+            if not is_warm:
+                is_warm = True  # the first tick waited seconds for the network to warm up
+                continue
+            if done.started_s is None:
+                done.started_s = done.picture_s = time.monotonic()
+                dropped_before = tick.dropped_frames
+            done.count_gap()
+            done.count_lost(tick.frame.lost)
+            done.camera_dropped = tick.dropped_frames - dropped_before
+            writer.put(tick, pilot.view if pilot is not None else None, engine.bus_status())
+            status = writer.status()
+            if status.problem:
+                break
+            bar.update(
+                task, completed=int(done.seconds), description=f"seconds, {status.bytes / 1e6:.1f} MB, {status.dropped} dropped"
+            )
+
+
+def _print(result: dict[str, Any], config: Config) -> None:
+    sys.stdout.write(f"{result['session']}\n")
+    minutes = max(result["seconds"], 1e-3) / 60.0
+    if result["without_picture_s"]:
+        sys.stderr.write(f"for {result['without_picture_s']:.1f} s of it the camera sent no picture\n")
+    sys.stderr.write(
+        f"{result['ended']}: {result['seconds']:.1f} s, {result['frames']} frames, {result['dropped']} dropped by the recorder, "
+        f"{result['camera_dropped']} skipped for newer ones, {result['camera_lost']} lost by the camera, "
+        f"{result['bytes'] / 1e6:.1f} MB "
+        f"({result['bytes'] / 1e6 / minutes:.1f} MB a minute, {config.record.codec})\n"
+    )

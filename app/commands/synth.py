@@ -1,0 +1,72 @@
+"""``synth``: labelled frames from the twin."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.commands.options import SchedulerOption
+from app.commands.progress import console, progress_bar
+
+
+def synth(
+    out: Annotated[Path, typer.Option(help="folder of the set; an interrupted one is continued")],
+    count: Annotated[int, typer.Option(min=1, help="frames")],
+    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; 16 x --poses frames use one seed")] = 0,
+    width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
+    height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
+    family: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="only these families of looks, rare ones among them (gel, drape, stage_light, glow, tank, picture, resin: drawn "
+            "only where they are named), or bench: the twin's own; may be repeated"
+        ),
+    ] = None,
+    phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
+    poses: Annotated[
+        int, typer.Option(min=1, max=8, help="poses of the robot in every look: more frames in the same time, but fewer looks")
+    ] = 1,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="processes")] = 1,
+    scheduler: SchedulerOption = None,
+) -> None:
+    """Randomised labelled frames from the bench twin: images, masks, truth."""
+    make_set(out, count, seed, (width, height), tuple(family) if family else None, phantom, poses, workers, scheduler)
+
+
+def make_set(
+    out: Path,
+    count: int,
+    seed: int,
+    size: tuple[int, int] = (640, 480),
+    families: tuple[str, ...] | None = None,
+    phantom: str | None = None,
+    poses: int = 1,
+    workers: int = 1,
+    scheduler: str | None = None,
+) -> None:
+    """Write a labelled set; raises SynthError, and ClusterError with `scheduler`."""
+    from hardware.twin.catalog import LOOKS
+    from hardware.twin.dataset import SynthError, SynthPlan, write_set
+    from hardware.twin.phantoms import make_phantom
+
+    unknown = [name for name in families or () if name not in LOOKS]
+    if unknown:
+        raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join(LOOKS)}")
+    if phantom is not None:
+        try:
+            make_phantom(phantom)
+        except ValueError as error:
+            raise SynthError(str(error)) from None
+    plan = SynthPlan(out, count, seed, size, families, phantom, poses)
+    elsewhere = None
+    if scheduler is not None:
+        from app.commands.workers import over_cluster
+
+        elsewhere = partial(over_cluster, scheduler)
+    with progress_bar() as bar:
+        task = bar.add_task(f"frames -> {out}", total=count)
+        write_set(plan, workers=workers, elsewhere=elsewhere, on_progress=lambda frames: bar.advance(task, frames))
+    console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)
