@@ -133,12 +133,12 @@ def _check_workers(client: Any, address: str) -> None:
     if not client.scheduler_info(n_workers=-1)["workers"]:
         raise ClusterError(f"--scheduler {address}: has no workers; start some, {start}")
 
-    def code() -> str | None:  # goes there by value: a worker without LumenPilot could not even find it
+    def code() -> str | None:  # sent by value: a worker without LumenPilot could not import it
         try:
-            pass
+            workers = importlib.import_module("app.commands.workers")
         except ImportError:
             return None
-        return code_of_worker()
+        return str(workers.code_of_worker())
 
     found: dict[str, str | None] = client.run(code)
     without = sorted(worker for worker, its in found.items() if its is None)

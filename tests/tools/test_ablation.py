@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from core.devices import UserError
-from tests.app.commands import run
+from tests.app.program import run
 from tools import ablation as command
 from tools.ablation import STEPS, Plan, run_ablation
 

@@ -29,7 +29,7 @@ from core.evaluation.paper import PAPER_CONFUSION
 from core.learning.dataset import write_png
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
-from tests.app.commands import MAIN, run, run_apart
+from tests.app.program import MAIN, run, run_apart
 from tests.core.evaluation.test_classification import label_pairs
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")

@@ -15,7 +15,7 @@ import pytest
 from core.config.models import TwinConfig
 from core.files import read_image
 from hardware.twin.world import TwinWorld
-from tests.app.commands import MAIN, run, run_apart
+from tests.app.program import MAIN, run, run_apart
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
 

@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
-from tests.app.commands import MAIN, run
+from tests.app.program import MAIN, run
 
 # a small picture and one thread: the machine that runs the tests may be busy
 CONFIG = """

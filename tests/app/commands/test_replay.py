@@ -28,8 +28,8 @@ from core.files import name_of
 from core.session.manifest import MANIFEST, read_manifest
 from core.session.reader import SessionReader, check_is_session
 from core.types import Frame, Point, PoseState, Reason, Refusal, Scene
-from tests.app.commands import MAIN, run_apart
 from tests.app.golden_session import COUNT, GOLDEN, TRUTH
+from tests.app.program import MAIN, run_apart
 from tests.core.session_data import record, tick_of
 
 

@@ -17,9 +17,9 @@ from app.commands import replay
 from app.commands.replay import ReplayOptions, run_replays, sessions_in
 from core.devices import UserError
 from core.evaluation.replay import ReplayTally
-from tests.app.commands import MAIN
-from tests.app.commands import run as main
 from tests.app.golden_session import COUNT, GOLDEN
+from tests.app.program import MAIN
+from tests.app.program import run as main
 from tests.core.session_data import record, tick_of
 
 

@@ -27,8 +27,8 @@ from core.learning.augmentation import FrameCrops
 from core.learning.dataset import find_samples, read_truth
 from core.learning.training_plan import TrainingPlan
 from core.perception.model_file import read_model_info
-from tests.app.commands import MAIN, run, run_apart
 from tests.app.golden_session import GOLDEN
+from tests.app.program import MAIN, run, run_apart
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -18,7 +18,7 @@ from core.config.models import Config
 from core.evaluation.trial import Row, TrialLog, TrialSample, summarise, trial_row
 from core.perception.model_file import model_folder
 from hardware.twin.trial import TrialPlan
-from tests.app.commands import run, run_apart
+from tests.app.program import run, run_apart
 
 
 def fake_row(plan: TrialPlan, job: tuple[str, int]) -> Row:

@@ -19,8 +19,8 @@ from app.commands.workers import ClusterError, code_of_worker, over_cluster
 from core.config.models import Config
 from hardware.twin.dataset import Episode, SynthPlan, write_set
 from hardware.twin.trial import TrialPlan
-from tests.app.commands import run
 from tests.app.golden_session import GOLDEN
+from tests.app.program import run
 
 ROOT = Path(__file__).resolve().parents[3]
 DASK = [sys.executable, "-m", "dask"]
