@@ -5,65 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from pytestqt.qtbot import QtBot
 
 from app.widgets.command_panel import MAX_ENTRIES, ClampLog, CommandPanel
-from core.config.safety import SafetyConfig, ServosConfig
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Limit
 from core.control.pilot import DriveView
 from core.types import Advice, Command, Speed
-from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
-from hardware.servos.dynamixel_port import LineCounts
-from hardware.servos.registers import HardwareError, ServoReading, ServoState
+from tests.app.bus_status import MINUS, bus
 from tests.app.hand_clock import Clock
-
-SERVOS, SAFETY = ServosConfig(), SafetyConfig()
-
-
-MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
-
-
-def servo(place: int, **changes: object) -> ServoState:
-    """A servo that holds its joint: tendons at the pretension of 0.3 mm, feeds at 20 mm."""
-    joint = SERVOS.joints[place]
-    at_mm = 0.3 if place < 4 else 20.0
-    state = ServoState(
-        joint.name, joint.id, 100.0, 1000, 1000, at_mm, at_mm, 0.0, 8.07, 12.0, 31.0, HardwareError(0), torque=True,
-        watchdog_tripped=False,
-    )  # fmt: skip
-    return replace(state, **changes)  # type: ignore[arg-type]
-
-
-def bus(*others: ServoReading, **changes: object) -> BusStatus:
-    """An armed bus; `others` replace the servos of the same name."""
-    by_name = {reading.name: reading for reading in others}
-    status = BusStatus(
-        cycle=1,
-        time_s=100.0,
-        phase=BusPhase.ARMED,
-        servos=tuple(by_name.get(joint.name, servo(place)) for place, joint in enumerate(SERVOS.joints)),
-        active=(),
-        latched=None,
-        fault_counts={},
-        sent=None,
-        rejection=None,
-        clamps=(),
-        at_end=(),
-        rejections={},
-        clamp_count=12,
-        line=LineCounts(),
-        bad_packets=3,
-        restarts=0,
-        times=CycleTimes(20.0, 21.4, 4.0, 6.0),
-        zeroed=(True,) * 7,
-    )
-    return replace(status, **changes)  # type: ignore[arg-type]
-
-
-@pytest.fixture
-def clock() -> Clock:
-    return Clock()
+from tests.app.widgets.conftest import Own
 
 
 def clamp(joint: str = "right", asked_mm: float = 1.2, allowed_mm: float = 0.8, limit: Limit = Limit.RATE) -> Clamp:
@@ -74,14 +24,44 @@ def told(log: ClampLog) -> list[tuple[str, str, int]]:
     return [(entry.joint or "rejected", entry.text, entry.count) for entry in log.entries]
 
 
-def test_log_tells_clamps_newest_first() -> None:
+STALE, TOO_FAR = RejectReason.STALE_POSE, RejectReason.OVER_RATE
+SEEN = Rejection(STALE, "182 ms (at most 150 ms)")
+
+
+@pytest.mark.parametrize(
+    ("statuses", "entries"),
+    [
+        (
+            [{"clamps": (clamp(),)}, {"clamps": (clamp("delivery_1", -3.0, -2.9, Limit.STEP),)}],
+            [
+                ("delivery 1", f"{MINUS}3.00 → {MINUS}2.90 mm, step from the measured position", 1),
+                ("right", "1.20 → 0.80 mm, speed", 1),
+            ],
+        ),
+        ([{"cycle": 7, "clamps": (clamp(),)}] * 3, [("right", "1.20 → 0.80 mm, speed", 1)]),
+        ([{"rejections": {STALE: 4}}], []),
+        (
+            [{"rejections": {STALE: 4}}, {"rejection": SEEN, "rejections": {STALE: 5}}, {"rejections": {STALE: 8}}],
+            [("rejected", "pose behind the command too old: 182 ms (at most 150 ms)", 4)],
+        ),
+        ([{}, {"rejections": {RejectReason.NO_COMMAND: 30, RejectReason.NOT_ARMED: 2}}], []),
+        (
+            [
+                {"cycle": 900, "rejections": {TOO_FAR: 9}},
+                {"cycle": 3, "rejections": {TOO_FAR: 1}},
+                {"cycle": 4, "rejections": {TOO_FAR: 2}},
+            ],
+            [("rejected", "goal too far away", 1)],
+        ),
+        ([{"at_end": ("advance",)}], [("advance", "stopped at the end of its envelope", 1)]),
+    ],
+    ids=["newest first", "a cycle once", "counted before", "between cycles", "rest", "new bus process", "end of envelope"],
+)
+def test_log_of_the_gate(statuses: list[dict[str, object]], entries: list[tuple[str, str, int]]) -> None:
     log = ClampLog()
-    log.add_status(bus(cycle=1, clamps=(clamp(),)), "12:00:00")
-    log.add_status(bus(cycle=2, clamps=(clamp("delivery_1", -3.0, -2.9, Limit.STEP),)), "12:00:01")
-    assert told(log) == [
-        ("delivery 1", f"{MINUS}3.00 → {MINUS}2.90 mm, step from the measured position", 1),
-        ("right", "1.20 → 0.80 mm, speed", 1),
-    ]
+    for cycle, changes in enumerate(statuses, start=1):
+        log.add_status(bus(**{"cycle": cycle, **changes}), "12:00:00")
+    assert told(log) == entries
 
 
 def test_log_counts_repeats_of_the_same_limit_until_a_second_has_passed() -> None:
@@ -93,62 +73,12 @@ def test_log_counts_repeats_of_the_same_limit_until_a_second_has_passed() -> Non
     assert told(log)[0] == ("right", "1.20 → 0.80 mm, speed", 1)
 
 
-def test_log_sees_a_cycle_once() -> None:
-    log = ClampLog()
-    for _ in range(3):
-        log.add_status(bus(cycle=7, clamps=(clamp(),)), "12:00:00")
-    assert told(log) == [("right", "1.20 → 0.80 mm, speed", 1)]
-
-
-def test_log_misses_no_rejection_of_the_cycles_between() -> None:
-    log = ClampLog()
-    log.add_status(bus(cycle=1, rejections={RejectReason.STALE_POSE: 4}), "12:00:00")
-    assert told(log) == [], "what was counted before is no news"
-    seen = Rejection(RejectReason.STALE_POSE, "182 ms (at most 150 ms)")
-    log.add_status(bus(cycle=2, rejection=seen, rejections={RejectReason.STALE_POSE: 5}), "12:00:00")
-    log.add_status(bus(cycle=5, rejections={RejectReason.STALE_POSE: 8}), "12:00:00")
-    assert told(log) == [("rejected", "pose behind the command too old: 182 ms (at most 150 ms)", 4)]
-
-
-def test_rest_is_no_rejection() -> None:
-    log = ClampLog()
-    log.add_status(bus(cycle=1), "12:00:00")
-    log.add_status(bus(cycle=2, rejections={RejectReason.NO_COMMAND: 30, RejectReason.NOT_ARMED: 2}), "12:00:00")
-    assert told(log) == []
-
-
-def test_a_new_bus_process_starts_its_counts_anew() -> None:
-    log = ClampLog()
-    log.add_status(bus(cycle=900, rejections={RejectReason.OVER_RATE: 9}), "12:00:00")
-    log.add_status(bus(cycle=3, rejections={RejectReason.OVER_RATE: 1}), "12:00:00")
-    assert told(log) == []
-    log.add_status(bus(cycle=4, rejections={RejectReason.OVER_RATE: 2}), "12:00:00")
-    assert told(log) == [("rejected", "goal too far away", 1)]
-
-
-def test_driving_against_the_end_is_told() -> None:
-    log = ClampLog()
-    log.add_status(bus(cycle=1, at_end=("advance",)), "12:00:00")
-    assert told(log) == [("advance", "stopped at the end of its envelope", 1)]
-
-
-def test_log_keeps_500_entries() -> None:
-    log = ClampLog()
-    for cycle in range(MAX_ENTRIES + 20):
-        log.add_status(bus(cycle=cycle, time_s=2.0 * cycle, clamps=(clamp(asked_mm=cycle),)), "12:00:00")
-    assert len(log.entries) == MAX_ENTRIES
-    assert log.entries[0].text.startswith("519.00")
-
-
 ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
 
 
 @pytest.fixture
-def panel(qtbot: QtBot, clock: Clock) -> CommandPanel:
-    widget = CommandPanel(clock, lambda: "12:00:00")
-    qtbot.addWidget(widget)
-    widget.resize(446, 205)
-    widget.show()
+def panel(own: Own, clock: Clock) -> CommandPanel:
+    widget = own(CommandPanel(clock, lambda: "12:00:00"), 446, 205, show=True)
     return widget
 
 

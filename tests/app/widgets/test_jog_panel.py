@@ -13,6 +13,7 @@ from app.widgets.mode_bar import MouseHeld
 from core.config.models import JogConfig
 from core.config.safety import ServosConfig
 from core.types import RobotStatus
+from tests.app.widgets.conftest import Own
 
 
 def test_a_motion_held_with_the_mouse_ends_with_a_release_that_a_menu_got(qtbot: QtBot) -> None:
@@ -34,20 +35,8 @@ def test_a_motion_held_with_the_mouse_ends_with_a_release_that_a_menu_got(qtbot:
     menu.close()
 
 
-def test_jog_panel_says_aloud_what_it_shows(qtbot: QtBot) -> None:
-    panel = JogPanel(max_pull_mm=2.0)
-    qtbot.addWidget(panel)
-    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (1.3, -0.7, 0.3, 0.3), (0.0,) * 4))
-    assert panel.readout == "bend 0.50, pitch 0.00, in 84 mm"
-    assert panel._readout.accessibleName()
-    assert panel._readout.accessibleDescription() == panel.readout
-    panel.set_enabled(False, "Fault")
-    assert panel.accessibleDescription() == "Fault"
-
-
-def test_jog_panel_says_what_a_held_key_makes(qtbot: QtBot) -> None:
-    panel = JogPanel(2.0)
-    qtbot.addWidget(panel)
+def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:
+    panel = own(JogPanel(2.0))
     assert panel.speeds == "", "no rig is known"
     panel.set_speeds(JogConfig(bend_rate_per_s=1.2, advance_mm_s=10.0, delivery_mm_s=8.0), ServosConfig(max_pull_mm=2.0))
     assert panel.speeds == "feed 10, sheath 8, wires 2.4 mm/s"
@@ -63,22 +52,8 @@ def test_jog_panel_says_what_a_held_key_makes(qtbot: QtBot) -> None:
     assert panel.speeds == "feed 5, sheath 5, wires 0.6 mm/s", "another rig has the chosen share, too"
 
 
-def test_pitch_is_seen_and_not_only_said(qtbot: QtBot) -> None:
-    panel = JogPanel(2.0)
-    qtbot.addWidget(panel)
-    panel.resize(203, 170)
-    panel.show()
-    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (0.3, 0.3, 0.3, 0.3), (0.0,) * 4))
-    before = panel._readout.grab().toImage()
-    panel.show_status(RobotStatus(0.0, 84.0, 0.0, (0.3, 0.3, 1.7, -1.1), (0.0,) * 4))
-    assert panel._readout.grab().toImage() != before
-
-
-def test_key_caps_light_up_and_can_be_held_with_the_mouse(qtbot: QtBot) -> None:
-    panel = JogPanel(2.0)
-    qtbot.addWidget(panel)
-    panel.resize(280, 140)
-    panel.show()
+def test_key_caps_light_up_and_can_be_held_with_the_mouse(own: Own, qtbot: QtBot) -> None:
+    panel = own(JogPanel(2.0), 280, 140, show=True)
     events: list[tuple[str, Motion]] = []
     panel.pressed.connect(lambda motion: events.append(("down", motion)))
     panel.released.connect(lambda motion: events.append(("up", motion)))
@@ -94,18 +69,26 @@ def test_key_caps_light_up_and_can_be_held_with_the_mouse(qtbot: QtBot) -> None:
     assert events[-1] == ("up", Motion.STEER_LEFT), "a hidden cap holds nothing"
 
 
-def test_readout_shows_how_far_the_robot_is_in(qtbot: QtBot) -> None:
-    panel = JogPanel(2.0)
-    qtbot.addWidget(panel)
-    panel.show_status(RobotStatus(0.0, 84.2, 0.0, (-1.0, 1.0, 0, 0), (0, 0, 0, 0)))
-    assert panel.readout == "bend -0.50, pitch 0.00, in 84 mm"
+def test_readout_shows_and_says_how_the_robot_stands(own: Own) -> None:
+    panel = own(JogPanel(2.0), 203, 170, show=True)
+    pictures = []
+    for pulls, text in (
+        ((0.3, 0.3, 0.3, 0.3), "bend 0.00, pitch 0.00, in 84 mm"),
+        ((1.3, -0.7, 0.3, 0.3), "bend 0.50, pitch 0.00, in 84 mm"),
+        ((0.3, 0.3, -0.7, 1.3), "bend 0.00, pitch -0.50, in 84 mm"),
+    ):
+        panel.show_status(RobotStatus(0.0, 84.2, 0.0, pulls, (0.0,) * 4))
+        assert panel.readout == panel._readout.accessibleDescription() == text
+        pictures.append(panel._readout.grab().toImage())
+    assert pictures[0] != pictures[1] and pictures[1] != pictures[2]
     panel.show_status(None)
     assert panel.readout == "bend –, pitch –, in – mm", "a straight head would be something that is known"
+    panel.set_enabled(False, "Fault")
+    assert panel.accessibleDescription() == "Fault"
 
 
-def test_readout_shows_nothing_of_joints_of_which_nobody_knows_where_they_are(qtbot: QtBot) -> None:
-    panel = JogPanel(2.0)
-    qtbot.addWidget(panel)
+def test_readout_shows_nothing_of_unknown_joints(own: Own) -> None:
+    panel = own(JogPanel(2.0))
     panel.show_known((False,) * 7)
     panel.show_status(RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4))
     assert panel.readout == "bend –, pitch –, in – mm"

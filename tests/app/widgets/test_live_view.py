@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.ui import theme
 from app.widgets.live_view import LiveView, LoupeCorner, _middle
-from app.widgets.scene_overlay import Layer, seen_places
+from app.widgets.scene_overlay import Layer
 from core.types import (
     Advice,
     Frame,
@@ -28,15 +28,13 @@ from core.types import (
 )
 from tests.app.fakes import FakeBench, make_pose, make_scene
 from tests.app.hand_clock import Clock
+from tests.app.widgets.conftest import Own
 
 ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
 
 
-def test_ghost_is_drawn_only_with_advice_and_goes_with_the_scene(qtbot: QtBot, bench: FakeBench) -> None:
-    live = LiveView()
-    qtbot.addWidget(live)
-    live.resize(640, 480)
-    live.show()
+def test_ghost_is_drawn_only_with_advice_and_goes_with_the_scene(own: Own, bench: FakeBench) -> None:
+    live = own(LiveView(), 640, 480, show=True)
     image, scene = bench.scene_at(0, 6.0)
     frame = Frame(0, 0.0, image)
     for layer in Layer:
@@ -59,11 +57,6 @@ MIDDLE = QPointF(200, 150)
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
-@pytest.fixture
 def corner(clock: Clock) -> LoupeCorner:
     return LoupeCorner(clock)
 
@@ -81,11 +74,8 @@ def choose(corner: LoupeCorner, places: Points, head: QPointF = MIDDLE) -> int:
 
 
 def test_it_begins_where_least_is_hidden(corner: LoupeCorner) -> None:
+    assert choose(LoupeCorner(), crowd()) == 0, "the upper right"
     assert choose(corner, crowd(right_top=50, left_top=20, right_bottom=1, left_bottom=40)) == 2
-
-
-def test_with_nothing_to_hide_it_lies_at_the_upper_right(corner: LoupeCorner) -> None:
-    assert choose(corner, crowd()) == 0
 
 
 def test_a_corner_that_is_a_little_better_is_no_reason_to_move(corner: LoupeCorner, clock: Clock) -> None:
@@ -114,20 +104,6 @@ def test_it_leaves_at_once_when_the_head_comes(corner: LoupeCorner) -> None:
     assert choose(corner, crowded, QPointF(290, 70)) == 3
 
 
-def test_a_head_that_is_near_all_corners_moves_nothing(corner: LoupeCorner) -> None:
-    """In a tiny view."""
-    everywhere = [QRectF(0, 0, 100, 80)] * 4
-    assert corner.choose(everywhere, QPointF(50, 40), np.empty((0, 2)), np.empty(0)) == 0
-    assert corner.choose(everywhere, QPointF(55, 40), np.empty((0, 2)), np.empty(0)) == 0
-
-
-def test_a_destination_counts_more_than_a_vessel() -> None:
-    places, weights = seen_places(None, (10.0, 20.0))
-    assert places.tolist() == [[10.0, 20.0]]
-    assert weights[0] > 100
-    assert len(seen_places(None, None)[0]) == 0
-
-
 def test_it_goes_out_of_the_way_of_what_lies_over_it(corner: LoupeCorner, clock: Clock) -> None:
     alerts = [QRectF(12, 12, 360, 60)]
     nothing, ones = crowd(), np.ones(0)
@@ -149,11 +125,8 @@ def _show(view: LiveView, frame: Frame, scene: Scene, advice: Advice | None = No
 
 
 @pytest.fixture
-def view(qtbot: QtBot) -> LiveView:
-    live = LiveView()
-    qtbot.addWidget(live)
-    live.resize(640, 480)
-    live.show()
+def view(own: Own) -> LiveView:
+    live = own(LiveView(), 640, 480, show=True)
     return live
 
 
@@ -312,6 +285,16 @@ def test_click_gives_source_pixels(view: LiveView, qtbot: QtBot) -> None:
     assert signal.args == pytest.approx([800.0, 300.0], abs=1.5)
 
 
+def test_a_click_beside_the_picture_is_no_target_and_a_right_click_clears(view: LiveView, qtbot: QtBot) -> None:
+    _show(view, blank_frame(640, 240), make_scene())
+    clicked: list[tuple[float, float]] = []
+    view.clicked.connect(lambda x, y: clicked.append((x, y)))
+    qtbot.mouseClick(view._view.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(320, 10))
+    with qtbot.waitSignal(view.cleared):
+        qtbot.mouseClick(view._view.viewport(), Qt.MouseButton.RightButton, pos=QPoint(320, 240))
+    assert clicked == []
+
+
 def test_a_double_click_means_one_place_and_none_where_it_began_elsewhere(view: LiveView, qtbot: QtBot) -> None:
     """Who double-clicks an alert or an offer away clicks the second time on the picture that lay behind it."""
     _show(view, blank_frame(1280, 960), replace(make_scene(), source_size=(1280, 960), scale=0.5))
@@ -326,18 +309,6 @@ def test_a_double_click_means_one_place_and_none_where_it_began_elsewhere(view: 
     qtbot.mouseClick(loupe, Qt.MouseButton.LeftButton)
     qtbot.mouseDClick(loupe, Qt.MouseButton.LeftButton)
     assert len(places) == 2
-
-
-def test_click_beside_the_picture_is_no_target(view: LiveView, qtbot: QtBot) -> None:
-    _show(view, blank_frame(640, 240), make_scene())
-    with qtbot.assertNotEmitted(view.clicked, wait=50):
-        qtbot.mouseClick(view._view.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(320, 10))
-
-
-def test_right_click_clears(view: LiveView, qtbot: QtBot) -> None:
-    _show(view, blank_frame(), make_scene())
-    with qtbot.waitSignal(view.cleared):
-        qtbot.mouseClick(view._view.viewport(), Qt.MouseButton.RightButton, pos=QPoint(320, 240))
 
 
 def test_target_is_marked_without_any_scene(view: LiveView) -> None:

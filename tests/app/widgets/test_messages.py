@@ -8,13 +8,11 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.widgets.messages import Notice, NoticeKind
+from tests.app.widgets.conftest import Own
 
 
-def test_notice_shows_title_detail_and_a_way_out(qtbot: QtBot) -> None:
-    room = QWidget()
-    qtbot.addWidget(room)
-    room.resize(700, 500)
-    room.show()
+def test_notice_shows_title_detail_and_a_way_out(own: Own, qtbot: QtBot) -> None:
+    room = own(QWidget(), 700, 500, show=True)
     notice = Notice(room)
     notice.show_notice(NoticeKind.FAULT, "The rig stopped", "camera lost", restartable=True)
     assert notice.text == "The rig stopped. camera lost"
@@ -27,11 +25,8 @@ def test_notice_shows_title_detail_and_a_way_out(qtbot: QtBot) -> None:
 
 @pytest.mark.parametrize("size", [(480, 320), (590, 345), (1000, 700)])
 @pytest.mark.parametrize("restartable", [False, True])
-def test_a_notice_has_room_for_all_that_it_says(qtbot: QtBot, size: tuple[int, int], restartable: bool) -> None:
-    room = QWidget()
-    qtbot.addWidget(room)
-    room.resize(*size)
-    room.show()
+def test_a_notice_has_room_for_all_that_it_says(own: Own, size: tuple[int, int], restartable: bool) -> None:
+    room = own(QWidget(), *size, show=True)
     notice = Notice(room)
     path = "/dev/serial/by-id/usb-FTDI_USB__-__Serial_Converter_FT8J0MXY-if00-port0"
     why = f"no permission for {path}: {'add yourself to the group dialout, log out and in again; ' * 4}then start the rig again"

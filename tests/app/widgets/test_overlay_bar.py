@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtWidgets import QAbstractButton
-from pytestqt.qtbot import QtBot
 
 from app.widgets.overlay_bar import OverlayBar
 from app.widgets.scene_overlay import Layer
+from tests.app.widgets.conftest import Own
 
 
-def test_chips_switch_their_layer(qtbot: QtBot) -> None:
-    bar = OverlayBar()
-    qtbot.addWidget(bar)
+def test_chips_switch_their_layer(own: Own) -> None:
+    bar = own(OverlayBar())
     seen: list[tuple[Layer, bool]] = []
     bar.toggled.connect(lambda layer, on: seen.append((layer, on)))
     bar.toggle(Layer.VECTORS)
@@ -23,9 +22,8 @@ def test_chips_switch_their_layer(qtbot: QtBot) -> None:
 
 
 @pytest.mark.parametrize(("width", "rows"), [(1200, 1), (600, 2), (420, 2)])
-def test_chips_go_in_two_rows_where_one_would_cut_their_names(qtbot: QtBot, width: int, rows: int) -> None:
-    bar = OverlayBar()
-    qtbot.addWidget(bar)
+def test_chips_go_in_two_rows_where_one_would_cut_their_names(own: Own, width: int, rows: int) -> None:
+    bar = own(OverlayBar())
     bar.resize(width, bar.heightForWidth(width))
     bar.grab()
     chips = bar.findChildren(QAbstractButton)

@@ -7,14 +7,13 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
-from pytestqt.qtbot import QtBot
 
 from app.widgets.phantom_picker import PhantomPicker
+from tests.app.widgets.conftest import Own
 
 
-def test_picker_gives_names_as_the_configuration_writes_them(qtbot: QtBot) -> None:
-    picker = PhantomPicker([("s_curve", "S-curve"), ("tree", "Tree")], "tree")
-    qtbot.addWidget(picker)
+def test_picker_gives_names_as_the_configuration_writes_them(own: Own) -> None:
+    picker = own(PhantomPicker([("s_curve", "S-curve"), ("tree", "Tree")], "tree"))
     chosen: list[str] = []
     picker.chosen.connect(chosen.append)
     assert (picker.name, picker.title) == ("tree", "Tree")
@@ -26,9 +25,8 @@ def test_picker_gives_names_as_the_configuration_writes_them(qtbot: QtBot) -> No
     assert picker.title == "random 2"
 
 
-def test_the_wheel_chooses_nothing(qtbot: QtBot) -> None:
-    picker = PhantomPicker([("s_curve", "S-curve"), ("tree", "Tree")], "random:5")
-    qtbot.addWidget(picker)
+def test_the_wheel_chooses_nothing(own: Own) -> None:
+    picker = own(PhantomPicker([("s_curve", "S-curve"), ("tree", "Tree")], "random:5"))
     chosen: list[str] = []
     picker.chosen.connect(chosen.append)
     for widget in (picker._combo, picker._seed):
@@ -49,15 +47,8 @@ def test_the_wheel_chooses_nothing(qtbot: QtBot) -> None:
     assert picker.name == "random:5"
 
 
-def test_picker_shows_a_random_phantom_of_the_configuration(qtbot: QtBot) -> None:
-    picker = PhantomPicker([("tree", "Tree")], "random:77")
-    qtbot.addWidget(picker)
-    assert picker.name == "random:77"
-
-
-def test_seed_counts_when_confirmed_not_at_each_digit(qtbot: QtBot) -> None:
-    holder = QWidget()
-    qtbot.addWidget(holder)
+def test_seed_counts_when_confirmed_not_at_each_digit(own: Own) -> None:
+    holder = own(QWidget())
     picker = PhantomPicker([("tree", "Tree")], "random:1")
     QVBoxLayout(holder).addWidget(picker)
     holder.show()
@@ -72,10 +63,8 @@ def test_seed_counts_when_confirmed_not_at_each_digit(qtbot: QtBot) -> None:
 
 
 @pytest.mark.parametrize("came_by", ["key", "configuration"])
-def test_the_seed_before_this_one_can_be_typed_again(qtbot: QtBot, came_by: str) -> None:
-    picker = PhantomPicker([("tree", "Tree")], "random:1")
-    qtbot.addWidget(picker)
-    picker.show()
+def test_the_seed_before_this_one_can_be_typed_again(own: Own, came_by: str) -> None:
+    picker = own(PhantomPicker([("tree", "Tree")], "random:1"), show=True)
     chosen: list[str] = []
     picker.chosen.connect(chosen.append)
     if came_by == "key":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -14,64 +13,22 @@ from pytestqt.qtbot import QtBot
 from app.ui import theme
 from app.widgets.painting import number
 from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_words, known_joints, pair_balances, servo_rows
-from core.config.safety import SafetyConfig, ServosConfig
+from core.config.safety import SafetyConfig
 from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
-from hardware.servos.dynamixel_port import LineCounts
-from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
+from hardware.servos.registers import HardwareError, MissingServo
+from tests.app.bus_status import DASH, MINUS, SERVOS, bus, servo
 from tests.app.hand_clock import Clock
+from tests.app.widgets.conftest import Own
 
-SERVOS, SAFETY = ServosConfig(), SafetyConfig()
-
-
-MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
-
-
-def servo(place: int, **changes: object) -> ServoState:
-    """A servo that holds its joint: tendons at the pretension of 0.3 mm, feeds at 20 mm."""
-    joint = SERVOS.joints[place]
-    at_mm = 0.3 if place < 4 else 20.0
-    state = ServoState(
-        joint.name, joint.id, 100.0, 1000, 1000, at_mm, at_mm, 0.0, 8.07, 12.0, 31.0, HardwareError(0), torque=True,
-        watchdog_tripped=False,
-    )  # fmt: skip
-    return replace(state, **changes)  # type: ignore[arg-type]
-
-
-def bus(*others: ServoReading, **changes: object) -> BusStatus:
-    """An armed bus; `others` replace the servos of the same name."""
-    by_name = {reading.name: reading for reading in others}
-    status = BusStatus(
-        cycle=1,
-        time_s=100.0,
-        phase=BusPhase.ARMED,
-        servos=tuple(by_name.get(joint.name, servo(place)) for place, joint in enumerate(SERVOS.joints)),
-        active=(),
-        latched=None,
-        fault_counts={},
-        sent=None,
-        rejection=None,
-        clamps=(),
-        at_end=(),
-        rejections={},
-        clamp_count=12,
-        line=LineCounts(),
-        bad_packets=3,
-        restarts=0,
-        times=CycleTimes(20.0, 21.4, 4.0, 6.0),
-        zeroed=(True,) * 7,
-    )
-    return replace(status, **changes)  # type: ignore[arg-type]
+SAFETY = SafetyConfig()
 
 
 def cells(status: BusStatus | None, place: int) -> dict[Column, tuple[str, Tone]]:
     return {column: (cell.text, cell.tone) for column, cell in zip(Column, servo_rows(status, SERVOS, SAFETY)[place], strict=True)}
 
 
-def test_no_heading_of_the_table_is_cut_in_the_smallest_window(qtbot: QtBot) -> None:
-    table = ServoTable()
-    qtbot.addWidget(table)
-    table.resize(470, 240)
-    table.show()
+def test_no_heading_of_the_table_is_cut_in_the_smallest_window(own: Own) -> None:
+    table = own(ServoTable(), 470, 240, show=True)
     header, metrics = table.table.horizontalHeader(), QFontMetrics(theme.font(11))
     for place in range(table.table.columnCount()):
         heading = table.table.horizontalHeaderItem(place).text().strip()
@@ -103,32 +60,39 @@ def test_a_healthy_servo_in_words_and_numbers() -> None:
     }
 
 
-def test_feeds_are_read_in_tenths() -> None:
-    assert cells(bus(servo(4, position_mm=123.456)), 4)[Column.POSITION][0] == "123.5"
+LOOSE = {"position_mm": None, "goal_mm": None}
 
 
 @pytest.mark.parametrize(
-    ("temperature_c", "text", "tone"), [(64.0, "64", Tone.PLAIN), (65.0, "!65", Tone.WARN), (70.0, "!!70", Tone.BAD)]
+    ("place", "changes", "column", "text", "tone"),
+    [
+        (4, {"position_mm": 123.456}, Column.POSITION, "123.5", Tone.PLAIN),  # feeds are read in tenths
+        (2, {"position_mm": 2.5}, Column.POSITION, "2.50", Tone.PLAIN),  # envelope -2.4 to 2.8 mm, margin 0.3 mm
+        (2, {"position_mm": 2.6}, Column.POSITION, "!2.60", Tone.WARN),
+        (2, {"position_mm": -2.2}, Column.POSITION, f"!{MINUS}2.20", Tone.WARN),
+        (2, {"position_mm": 2.81}, Column.POSITION, "!!2.81", Tone.BAD),
+        (0, LOOSE, Column.POSITION, DASH, Tone.FAINT),
+        (0, {"temperature_c": 64.0}, Column.TEMPERATURE, "64", Tone.PLAIN),  # limit 70, warning 5 degrees before
+        (0, {"temperature_c": 65.0}, Column.TEMPERATURE, "!65", Tone.WARN),
+        (0, {"temperature_c": 70.0}, Column.TEMPERATURE, "!!70", Tone.BAD),
+        (0, {"temperature_c": 70.0}, Column.JOINT, "right · 1", Tone.BAD),  # the joint's name is marked as well
+        (0, {"voltage_v": 11.1}, Column.VOLTAGE, "11.1", Tone.PLAIN),
+        (0, {"voltage_v": 11.0}, Column.VOLTAGE, "!11.0", Tone.WARN),
+        (0, {"voltage_v": 10.5}, Column.VOLTAGE, "!!10.5", Tone.BAD),
+        (0, {"current_ma": 600.0}, Column.CURRENT, "600", Tone.PLAIN),
+        (0, {"current_ma": -612.0}, Column.CURRENT, f"!!{MINUS}612", Tone.BAD),
+        (0, {"current_ma": None}, Column.CURRENT, DASH, Tone.PLAIN),  # models that report a load
+        (0, {"watchdog_tripped": True}, Column.ERROR, "bus watchdog", Tone.BAD),
+        (0, {"torque": False}, Column.TORQUE, "!!off", Tone.BAD),  # armed, and yet it does not hold
+    ],
 )
-def test_heat_warns_five_degrees_before_the_limit_of_70(temperature_c: float, text: str, tone: Tone) -> None:
-    row = cells(bus(servo(0, temperature_c=temperature_c)), 0)
-    assert row[Column.TEMPERATURE] == (text, tone)
-    assert row[Column.JOINT][1] is tone, "the joint's name is marked as well"
+def test_cells_and_their_warnings(place: int, changes: dict[str, object], column: Column, text: str, tone: Tone) -> None:
+    assert cells(bus(servo(place, **changes)), place)[column] == (text, tone)
 
 
-@pytest.mark.parametrize(
-    ("voltage_v", "text", "tone"), [(11.1, "11.1", Tone.PLAIN), (11.0, "!11.0", Tone.WARN), (10.5, "!!10.5", Tone.BAD)]
-)
-def test_voltage_warns_half_a_volt_before_the_limit(voltage_v: float, text: str, tone: Tone) -> None:
-    assert cells(bus(servo(0, voltage_v=voltage_v)), 0)[Column.VOLTAGE] == (text, tone)
-
-
-@pytest.mark.parametrize(
-    ("at_mm", "tone"), [(0.0, Tone.PLAIN), (2.5, Tone.PLAIN), (2.6, Tone.WARN), (-2.2, Tone.WARN), (2.81, Tone.BAD)]
-)
-def test_position_warns_inside_the_margin_and_outside_the_envelope(at_mm: float, tone: Tone) -> None:
-    """A tendon's envelope is -2.4 to 2.8 mm, its margin 0.3 mm."""
-    assert cells(bus(servo(2, position_mm=at_mm)), 2)[Column.POSITION][1] is tone
+def test_before_arming_loose_and_unzeroed_joints_are_no_fault() -> None:
+    row = cells(bus(servo(0, torque=False, **LOOSE), phase=BusPhase.DISARMED, zeroed=(False,) * 7), 0)
+    assert (row[Column.TORQUE], row[Column.ZERO]) == (("off", Tone.FAINT), ("!no", Tone.WARN))
 
 
 def test_track_tells_shares_of_the_envelope() -> None:
@@ -161,25 +125,6 @@ def test_a_silent_servo_says_so_and_shows_no_old_number() -> None:
     assert cells(bus(restarted), 2)[Column.ERROR][0] == "restarted"
 
 
-def test_watchdog_torque_and_zero() -> None:
-    assert cells(bus(servo(0, watchdog_tripped=True)), 0)[Column.ERROR] == ("bus watchdog", Tone.BAD)
-    assert cells(bus(servo(0, torque=False)), 0)[Column.TORQUE] == ("!!off", Tone.BAD), "armed, and yet it does not hold"
-    assert cells(bus(servo(0, torque=False), phase=BusPhase.DISARMED), 0)[Column.TORQUE] == ("off", Tone.FAINT)
-    loose = bus(servo(0, position_mm=None, goal_mm=None), zeroed=(False,) * 7)
-    assert cells(loose, 0)[Column.ZERO] == ("!no", Tone.WARN)
-    assert cells(loose, 0)[Column.POSITION][0] == DASH
-
-
-def test_a_current_beyond_its_limit_is_marked() -> None:
-    assert cells(bus(servo(0, current_ma=600.0)), 0)[Column.CURRENT] == ("600", Tone.PLAIN)
-    assert cells(bus(servo(0, current_ma=-612.0)), 0)[Column.CURRENT] == (f"!!{MINUS}612", Tone.BAD)
-    assert "limit 600 mA for half a second" in servo_rows(bus(), SERVOS, SAFETY)[0][list(Column).index(Column.CURRENT)].tip
-
-
-def test_models_that_report_a_load_have_no_current() -> None:
-    assert cells(bus(servo(0, current_ma=None)), 0)[Column.CURRENT][0] == DASH
-
-
 def test_nothing_is_known_without_a_bus_and_while_its_port_is_closed() -> None:
     for status in (None, bus(phase=BusPhase.CLOSED, servos=())):
         assert {cell.text for row in servo_rows(status, SERVOS, SAFETY) for cell in row[1:]} == {DASH}
@@ -206,22 +151,16 @@ def test_slack_and_tight_pairs_are_named(left_mm: float, word: str, tone: Tone) 
     assert (first.word, first.tone) == (word, tone)
 
 
-def test_slack_wires_are_no_warning_before_arming() -> None:
-    first, _ = pair_balances(bus(servo(0, position_mm=0.0), servo(1, position_mm=0.0), phase=BusPhase.DISARMED), SERVOS)
-    assert (first.share, first.word) == (pytest.approx(-1.0), "")
-
-
 def test_tension_is_told_by_the_currents() -> None:
     """100 mA at 4.1 Nm / 2.3 A on a drum of 40 mm per turn: 0.178 Nm / 6.37 mm = 28 N."""
     first, second = pair_balances(bus(servo(0, current_ma=100.0), servo(2, current_ma=None)), SERVOS)
+    silent, _ = pair_balances(bus(MissingServo("left", 2, 100.0, 3, "no answer")), SERVOS)
+    assert silent.share is None
+    loose, _ = pair_balances(bus(servo(0, position_mm=0.0), servo(1, position_mm=0.0), phase=BusPhase.DISARMED), SERVOS)
+    assert (loose.share, loose.word) == (pytest.approx(-1.0), ""), "slack wires are no warning before arming"
     assert first.forces_n is not None
     assert first.forces_n[0] == pytest.approx(28.0, abs=0.05)
     assert second.forces_n is None
-
-
-def test_a_pair_with_a_silent_servo_is_unknown() -> None:
-    first, _ = pair_balances(bus(MissingServo("left", 2, 100.0, 3, "no answer")), SERVOS)
-    assert first.share is None
 
 
 def test_bus_line_has_phase_timing_and_counts() -> None:
@@ -240,16 +179,8 @@ def test_bus_line_spells_out_errors() -> None:
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
-@pytest.fixture
-def table(qtbot: QtBot, clock: Clock) -> Iterator[ServoTable]:
-    widget = ServoTable(SAFETY, clock)
-    qtbot.addWidget(widget)
-    widget.resize(446, 205)
-    widget.show()
+def table(own: Own, clock: Clock) -> Iterator[ServoTable]:
+    widget = own(ServoTable(SAFETY, clock), 446, 205, show=True)
     yield widget
     for menu in widget.findChildren(QMenu):
         menu.close()
@@ -299,13 +230,6 @@ def test_all_rows_and_columns_fit(table: ServoTable, size: tuple[int, int]) -> N
     assert view.columnViewportPosition(8) + view.columnWidth(8) == view.viewport().width()
 
 
-def test_what_is_wrong_is_tinted(table: ServoTable) -> None:
-    table.show_status(bus(servo(2, error=HardwareError.OVERLOAD)), SERVOS)
-    image = table.table.grab().toImage()
-    found = {image.pixelColor(x, y).name().upper() for x in range(image.width()) for y in range(image.height())}
-    assert theme.FAULT in found
-
-
 def button(widget: QWidget, text: str) -> QPushButton:
     return next(found for found in widget.findChildren(QPushButton) if found.text().startswith(text))
 
@@ -330,18 +254,10 @@ def test_zeroing_is_asked_back_and_then_told(table: ServoTable, qtbot: QtBot) ->
     next(b for b in table.question.findChildren(QPushButton) if b.text() == "Zero").click()
     assert asked == [None]
     assert table.question.text == ""
-
-
-def test_one_joint_can_be_zeroed_and_the_question_taken_back(table: ServoTable) -> None:
-    table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
-    asked: list[object] = []
-    table.zero_asked.connect(asked.append)
-    choose(table.menu_for(SERVOS.joints[5]), "Zero delivery 1")
-    button(table.question, "Cancel").click()
-    assert (asked, table.question.text) == ([], "")
-    choose(table.menu_for(SERVOS.joints[5]), "Zero delivery 1")
-    button(table.question, "Zero").click()
-    assert asked == [["delivery_1"]]
+    for answer in ("Cancel", "Zero"):
+        choose(table.menu_for(SERVOS.joints[5]), "Zero delivery 1")
+        button(table.question, answer).click()
+    assert asked == [None, ["delivery_1"]]
 
 
 def test_restart_and_torque_off_are_asked_back(table: ServoTable, qtbot: QtBot) -> None:
@@ -380,15 +296,10 @@ def test_arming_takes_an_open_question_back(table: ServoTable) -> None:
     assert table.question.text == ""
 
 
-def test_the_table_keeps_off_the_keyboard_but_its_buttons_do_not(table: ServoTable) -> None:
+def test_right_click_offers_the_row_under_it_and_tab_reaches_the_buttons_only(table: ServoTable) -> None:
     table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
     assert table.table.focusPolicy() is Qt.FocusPolicy.NoFocus
     for text in ("Restart", "Zero", "Torque off"):
         assert button(table, text).focusPolicy() is Qt.FocusPolicy.TabFocus
-
-
-def test_right_click_offers_the_row_under_it(table: ServoTable, qtbot: QtBot) -> None:
-    table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
-    at = QPoint(20, table.table.rowViewportPosition(4) + 4)
-    table.table.customContextMenuRequested.emit(at)
+    table.table.customContextMenuRequested.emit(QPoint(20, table.table.rowViewportPosition(4) + 4))
     assert any(action.text() == "Restart servo 5 (advance)" for action in open_menu(table).actions())

@@ -5,27 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from PySide6.QtWidgets import QWidget
-from pytestqt.qtbot import QtBot
 
 from app.ui import theme
 from app.widgets.state_badge import StateBadge
 from core.config.models import PoseConfig
 from core.types import PoseState, Reason, Refusal
 from tests.app.fakes import make_pose, make_scene
+from tests.app.widgets.conftest import Own, colours_in
 
 LIMITS = PoseConfig()
 
 
-def colours_in(widget: QWidget) -> set[str]:
-    image = widget.grab().toImage()
-    return {image.pixelColor(x, y).name().upper() for x in range(0, image.width(), 2) for y in range(0, image.height(), 2)}
-
-
 @pytest.mark.parametrize("state", list(PoseState))
-def test_badge_shows_letter_title_and_colour_of_the_state(qtbot: QtBot, state: PoseState) -> None:
-    badge = StateBadge(LIMITS, 0.5)
-    qtbot.addWidget(badge)
+def test_badge_shows_letter_title_and_colour_of_the_state(own: Own, state: PoseState) -> None:
+    badge = own(StateBadge(LIMITS, 0.5))
     badge.resize(480, badge.height())
     badge.show_scene(make_scene(make_pose(state)))
     assert badge.letter == state.value
@@ -33,18 +26,16 @@ def test_badge_shows_letter_title_and_colour_of_the_state(qtbot: QtBot, state: P
     assert theme.STATE_COLOUR[state].upper() in colours_in(badge)
 
 
-def test_badge_shows_a_dash_and_the_reason_without_a_pose(qtbot: QtBot) -> None:
-    badge = StateBadge(LIMITS, 0.5)
-    qtbot.addWidget(badge)
+def test_badge_shows_a_dash_and_the_reason_without_a_pose(own: Own) -> None:
+    badge = own(StateBadge(LIMITS, 0.5))
     badge.show_scene(make_scene(make_pose()))
     badge.show_scene(make_scene(refusal=Refusal(Reason.OUTSIDE_VESSEL, "41 % inside, 60 % needed")), renew_text=False)
     assert (badge.letter, badge.title) == ("-", "Robot is outside the vessel")
     assert badge.why.endswith("41 % inside, 60 % needed")
 
 
-def test_badge_keeps_its_sentence_until_texts_are_renewed_but_never_a_wrong_letter(qtbot: QtBot) -> None:
-    badge = StateBadge(LIMITS, 0.5)
-    qtbot.addWidget(badge)
+def test_badge_keeps_its_sentence_until_texts_are_renewed_but_never_a_wrong_letter(own: Own) -> None:
+    badge = own(StateBadge(LIMITS, 0.5))
     badge.show_scene(make_scene(make_pose(PoseState.C, head=14.0)))
     before = badge.why
     badge.show_scene(make_scene(make_pose(PoseState.C, head=19.0)), renew_text=False)
@@ -59,9 +50,8 @@ def _shown(badge: StateBadge, confidence: float, *, renew_text: bool = True) -> 
     return badge.is_unsure, badge.sureness
 
 
-def test_badge_says_how_sure_it_is_and_leaves_the_shape_of_an_unsure_state_open(qtbot: QtBot) -> None:
-    badge = StateBadge(LIMITS, 0.5)
-    qtbot.addWidget(badge)
+def test_badge_says_how_sure_it_is_and_leaves_the_shape_of_an_unsure_state_open(own: Own) -> None:
+    badge = own(StateBadge(LIMITS, 0.5))
     badge.resize(480, badge.height())
     assert _shown(badge, 0.974) == (False, "97 % sure")
     filled = _share_of(badge, theme.STATE_COLOUR[PoseState.D])
@@ -74,9 +64,8 @@ def test_badge_says_how_sure_it_is_and_leaves_the_shape_of_an_unsure_state_open(
     assert _shown(badge, 0.52) == (False, "52 % sure"), "after a refusal it begins anew"
 
 
-def test_the_limit_decides_whether_a_badge_is_unsure_and_nothing_that_was_before(qtbot: QtBot) -> None:
-    badge = StateBadge(LIMITS, 0.57)
-    qtbot.addWidget(badge)
+def test_the_limit_decides_whether_a_badge_is_unsure_and_nothing_that_was_before(own: Own) -> None:
+    badge = own(StateBadge(LIMITS, 0.57))
     assert _shown(badge, 0.57) == (False, "57 % sure"), "0.57 is a little less than that in binary"
     assert _shown(badge, 0.569) == (True, "unsure: 56 %")
     assert _shown(badge, 0.57) == (False, "57 % sure")

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pytestqt.qtbot import QtBot
 
 from app.ui import theme
 from app.widgets.theta_gauge import ThetaGauge
 from tests.app.fakes import make_pose
+from tests.app.widgets.conftest import Own
 
 
-def test_gauge_shows_sign_number_and_side(qtbot: QtBot) -> None:
-    gauge = ThetaGauge(10.0)
-    qtbot.addWidget(gauge)
+def test_gauge_shows_sign_number_and_side(own: Own) -> None:
+    gauge = own(ThetaGauge(10.0))
     assert (gauge.text, gauge.direction) == ("–", "")
     gauge.show_pose(make_pose(theta=18.44))
     assert (gauge.text, gauge.direction) == ("+18.4°", "right")
@@ -24,10 +23,8 @@ def test_gauge_shows_sign_number_and_side(qtbot: QtBot) -> None:
 
 
 @pytest.mark.parametrize(("theta", "side"), [(60.0, 1), (-60.0, -1), (170.0, 1), (-170.0, -1)])
-def test_needle_points_to_the_side_of_the_sign(qtbot: QtBot, theta: float, side: int) -> None:
-    gauge = ThetaGauge(10.0)
-    qtbot.addWidget(gauge)
-    gauge.resize(300, 200)
+def test_needle_points_to_the_side_of_the_sign(own: Own, theta: float, side: int) -> None:
+    gauge = own(ThetaGauge(10.0), 300, 200)
     gauge.show_pose(make_pose(theta=theta))
     image = gauge.grab().toImage()
     needle = [
@@ -37,9 +34,8 @@ def test_needle_points_to_the_side_of_the_sign(qtbot: QtBot, theta: float, side:
     assert (np.mean(needle) - image.width() / 2) * side > 5
 
 
-def test_needle_follows_at_once_the_number_when_texts_are_renewed(qtbot: QtBot) -> None:
-    gauge = ThetaGauge(10.0)
-    qtbot.addWidget(gauge)
+def test_needle_follows_at_once_the_number_when_texts_are_renewed(own: Own) -> None:
+    gauge = own(ThetaGauge(10.0))
     gauge.show_pose(make_pose(theta=10.0))
     gauge.show_pose(make_pose(theta=20.0), renew_text=False)
     assert gauge.text == "+10.0°"

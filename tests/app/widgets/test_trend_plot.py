@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pytestqt.qtbot import QtBot
 
 from app.widgets.trend_plot import SPAN_S, TrendPlot
 from core.config.models import PoseConfig
 from tests.app.fakes import make_pose, make_scene
+from tests.app.widgets.conftest import Own
 
 LIMITS = PoseConfig()
 
 
-def test_frames_without_a_pose_are_gaps(qtbot: QtBot) -> None:
-    plot = TrendPlot(LIMITS)
-    qtbot.addWidget(plot)
+def test_frames_without_a_pose_are_gaps(own: Own) -> None:
+    plot = own(TrendPlot(LIMITS))
     for k in range(5):
         plot.add(make_scene(None if k == 2 else make_pose(theta=float(k)), captured_s=k * 0.1))
     plot._draw()
@@ -24,10 +23,9 @@ def test_frames_without_a_pose_are_gaps(qtbot: QtBot) -> None:
     np.testing.assert_array_equal(theta, [0.0, 1.0, np.nan, 3.0, 4.0])
 
 
-def test_trends_go_on_to_the_left_while_nothing_comes(qtbot: QtBot) -> None:
+def test_trends_go_on_to_the_left_while_nothing_comes(own: Own) -> None:
     """Where now is there is no value: the newest one is not taken for it."""
-    plot = TrendPlot(LIMITS)
-    qtbot.addWidget(plot)
+    plot = own(TrendPlot(LIMITS))
     for k in range(50):
         plot._pace.reset()
         plot.add(make_scene(make_pose(theta=5.0), index=k, captured_s=100.0 + 0.1 * k))
@@ -44,9 +42,8 @@ def test_trends_go_on_to_the_left_while_nothing_comes(qtbot: QtBot) -> None:
     assert plot.curves[0].xData[-1] == 0.0
 
 
-def test_trends_hold_thirty_seconds_and_restart_when_the_clock_jumps_back(qtbot: QtBot) -> None:
-    plot = TrendPlot(LIMITS)
-    qtbot.addWidget(plot)
+def test_trends_hold_thirty_seconds_and_restart_when_the_clock_jumps_back(own: Own) -> None:
+    plot = own(TrendPlot(LIMITS))
     for k in range(1200):
         plot.add(make_scene(make_pose(), captured_s=k / 30))
     plot._draw()

@@ -1,0 +1,40 @@
+"""Fixtures of the widgets' tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import pytest
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+from tests.app.hand_clock import Clock
+
+Widget = TypeVar("Widget", bound=QWidget)
+Own = Callable[..., Widget]
+
+
+@pytest.fixture
+def own(qtbot: QtBot) -> Callable[..., QWidget]:
+    """Gives a widget to the test, in a size; with ``show=True`` on the screen."""
+
+    def take(widget: Widget, *size: int, show: bool = False) -> Widget:
+        qtbot.addWidget(widget)
+        if size:
+            widget.resize(*size)
+        widget.setVisible(show)
+        return widget
+
+    return take
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def colours_in(widget: QWidget) -> set[str]:
+    """All colours of every second pixel."""
+    image = widget.grab().toImage()
+    return {image.pixelColor(x, y).name().upper() for x in range(0, image.width(), 2) for y in range(0, image.height(), 2)}
