@@ -272,15 +272,15 @@ class ScriptedOperator(QObject):
 
     def stop(self) -> None:
         self._timer.stop()
-        self._window.desk.hold_deadman(False)
+        self._window.controls.deadman.hold("mouse", False)
 
     def _act(self) -> None:
         self._since_s += REPEAT_MS / 1000.0
         if self._since_s < self._by_hand_s:
             # As a held key does, the motion is repeated: silence counts as let go.
-            self._window.drive(_MOVES[int(self._since_s / _MOVE_S) % len(_MOVES)])
+            self._window.controls.drive(_MOVES[int(self._since_s / _MOVE_S) % len(_MOVES)])
             return
-        view = self._window.desk.view
+        view = self._window.controls.view
         if view is not None and view.mode in DRIVING_MODES:
             self.driven_s += REPEAT_MS / 1000.0 * (view.mode is Mode.AUTONOMOUS)
         self._asked_s += REPEAT_MS / 1000.0
@@ -289,17 +289,17 @@ class ScriptedOperator(QObject):
             self._ask(view.mode, view.latched is not None)
 
     def _ask(self, mode: Mode, latched: bool) -> None:
-        desk, tick = self._window.desk, self._window.shown_tick
+        desk, tick = self._window.controls, self._window.shown_tick
         if latched:
-            desk.take(OperatorStep.ACKNOWLEDGE)
+            desk.ask_step(OperatorStep.ACKNOWLEDGE)
         elif mode is Mode.ADVISORY:
-            desk.hold_deadman(False)
-            desk.take(OperatorStep.ARM)
+            desk.deadman.hold("mouse", False)
+            desk.ask_step(OperatorStep.ARM)
         elif mode in {Mode.ARMED, Mode.HOLD}:
             if tick is not None and mode is Mode.ARMED and (target := _far_ahead(tick.scene)) is not None:
                 self._window.choose_target(*target)
-            desk.hold_deadman(True)
-            desk.take(OperatorStep.HAND_OVER)
+            desk.deadman.hold("mouse", True)
+            desk.ask_step(OperatorStep.HAND_OVER)
 
 
 def _far_ahead(scene: Scene) -> Point | None:
@@ -373,7 +373,7 @@ class WindowWatch(QObject):
                 self._ended_s = now + self._seconds
                 self._weigh()
                 self._operator.start()
-        view, servo_ms = self._window.desk.view, self.readings.servo_ms
+        view, servo_ms = self._window.controls.view, self.readings.servo_ms
         if view is not None and view.latency_s is not None and servo_ms[-1:] != [view.latency_s * 1e3]:
             servo_ms.append(view.latency_s * 1e3)
         if now >= self._ended_s:
@@ -388,7 +388,7 @@ class WindowWatch(QObject):
         if seen.first_shown_s is None:
             return
         at_s = time.monotonic() - seen.first_shown_s
-        view, bus, block_ms = self._window.desk.view, self._window.desk.bus, self._window.max_block_ms
+        view, bus, block_ms = self._window.controls.view, self._window.controls.bus, self._window.max_block_ms
         if block_ms > max((ms for _, ms, _ in seen.blocks), default=0.0):
             seen.blocks.append((at_s, block_ms, view.mode.value if view is not None else ""))
         if bus is not None and at_s >= _WARM_UP_S:

@@ -50,7 +50,8 @@ from app.operator.window import OperatorWindow
 from app.player.window import PlayerWindow
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
-from app.settings.dialog import SettingsDialog, SettingsDraft
+from app.settings.dialog import SettingsDialog
+from app.settings.draft import SettingsDraft
 from app.training.dialog import TrainingDialog, Wish, collect_from_file
 from app.ui import theme
 from app.widgets.basics import Card

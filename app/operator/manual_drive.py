@@ -1,16 +1,7 @@
-"""Ties the operator's controls and the panels that show driving to the pilot of the running rig.
+"""Manual driving: keys, buttons, gamepad and pedal that move and stop the robot, and the panels that show it.
 
-Keys that move the robot by hand: hold to move, release to stop. STOP stops everything, whatever has the focus.
-
-What is held on keyboard or screen: said again and again while it is, and let go when nobody can be holding it any more.
-
-The deadman on the keyboard and on the screen: Shift, or a field that is held with the mouse.
-
-The keys of STOP. Space is STOP in any focus, except while a text is typed and nothing can move: then it is a space.
-
-Pause, and Space with Ctrl, Alt or Meta, are STOP in any focus and in every mode, so that a key is there at any moment.
-
-Gamepad and foot pedal, beside the keys: their threads talk straight to the pilot, never by way of the window.
+Keys and buttons act while they are held. STOP acts with any focus: Pause, and Space with Ctrl, Alt or Meta, always; Space alone
+except while a text is typed and nothing can move. The threads of gamepad and pedal call the pilot directly.
 """
 
 from __future__ import annotations
@@ -20,7 +11,7 @@ from enum import Enum
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractSpinBox,
@@ -32,8 +23,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.operator.engine_thread import EngineThread
 from app.operator.recording import Recorder
+from app.operator.rig_session import RigSession
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import OperatorStep, Undriven
 from app.widgets.alerts import AlertSounds
@@ -42,7 +33,7 @@ from app.widgets.event_log import LogKind
 from core.config.models import Config
 from core.config.safety import JointName
 from core.control.alerts import Alert
-from core.control.modes import Act
+from core.control.modes import ARMED_MODES, Act
 from core.control.motion import AT_REST, Jog
 from core.control.pilot import DriveView, Pilot
 from core.types import Point
@@ -50,40 +41,40 @@ from hardware.inputs.gamepad import Gamepad, GamepadError, GamepadState
 from hardware.inputs.pedal import Pedal, PedalError, PedalReport
 from hardware.servos.bus_ipc import BusStatus
 
+
+def _application() -> QApplication:
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    return application
+
+
 _WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked)
 """Blocked by a dialog, a window gets no release any more, even where the desktop leaves it the focus."""
 
 
 class HeldInput(QObject):
-    """Listens to the keys of the whole application, from its making to ``detach``.
+    """Controls that act while they are held: listens to the keys of the whole application until ``detach``.
 
-    Subclasses say what a press and a release mean, how all is let go, and what is said every `period_ms` while ``_timer`` runs. All
-    is let go when `window` or the application loses the focus, or a dialog blocks it, so that nothing goes on unattended.
+    Subclasses say what a press and a release mean, and what is repeated every `period_ms` while ``_timer`` runs. Everything is
+    released when `window` or the application loses the focus, or a dialog blocks it, so that nothing goes on unattended.
     """
 
     def __init__(self, window: QWidget, period_ms: int) -> None:
         super().__init__(window)
         self._window = window
-        self._timer = QTimer(self)
-        self._timer.setInterval(period_ms)
-        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer = QTimer(self, interval=period_ms, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._repeat)
-        application = QApplication.instance()
-        if application is not None:
-            application.installEventFilter(self)
-        if isinstance(application, QGuiApplication):
-            application.applicationStateChanged.connect(self._on_application_state)
+        application = _application()
+        application.installEventFilter(self)
+        application.applicationStateChanged.connect(self._on_application_state)
 
     def release_all(self) -> None:
-        """Nothing is held any more."""
         raise NotImplementedError
 
     def detach(self) -> None:
-        """Let go and listen no more."""
+        """Release everything and listen no more."""
         self.release_all()
-        application = QApplication.instance()
-        if application is not None:
-            application.removeEventFilter(self)
+        _application().removeEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
@@ -112,10 +103,10 @@ class HeldInput(QObject):
 
 
 def place_of(event: QKeyEvent) -> tuple[str, int]:
-    """Which key of the keyboard it is.
+    """Which key of the keyboard it is: what it means may change while it is down.
 
-    What a key means may change while it is down: with NumLock the keypad's Up, pressed beside Shift, is let go as an 8, and where
-    Shift and Alt together change the layout, Shift itself is let go as another key.
+    With NumLock the keypad's Up, pressed beside Shift, is released as an 8; where Shift and Alt together change the layout, Shift
+    itself is released as another key.
     """
     scan_code = event.nativeScanCode()
     return ("place", scan_code) if scan_code else ("key", event.key())
@@ -123,7 +114,7 @@ def place_of(event: QKeyEvent) -> tuple[str, int]:
 
 NUMBERS_ONLY = "numbers_only"
 """Property of a line edit whose text is a number: Space is STOP there, too."""
-_NEVER_TYPED = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+_COMMAND_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 
 
 def is_stop(watched: QObject, event: QKeyEvent, can_move: bool) -> bool:
@@ -138,7 +129,7 @@ def is_stop(watched: QObject, event: QKeyEvent, can_move: bool) -> bool:
         return True
     if event.key() != Qt.Key.Key_Space:
         return False
-    return can_move or bool(event.modifiers() & _NEVER_TYPED) or not takes_a_space(watched)
+    return can_move or bool(event.modifiers() & _COMMAND_MODIFIERS) or not takes_a_space(watched)
 
 
 def takes_a_space(widget: QObject) -> bool:
@@ -149,7 +140,7 @@ def takes_a_space(widget: QObject) -> bool:
 
 
 class StopKeys(QObject):
-    """Hears STOP in all windows of the program while `owner` is visible, for a dialog that has the servos.
+    """STOP keys in all windows of the program while `owner` is visible, for a dialog that has the servos.
 
     Parameters
     ----------
@@ -161,15 +152,11 @@ class StopKeys(QObject):
     def __init__(self, owner: QWidget, can_move: Callable[[], bool], stop: Callable[[], object]) -> None:
         super().__init__(owner)
         self._owner, self._can_move, self._stop = owner, can_move, stop
-        application = QApplication.instance()
-        assert application is not None
-        application.installEventFilter(self)
+        _application().installEventFilter(self)
 
     def detach(self) -> None:
         """Listen no more."""
-        application = QApplication.instance()
-        if application is not None:
-            application.removeEventFilter(self)
+        _application().removeEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() not in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride) or not isinstance(event, QKeyEvent):
@@ -185,6 +172,7 @@ class StopKeys(QObject):
 
 
 PERIOD_MS = 33
+"""A held jog is repeated at this period."""
 
 
 class Motion(Enum):
@@ -218,15 +206,13 @@ _BY_PLACE = {
 }  # fmt: skip
 """Where these letters lie, in the numbers of X11 and Wayland, for a layout that has the letters of another alphabet there."""
 _FIRST_LETTER, _FIRST_OTHER_KEY = 0x80, 0x0100_0000
-_OTHER_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 
 
 class JogKeys(HeldInput):
     """Turns held keys and held buttons into a ``Jog``.
 
-    Everything held is released when the window loses the focus, so nothing moves unattended. ``changed`` carries the jog; it comes
-    at each press and release and every 33 ms while something is held, since its silence counts as let go. ``stop_pressed`` comes
-    from a key of STOP in any window of the program that has the focus; ``can_move`` is asked when Space is pressed in a text field.
+    ``changed`` carries the jog at each press and release and every 33 ms while something is held, since silence counts as released.
+    ``stop_pressed`` comes from a STOP key in any window of the program; ``can_move`` decides what Space is in a text field.
     """
 
     changed = Signal(object)
@@ -262,7 +248,6 @@ class JogKeys(HeldInput):
             self._announce()
 
     def release(self, source: object) -> None:
-        """`source` lets go."""
         if source in self._held:
             del self._held[source]
             if not self._held:
@@ -270,7 +255,6 @@ class JogKeys(HeldInput):
             self._announce()
 
     def release_all(self) -> None:
-        """Nothing is held any more; nothing is said when nothing was held."""
         if self._held:
             self._held.clear()
             self._timer.stop()
@@ -287,7 +271,7 @@ class JogKeys(HeldInput):
             return True
         if event.isAutoRepeat() and place_of(event) in self._held:
             return True  # a field or menu that gets the focus meanwhile is not typed into by it
-        if watched.window() is not self._window or event.modifiers() & _OTHER_MODIFIERS:
+        if watched.window() is not self._window or event.modifiers() & _COMMAND_MODIFIERS:
             return False
         motion = _MOTION_OF_KEY.get(key)
         # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
@@ -302,7 +286,7 @@ class JogKeys(HeldInput):
         return True
 
     def _on_release(self, event: QKeyEvent) -> bool:
-        """A release counts wherever it goes to, or motion would go on after a menu opened over the window."""
+        """A release counts wherever it goes, or motion would go on after a menu opened over the window."""
         place = place_of(event)
         if event.isAutoRepeat():
             return place in self._held
@@ -331,14 +315,15 @@ def _sign(held: frozenset[Motion], plus: Motion, minus: Motion) -> int:
 
 
 REPEAT_MS = 25
-"""Silence of 80 ms counts as let go, so it is said three times in that time."""
+"""Silence of 80 ms counts as released, so a held deadman is reported three times in that time."""
 _KEY = Qt.Key.Key_Shift
 
 
 class DeadmanKey(HeldInput):
-    """``reported`` comes with True every 25 ms while it is held, and with False at once when it is let go or the focus is lost.
+    """The deadman on the keyboard (Shift) and on the screen (a field that is held with the mouse).
 
-    A key that was down when the window got the focus does not count: only a press does.
+    ``reported`` comes with True every 25 ms while it is held, and with False at once when it is released or the focus is lost. A
+    key that was down when the window got the focus does not count: only a press does.
     """
 
     reported = Signal(bool)
@@ -353,7 +338,7 @@ class DeadmanKey(HeldInput):
         return bool(self._holders)
 
     def hold(self, holder: str, on: bool) -> None:
-        """The key or the mouse takes it, or lets go."""
+        """The key or the mouse presses it, or releases it."""
         before = self.is_held
         if on:
             self._holders.add(holder)
@@ -367,14 +352,13 @@ class DeadmanKey(HeldInput):
             self.reported.emit(self.is_held)
 
     def release_all(self) -> None:
-        """Nobody holds it."""
         self._places.clear()
         for holder in tuple(self._holders):
             self.hold(holder, False)
 
     def _on_press(self, watched: QObject, event: QKeyEvent) -> bool:
-        is_ours = isinstance(watched, QWidget) and watched.window() is self._window
-        if event.key() == _KEY and is_ours and not event.isAutoRepeat():
+        is_own = isinstance(watched, QWidget) and watched.window() is self._window
+        if event.key() == _KEY and is_own and not event.isAutoRepeat():
             self._places.add(place_of(event))
             self.hold("key", True)
         return False
@@ -390,7 +374,7 @@ class DeadmanKey(HeldInput):
         self.reported.emit(True)
 
 
-_LOOK_EVERY_MS = 50
+_UPDATE_EVERY_MS = 50
 _ACT_OF = {
     OperatorStep.ACKNOWLEDGE: Act.ACKNOWLEDGE,
     OperatorStep.ARM: Act.ARM,
@@ -401,7 +385,7 @@ _ACT_OF = {
 
 
 class DrivePanels(Protocol):
-    """What the desk shows things on."""
+    """What shows driving."""
 
     def show_drive(self, view: DriveView | None, bus: BusStatus | None, why_not: Undriven = Undriven.NO_ROBOT) -> None: ...
     def show_alerts(self, alerts: tuple[Alert, ...]) -> None: ...
@@ -409,182 +393,155 @@ class DrivePanels(Protocol):
 
 
 class DriveController(QObject):
-    """The operator's side of driving. Without a pilot (a recording) it shows that there is nothing to drive.
+    """Passes the operator's controls to the pilot of the running rig, and the pilot's view and alerts to panels and recorder.
 
     Parameters
     ----------
     window : whose keys are listened to.
-    thread : runs the rig.
-    panels : what to show the pilot's view on.
+    panels : what shows driving; without a pilot (a recording) that there is nothing to drive.
     recorder : keeps alerts and destinations with the session.
     """
 
-    def __init__(self, window: QWidget, thread: EngineThread, panels: DrivePanels, recorder: Recorder) -> None:
+    def __init__(self, window: QWidget, rig: RigSession, panels: DrivePanels, recorder: Recorder) -> None:
         super().__init__(window)
-        self._thread, self._panels, self._recorder = thread, panels, recorder
+        self._rig, self._panels, self._recorder = rig, panels, recorder
         self.jog = JogKeys(window, lambda: self.can_move)
         self.deadman = DeadmanKey(window)
         self.sounds = AlertSounds(self)
-        self._shown: DriveView | None = None
-        self._speed = 1.0
+        self.view: DriveView | None = None
+        """What is on the screen."""
         self.why_not = Undriven.NOT_YET
         """What is shown while there is no pilot."""
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LOOK_EVERY_MS)
-        self._timer.timeout.connect(self.look)
-        self.jog.changed.connect(self._on_jog)
+        self._speed = 1.0
+        self._timer = QTimer(self, interval=_UPDATE_EVERY_MS)
+        self._timer.timeout.connect(self.update_view)
+        self.jog.changed.connect(self.drive)
         self.jog.stop_pressed.connect(self.stop)
         self.deadman.reported.connect(self._on_deadman)
-
-    @property
-    def view(self) -> DriveView | None:
-        """What is on the screen."""
-        return self._shown
+        rig.leaving.connect(self.update_view)
+        rig.releasing.connect(self._release_all)
+        rig.add_work(self._work)
 
     @property
     def bus(self) -> BusStatus | None:
-        """The servo bus's latest word; None where there is none."""
-        return self._thread.bus_status()
+        """The newest status of the servo bus; None where there is none."""
+        return self._rig.engine.bus_status()
 
     @property
     def can_move(self) -> bool:
-        """Whether anything can move now, or is about to; without a rig nothing can."""
-        pilot = self._thread.pilot
+        """Whether anything can move now, or is about to."""
+        pilot = self._rig.pilot
         return pilot is not None and pilot.can_move
 
     def start(self) -> None:
-        """Look at the pilot from now on; each look is a sign of life of the window."""
+        """Read the pilot's view from now on; each time is a sign of life of the window."""
         self._timer.start()
 
-    def reset(self) -> None:
-        """Let go of everything, and let nobody drive, for a rig that is being opened."""
-        self.halt()
-        self.jog.release_all()
-        self.deadman.release_all()
-
-    def halt(self) -> None:
-        """Nobody drives any more: the rig is about to be closed."""
-        pilot = self._thread.pilot
-        if pilot is not None:
-            pilot.halt()
-
     def detach(self) -> None:
-        """Let go, look and listen no more."""
+        """Let go of everything, and listen no more."""
         self._timer.stop()
         self.jog.detach()
         self.deadman.detach()
 
+    @Slot()
+    def _release_all(self) -> None:
+        self.jog.release_all()
+        self.deadman.release_all()
+
+    def _work(self) -> str:
+        return tr("the robot is armed: disarm it first") if self.view is not None and self.view.mode in ARMED_MODES else ""
+
     # ---- requests
 
-    def take(self, step: OperatorStep) -> None:
-        """One of the steps that have a button and a key."""
+    def ask_step(self, step: OperatorStep) -> None:
+        """One of the steps that have a button and a key; refusals come back as alerts."""
         if step is OperatorStep.SERVOS_ON:
-            self.switch_on()
+            if (pilot := self._rig.pilot) is not None and pilot.switch_on():
+                self._log(tr("servos on"))
         else:
             self.ask(_ACT_OF[step])
 
     def ask(self, act: Act) -> None:
         """A request of the operator; refusals come back as alerts."""
-        pilot = self._thread.pilot
+        pilot = self._rig.pilot
         if pilot is None and act is Act.STOP:
-            if self._thread.stop_opening():
-                self._panels.log(LogKind.OPERATOR, tr("stop: the rig that is being opened starts stopped"))
+            if self._rig.engine.stop_opening():
+                self._log(tr("stop: the rig that is being opened starts stopped"))
                 return
-            pilot = self._thread.pilot  # it may have been opened between the two questions
+            pilot = self._rig.pilot  # it may have been opened between the two questions
         if pilot is not None:
             pilot.ask(act)
-            self._panels.log(LogKind.OPERATOR, act.value)
+            self._log(act.value)
         elif act is Act.STOP:
-            self._panels.log(LogKind.OPERATOR, tr("stop: no rig is open, so nothing moves"))
+            self._log(tr("stop: no rig is open, so nothing moves"))
 
     @Slot()
     def stop(self) -> None:
         """STOP, before anything else."""
         self.ask(Act.STOP)
-        self.jog.release_all()
-        self.deadman.release_all()
-
-    @Slot()
-    def switch_on(self) -> None:
-        pilot = self._thread.pilot
-        if pilot is not None and pilot.switch_on():
-            self._panels.log(LogKind.OPERATOR, tr("servos on"))
+        self._release_all()
 
     @Slot(int)
     def reboot(self, servo_id: int) -> None:
-        pilot = self._thread.pilot
-        if pilot is not None and pilot.reboot(servo_id):
-            self._panels.log(LogKind.OPERATOR, tr("restart servo {servo_id}", servo_id=servo_id))
+        if (pilot := self._rig.pilot) is not None and pilot.reboot(servo_id):
+            self._log(tr("restart servo {servo_id}", servo_id=servo_id))
 
     @Slot(object)
     def zero(self, names: Sequence[JointName] | None) -> None:
-        pilot = self._thread.pilot
-        if pilot is not None and pilot.zero(names):
-            self._panels.log(
-                LogKind.OPERATOR,
-                tr("zero {what}", what=", ".join(tr_text(name) for name in names) if names else tr("all servos")),
-            )
+        if (pilot := self._rig.pilot) is not None and pilot.zero(names):
+            what = ", ".join(tr_text(name) for name in names) if names else tr("all servos")
+            self._log(tr("zero {what}", what=what))
 
     @Slot()
     def torque_off(self) -> None:
-        pilot = self._thread.pilot
-        if pilot is not None and pilot.torque_off():
-            self._panels.log(LogKind.OPERATOR, tr("torque off"))
+        if (pilot := self._rig.pilot) is not None and pilot.torque_off():
+            self._log(tr("torque off"))
 
+    @Slot(object)
     def drive(self, jog: Jog) -> None:
         """Move the robot as held keys do; to be repeated."""
-        self._on_jog(jog)
+        if (pilot := self._rig.pilot) is not None:
+            pilot.jog("window", jog)
 
     @Slot(float)
     def set_speed(self, share: float) -> None:
         """Move at a share of full speed, 0..1, by whatever control; the next rig keeps it."""
         self._speed = share
-        pilot = self._thread.pilot
-        if pilot is not None:
+        if (pilot := self._rig.pilot) is not None:
             pilot.hand_speed(share)
 
     def log_target(self, target: Point | None) -> None:
-        self._recorder.target(target)
-        self._panels.log(
-            LogKind.TARGET,
-            tr("cleared") if target is None else tr("set to {x:.0f}, {y:.0f} px", x=target[0], y=target[1]),
-        )
+        self._recorder.keep_target(target)
+        text = tr("cleared") if target is None else tr("set to {x:.0f}, {y:.0f} px", x=target[0], y=target[1])
+        self._panels.log(LogKind.TARGET, text)
 
     @Slot(object)
     def press(self, motion: Motion) -> None:
-        """A cap on the screen is held."""
-        self.jog.press(("cap", motion), motion)
+        """A button of the jog panel is held."""
+        self.jog.press(("button", motion), motion)
 
     @Slot(object)
     def release(self, motion: Motion) -> None:
-        self.jog.release(("cap", motion))
-
-    def hold_deadman(self, on: bool) -> None:
-        """The field on the screen is held."""
-        self.deadman.hold("mouse", on)
-
-    # ---- the pilot
-
-    @Slot(object)
-    def _on_jog(self, jog: Jog) -> None:
-        pilot = self._thread.pilot
-        if pilot is not None:
-            pilot.jog("window", jog)
+        self.jog.release(("button", motion))
 
     @Slot(bool)
     def _on_deadman(self, held: bool) -> None:
-        pilot = self._thread.pilot
-        if pilot is not None:
+        if (pilot := self._rig.pilot) is not None:
             pilot.deadman("window", held)
 
+    def _log(self, text: str) -> None:
+        self._panels.log(LogKind.OPERATOR, text)
+
+    # ---- what the pilot reports
+
     @Slot()
-    def look(self) -> None:
-        """Take in what the pilot has said since the last look."""
-        pilot = self._thread.pilot
+    def update_view(self) -> None:
+        """Show, record and sound what the pilot has reported since the last time."""
+        pilot = self._rig.pilot
         if pilot is None:
-            # A pilot that has just gone belonged to a rig that is over, even where nobody has told so yet.
-            has_just_gone, self._shown = self._shown is not None, None
-            is_told = not has_just_gone or self.why_not is not Undriven.NO_ROBOT
+            # A pilot that has just gone belonged to a rig that is over, even where its phase has not been reported yet.
+            is_told = self.view is None or self.why_not is not Undriven.NO_ROBOT
+            self.view = None
             self._panels.show_drive(None, None, self.why_not if is_told else Undriven.NOT_YET)
             return
         pilot.window_alive()
@@ -592,33 +549,35 @@ class DriveController(QObject):
         if not self.deadman.is_held:
             pilot.deadman("window", False)
         news = pilot.news()
-        # The recorder may have heard of the next rig already; what this one said until then was told before (``look``).
-        is_kept = not self._thread.is_ending
+        # The recorder may know of the next rig already; what this one reported until then was recorded when it was left.
+        is_kept = not self._rig.engine.is_ending
         for view in news.changes if is_kept else ():
-            self._recorder.drive(view)
-        before, self._shown = self._shown, news.view
+            self._recorder.keep_drive(view)
+        before, self.view = self.view, news.view
         if before is None or before.mode is not news.view.mode:
             self._panels.log(LogKind.MODE, news.view.mode.value)
         for alert in news.alerts:
             detail = f": {tr_text(alert.detail)}" if alert.detail else ""
             self._panels.log(LogKind.ALERT, f"{tr(alert.spec.text)}{detail}")
             if is_kept:
-                self._recorder.alert(alert, news.view.time_s)
+                self._recorder.keep_alert(alert, news.view.time_s)
             if alert.sound is not None:
                 self.sounds.play(alert.sound)
-        self._panels.show_drive(news.view, self._thread.bus_status())
+        self._panels.show_drive(news.view, self.bus)
         if news.alerts:
             self._panels.show_alerts(news.alerts)
 
 
 class OperatorDevices(QObject):
-    """From ``start`` to ``close``. ``said`` carries a line for people: what was found, lost, or cannot be used, and what to do.
+    """Gamepad and foot pedal, from ``start`` to ``close``.
+
+    ``said`` carries a line for the operator (what was found, lost, or cannot be used, and what to do) and whether it is a fault.
 
     Parameters
     ----------
     config : sections `gamepad` and `pedal`; without a pedal's port there is no pedal.
     pilot : the running rig's pilot, None while there is none; called from the devices' threads.
-    stop : called instead for STOP while there is no pilot: somebody else may be moving the servos.
+    stop : called instead for STOP while there is no pilot: something else may be moving the servos.
     """
 
     said = Signal(str, bool)
@@ -628,7 +587,7 @@ class OperatorDevices(QObject):
         config: Config,
         pilot: Callable[[], Pilot | None],
         parent: QObject | None = None,
-        stop: Callable[[], None] = lambda: None,
+        stop: Callable[[], object] = lambda: None,
     ) -> None:
         super().__init__(parent)
         self._pilot, self._stop = pilot, stop
@@ -647,8 +606,16 @@ class OperatorDevices(QObject):
         if self._pedal is not None:
             self._pedal.close()
 
+    def _pilot_or_stop(self, stop: bool) -> Pilot | None:
+        """Without a pilot STOP goes to whatever else has the servos; a rig may have been opened in that moment."""
+        pilot = self._pilot()
+        if pilot is None and stop:
+            self._stop()
+            pilot = self._pilot()
+        return pilot
+
     def _on_gamepad(self, state: GamepadState) -> None:
-        pilot = self._pilot() or self._pilot_after(state.stop)
+        pilot = self._pilot_or_stop(state.stop)
         if pilot is None:
             return
         pilot.jog("gamepad", Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery))
@@ -657,12 +624,13 @@ class OperatorDevices(QObject):
         if state.stop:
             pilot.ask(Act.STOP)
 
-    def _pilot_after(self, stop: bool) -> Pilot | None:
-        """Without a pilot STOP goes to whoever else has the servos; a rig may have been opened in that moment."""
-        if not stop:
-            return None
-        self._stop()
-        return self._pilot()
+    def _on_pedal(self, report: PedalReport) -> None:
+        pilot = self._pilot_or_stop(report.stop)
+        if pilot is None:
+            return
+        pilot.deadman("pedal", report.deadman)
+        if report.stop:
+            pilot.ask(Act.STOP)
 
     def _on_gamepad_device(self, name: str | None, problem: GamepadError | None) -> None:
         before, self._gamepad_name = self._gamepad_name, name
@@ -672,14 +640,6 @@ class OperatorDevices(QObject):
             self.said.emit(tr("Gamepad: {name}", name=name), False)
         elif name is None and before is not None:
             self.said.emit(tr("Gamepad lost: {name}", name=before), True)
-
-    def _on_pedal(self, report: PedalReport) -> None:
-        pilot = self._pilot() or self._pilot_after(report.stop)
-        if pilot is None:
-            return
-        pilot.deadman("pedal", report.deadman)
-        if report.stop:
-            pilot.ask(Act.STOP)
 
     def _on_pedal_problem(self, problem: PedalError | None) -> None:
         self.said.emit(tr("Foot pedal: ready") if problem is None else str(problem), problem is not None)

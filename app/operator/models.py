@@ -1,7 +1,4 @@
-"""The Model menu: which models there are and how good, which one is used, and another one on request; training a new one.
-
-Which models there are, shipped and the user's own, and what is known of each. No Qt here.
-"""
+"""The Model menu: the installed models with their measured accuracy, the one in use, and training a new one."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ class InstalledModel:
 
     @property
     def figures(self) -> str:
-        """How good it was measured to be, in one line."""
+        """Its measured accuracy, in one line."""
         return figures_line(self.info) if self.info is not None else self.problem
 
 
@@ -85,9 +82,9 @@ _KEY = "model"
 
 
 class ModelMenu(QObject):
-    """Lists the models anew each time it opens. Nothing is chosen without a question, and nothing while the program may drive.
+    """Lists the models each time it opens. Choosing one is confirmed first, and refused while the program may drive.
 
-    ``chosen`` carries the name of the model that is to be used from now on; ``said`` a line for people and whether it is a fault.
+    ``chosen`` carries the name of the model that is to be used from now on; ``said`` a line and whether it is a fault.
 
     Parameters
     ----------
@@ -118,15 +115,15 @@ class ModelMenu(QObject):
         self._menu.setToolTipsVisible(True)
         self._actions: list[QAction] = []
         self._group = QActionGroup(self)
-        self._menu.aboutToShow.connect(self.renew)
-        self.renew()
+        self._menu.aboutToShow.connect(self.update_entries)
+        self.update_entries()
 
     @property
     def entries(self) -> list[str]:
         """What is listed, as it was when the menu was opened last."""
         return [action.text() for action in self._actions if not action.isSeparator()]
 
-    def renew(self) -> None:
+    def update_entries(self) -> None:
         """Read the folders again: a training may have put a model there."""
         for action in self._actions:
             self._menu.removeAction(action)
@@ -157,11 +154,11 @@ class ModelMenu(QObject):
         if why := self._hindrance():
             self.said.emit(tr("The model stays {current}: {why}", current=current, why=tr_text(why)), True)
             return
-        use = OfferButton(tr("Use {name}", name=name), partial(self._take, name))
+        use = OfferButton(tr("Use {name}", name=name), partial(self._use, name))
         text = tr("Use model {name} instead of {current}?", name=name, current=current)
         self._offers.offer(Offer(_KEY, text, self._cost(), (use, OfferButton(tr("No"), lambda: None))))
 
-    def _take(self, name: str) -> None:
+    def _use(self, name: str) -> None:
         if why := self._hindrance():  # since the question was asked
             self.said.emit(tr("The model stays {current}: {why}", current=self._current(), why=tr_text(why)), True)
         else:

@@ -1,4 +1,4 @@
-"""All that the operator sees below the menus: the panels of the operator window and their places."""
+"""The panels of the operator window and their places."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class OperatorPanels(ScenePanels):
         self._needle_pace = Pace(_NEEDLE_EVERY_S)
         self._blanked = ""
         self._beside: tuple[Tick, float] | None = None
-        self._standing = ""
+        self._blank_title = ""
         self._has_picture = False
         left = holder(column((self.live, 1), (self.overlay_bar, 0), (self.advice, 0), (self.mode_bar, 0)))
         self.help = operator_help(self._lay_out(self._header(), left, self._right_side()), self.mode_bar)
@@ -94,10 +94,10 @@ class OperatorPanels(ScenePanels):
         self._show_allowed(limits)
 
     def set_config(self, config: Config) -> None:
-        """What the panels know of the configuration, for a rig that is being opened with another one."""
+        """What the panels take from the configuration of the rig that is being opened."""
         self.set_limits(config.perception)
         known = _calibration_of(config)
-        self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)  # for the ghost, which may be rough
+        self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)  # for the head prediction, which may be rough
         self.servos.set_safety(config.safety)
         self.jog.max_pull_mm = config.servos.max_pull_mm
         self.jog.set_speeds(config.hand, config.servos)
@@ -107,7 +107,7 @@ class OperatorPanels(ScenePanels):
             self.picker.show_name(config.twin.phantom)
 
     def show_still(self, frame: Frame, scene: Scene) -> None:
-        """A frame of a rig that is closed, understood anew; nothing of it is added to trends."""
+        """Another scene of the last frame of a closed rig; nothing of it is added to trends."""
         self.notice.clear()
         self.live.show_frame(frame, scene)
         self.badge.show_scene(scene)
@@ -124,10 +124,10 @@ class OperatorPanels(ScenePanels):
         self.mode_bar.show_view(view, why_not)
         if view is not None:
             self.alerts.show_view(view)
-        why_still = tr("This rig has no robot") if why_not is Undriven.NO_ROBOT else self._standing
+        why_still = tr("This rig has no robot") if why_not is Undriven.NO_ROBOT else self._blank_title
         self.jog.set_enabled(view is not None, "" if view is not None else why_still)
         self.jog.show_known(known_joints(bus, time.monotonic()))
-        if not self._has_picture:  # who has a robot in a vessel brings it back by hand, and must see how far
+        if not self._has_picture:  # a robot in a vessel is brought back by hand, and the operator must see how far
             self.jog.show_status(status_by_servos(bus))
         self.servos.show_status(bus, self._servo_config)
         self.commands.show_view(view, bus)
@@ -177,16 +177,16 @@ class OperatorPanels(ScenePanels):
         """How far the rig is, and why; `what` is its phantom, source or name."""
         notice, kind = self.notice, NoticeKind.PROGRESS
         if phase is EnginePhase.STARTING:
-            self._stand_still(tr("Starting"), what)
+            self._blank_all(tr("Starting"), what)
             notice.show_notice(kind, tr("Starting: {what}", what=what), tr("Opening camera and robot, loading the network"))
         elif phase is EnginePhase.RUNNING:
-            self._stand_still(tr("Waiting for the first picture"), "")
+            self._blank_all(tr("Waiting for the first picture"), "")
             notice.show_notice(kind, tr("Waiting for the first picture"), what)
         elif phase is EnginePhase.ENDED:
-            self._stand_still(tr("Recording is over"), tr("F5 plays it again"))
+            self._blank_all(tr("Recording is over"), tr("F5 plays it again"))
             notice.show_notice(NoticeKind.WARNING, tr("Recording is over"), message, restartable=True)
         elif phase is EnginePhase.FAULT:
-            self._stand_still(tr("Fault"), message)
+            self._blank_all(tr("Fault"), message)
             notice.show_notice(NoticeKind.FAULT, tr("The rig stopped"), message, restartable=True)
 
     def show_stale(self, age_s: float, problem: str | None) -> None:
@@ -209,13 +209,13 @@ class OperatorPanels(ScenePanels):
         self.notice.show_notice(NoticeKind.WARNING, title, detail, restartable=restartable)
         self.alerts.raise_()
 
-    def _stand_still(self, title: str, why: str) -> None:
+    def _blank_all(self, title: str, why: str) -> None:
         self.blank(title, why)
-        self._standing = title
+        self._blank_title = title
         self.jog.set_enabled(False, title)
 
-    def forget(self) -> None:
-        """Empty trends and performance: what comes next has nothing to do with them."""
+    def clear_history(self) -> None:
+        """Empty trends and performance, for another rig."""
         self._beside = None
         self.performance.clear()
         self.trends.clear()
@@ -275,7 +275,7 @@ class OperatorPanels(ScenePanels):
 
 
 def _calibration_of(config: Config) -> CalibrationConfig | None:
-    """What is known of the rig; None when nobody has measured it. A rig file that is broken is told by who opens the rig."""
+    """None without a calibration. What is wrong with a rig file is reported when the rig is opened."""
     try:
         return calibration_of(config)
     except RigFileError:

@@ -1,4 +1,4 @@
-"""The checks before the program may drive: made beside the window, kept for some minutes, and a red one stands against arming."""
+"""The checks before arming: made in a process beside the window, valid for some minutes; a red one prevents arming."""
 
 from __future__ import annotations
 
@@ -21,10 +21,13 @@ from hardware.preflight.checks import Check
 from hardware.preflight.preflight import Level, level_of
 
 KEPT_S = 600.0
+"""Checks are valid for so long."""
 _BEGIN_AFTER_MS = 4000
 """After the first picture of a rig: its own start has the computer to itself."""
 _LONGEST_MS = 60_000
+"""Checks that take longer are cancelled."""
 _MATTERS = ("rig", "camera", "perception", "servos", "pedal", "gamepad", "record")
+"""Sections of the configuration that the checks depend on: another phantom needs no new ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +99,9 @@ def live_findings(view: DriveView | None) -> tuple[PreflightFinding, ...]:
 
 
 class PreflightModel(QObject):
-    """Makes the checks in a process of their own, and says whether arming may be asked for.
+    """Makes the checks in a process of their own, and refuses arming without them.
 
-    ``changed`` comes when there is something new to show; ``asked`` when an operator wanted to arm and could not yet, with a line.
+    ``changed`` comes when there is something new to show; ``asked`` with a line when the operator wanted to arm and could not yet.
 
     Parameters
     ----------
@@ -128,13 +131,9 @@ class PreflightModel(QObject):
         self._of = ""
         self._done_s = 0.0
         self._problem = ""
-        self._later = QTimer(self)
-        self._later.setSingleShot(True)
-        self._later.setInterval(_BEGIN_AFTER_MS)
+        self._later = QTimer(self, singleShot=True, interval=_BEGIN_AFTER_MS)
         self._later.timeout.connect(self._begin_if_needed)
-        self._limit = QTimer(self)
-        self._limit.setSingleShot(True)
-        self._limit.setInterval(_LONGEST_MS)
+        self._limit = QTimer(self, singleShot=True, interval=_LONGEST_MS)
         self._limit.timeout.connect(self._on_too_long)
 
     @property
@@ -155,13 +154,13 @@ class PreflightModel(QObject):
         return Preflight((*live_findings(self._view()), *made), self._child is not None, age_s, self._problem)
 
     def begin_soon(self) -> None:
-        """A rig has given its first picture: have the answer ready before it is asked for."""
+        """Make the checks soon after a rig's first picture, so that they are ready before arming."""
         self._later.start()
 
     @Slot()
     def begin(self) -> None:
-        """Make the checks, anew; those that are being made are given up."""
-        self._give_up()
+        """Make the checks; running ones are cancelled."""
+        self._cancel()
         config = self._config()
         self._checks, self._checked, self._problem, self._of = [], None, "", _digest(config)
         child = ChildProcess(self._command, self, given=config.model_dump_json())
@@ -172,8 +171,8 @@ class PreflightModel(QObject):
         child.start()
         self.changed.emit()
 
-    def may_take(self, step: OperatorStep) -> bool:
-        """Every step may be asked for at any time, but arming only after the checks. What is missing is begun and said."""
+    def may_ask(self, step: OperatorStep) -> bool:
+        """Whether a step may be asked for: arming only after the checks. Missing ones are begun, and the operator is told."""
         if step is not OperatorStep.ARM or self._view() is None:
             return True
         now = self.preflight
@@ -200,9 +199,9 @@ class PreflightModel(QObject):
 
     def close(self) -> None:
         self._later.stop()
-        self._give_up()
+        self._cancel()
 
-    def _give_up(self) -> None:
+    def _cancel(self) -> None:
         child, self._child = self._child, None
         self._limit.stop()
         if child is not None:
@@ -230,11 +229,10 @@ class PreflightModel(QObject):
 
     @Slot()
     def _on_too_long(self) -> None:
-        self._give_up()
+        self._cancel()
         self._problem = tr("no answer within {seconds:.0f} s", seconds=_LONGEST_MS / 1000)
         self.changed.emit()
 
 
 def _digest(config: Config) -> str:
-    """What the checks depend on: another phantom needs no new ones."""
     return json.dumps({name: getattr(config, name).model_dump(mode="json") for name in _MATTERS}, sort_keys=True)

@@ -1,8 +1,6 @@
-"""Recording from the window: the writer of sessions beside the engine's thread, and what the bar shows of it.
+"""Sessions in the operator window: recorded beside the engine's thread, annotated, evaluated and played in processes of their own.
 
-What is done with a session that has ended: annotate it, evaluate it, play it; each in a process of its own beside the window.
-
-Sessions that were cut (kill, power, full disk): looked for when the window starts, offered one by one, recovered into copies.
+Sessions that were cut (kill, power, full disk) are searched when the window starts, offered one by one, and recovered into copies.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from typing import Any, Protocol
 from PySide6.QtCore import QObject, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
 
-from app.operator.engine_thread import EngineThread
+from app.operator.rig_session import RigSession
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.workers import NOT_STARTED, ChildProcess, Worker, command_of
 from app.widgets.messages import Offer, OfferButton
@@ -32,7 +30,7 @@ from core.session.writer import STOPPED, RecordStatus, SessionWriter, faults_bet
 from core.types import Point, Tick
 from hardware.rig import RigKind
 
-_LOOK_EVERY_MS = 250
+_UPDATE_EVERY_MS = 250
 _CLOSE_WITHIN_S = 10.0
 
 
@@ -43,25 +41,25 @@ class Recorder(QObject):
 
     Parameters
     ----------
-    thread : whose ticks are recorded; they come in its own thread, and nothing here makes it wait.
+    rig : whose ticks are recorded; they come in the engine's thread, and nothing here makes it wait.
     """
 
     changed = Signal(object)
     said = Signal(str, bool)
 
-    def __init__(self, config: Config, kind: RigKind, thread: EngineThread, parent: QObject | None = None) -> None:
+    def __init__(self, rig: RigSession, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._kind, self._thread = kind, thread
+        self._engine = rig.engine
         self._writer: SessionWriter | None = None
         self._about: About | None = None
         self._target: Event | None = None
-        self._config = config
+        self._config = rig.config
         self._shown = RecordStatus()
         self._marks = 0
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LOOK_EVERY_MS)
-        self._timer.timeout.connect(self._look)
-        thread.on_tick = self._put
+        self._timer = QTimer(self, interval=_UPDATE_EVERY_MS)
+        self._timer.timeout.connect(self._update)
+        self._engine.on_tick = self._put
+        rig.add_work(lambda: tr("a session is being recorded: end it first") if self.status.recording else "")
 
     @property
     def status(self) -> RecordStatus:
@@ -70,31 +68,30 @@ class Recorder(QObject):
 
     def open_rig(self, config: Config, kind: RigKind) -> None:
         """Another rig is being opened: what is being recorded ends, for a session never mixes two rigs."""
-        self._kind = kind
-        self._about = about_rig(config, self._kind.value, config.rig.name)
+        self._about = about_rig(config, kind.value, config.rig.name)
         if self._writer is None:
             self._config = config
             self._writer = SessionWriter(config.record, self._about)
             self._timer.start()
         else:
-            self._living(self._writer).set_about(self._about)
+            self._usable(self._writer).set_about(self._about)
 
-    def _living(self, writer: SessionWriter) -> SessionWriter:
-        """The writer, or another one in the place of one that a fault of the program has ended: a day's recording goes on."""
+    def _usable(self, writer: SessionWriter) -> SessionWriter:
+        """The writer, or a new one in place of one that a fault of the program has ended: a day's recording goes on."""
         if writer.is_alive or self._about is None:
             return writer
         writer.close(0.0)
-        self._writer = living = SessionWriter(self._config.record, self._about)
+        self._writer = usable = SessionWriter(self._config.record, self._about)
         if self._target is not None:
-            living.add_event(self._target)
-        return living
+            usable.add_event(self._target)
+        return usable
 
     @Slot()
     def toggle(self) -> None:
         """Begin a session with the next picture, or end it; one that has not begun yet is taken back."""
         if self._writer is None:
             return
-        writer = self._living(self._writer)
+        writer = self._usable(self._writer)
         status = writer.status()
         if status.recording or status.armed:
             writer.stop()
@@ -112,7 +109,7 @@ class Recorder(QObject):
         """Make a session of the last seconds, without having recorded."""
         if self._writer is None:
             return
-        writer = self._living(self._writer)
+        writer = self._usable(self._writer)
         if writer.status().ring_s <= 0.0:
             self.said.emit(tr("Nothing to save yet: record.ring_s is 0, or the rig has just been opened"), True)
             return
@@ -122,11 +119,11 @@ class Recorder(QObject):
     def mark(self) -> None:
         """Mark this moment with a numbered note in the session, or in the last seconds; what it was can be said in the player.
 
-        Nothing is typed here: hands stay on the controls, and Space stays STOP.
+        Nothing is typed here: the operator stays at the controls, and Space stays STOP.
         """
         if self._writer is None:
             return
-        writer = self._living(self._writer)
+        writer = self._usable(self._writer)
         status = writer.status()
         is_recorded = status.recording or status.armed
         if not is_recorded and status.ring_s <= 0.0:
@@ -141,23 +138,23 @@ class Recorder(QObject):
         else:
             self.said.emit(tr("Mark {number} is in the last seconds: F10 saves them", number=self._marks), False)
 
-    def target(self, target: Point | None) -> None:
+    def keep_target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""
         self._target = event_of_target(target, time.monotonic())
         if self._writer is not None:
             self._writer.add_event(self._target)
 
-    def drive(self, view: DriveView) -> None:
+    def keep_drive(self, view: DriveView) -> None:
         """Keep that mode or faults have changed, also when there are no pictures."""
         if self._writer is not None:
             self._writer.drive(view)
 
-    def rig_stopped(self, message: str) -> None:
-        """Keep that the rig stopped by itself, and why: from here on there is no pilot whose views would tell."""
+    def keep_rig_stop(self, message: str) -> None:
+        """Keep that the rig stopped by itself, and why: from here on no pilot reports it."""
         if self._writer is not None:
             self._writer.event(EventKind.FAULT, Cause.WORKER_DEAD.value, {"detail": message})
 
-    def alert(self, alert: Alert, time_s: float) -> None:
+    def keep_alert(self, alert: Alert, time_s: float) -> None:
         """Keep an alert that was shown."""
         if self._writer is not None:
             self._writer.add_event(event_of_alert(alert, time_s))
@@ -165,25 +162,22 @@ class Recorder(QObject):
     def close(self) -> bool:
         """End the session; False when the disk has not answered in time."""
         self._timer.stop()
-        self._thread.on_tick = None
-        self._about = None  # what has ended now is not to live again
+        self._engine.on_tick = None
+        self._about = None  # no other writer replaces the one that ends now
         return self._writer.close(_CLOSE_WITHIN_S) if self._writer is not None else True
 
     def _put(self, tick: Tick) -> None:
         """A tick, in the engine's thread."""
-        writer, pilot = self._writer, self._thread.pilot
+        writer, pilot = self._writer, self._engine.pilot
         if writer is not None:
-            writer.put(tick, pilot.view if pilot is not None else None, self._thread.bus_status())
+            writer.put(tick, pilot.view if pilot is not None else None, self._engine.bus_status())
 
     @Slot()
-    def _look(self) -> None:
+    def _update(self) -> None:
         before, self._shown = self._shown, self.status
-        self.changed.emit(self._shown)
-        self._tell(before, self._shown)
-
-    def _tell(self, before: RecordStatus, now: RecordStatus) -> None:
-        """What the operator and the pilot's alerts must know."""
-        if (pilot := self._thread.pilot) is not None:
+        now = self._shown
+        self.changed.emit(now)
+        if (pilot := self._engine.pilot) is not None:
             for fault in faults_between(before, now):
                 pilot.report(fault)
         if now.saved is not None and now.saved != before.saved:
@@ -207,7 +201,7 @@ class Offers(Protocol):
 
 
 class Declined:
-    """The sessions that nobody wants to hear of again, by their folders' names; a small file in the program's state folder."""
+    """The sessions that are not offered again, by their folders' names; a small file in the program's state folder."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -227,9 +221,9 @@ class Declined:
 
 
 class RecoveryController(QObject):
-    """Looks, measures, offers, recovers. The window waits for none of it, and the damaged original is never touched.
+    """Searches, measures, offers and recovers cut sessions beside the window. The damaged original is never changed.
 
-    ``said`` carries a line for people and whether it is a fault; ``recovered`` the folder of a copy and what it lacks, in words.
+    ``said`` carries a line and whether it is a fault; ``recovered`` the folder of a copy and what it lacks, in words.
 
     Parameters
     ----------
@@ -250,11 +244,11 @@ class RecoveryController(QObject):
         self._says_none = False
         self._is_closed = False
         self._work = Worker("looking for cut sessions", self)
-        self._work.done.connect(self._on_looked)
-        self._work.failed.connect(self._on_look_failed)
+        self._work.done.connect(self._on_found)
+        self._work.failed.connect(self._on_search_failed)
 
-    def look(self, *, again: bool = False) -> None:
-        """Look for cut sessions; `again`: also for those that were declined, and say when there are none."""
+    def search(self, *, again: bool = False) -> None:
+        """Search cut sessions; `again`: also those that were declined, and say when there are none."""
         if self._child is not None or self._waiting or self._is_closed:
             return
         self._says_none = again
@@ -264,10 +258,10 @@ class RecoveryController(QObject):
             not_wanted = set() if again else declined.names()
             return [cut for cut in find_cut_sessions(folder) if cut.folder.name not in not_wanted]
 
-        self._work.submit("look", find, once=True)
+        self._work.submit("search", find, once=True)
 
     def close(self) -> None:
-        """Look no further; a recovery that goes on ends by itself, and leaves a whole copy or none."""
+        """Search no more; a running recovery ends by itself, and leaves a whole copy or none."""
         self._is_closed = True
         if self._child is not None:
             self._child.leave()
@@ -275,7 +269,7 @@ class RecoveryController(QObject):
         self._work.stop(finish=False)
         self._work.wait(_END_WITHIN_MS)
 
-    def _on_looked(self, _key: object, found: list[CutSession]) -> None:
+    def _on_found(self, _key: object, found: list[CutSession]) -> None:
         if self._is_closed:  # what was found meanwhile was already on its way
             return
         self._waiting, self._found = list(found), len(found)
@@ -283,13 +277,13 @@ class RecoveryController(QObject):
             self.said.emit(tr("No cut session in {folder}", folder=self._folder), False)
         self._measure_next()
 
-    def _on_look_failed(self, _key: object, line: str) -> None:
+    def _on_search_failed(self, _key: object, line: str) -> None:
         self.said.emit(tr("Cut sessions could not be looked for: {line}", line=line), True)
 
     # ---- one after the other
 
     def _measure_next(self) -> None:
-        """How much would be lost is read before anybody is asked."""
+        """How much would be lost is measured before the operator is asked."""
         if not self._waiting:
             return
         session = self._waiting[0].folder
@@ -299,7 +293,7 @@ class RecoveryController(QObject):
     def _on_measured(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
         self._child = None
         lost = told.get("lost")
-        if _says_nothing(code):
+        if _is_inconclusive(code):
             self._offer_again(session, code, line, self._measure_next)
             return
         if code != 0 or not isinstance(lost, dict):
@@ -329,7 +323,7 @@ class RecoveryController(QObject):
         )
 
     def _offer_again(self, session: Path, code: int, line: str, again: Callable[[], None]) -> None:
-        """The session may well be recovered, at another time; so nothing is said against it."""
+        """The session may well be recovered at another time, so it is not declined."""
         if code == NOT_STARTED:
             text = tr("A recording was cut; the program that recovers it could not be started")
         else:
@@ -371,7 +365,7 @@ class RecoveryController(QObject):
 
     def _on_recovered(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
         self._child = None
-        if _says_nothing(code):
+        if _is_inconclusive(code):
             self._offer_again(session, code, line, lambda: self._recover(session))
             return
         self._offers.withdraw(_KEY)
@@ -392,13 +386,13 @@ class RecoveryController(QObject):
         self._child.start()
 
 
-def _says_nothing(code: int) -> bool:
-    """Whether a process never began, or a signal ended it: that tells nothing of the session."""
+def _is_inconclusive(code: int) -> bool:
+    """Whether the process never began, or a signal ended it: that says nothing about the session."""
     return code == NOT_STARTED or code < 0
 
 
 def loss_words(lost: dict[str, Any]) -> str:
-    """A loss as people say it."""
+    """A loss in words."""
     if not lost["rows"] and not lost["pictures"]:
         return tr("nothing of it is lost")
     return tr(
@@ -410,7 +404,7 @@ def loss_words(lost: dict[str, Any]) -> str:
 
 
 FRAMES = 48
-"""Pictures of a session that are offered for annotation, evenly over its time: as many as the paper's."""
+"""Pictures of a session that are offered for annotation, evenly over its time: as many as in the paper."""
 REPORT = "report.html"
 _OFFER, _WORK = "session", "evaluation"
 
@@ -421,9 +415,9 @@ def open_file(path: Path) -> bool:
 
 
 class AfterSession(QObject):
-    """Offers the next steps for a session, and takes them.
+    """Offers to evaluate, annotate or play a session that has ended, and starts that.
 
-    ``said`` carries a line for people and whether it is a fault.
+    ``said`` carries a line for the operator and whether it is a fault.
 
     Parameters
     ----------
@@ -460,7 +454,7 @@ class AfterSession(QObject):
         )
 
     def withdraw(self) -> None:
-        """Another recording has begun: what is offered is no longer the matter."""
+        """Another recording has begun: the offer is outdated."""
         self._offers.withdraw(_OFFER)
 
     def close(self) -> None:

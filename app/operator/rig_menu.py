@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -27,14 +26,14 @@ from core.types import Point
 from hardware.cameras.kinds import FoundCamera
 from hardware.rig import RigKind, find_devices, kind_of, with_camera
 
-_LEAVING = mark("Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again")
+_CLOSING = mark("Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again")
 _SLOW_MS = 3000
 _LENT = mark("the rig wizard has camera and servos; the rig is opened again when it is closed")
 
 
 @dataclass(frozen=True, slots=True)
-class _Wish:
-    """What the wizard is to begin with, once the rig is free."""
+class _WizardRequest:
+    """What the wizard begins with, once the rig is free."""
 
     name: str
     config: Config
@@ -42,34 +41,25 @@ class _Wish:
     order: int = 0
 
 
-def _open_bench(config: Config, see: Callable) -> object:  # type: ignore[type-arg]
-    from hardware.calibration.bench import open_bench
-
-    return open_bench(config, see)
-
-
 class RigMenuController(QObject):
     """Lives as long as the window.
 
     Parameters
     ----------
-    window : gets the menu; the chosen rig, of whatever kind, is opened in it.
+    window : gets the menu; the chosen rig is opened in it.
     open_bench, make_sight : what the wizard works with.
     """
 
-    def __init__(
-        self,
-        window: OperatorWindow,
-        open_bench: OpenBench = _open_bench,  # type: ignore[assignment]
-        make_sight: MakeSight = quick_sight,
-    ) -> None:
+    def __init__(self, window: OperatorWindow, open_bench: OpenBench | None = None, make_sight: MakeSight = quick_sight) -> None:
         super().__init__(window)
-        self._window = window
-        self._open_bench, self._make_sight = open_bench, make_sight
-        self._wish: _Wish | None = None
+        from hardware.calibration import bench  # loads what only a wizard needs
+
+        self._window, self._rig = window, window.rig
+        self._open_bench, self._make_sight = open_bench or bench.open_bench, make_sight
+        self._request: _WizardRequest | None = None
         self._saved = ""
         self.wizard: RigWizard | None = None
-        self._leaving: RigWizard | None = None
+        self._closing: RigWizard | None = None
         new = add_menu(
             window,
             tr("Ri&g"),
@@ -87,11 +77,11 @@ class RigMenuController(QObject):
         self._cameras = QMenu(tr("C&amera"), self._menu)
         self._menu.addMenu(self._cameras)
         self._menu.addSeparator()
-        self._menu.aboutToShow.connect(self.renew)
-        self._cameras.aboutToShow.connect(self._renew_cameras)
-        window.phase_changed.connect(self._on_phase)
-        window.stop_lent = self.stop
-        self.renew()
+        self._menu.aboutToShow.connect(self.update_entries)
+        self._cameras.aboutToShow.connect(self._update_cameras)
+        self._rig.phase_changed.connect(self._on_phase)
+        self._rig.add_borrower(self.stop)
+        self.update_entries()
 
     @property
     def entries(self) -> list[str]:
@@ -100,13 +90,13 @@ class RigMenuController(QObject):
 
     def stop(self) -> bool:
         """STOP while the wizard has the servos; False: it moves none. From any thread."""
-        wizard = self.wizard or self._leaving
+        wizard = self.wizard or self._closing
         return wizard is not None and wizard.desk.stop()
 
     @Slot()
     def close(self) -> None:
         """The program ends: the wizard gives back what it has, and opens no rig again."""
-        wizard, self.wizard, self._leaving = self.wizard or self._leaving, None, None
+        wizard, self.wizard, self._closing = self.wizard or self._closing, None, None
         if wizard is not None:
             wizard.finished.disconnect(self._on_finished)
             wizard.desk.closed.disconnect(self._on_closed)
@@ -116,8 +106,8 @@ class RigMenuController(QObject):
     # ---- the menu
 
     @Slot()
-    def renew(self) -> None:
-        """List the rigs anew: the wizard, or somebody with an editor, may have made one."""
+    def update_entries(self) -> None:
+        """List the rigs: the wizard or an editor may have made one meanwhile."""
         for action in self._rigs:
             self._menu.removeAction(action)
             action.deleteLater()
@@ -126,7 +116,7 @@ class RigMenuController(QObject):
     def _rig_action(self, rig: ListedRig) -> QAction:
         action = QAction(rig.name.replace("&", "&&"), self._menu)
         action.setCheckable(True)
-        action.setChecked(self._window.config.rig.file == str(rig.path))
+        action.setChecked(self._rig.config.rig.file == str(rig.path))
         action.setEnabled(rig.rig is not None)
         action.setToolTip(rig_line(rig.rig) if rig.rig is not None else rig.problem)
         action.triggered.connect(partial(self.choose, rig.name))
@@ -135,9 +125,8 @@ class RigMenuController(QObject):
         return action
 
     @Slot()
-    def _renew_cameras(self) -> None:
-        """Those that are plugged in; none is looked for while none may be chosen, since a look may hold the window up for so long
-        that the robot is disarmed."""
+    def _update_cameras(self) -> None:
+        """List the cameras, unless none may be chosen: a search may block the window so long that the robot is disarmed."""
         self._cameras.clear()
         if why := self.hindrance():
             self._cameras.addAction(tr("The rig stays as it is: {why}", why=why)).setEnabled(False)
@@ -157,19 +146,19 @@ class RigMenuController(QObject):
         except RigFileError as error:
             self._refuse(str(error))
             return
-        self._window.use_config(with_rig(self._window.config, rig, path))
-        self.renew()
+        self._rig.use_config(with_rig(self._rig.config, rig, path))
+        self.update_entries()
 
     def choose_camera(self, camera: FoundCamera) -> None:
         """Another camera in the present rig; what was calibrated with the old one does not hold good for it."""
         if why := self.hindrance():
             self._refuse(why)
             return
-        self._window.use_config(with_camera(self._window.config, camera))
+        self._rig.use_config(with_camera(self._rig.config, camera))
 
     def hindrance(self) -> str:
         """Why neither rig nor camera may be taken away now; "" when they may."""
-        view = self._window.desk.view
+        view = self._window.controls.view
         if view is not None and view.mode in ARMED_MODES:
             return tr("the robot is armed: disarm it first")
         if view is not None and (view.mode is Mode.STOPPED or view.latched is not None):
@@ -178,26 +167,25 @@ class RigMenuController(QObject):
             return tr("wait: {what}", what=tr_text(view.busy))
         if self._window.recorder.status.recording:
             return tr("a session is being recorded: end it first")
-        if self._leaving is not None:
-            return tr(_LEAVING)
+        if self._closing is not None:
+            return tr(_CLOSING)
         return ""
 
     def _refuse(self, why: str) -> None:
         self._window.say(tr("The rig stays as it is: {why}", why=why), is_fault=True)
-        self.renew()
+        self.update_entries()
 
     # ---- the insertion port
 
     @Slot()
     def ask_port(self) -> None:
-        """The next click into the picture says where the robot is inserted: that end of it is its tail."""
+        """The next click into the picture is where the robot is inserted: that end of it is its tail."""
         if self._rig_path() is not None:
             self._window.ask_for_place(self._set_port)
             self._window.say(tr("Click where the robot is inserted; Esc leaves it as it is"))
 
     @Slot()
     def forget_port(self) -> None:
-        """Nobody knows any more where the robot is inserted."""
         self._keep_port(None, tr("The insertion port is forgotten"))
 
     def _set_port(self, place: Point) -> None:
@@ -218,12 +206,12 @@ class RigMenuController(QObject):
         except RigFileError as error:
             self._refuse(str(error))
             return
-        self._window.preview(self._window.config.perception)
+        self._window.preview(self._rig.config.perception)
         self._window.say(said)
 
     def _rig_path(self) -> Path | None:
         """The rig file that keeps the port; None, said, when there is none or the robot is in use."""
-        file = self._window.config.rig.file
+        file = self._rig.config.rig.file
         why = self.hindrance() if file is not None else tr("it has no file: save one first (menu Rig, New rig)")
         if why:
             self._refuse(why)
@@ -234,13 +222,13 @@ class RigMenuController(QObject):
     @Slot()
     def new(self) -> None:
         """Make a rig, beginning with what is configured."""
-        config = self._window.config
+        config = self._rig.config
         self._begin("", config.model_copy(update={"rig": config.rig.model_copy(update={"file": None})}), None)
 
     @Slot()
     def calibrate(self) -> None:
-        """Calibrate the present rig once more, or make one of it."""
-        config = self._window.read_rig_again(self._window.config)  # or the wizard would save the file's old servos once more
+        """Calibrate the present rig again, or make one of it."""
+        config = self._rig.reread_config()  # or the wizard would save the file's old servos
         try:
             known = calibration_of(config)
         except RigFileError as error:
@@ -249,7 +237,7 @@ class RigMenuController(QObject):
         self._begin(config.rig.name if config.rig.file is not None else "", config, known)
 
     def _begin(self, name: str, config: Config, known: CalibrationConfig | None) -> None:
-        if self.wizard is not None or self._wish is not None:
+        if self.wizard is not None or self._request is not None:
             return
         why = self.hindrance()
         if kind_of(config.rig) is RigKind.PLAYBACK:
@@ -257,27 +245,27 @@ class RigMenuController(QObject):
         if why:
             self._refuse(why)
             return
-        self._window.lend(_LENT)
-        self._wish = _Wish(name, config, known, self._window.orders)
+        self._rig.lend(_LENT)
+        self._request = _WizardRequest(name, config, known, self._rig.orders)
 
     @Slot(object)
     def _on_phase(self, phase: EnginePhase) -> None:
-        wish = self._wish
-        if wish is None or phase is EnginePhase.STARTING:
+        request = self._request
+        if request is None or phase is EnginePhase.STARTING:
             return
-        if self._window.orders != wish.order:  # another order came in between: F5, a phantom, a model
-            self._wish = None
+        if self._rig.orders != request.order:  # another order came in between: F5, a phantom, a model
+            self._request = None
             self._window.say(tr("The rig was opened anew meanwhile; ask for the wizard again"), is_fault=True)
         elif self._is_lent(phase):  # and not what became of the rig before
-            self._wish = None
-            QTimer.singleShot(0, partial(self._show, wish))
+            self._request = None
+            QTimer.singleShot(0, partial(self._show, request))
 
     def _is_lent(self, phase: EnginePhase) -> bool:
-        return phase is EnginePhase.FAULT and self._window.phase_message == _LENT
+        return phase is EnginePhase.FAULT and self._rig.message == _LENT
 
-    def _show(self, wish: _Wish) -> None:
-        desk = RigWizardModel(wish.config, wish.known, self._open_bench, self._make_sight)
-        wizard = RigWizard(desk, wish.name, self._window)
+    def _show(self, request: _WizardRequest) -> None:
+        desk = RigWizardModel(request.config, request.known, self._open_bench, self._make_sight)
+        wizard = RigWizard(desk, request.name, self._window)
         wizard.saved.connect(self._on_saved)
         wizard.finished.connect(self._on_finished)
         desk.closed.connect(self._on_closed)
@@ -290,26 +278,26 @@ class RigMenuController(QObject):
 
     @Slot(int)
     def _on_finished(self, _result: int) -> None:
-        self._leaving, self.wizard = self.wizard, None
-        QTimer.singleShot(_SLOW_MS, self._tell_slow)
+        self._closing, self.wizard = self.wizard, None
+        QTimer.singleShot(_SLOW_MS, self._report_slow)
 
     @Slot()
-    def _tell_slow(self) -> None:
-        if self._leaving is not None:
-            self._window.say(tr(_LEAVING), is_fault=True)
+    def _report_slow(self) -> None:
+        if self._closing is not None:
+            self._window.say(tr(_CLOSING), is_fault=True)
 
     @Slot()
     def _on_closed(self) -> None:
         """Camera and servos are free: the rig is opened again."""
-        wizard, self._leaving = self._leaving, None
+        wizard, self._closing = self._closing, None
         if wizard is not None:
             wizard.deleteLater()
         saved, self._saved = self._saved, ""
         if saved:
             self._window.say(tr("Rig {name} saved", name=saved))
-        if self._is_lent(self._window.phase):  # or somebody has opened a rig meanwhile, and may be recording or driving
+        if self._is_lent(self._rig.phase):  # or another rig was opened meanwhile, and may be recording or driving
             if saved:
                 self.choose(saved)
             else:
-                self._window.use_config(self._window.config)
-        self.renew()
+                self._rig.use_config(self._rig.config)
+        self.update_entries()

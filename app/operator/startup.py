@@ -1,9 +1,4 @@
-"""Opens the operator window on a rig.
-
-What the operator window does beside driving: cut sessions, the steps after a session, checks before arming, models, crashes.
-
-When the tour is shown: once, at the first start on a real screen, and whenever it is asked for.
-"""
+"""Opens the operator window on a rig, with what it does beside driving: sessions, checks, models, training, crashes, tour."""
 
 from __future__ import annotations
 
@@ -12,7 +7,6 @@ import json
 import logging
 import sys
 import time
-from enum import Enum
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,18 +21,19 @@ from app.operator.engine_thread import EnginePhase
 from app.operator.models import ModelMenu
 from app.operator.preflight import PreflightModel
 from app.operator.recording import AfterSession, Declined, RecoveryController, open_file
+from app.operator.rig_session import StopOutcome
 from app.operator.window import OperatorWindow
 from app.training.dialog import TrainingDialog, collect_from_file
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
-from app.ui.i18n import mark, tr
+from app.ui.i18n import tr
 from app.ui.texts import OperatorStep
 from app.ui.window_base import check_display, make_application, run_until_closed
 from app.widgets.messages import Offer, OfferButton
 from app.widgets.preflight_list import PreflightList
 from core.config.files import settings_of_windows
 from core.config.models import Config, sessions_folder
-from core.control.modes import ARMED_MODES, Act, Mode
+from core.control.modes import ARMED_MODES, Mode
 from core.perception import compiled
 from core.session.writer import RecordStatus
 from core.types import Reason
@@ -50,9 +45,9 @@ if TYPE_CHECKING:
 
 
 def finish_loading() -> None:
-    """What a window needs is loaded before it is there, and stays, so that later collections of garbage are short.
+    """Load what a window needs before it is made, and keep it out of later garbage collections.
 
-    Loading holds the interpreter's lock, and so stops the window, for up to a quarter of a second, mostly for such collections.
+    Loading holds the interpreter's lock, and so blocks the window, for up to a quarter of a second, mostly for such collections.
     """
     compiled.load()
     gc.freeze()
@@ -88,9 +83,9 @@ def run_window(
     application = make_application(config.window)
     maker = EngineMaker(ahead)
     window = make_window(config, kind, maker)
-    watch = CrashWatch(state_folder() / "crashes", lambda: window.config.model_dump(mode="json"))
+    watch = CrashWatch(state_folder() / "crashes", lambda: window.rig.config.model_dump(mode="json"))
     watch.install()
-    side_work = WindowServices(window, state_folder(), watch)
+    services = WindowServices(window, state_folder(), watch)
     settings = SettingsController(window, file, maker.perceive_again)
     if not until_first_frame:
         panels = window.panels
@@ -98,21 +93,17 @@ def run_window(
         LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
     rigs = RigMenuController(window)
 
-    def stop() -> None:  # whoever has the servos, or is about to
-        window.stop_opening()
-        window.stop_lent()
-
-    devices = OperatorDevices(config, lambda: window.pilot, window, stop)
+    devices = OperatorDevices(config, lambda: window.rig.pilot, window, window.rig.stop)
     devices.said.connect(window.say)
     application.aboutToQuit.connect(settings.close)
     application.aboutToQuit.connect(rigs.close)
     application.aboutToQuit.connect(devices.close)
-    application.aboutToQuit.connect(side_work.close)
+    application.aboutToQuit.connect(services.close)
     timers: list[QTimer] = []
 
     def begin() -> None:
         devices.start()
-        side_work.start()
+        services.start()
         settings.start()
         if until_first_frame:
             timers.append(_leave_after_first_frame(window))
@@ -150,28 +141,19 @@ def _leave_after_first_frame(window: OperatorWindow) -> QTimer:
     return timer
 
 
-_LOOK_AFTER_MS = 1500
-"""The window is open and its rig is being started; a search must not delay that."""
+_SEARCH_AFTER_MS = 1500
+"""The rig is opened first; a search must not delay that."""
 _CRASH = "crash"
 
 
-class StopOutcome(Enum):
-    """What the STOP after an unforeseen error has reached, in the words of its box."""
-
-    SERVOS = mark("The servos were stopped")
-    OPENING = mark("The rig that is being opened starts stopped")
-    NOTHING = mark("No servos were in use, so there was nothing to stop")
-    UNKNOWN = mark("It is not certain that the servos were stopped: press Space")
-
-
 class WindowServices(QObject):
-    """Composes and wires; all work is done in threads and processes of their own.
+    """What the operator window does beside driving; all work is done in threads and processes of their own.
 
     Parameters
     ----------
     window : not started yet.
-    state : folder of what the program remembers between runs.
-    watch : is told what to do at an unforeseen error; installed and removed by its owner.
+    state : folder of what the program keeps between runs.
+    watch : calls ``make_safe`` at an unforeseen error; installed and removed by its owner.
     """
 
     _crashed = Signal(object)
@@ -184,9 +166,9 @@ class WindowServices(QObject):
         self._offers = offers
         self.after = AfterSession(offers, parent=self)
         self.recovery = RecoveryController(
-            sessions_folder(window.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
+            sessions_folder(window.rig.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
         )
-        self.preflight = PreflightModel(lambda: window.config, lambda: window.desk.view, self)
+        self.preflight = PreflightModel(lambda: window.rig.config, lambda: window.controls.view, self)
         self.checks = PreflightList(self.preflight, window, window.panels.mode_bar.stop)
         self.models = ModelMenu(window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.train)
         self.training: TrainingDialog | None = None
@@ -199,7 +181,7 @@ class WindowServices(QObject):
             watch.on_error, watch.on_report = self.make_safe, self._crashed.emit
             # also from the window's own thread not before the slot that failed has returned
             self._crashed.connect(self._show_crash, Qt.ConnectionType.QueuedConnection)
-            self._stopped_again.connect(self._tell_stopped_again, Qt.ConnectionType.QueuedConnection)
+            self._stopped_again.connect(self._report_stopped_again, Qt.ConnectionType.QueuedConnection)
 
     def _wire(self) -> None:
         window = self._window
@@ -207,10 +189,10 @@ class WindowServices(QObject):
             part.said.connect(window.say)
         self.recovery.recovered.connect(self.after.offer)
         window.recorder.changed.connect(self._on_recording)
-        window.phase_changed.connect(self._on_phase)
-        window.may_take = self.preflight.may_take
+        window.rig.phase_changed.connect(self._on_phase)
+        window.rig.add_guard(self.preflight.may_ask)
         self.preflight.asked.connect(self._on_not_armed)
-        self.checks.arm_asked.connect(partial(window.take, OperatorStep.ARM))
+        self.checks.arm_asked.connect(partial(window.ask_step, OperatorStep.ARM))
         self.models.chosen.connect(self._use_model)
 
     def _add_menus(self) -> None:
@@ -221,14 +203,14 @@ class WindowServices(QObject):
             MenuEntry(tr("&Play the newest session"), partial(self._with_newest, self.after.play)),
             MenuEntry(tr("&Open another session..."), self._choose_session),
             None,
-            MenuEntry(tr("Look for &cut sessions"), partial(self.recovery.look, again=True)),
+            MenuEntry(tr("Look for &cut sessions"), partial(self.recovery.search, again=True)),
         ]
         add_menu(window, tr("&Session"), session)
         add_menu(window, tr("&Robot"), [MenuEntry(tr("Chec&ks before driving..."), self.checks.open_list, ("F2",))])
 
     def start(self) -> None:
-        """Look for what the last run left behind."""
-        QTimer.singleShot(_LOOK_AFTER_MS, self, self.recovery.look)
+        """Offer what the last run left: cut sessions, a crash report."""
+        QTimer.singleShot(_SEARCH_AFTER_MS, self, self.recovery.search)
         crash = crash_of_last_run(self._state / "crashes")
         if crash is not None and crash.report is not None:
             self._offer_report(tr("The last run of the program crashed"), crash)
@@ -260,7 +242,7 @@ class WindowServices(QObject):
             step(session)
 
     def _choose_session(self) -> None:
-        folder = sessions_folder(self._window.config.record.folder)
+        folder = sessions_folder(self._window.rig.config.record.folder)
         dialog = QFileDialog(self._window, tr("A recorded session"), str(folder))
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
@@ -281,10 +263,10 @@ class WindowServices(QObject):
     # ---- models
 
     def _model(self) -> str:
-        return self._window.config.perception.segmentation.model
+        return self._window.rig.config.perception.segmentation.model
 
     def _against_another_model(self) -> str:
-        view = self._window.desk.view
+        view = self._window.controls.view
         if view is not None and view.mode in ARMED_MODES:
             return tr("the program is armed; disarm first (Shift+F6)")
         return ""
@@ -294,11 +276,11 @@ class WindowServices(QObject):
         return tr("The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}", ends=ends)
 
     def _use_model(self, name: str) -> None:
-        config = self._window.config
+        config = self._window.rig.config
         segmentation = config.perception.segmentation.model_copy(update={"model": name})
         perception = config.perception.model_copy(update={"segmentation": segmentation})
         self._window.say(tr("Model {name} from now on, until the program ends", name=name), False)
-        self._window.use_config(config.model_copy(update={"perception": perception}))
+        self._window.rig.use_config(config.model_copy(update={"perception": perception}))
 
     def train(self) -> None:
         """The training that is there already, or a new one on a chosen annotation file."""
@@ -307,7 +289,7 @@ class WindowServices(QObject):
             self.training.raise_()
             return
         session = self.after.session
-        start = default_store([session]).parent if session is not None else sessions_folder(self._window.config.record.folder)
+        start = default_store([session]).parent if session is not None else sessions_folder(self._window.rig.config.record.folder)
         dialog = QFileDialog(self._window, tr("Annotations to train on"), str(start), tr("Annotations (*.sqlite)"))
         dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
         dialog.fileSelected.connect(lambda path: self.open_training(Path(path)))
@@ -329,36 +311,22 @@ class WindowServices(QObject):
     # ---- crashes
 
     def make_safe(self, is_first: bool = True) -> None:
-        """After an unforeseen error, from any thread: the servos stop, and at the first one the recording ends as a whole session.
+        """After an unforeseen error, from any thread: the servos stop; at the first one the recording ends as a whole session.
 
-        Later ones find an operator who was told and went on: they stop what he drives.
+        At later ones the operator was told and went on: only what moves is stopped.
         """
+        rig = self._window.rig
         if is_first:
-            self._stopped = self._stop_whoever_moves()
+            self._stopped = rig.stop()
             self._window.recorder.stop("the program met an unforeseen error")
-        elif not self._is_at_rest() and self._stop_whoever_moves() is StopOutcome.SERVOS:
+            return
+        pilot = rig.pilot
+        is_at_rest = pilot is not None and (not pilot.can_move or pilot.view.mode is Mode.STOPPED)
+        # an error may come with every repaint, and each STOP is shown
+        if not is_at_rest and rig.stop() is StopOutcome.SERVOS:
             self._stopped_again.emit()
 
-    def _is_at_rest(self) -> bool:
-        """Whether the rig would not move anyway: an error may come with every repaint, and each STOP is told."""
-        pilot = self._window.pilot
-        return pilot is not None and (not pilot.can_move or pilot.view.mode is Mode.STOPPED)
-
-    def _stop_whoever_moves(self) -> StopOutcome:
-        """STOP to the rig's pilot, to a rig that is being opened, and to whoever the rig is lent to."""
-        window = self._window
-        before = window.pilot
-        if before is not None:
-            before.ask(Act.STOP)
-        is_opening, is_lent = window.stop_opening(), window.stop_lent()
-        pilot = window.pilot
-        if pilot is not None and pilot is not before:  # opened between the questions
-            pilot.ask(Act.STOP)
-        if before is not None or pilot is not None or is_lent:
-            return StopOutcome.SERVOS
-        return StopOutcome.OPENING if is_opening else StopOutcome.NOTHING
-
-    def _tell_stopped_again(self) -> None:
+    def _report_stopped_again(self) -> None:
         self._window.say(tr("Another unforeseen error: the servos were stopped again"), True)
 
     def _show_crash(self, crash: Crash) -> None:
@@ -416,7 +384,7 @@ def was_seen() -> bool:
 
 
 def mark_seen() -> None:
-    """Not again by itself. A folder that cannot be written is no reason to disturb anybody."""
+    """Do not show it again by itself. A folder that cannot be written is ignored."""
     settings = _settings()
     settings.setValue(_SEEN, True)
     settings.sync()

@@ -1,6 +1,6 @@
-"""Settings of the operator window: opens the dialog, tries thresholds out on the picture, saves, and says when a setting acts.
+"""Settings of the operator window: opens the dialog, tries thresholds on the picture, saves, and says when a setting acts.
 
-Nothing changes while the robot is armed or a session is being recorded, and the robot cannot be armed while something is tried out.
+Nothing changes while the robot is armed or a session is being recorded; the robot cannot be armed while settings are tried out.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from PySide6.QtWidgets import QApplication
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.window import OperatorWindow
-from app.settings.dialog import SettingsDialog, SettingsDraft, with_changes
+from app.settings.dialog import SettingsDialog
+from app.settings.draft import SettingsDraft, with_changes
 from app.ui import theme
 from app.ui.actions import LanguageMenu, MenuEntry, add_menu, next_start_text
 from app.ui.i18n import font_problem, tr, tr_text, wanted
@@ -29,7 +30,7 @@ from core.types import Frame, Point, Scene
 
 PerceiveAgain = Callable[[Frame, Point | None, PerceptionConfig], Scene | None]
 
-_LOOK_EVERY_MS = 100
+_UPDATE_EVERY_MS = 100
 _NOW = frozenset({Effect.NOW})
 _AT_START = frozenset({Effect.NOW, Effect.RIG})
 
@@ -41,7 +42,7 @@ class SettingsController(QObject):
     ----------
     window : gets the menu entry, and what is changed.
     file : the settings that the window was opened with, and where they are saved.
-    perceive_again : understands the last frame of a rig that is over under other thresholds; it takes its time.
+    perceive_again : perceives the last frame of a rig that is over under other thresholds; slow.
     profiles : the named ones, None: in the user's folder.
     """
 
@@ -49,7 +50,8 @@ class SettingsController(QObject):
         self, window: OperatorWindow, file: SettingsFile, perceive_again: PerceiveAgain, profiles: Profiles | None = None
     ) -> None:
         super().__init__(window)
-        self._window, self._file, self._perceive_again = window, file, perceive_again
+        self._window, self._rig = window, window.rig
+        self._file, self._perceive_again = file, perceive_again
         self._profiles = profiles or Profiles()
         self._saved = self._at_rig_start = file.config
         self._saved_over: Config | None = None
@@ -61,16 +63,15 @@ class SettingsController(QObject):
         self._stills = Worker("preview", self, latest_only=True)
         self._stills.done.connect(self._on_still)
         self._stills.failed.connect(lambda _key, line: window.say(line, is_fault=True))
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LOOK_EVERY_MS)
-        self._timer.timeout.connect(self._look)
+        self._timer = QTimer(self, interval=_UPDATE_EVERY_MS)
+        self._timer.timeout.connect(self._update)
         add_menu(window, tr("&File"), [MenuEntry(tr("S&ettings..."), self.open, ("Ctrl+,",))])
         self._languages = LanguageMenu(window, file.config.window.language)
         self._languages.chosen.connect(self.choose_language)
-        window.amend_config = self._amend
-        window.read_rig_again = self._read_rig_again
-        window.may_take = partial(self._may_take, window.may_take)
-        window.phase_changed.connect(self._on_phase)
+        self._rig.add_config_source(self._amend)
+        self._rig.add_config_source(self._read_rig_again, rereads=True)
+        self._rig.add_guard(self._may_ask)
+        self._rig.phase_changed.connect(self._on_phase)
 
     @property
     def is_trying(self) -> bool:
@@ -95,7 +96,7 @@ class SettingsController(QObject):
             self._timer.start()
             dialog.stand_beside(self._window, self._window.panels.mode_bar.stop)
             dialog.show()
-        self._look()
+        self._update()
         self.dialog.raise_()
         self.dialog.activateWindow()
 
@@ -125,22 +126,22 @@ class SettingsController(QObject):
     @Slot(object)
     def _on_drafted(self, config: Config) -> None:
         if not self._why_locked():
-            self._try(config)
+            self._try_out(config)
 
-    def _try(self, config: Config) -> None:
+    def _try_out(self, config: Config) -> None:
         """Show the picture, and the windows' colours, as they would be."""
         shown = self._shown_config()
         self._drafted = config
         wanted = self._shown_config()
-        if wanted == self._window.config:
+        if wanted == self._rig.config:
             self._drafted = None
-        _take_theme(wanted)
+        _use_theme(wanted)
         if wanted.perception != shown.perception:
             self._show(wanted.perception)
 
     def _shown_config(self) -> Config:
-        """The window's configuration with what is tried out. Worked out anew: a model or a rig may have been chosen meanwhile."""
-        config = self._window.config
+        """The window's configuration with what is tried out; a model or a rig may have been chosen meanwhile."""
+        config = self._rig.config
         return config if self._drafted is None else with_changes(config, self._saved, self._drafted, _NOW)
 
     def _put_back(self) -> None:
@@ -153,9 +154,9 @@ class SettingsController(QObject):
             return
         tried = self._shown_config()
         self._drafted, self._wants_back = None, False
-        _take_theme(self._window.config)
-        if tried.perception != self._window.config.perception:
-            self._show(self._window.config.perception)
+        _use_theme(self._rig.config)
+        if tried.perception != self._rig.config.perception:
+            self._show(self._rig.config.perception)
 
     def _show(self, perception: PerceptionConfig) -> None:
         """On the running feed, else on the last frame."""
@@ -170,15 +171,15 @@ class SettingsController(QObject):
 
     @Slot(object)
     def _on_phase(self, phase: EnginePhase) -> None:
-        """A rig that was started again knows nothing of what is being tried out."""
+        """What is being tried out applies to a rig that was opened again, too."""
         if phase is EnginePhase.RUNNING and self._drafted is not None:
             self._window.preview(self._shown_config().perception)
 
-    def _may_take(self, others: Callable[[OperatorStep], bool], step: OperatorStep) -> bool:
+    def _may_ask(self, step: OperatorStep) -> bool:
         if self.is_trying and step in (OperatorStep.ARM, OperatorStep.HAND_OVER):
             self._window.say(tr("Not while settings are tried out: save or cancel them first"), is_fault=True)
             return False
-        return others(step)
+        return True
 
     # ---- saving
 
@@ -193,20 +194,20 @@ class SettingsController(QObject):
             return
         self._drafted = None
         self._stills.cancel_waiting()
-        self._window.take_settings(with_changes(self._window.config, before, config, _NOW))
-        self._saved_over = self._window.config
+        self._window.apply_settings(with_changes(self._rig.config, before, config, _NOW))
+        self._saved_over = self._rig.config
         self._window.show_still(None)  # of a rig that is over, what was tried out on its last picture must not stay: it looks alive
-        _take_theme(self._window.config)
+        _use_theme(self._rig.config)
         self._window.say(tr("Settings saved in {path}", path=self._file.path) + (f". {tr_text(note)}" if note else ""))
         dialog.draft.mark_saved()
         dialog.accept()
         if restart:
-            self._window.use_config(self._window.config)
+            self._rig.use_config(self._rig.config)
 
     def _keep(self, config: Config) -> str | None:
         """Write the file; a note about the old one, None when it could not be written."""
         try:
-            # None would mean that nobody has looked: what somebody else wrote since then would go without a copy.
+            # None would mean "not read": what another program wrote since then would be replaced without a copy.
             note = write_settings(self._file.path, config, self._file.text or "")
         except ConfigError as error:
             if self.dialog is not None:
@@ -225,7 +226,7 @@ class SettingsController(QObject):
         return amended
 
     def _read_rig_again(self, config: Config) -> Config:
-        """What stands in its rig file now; whoever opens the rig tells what is wrong with that file."""
+        """With its rig file as it is now; what is wrong with that file is reported when the rig is opened."""
         with contextlib.suppress(RigFileError):
             return read_again(config, self._saved)
         return config
@@ -240,7 +241,7 @@ class SettingsController(QObject):
     # ---- what stands against it
 
     def _why_locked(self) -> str:
-        view = self._window.desk.view
+        view = self._window.controls.view
         if view is not None and view.mode in ARMED_MODES:
             return tr("The robot is armed: settings can be changed when it is disarmed")
         if self._window.recorder.status.recording:
@@ -248,17 +249,17 @@ class SettingsController(QObject):
         return ""
 
     @Slot()
-    def _look(self) -> None:
+    def _update(self) -> None:
         why = self._why_locked()
         if self.dialog is not None:
             self.dialog.lock(why)
-            self.dialog.show_rig(self._window.config)
+            self.dialog.show_rig(self._rig.config)
         elif self._wants_back and not why:
             self._put_back()
             self._timer.stop()
 
 
-def _take_theme(config: Config) -> None:
+def _use_theme(config: Config) -> None:
     application = QApplication.instance()
     if isinstance(application, QApplication) and theme.chosen(application) != config.window.theme:
         theme.apply_theme(application, config.window.theme)

@@ -1,42 +1,21 @@
-"""The settings dialog: the whole configuration, section by section, made from its models. STOP works while it is open.
-
-Settings while they are edited: every entry is checked as it is typed, and nothing acts before it is allowed. No Qt here.
-
-One setting: name, field, unit, what is allowed, what it means; checked as it is typed, marked where it is not the default.
-
-Settings below each other: a section of the configuration, or what a search has found in several.
-
-Profiles: choose one, save the settings under a name, delete one. Questions are asked in the row itself, never in a box.
-
-Browse...: chooses the file or folder that a setting names.
-"""
+"""The settings dialog: the whole configuration, section by section, generated from its schema. STOP works while it is open."""
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from pydantic import ValidationError
-from PySide6.QtCore import QPoint, QRectF, QSignalBlocker, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QPainter, QPaintEvent, QPen, QShortcut, QWheelEvent
+from PySide6.QtCore import QPoint, QSignalBlocker, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
-    QCheckBox,
     QDialog,
-    QFileDialog,
     QFrame,
-    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLineEdit,
-    QMenu,
     QPushButton,
     QScrollArea,
-    QSlider,
     QSplitter,
     QStackedLayout,
     QTreeWidget,
@@ -45,675 +24,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.operator.manual_drive import NUMBERS_ONLY
+from app.settings.draft import SettingsDraft, search
+from app.settings.fields import SettingField
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.widgets.basics import QuietCombo, takes_enter
 from app.widgets.messages import QuestionStrip
-from core.config.files import Profile, ProfileError, Profiles, changed_keys
-from core.config.models import RESOURCES, Config, load_config
-from core.config.rig_file import rigs_folder, sections_of_rig
-from core.config.schema import Effect, FieldKind, Section, Setting, schema, settings_by_key, value_at, with_value
-from core.files import VIDEO_ENDINGS
-
-_SEPARATORS = re.compile(r"[\s_.,]+")
-
-
-class SettingsDraft:
-    """A configuration under edit. What the running rig keeps in a file of its own is shown as it is there, and not edited.
-
-    Parameters
-    ----------
-    saved : what the settings file says.
-    """
-
-    def __init__(self, saved: Config) -> None:
-        self.default = load_config()
-        self.saved = saved
-        self._defaults = _flat(self.default.model_dump(mode="json"))
-        self._data = saved.model_dump(mode="json")
-        self._saved_values = self._values = _flat(self._data)
-        self._config: Config | None = saved
-        self._entries: dict[str, str] = {}
-        self._errors: dict[str, str] = {}
-        self._section_errors: dict[str, str] = {}
-        self.rig_file = ""
-        self._kept: frozenset[str] = frozenset()
-        self._in_force: dict[str, Any] = {}
-
-    def show_rig(self, running: Config) -> None:
-        """Say what is in force where the rig file of the running configuration keeps it; edits there are dropped."""
-        self.rig_file = running.rig.file or ""
-        self._kept = sections_of_rig(running, self.saved)
-        self._in_force = {key: value for key, value in _flat(running.model_dump(mode="json")).items() if self.is_kept(key)}
-        for key in self._in_force:
-            self._forget_entry(key)
-        self._take(self._data, kept=self.saved.model_dump(mode="json"))
-
-    # ---- what is there
-
-    @property
-    def config(self) -> Config | None:
-        """The configuration as edited, None while anything in it is not allowed."""
-        return self._config if not self._errors and not self._section_errors else None
-
-    def value(self, key: str) -> Any:
-        """The last allowed value of a setting; of one that the rig file keeps, the one in force."""
-        return self._in_force[key] if key in self._in_force else self._values[key]
-
-    def is_kept(self, key: str) -> bool:
-        """Whether the rig file keeps a setting, or a section."""
-        return key.partition(".")[0] in self._kept
-
-    def default_value(self, key: str) -> Any:
-        return self._defaults[key]
-
-    def entry(self, key: str) -> str:
-        """What stands in the field: what was typed, to the letter, or the value. "12." is the beginning of a decimal."""
-        return self._entries.get(key, as_text(self.value(key)))
-
-    def is_changed(self, key: str) -> bool:
-        """Whether it differs from the default."""
-        return key in self._errors or self.value(key) != self.default_value(key)
-
-    def changed_in(self, section: Section) -> int:
-        """How many settings of a section, those within included, differ from the default."""
-        return sum(self.is_changed(setting.key) for setting in section.all_settings())
-
-    @property
-    def is_dirty(self) -> bool:
-        """Whether anything is to be saved, or stands there that cannot be."""
-        return bool(self._errors or self._section_errors) or self._values != self._saved_values
-
-    def effects(self) -> set[Effect]:
-        """When what differs from the saved settings begins to act."""
-        settings = settings_by_key()
-        return {settings[key].effect for key in self.unsaved_keys()}
-
-    def unsaved_keys(self) -> tuple[str, ...]:
-        return tuple(key for key, value in self._values.items() if value != self._saved_values[key])
-
-    # ---- what is wrong
-
-    def error(self, key: str) -> str:
-        """One clear message for an entry, empty when it is allowed."""
-        return self._errors.get(key, "")
-
-    def section_error(self, section_key: str) -> str:
-        """What does not go together in a section."""
-        return self._section_errors.get(section_key, "")
-
-    def is_wrong_in(self, section: Section) -> bool:
-        return any(part.key in self._section_errors for part in section.walk()) or any(
-            setting.key in self._errors for setting in section.all_settings()
-        )
-
-    @property
-    def first_problem(self) -> tuple[str, str] | None:
-        """Key (of a setting or a section) and message of the first problem."""
-        for problems in (self._errors, self._section_errors):
-            for key, message in problems.items():
-                return key, message
-        return None
-
-    # ---- edits
-
-    def set_entry(self, key: str, entry: object) -> str:
-        """Take what was typed or chosen; returns the message, empty when it is allowed."""
-        setting = settings_by_key()[key]
-        text = entry if isinstance(entry, str) else as_text(entry)
-        value, message = parse(setting, entry)
-        if not message:
-            candidate = with_value(self._data, key, value)
-            message = _own_message(candidate, key)
-            if not message:
-                self._data = candidate
-        self._entries[key] = text
-        if message:
-            self._errors[key] = message
-        else:
-            self._errors.pop(key, None)
-        self._check_sections()
-        return message
-
-    def reset(self, keys: Iterable[str]) -> None:
-        """Put settings back to their defaults, together: half of them might not go with the other half."""
-        for key in keys:
-            if self.is_kept(key):
-                continue
-            self._forget_entry(key)
-            self._data = with_value(self._data, key, self.default_value(key))
-        self._check_sections()
-
-    def reset_section(self, section: Section) -> None:
-        """A section and all within."""
-        self.reset([setting.key for setting in section.all_settings()])
-
-    def load(self, config: Config) -> None:
-        """Take a whole configuration, of a profile."""
-        self._entries.clear()
-        self._errors.clear()
-        self._take(config.model_dump(mode="json"), kept=self._data)
-
-    def mark_saved(self) -> None:
-        """What is edited is what the file says now."""
-        if self.config is not None:
-            self.saved, self._saved_values = self.config, self._values
-
-    def _take(self, data: dict[str, Any], kept: dict[str, Any]) -> None:
-        """All of `data` but for what the rig file keeps: of that, what the settings file says stays in it."""
-        self._data = {**data, **{name: kept[name] for name in self._kept}}
-        self._check_sections()
-
-    def _forget_entry(self, key: str) -> None:
-        self._entries.pop(key, None)
-        self._errors.pop(key, None)
-
-    def _check_sections(self) -> None:
-        """Each entry is allowed by itself; do they go together?"""
-        self._values, self._section_errors = _flat(self._data), {}
-        try:
-            self._config = Config.model_validate(self._data)
-        except ValidationError as error:
-            for found in error.errors():
-                key = ".".join(str(part) for part in found["loc"])
-                self._section_errors.setdefault(key, _sentence(found["msg"]))
-
-
-def _flat(data: dict[str, Any]) -> dict[str, Any]:
-    """All settings by key."""
-    return {key: value_at(data, key) for key in settings_by_key()}
-
-
-def parse(setting: Setting, entry: object) -> tuple[Any, str]:
-    """The value of an entry, and why it is none (empty when it is)."""
-    if setting.kind is FieldKind.SWITCH:
-        return bool(entry), ""
-    if setting.kind is FieldKind.CHOICE:
-        return (entry, "") if entry in setting.choices else (None, tr("must be one of: {range}", range=tr_text(setting.range_text)))
-    text = as_text(entry).strip()
-    if not text:
-        return (None, "") if setting.is_optional else (None, tr("must not be empty{allowed}", allowed=_wanted(setting)))
-    if setting.kind is FieldKind.TEXT:
-        return text, ""
-    return _number(setting, text)
-
-
-def _number(setting: Setting, text: str) -> tuple[Any, str]:
-    if text.count(",") == 1 and "." not in text:
-        text = text.replace(",", ".")
-    try:
-        value = float(text)
-    except ValueError:
-        return None, tr("not a number{allowed}", allowed=_wanted(setting))
-    if not math.isfinite(value):
-        return None, tr("not a finite number{allowed}", allowed=_wanted(setting))
-    if setting.kind is FieldKind.WHOLE and not value.is_integer():
-        return None, tr("must be a whole number{allowed}", allowed=_wanted(setting))
-    bounds = setting.bounds
-    is_low = bounds.low is not None and (value <= bounds.low if bounds.low_open else value < bounds.low)
-    is_high = bounds.high is not None and (value >= bounds.high if bounds.high_open else value > bounds.high)
-    if is_low or is_high:
-        return None, tr("must be {range}", range=tr_text(setting.range_text))
-    return int(value) if setting.kind is FieldKind.WHOLE else value, ""
-
-
-def _wanted(setting: Setting) -> str:
-    return tr("; allowed: {range}", range=tr_text(setting.range_text)) if setting.range_text else ""
-
-
-def _own_message(data: dict[str, Any], key: str) -> str:
-    """What pydantic has against this entry itself (a pattern, a length); what does not go together is no matter of one entry."""
-    try:
-        Config.model_validate(data)
-    except ValidationError as error:
-        for found in error.errors():
-            if ".".join(str(part) for part in found["loc"]) == key:
-                if found["type"] == "string_pattern_mismatch":
-                    return tr("has not the right form: {description}", description=tr(settings_by_key()[key].description))
-                return _sentence(found["msg"])
-    return ""
-
-
-def _sentence(message: str) -> str:
-    return tr_text(message.removeprefix("Value error, "))
-
-
-def as_text(value: object) -> str:
-    """As it stands in a field: 6 for 6.0, nothing for None."""
-    if value is None:
-        return ""
-    if isinstance(value, float):
-        return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
-    return str(value)
-
-
-def search(words: str) -> list[tuple[Section, list[Setting]]]:
-    """Settings that have all the words in name, title, description, unit or their section's title, by section."""
-    wanted = [word for word in _SEPARATORS.split(words.casefold()) if word]
-    found = []
-    for section in schema().walk():
-        hits = [setting for setting in section.settings if all(word in _haystack(section, setting) for word in wanted)]
-        if hits and wanted:
-            found.append((section, hits))
-    return found
-
-
-def _haystack(section: Section, setting: Setting) -> str:
-    shown = (section.title, setting.title, setting.description)
-    parts = (*shown, *(tr(text) for text in shown), setting.key.replace(".", " "), setting.unit, setting.range_text)
-    return " ".join(parts).casefold()
-
-
-def with_changes(running: Config, before: Config, after: Config, effects: frozenset[Effect], since: Config | None = None) -> Config:
-    """`running` with those differences of two others that act then: what it has from elsewhere (a command line, a picker) stays.
-
-    So does what has changed in it `since` it was so.
-
-    What its rig file keeps stays, too: it would be gone at the next start of that rig.
-    Where that does not go together it is `running` as it was; the settings then act at the next start of the program.
-    """
-    data, new = running.model_dump(mode="json"), after.model_dump(mode="json")
-    settings, kept = settings_by_key(), sections_of_rig(running, after)
-    old = since.model_dump(mode="json") if since is not None else data
-    newer = {key for key in changed_keys(before, after) if value_at(old, key) != value_at(data, key)}
-    for key in changed_keys(before, after):
-        if settings[key].effect in effects and key.partition(".")[0] not in kept and key not in newer:
-            data = with_value(data, key, value_at(new, key))
-    try:
-        return Config.model_validate(data)
-    except ValidationError:
-        return running
-
-
-_VIDEOS = " ".join(f"*{ending}" for ending in (*VIDEO_ENDINGS, ".bag"))
-_MODELS = RESOURCES / "models"
-
-
-@dataclass(frozen=True, slots=True)
-class PathRequest:
-    """What a setting names. ``filter`` is for files; where `files` and `folders` are both True a menu asks which."""
-
-    title: str
-    files: bool = False
-    folders: bool = False
-    filter: str = mark("All files (*)")
-
-
-WANTED = {
-    "rig.source": PathRequest(
-        mark("Pictures to play"),
-        files=True,
-        folders=True,
-        filter=f"Videos and recordings ({_VIDEOS});;All files (*)",
-    ),
-    "rig.file": PathRequest(mark("Rig file"), files=True, filter=mark("Rigs (*.toml)")),
-    "perception.segmentation.model": PathRequest(mark("Model folder"), folders=True),
-    "window.pictures_folder": PathRequest(mark("Folder for snapshots"), folders=True),
-    "record.folder": PathRequest(mark("Folder for sessions"), folders=True),
-}
-"""The settings that name a file or folder of the disk, by their keys."""
-
-
-class BrowseButton(QPushButton):
-    """``chosen`` has the path. The dialog leaves the window in reach, so that STOP is, too."""
-
-    chosen = Signal(str)
-
-    def __init__(self, key: str, title: str) -> None:
-        super().__init__(tr("Browse..."))
-        self._key, self._wanted = key, WANTED[key]
-        self.dialog: QFileDialog | None = None
-        self.entry = ""
-        """What stands in the field: the dialog begins there."""
-        self.setAccessibleName(tr("Browse for {title}", title=title))
-        self.setToolTip(tr("{title}: choose it on the disk", title=tr(self._wanted.title)))
-        if self._wanted.files and self._wanted.folders:
-            menu = QMenu(self)
-            menu.addAction(tr("&File..."), lambda: self.browse(folders=False))
-            menu.addAction(tr("F&older..."), lambda: self.browse(folders=True))
-            self.setMenu(menu)
-        else:
-            self.clicked.connect(lambda _on=False: self.browse(folders=self._wanted.folders))
-
-    def browse(self, *, folders: bool) -> None:
-        """Open the dialog."""
-        if self.dialog is not None:
-            self.dialog.raise_()
-            return
-        dialog = QFileDialog(self.window(), tr(self._wanted.title), str(self._start()))
-        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        if folders:
-            dialog.setFileMode(QFileDialog.FileMode.Directory)
-            dialog.setOption(QFileDialog.Option.ShowDirsOnly)
-        else:
-            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-            dialog.setNameFilters(self._wanted.filter.split(";;"))
-        dialog.fileSelected.connect(self._on_selected)
-        dialog.finished.connect(self._on_finished)
-        self.dialog = dialog
-        dialog.show()  # not open(): nothing may cover STOP
-
-    def _on_selected(self, path: str) -> None:
-        chosen = Path(path)
-        self.chosen.emit(chosen.name if chosen.parent == _MODELS else path)  # a shipped model goes by its name
-
-    def _on_finished(self) -> None:
-        dialog, self.dialog = self.dialog, None
-        if dialog is not None:
-            dialog.deleteLater()
-
-    def _start(self) -> Path:
-        """The nearest folder that is there."""
-        usual = {"rig.file": rigs_folder(), "perception.segmentation.model": _MODELS}.get(self._key, Path.home())
-        entry = Path(self.entry).expanduser() if "/" in self.entry else usual
-        return next((path for path in (entry, *entry.parents) if path.is_dir()), Path.home())
-
-
-_SLIDER_STEPS = 1000
-_CURVED_FROM = 10.0
-"""A range this much longer than the default is stretched at its lower end, or the slider could not be set finely there."""
-_UNSET = mark("not set")
-"""An empty field; its description says what that means."""
-_NAME_PX, _FIELD_PX, _UNIT_PX = 132, 100, 46
-_SLIDE_PX = (36, 18)
-
-
-class SettingField(QFrame):
-    """Shows what it is told and says what was typed; it decides nothing. ``edited`` has key and entry, ``reset_asked`` the key."""
-
-    edited = Signal(str, object)
-    reset_asked = Signal(str)
-
-    def __init__(self, setting: Setting, default: Any) -> None:
-        super().__init__()
-        self.setting = setting
-        self._default = default
-        self._state: tuple[object, ...] = ()
-        self.setObjectName("setting")
-        self._name, self._error = QLabel(tr(setting.title)), QLabel()
-        self._name.setObjectName("setting_name")
-        self._name.setWordWrap(True)
-        self._error.setObjectName("setting_error")
-        self._error.setWordWrap(True)
-        self.editor = self._make_editor()
-        self.slider = self._make_slider()
-        self.browse_button = BrowseButton(setting.key, tr(setting.title)) if setting.key in WANTED else None
-        self.reset_button = QPushButton(tr("Reset"))
-        self.reset_button.setToolTip(tr("Back to the default: {default}", default=self.default_text))
-        self.reset_button.setAccessibleName(tr("Reset {title} to {default}", title=tr(setting.title), default=self.default_text))
-        self.reset_button.clicked.connect(lambda _on=False: self.reset_asked.emit(setting.key))
-        self._lay_out()
-
-    @property
-    def default_text(self) -> str:
-        """The default with its unit."""
-        if isinstance(self._default, bool):
-            return tr("on") if self._default else tr("off")
-        text = as_text(self._default)
-        return _with_unit(text, tr_text(self.setting.unit)) if text else tr(_UNSET)
-
-    @property
-    def error_text(self) -> str:
-        return self._error.text()
-
-    @property
-    def is_marked(self) -> bool:
-        """Whether it is marked as different from the default."""
-        return bool(self.property("changed"))
-
-    def show_state(self, entry: str, value: Any, *, is_changed: bool, error: str) -> None:
-        """What stands in the field, the last allowed value, and what is wrong with what stands there."""
-        state = (entry, value, is_changed, error)
-        if state == self._state:
-            return
-        self._state = state
-        with QSignalBlocker(self.editor):
-            if isinstance(self.editor, QCheckBox):
-                self.editor.setChecked(bool(value))
-                self.editor.setText(tr("on") if value else tr("off"))
-            elif isinstance(self.editor, QuietCombo):
-                self.editor.setCurrentIndex(self.editor.findData(value))
-            elif self.editor.text() != entry:
-                self.editor.setText(entry)
-        if self.browse_button is not None:
-            self.browse_button.entry = entry
-        if self.slider is not None and value is not None and not self.slider.isSliderDown():
-            with QSignalBlocker(self.slider):
-                self.slider.setValue(self._place_of(float(value)))
-        error = error.replace(" °", "°")
-        self._error.setText(f"\N{WARNING SIGN}  {error}" if error else "")
-        self._error.setVisible(bool(error))
-        self.reset_button.setEnabled(is_changed)
-        self._name.setText(f"\N{BLACK CIRCLE} {tr(self.setting.title)}" if is_changed else tr(self.setting.title))
-        self.editor.setAccessibleDescription(f"{error}. {self._note()}" if error else self._note())
-        if (bool(self.property("changed")), bool(self.property("wrong"))) != (is_changed, bool(error)):
-            self.setProperty("changed", is_changed)
-            self.setProperty("wrong", bool(error))
-            self.editor.setProperty("wrong", bool(error))
-            for widget in (self, self.editor):  # style sheets look at properties only when they are told to
-                widget.style().unpolish(widget)
-                widget.style().polish(widget)
-
-    def take_focus(self) -> None:
-        self.editor.setFocus()
-
-    # ---- the editor
-
-    def _make_editor(self) -> QCheckBox | QuietCombo | QLineEdit:
-        setting = self.setting
-        editor: QCheckBox | QuietCombo | QLineEdit
-        if setting.kind is FieldKind.SWITCH:
-            editor = _Switch()
-            editor.toggled.connect(lambda on: self.edited.emit(setting.key, on))
-        elif setting.kind is FieldKind.CHOICE:
-            editor = QuietCombo(tr(setting.title), keeps_focus=True)
-            for choice in setting.choices:
-                editor.addItem(as_text(choice).replace("_", " "), choice)
-            combo = editor
-            combo.currentIndexChanged.connect(lambda _place: self.edited.emit(setting.key, combo.currentData()))
-        else:
-            editor = (
-                QLineEdit()
-                if setting.kind is FieldKind.TEXT
-                else NumberEdit(is_whole=setting.kind is FieldKind.WHOLE, multiple=setting.bounds.step)
-            )
-            editor.setPlaceholderText(tr(_UNSET) if setting.is_optional else "")
-            editor.textEdited.connect(lambda text: self.edited.emit(setting.key, text))
-        editor.setAccessibleName(f"{tr(setting.title)}, {tr_text(setting.unit)}" if setting.unit else tr(setting.title))
-        editor.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        return editor
-
-    def _make_slider(self) -> QSlider | None:
-        """For what acts at once, so that the picture can be watched meanwhile."""
-        setting, bounds = self.setting, self.setting.bounds
-        if setting.effect is not Effect.NOW or bounds.low is None or bounds.high is None:
-            return None
-        slider = _Slider(Qt.Orientation.Horizontal)
-        slider.setRange(0, _SLIDER_STEPS)
-        slider.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the field beside it has the arrows
-        slider.setAccessibleName(tr("{title}, as a slider", title=tr(setting.title)))
-        slider.valueChanged.connect(lambda place: self.edited.emit(setting.key, self._value_at(place)))
-        return slider
-
-    def _power(self) -> float:
-        bounds = self.setting.bounds
-        assert bounds.low is not None
-        assert bounds.high is not None
-        is_long = bounds.low >= 0 and bounds.high - bounds.low > _CURVED_FROM * max(float(self._default or 0), 1e-9)
-        return 3.0 if is_long else 1.0
-
-    def _value_at(self, place: int) -> str:
-        """The value at a place of the slider, with no more digits than its step has."""
-        bounds = self.setting.bounds
-        assert bounds.low is not None
-        assert bounds.high is not None
-        span = bounds.high - bounds.low
-        value = bounds.low + span * (place / _SLIDER_STEPS) ** self._power()
-        if self.setting.kind is FieldKind.WHOLE:
-            step = round(bounds.step or 1)
-            return str(round(value / step) * step)
-        inside = span / _SLIDER_STEPS / 10.0  # an end that is excluded is not offered
-        value = max(value, bounds.low + inside * bounds.low_open)
-        value = min(value, bounds.high - inside * bounds.high_open)
-        digits = max(0, 2 - math.floor(math.log10(max(abs(value), span / 1e4, 1e-9))))
-        text = f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
-        text = "0" if text in ("-0", "") else text
-        is_out = (bounds.low_open and float(text) <= bounds.low) or (bounds.high_open and float(text) >= bounds.high)
-        return f"{value:.6g}" if is_out else text
-
-    def _place_of(self, value: float) -> int:
-        bounds = self.setting.bounds
-        assert bounds.low is not None
-        assert bounds.high is not None
-        share = max(0.0, min(1.0, (value - bounds.low) / (bounds.high - bounds.low)))
-        return round(_SLIDER_STEPS * float(share ** (1.0 / self._power())))
-
-    # ---- places
-
-    def _lay_out(self) -> None:
-        setting = self.setting
-        unit, meaning = QLabel(tr_text(setting.unit)), QLabel(_capital(tr(setting.description)))
-        note = QLabel(_together(self._note(), tr_text(setting.unit)))
-        unit.setObjectName("setting_note")
-        meaning.setObjectName("setting_meaning")
-        note.setObjectName("setting_note")
-        for label in (meaning, note):
-            label.setWordWrap(True)
-            label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._name.setFixedWidth(_NAME_PX)
-        self._name.setBuddy(self.editor)
-        self.setToolTip(setting.key)
-        grid = QGridLayout(self)
-        grid.setContentsMargins(12, 7, 10, 8)
-        grid.setHorizontalSpacing(8)
-        grid.setVerticalSpacing(2)
-        grid.addWidget(self._name, 0, 0)
-        if setting.kind is FieldKind.TEXT:
-            row = QHBoxLayout()
-            row.setSpacing(8)
-            row.addWidget(self.editor, 1)
-            if self.browse_button is not None:
-                row.addWidget(self.browse_button)
-                self.browse_button.chosen.connect(lambda path: self.edited.emit(setting.key, path))
-            grid.addLayout(row, 0, 1, 1, 3)
-        else:
-            self.editor.setFixedWidth(_FIELD_PX if setting.kind is not FieldKind.CHOICE else _FIELD_PX + 50)
-            unit.setMinimumWidth(_UNIT_PX)
-            if setting.kind is FieldKind.CHOICE:
-                grid.addWidget(self.editor, 0, 1, 1, 2, Qt.AlignmentFlag.AlignLeft)
-            else:
-                grid.addWidget(self.editor, 0, 1)
-                grid.addWidget(unit, 0, 2)
-            grid.addWidget(self.slider if self.slider is not None else QWidget(), 0, 3)
-        grid.addWidget(self.reset_button, 0, 4)
-        line = 1
-        for label in (self._error, meaning, note):
-            if label is self._error or label.text():
-                grid.addWidget(label, line, 1, 1, 4)
-                line += 1
-        self._error.hide()
-        grid.setColumnStretch(3, 1)
-
-    def _note(self) -> str:
-        parts = [tr("Default {default}", default=self.default_text)]
-        if self.setting.range_text and self.setting.kind is not FieldKind.CHOICE:
-            parts.append(tr("allowed {range}", range=tr_text(self.setting.range_text)))
-        if self.setting.effect is not Effect.NOW:
-            parts.append(tr(self.setting.effect.value))
-        return "  \N{MIDDLE DOT}  ".join(parts)
-
-
-class NumberEdit(QLineEdit):
-    """A number as text; up and down change it by a step that fits its size, with Shift by ten of them."""
-
-    def __init__(self, *, is_whole: bool, multiple: float | None = None) -> None:
-        super().__init__()
-        self._is_whole, self._multiple = is_whole, multiple
-        self.setProperty(NUMBERS_ONLY, True)
-        self.setAlignment(Qt.AlignmentFlag.AlignRight)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down):
-            sign = 1 if event.key() == Qt.Key.Key_Up else -1
-            self.step(sign * (10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1))
-            return
-        super().keyPressEvent(event)
-
-    def step(self, steps: int) -> None:
-        """So many steps up or down; what is no number stays as it is."""
-        try:
-            value = float(self.text().replace(",", "."))
-        except ValueError:
-            return
-        if not math.isfinite(value):
-            return
-        if self._multiple is not None:
-            self.setText(as_text((round(value / self._multiple) + steps) * self._multiple))
-            self.textEdited.emit(self.text())
-            return
-        exponent = 0 if self._is_whole else math.floor(math.log10(abs(value))) - 1 if value else -2
-        value = round(value / 10.0**exponent + steps) * 10.0**exponent
-        self.setText(as_text(round(value, max(0, -exponent))))
-        self.textEdited.emit(self.text())
-
-
-class _Switch(QCheckBox):
-    """A slide with its word. Enter turns it too: Space, which does it elsewhere, stops the robot."""
-
-    def sizeHint(self) -> QSize:
-        return QSize(_SLIDE_PX[0] + 12 + max(self.fontMetrics().horizontalAdvance(tr(word)) for word in ("on", "off")) + 8, 30)
-
-    def hitButton(self, at: QPoint) -> bool:
-        return self.rect().contains(at)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        is_on, can = self.isChecked(), self.isEnabled()
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        if self.hasFocus():
-            painter.setPen(QPen(QColor(theme.SKY), 1))
-            painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
-        width, height = _SLIDE_PX
-        slide = QRectF(4, (self.height() - height) / 2, width, height)
-        painter.setPen(QPen(QColor(theme.TEXT_FAINT if can else theme.LINE), 1.2))
-        painter.setBrush(QColor(theme.SKY if is_on and can else theme.LINE if is_on else theme.WINDOW))
-        painter.drawRoundedRect(slide, height / 2, height / 2)
-        knob = QRectF(slide.right() - height if is_on else slide.left(), slide.top(), height, height).adjusted(4, 4, -4, -4)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.TEXT_FAINT if not can else theme.INK if is_on else theme.TEXT_DIM))
-        painter.drawEllipse(knob)
-        painter.setPen(QColor(theme.TEXT if can else theme.TEXT_FAINT))
-        painter.setFont(theme.font())
-        room = QRectF(slide.right() + 8, 0, self.width(), self.height())
-        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, self.text())
-        painter.end()
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not event.isAutoRepeat():
-            self.toggle()
-            return
-        super().keyPressEvent(event)
-
-
-class _Slider(QSlider):
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        event.ignore()  # it belongs to the page
-
-
-def _with_unit(text: str, unit: str) -> str:
-    """The sign of degrees stands at its number."""
-    return f"{text}{unit}" if unit == "°" else f"{text} {unit}".strip()
-
-
-def _together(text: str, unit: str) -> str:
-    """No unit stands alone in a line."""
-    return text.replace(f" {unit}", "°" if unit == "°" else f"\N{NO-BREAK SPACE}{unit}") if unit else text
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
+from core.config.files import Profile, ProfileError, Profiles
+from core.config.models import Config
+from core.config.schema import Effect, Section, Setting, schema, settings_by_key
 
 MOST_FOUND = 40
 """Fields that are made for a search; more say nothing that a longer word would not."""
@@ -723,11 +42,13 @@ Group = tuple[Section, Sequence[Setting]]
 
 
 class SettingPage(QScrollArea):
-    """Shows groups of settings of a draft. ``edited`` carries key and entry, the others what is to be reset."""
+    """Settings of a draft below each other: a section, or what a search has found in several.
+
+    ``edited`` carries key and entry, ``reset_asked`` the keys of a setting or of a section.
+    """
 
     edited = Signal(str, object)
-    reset_asked = Signal(str)
-    section_reset_asked = Signal(object)
+    reset_asked = Signal(object)
 
     def __init__(self, draft: SettingsDraft) -> None:
         super().__init__()
@@ -738,8 +59,7 @@ class SettingPage(QScrollArea):
         self._section_buttons: dict[str, tuple[Section, QPushButton]] = {}
         self._column: QVBoxLayout | None = None
         self._waiting: list[Section | Setting | str] = []
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
+        self._soon = QTimer(self, singleShot=True)
         self._soon.timeout.connect(self._add_some)
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
@@ -748,9 +68,9 @@ class SettingPage(QScrollArea):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def show_groups(self, groups: Sequence[Group], empty: str = "") -> None:
-        """These instead of the ones before; `empty` is said when there are none.
+        """Show these groups, or the text `empty` when there are none.
 
-        What is in sight is there at once, the rest comes bit by bit: a long section would keep the window busy for too long.
+        What is in sight is made at once, the rest bit by bit: a long section would block the window for too long.
         """
         self.fields, self._section_errors, self._section_notes, self._section_buttons = {}, {}, {}, {}
         page = QWidget()
@@ -761,11 +81,18 @@ class SettingPage(QScrollArea):
         column.addStretch(1)
         self.setWidget(page)
         self._column = column
-        self._waiting = _parts(groups, empty)
+        left = MOST_FOUND if len(groups) > 1 else 10_000
+        self._waiting = []
+        for section, settings in groups:
+            if left > 0:
+                self._waiting += [section, *settings[:left]]
+            left -= len(settings)
+        if last := empty if not groups else tr("{count} more: add a word", count=-left) if left < 0 else "":
+            self._waiting.append(last)
         self._add_some()
         self.verticalScrollBar().setValue(0)
 
-    def renew(self) -> None:
+    def update_fields(self) -> None:
         """Show the draft as it is now."""
         draft = self._draft
         for key, field in self.fields.items():
@@ -784,7 +111,7 @@ class SettingPage(QScrollArea):
             button.setText(tr("Reset section ({count})", count=count) if count else tr("Reset section"))
 
     def add_all(self) -> None:
-        """Everything that has not come yet."""
+        """Make everything that is still waiting."""
         while self._waiting:
             self._add_some()
 
@@ -797,34 +124,35 @@ class SettingPage(QScrollArea):
         field = self.fields.get(key)
         if field is not None:
             self.ensureWidgetVisible(field, 0, 60)
-            field.take_focus()
+            field.editor.setFocus()
 
     def _add_some(self) -> None:
-        """The next few, above the stretch at the end."""
+        """Make the next few, above the stretch at the end."""
         for part in self._waiting[:_AT_ONCE]:
             if isinstance(part, Section):
                 self._add_head(part)
             elif isinstance(part, Setting):
-                self._add_field(part)
+                field = SettingField(part, self._draft.default_value(part.key))
+                field.edited.connect(self.edited)
+                field.reset_asked.connect(lambda key: self.reset_asked.emit([key]))
+                self.fields[part.key] = field
+                self._add(field)
             else:
                 label = QLabel(part)
                 label.setObjectName("setting_meaning")
                 self._add(label)
         del self._waiting[:_AT_ONCE]
-        self.renew()
-        self._make_room()
-        if self._waiting:
-            self._soon.start()
-
-    def _make_room(self) -> None:
-        """All that is there gets its height now: left to Qt it would be painted squeezed together once, and then pulled apart."""
+        self.update_fields()
+        # Everything gets its height now: left to Qt it would be painted squeezed together once, and then pulled apart.
         page, column = self.widget(), self._column
         assert column is not None
-        for part in page.findChildren(QWidget):
-            part.ensurePolished()
+        for child in page.findChildren(QWidget):
+            child.ensurePolished()
         column.activate()
         width = self.viewport().width()
         page.resize(width, max(self.viewport().height(), column.totalHeightForWidth(width)))
+        if self._waiting:
+            self._soon.start()
 
     def _add(self, part: QWidget) -> None:
         assert self._column is not None
@@ -841,7 +169,8 @@ class SettingPage(QScrollArea):
             label.setWordWrap(True)
         button = QPushButton(tr("Reset section"))
         button.setAccessibleName(tr("Reset section {title}", title=tr(section.title)))
-        button.clicked.connect(lambda _on=False: self.section_reset_asked.emit(section))
+        keys = [setting.key for setting in section.all_settings()]
+        button.clicked.connect(lambda _on=False: self.reset_asked.emit(keys))
         head = QWidget()
         row = QHBoxLayout(head)
         row.setContentsMargins(0, 0, 0, 0)
@@ -856,31 +185,15 @@ class SettingPage(QScrollArea):
         self._section_errors[section.key] = error
         self._section_buttons[section.key] = (section, button)
 
-    def _add_field(self, setting: Setting) -> None:
-        field = SettingField(setting, self._draft.default_value(setting.key))
-        field.edited.connect(self.edited)
-        field.reset_asked.connect(self.reset_asked)
-        self.fields[setting.key] = field
-        self._add(field)
-
-
-def _parts(groups: Sequence[Group], empty: str) -> list[Section | Setting | str]:
-    """Heads, settings and a last word, in the order of the page."""
-    parts: list[Section | Setting | str] = []
-    left = MOST_FOUND if len(groups) > 1 else 10_000
-    for section, settings in groups:
-        if left > 0:
-            parts += [section, *settings[:left]]
-        left -= len(settings)
-    said = empty if not groups else tr("{count} more: add a word", count=-left) if left < 0 else ""
-    return [*parts, said] if said else parts
-
 
 _OWN = mark("Own settings")
 
 
 class ProfileRow(QWidget):
-    """Asks only; ``chosen`` carries a profile, ``save_asked`` a name, ``delete_asked`` the profile that was confirmed."""
+    """Chooses a profile, saves the settings under a name, deletes one; questions are asked in the row itself.
+
+    ``chosen`` carries a profile, ``save_asked`` a name, ``delete_asked`` the profile that was confirmed.
+    """
 
     chosen = Signal(object)
     save_asked = Signal(str)
@@ -906,7 +219,7 @@ class ProfileRow(QWidget):
         self.question.closed.connect(self.end_asking)
 
     def show_profiles(self, profiles: tuple[Profile, ...], current: Profile | None) -> None:
-        """All there are, and the one that says exactly what is edited; None: none does."""
+        """List the profiles, and mark the one that equals what is edited, if any."""
         self._profiles = profiles
         with QSignalBlocker(self.combo):
             self.combo.clear()
@@ -990,11 +303,10 @@ _KEY_ROLE = Qt.ItemDataRole.UserRole
 
 
 class SettingsDialog(QDialog):
-    """Edits a draft and says what is to become of it; it writes profiles, and leaves the settings file to its owner.
+    """Edits a draft, and profiles; the settings file is written by its owner.
 
     ``drafted`` carries the configuration whenever it changes and is allowed, for the preview, ``save_asked`` whether the rig is to
-    be started again. ``finished`` comes at the end. Whoever leaves with changes by Esc, which is meant for the field
-    as often, is asked; Cancel and the window's cross ask nobody.
+    be started again. Esc with unsaved changes asks before it closes, since it is often meant for a field; Cancel does not ask.
 
     Parameters
     ----------
@@ -1030,9 +342,7 @@ class SettingsDialog(QDialog):
         self.reset_all, self.cancel = QPushButton(tr("Reset all")), QPushButton(tr("Cancel"))
         self.save, self.save_and_restart = QPushButton(tr("Save")), QPushButton(tr("Save, and start the rig again"))
         self._items: dict[str, QTreeWidgetItem] = {}
-        self._search_soon = QTimer(self)
-        self._search_soon.setSingleShot(True)
-        self._search_soon.setInterval(_SEARCH_AFTER_MS)
+        self._search_soon = QTimer(self, singleShot=True, interval=_SEARCH_AFTER_MS)
         self.setObjectName("settings")
         self.setWindowTitle(tr("LumenPilot \N{EM DASH} settings"))
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -1055,10 +365,10 @@ class SettingsDialog(QDialog):
         item = self._items.get(section.key)
         if item is not None and self.tree.currentItem() is not item:
             self.tree.setCurrentItem(item)
-        self._renew()
+        self._update()
 
     def stand_beside(self, window: QWidget, kept_clear: QWidget) -> None:
-        """At the right edge of a window, so that its picture stays in sight as far as can be, and `kept_clear` (STOP) wholly."""
+        """Place it at the right edge of a window, so that most of the picture and all of `kept_clear` (STOP) stay in sight."""
         frame = window.frameGeometry()
         width = max(_LEAST[0], min(_SIZE[0], round(frame.width() * _MOST_SHARE)))
         top = frame.top() + _MARGIN_PX
@@ -1089,22 +399,22 @@ class SettingsDialog(QDialog):
 
     def follow_theme(self) -> None:
         self.status.setText("")  # a link keeps the colour that it was laid out with
-        self._renew()
+        self._update()
 
     def lock(self, why: str) -> None:
-        """Nothing can be changed for this reason; empty: it can be again."""
+        """Allow no changes for this reason; empty: allow them."""
         if why != self._locked:
             self._locked = why
             for widget in (self.page, self.profile_row, self.reset_all):
                 widget.setEnabled(not why)
-            self._renew()
+            self._update()
 
     def show_rig(self, running: Config) -> None:
         """What the rig file of the running configuration keeps is shown as it is in force, and is not changed here."""
         if running is not self._running:
             self._running = running
             self.draft.show_rig(running)
-            self._renew()
+            self._update()
 
     # ---- edits
 
@@ -1112,12 +422,8 @@ class SettingsDialog(QDialog):
         self.draft.set_entry(key, entry)
         self._changed()
 
-    def _on_reset(self, key: str) -> None:
-        self.draft.reset([key])
-        self._changed()
-
-    def _on_section_reset(self, section: Section) -> None:
-        self.draft.reset_section(section)
+    def _on_reset(self, keys: list[str]) -> None:
+        self.draft.reset(keys)
         self._changed()
 
     def _ask_reset_all(self) -> None:
@@ -1128,14 +434,14 @@ class SettingsDialog(QDialog):
         self._changed()
 
     def _changed(self) -> None:
-        self._renew()
+        self._update()
         self.profile_row.show_current(self._profiles.matching(self.draft.config) if self.draft.config is not None else None)
         if self.draft.config is not None:
             self.drafted.emit(self.draft.config)
 
-    def _renew(self) -> None:
+    def _update(self) -> None:
         """Fields, marks, the line below and the buttons, as the draft is."""
-        self.page.renew()
+        self.page.update_fields()
         for section in schema().walk():
             if section.key:
                 count, is_wrong = self.draft.changed_in(section), self.draft.is_wrong_in(section)
@@ -1260,7 +566,7 @@ class SettingsDialog(QDialog):
             self._on_escape()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        self.reject()  # asks nobody: what refuses to be closed would keep the program from ending, too
+        self.reject()  # without a question, which would keep the program from ending, too
         super().closeEvent(event)
 
     def ask_to_leave(self) -> None:
@@ -1284,7 +590,7 @@ class SettingsDialog(QDialog):
             self.ask_to_leave()
 
     def _show_question(self, on: bool) -> None:
-        """In place of the state and of Cancel: the question has one of its own, which goes on with the dialog."""
+        """In place of the state and of Cancel: the question has a Cancel of its own, which keeps the dialog open."""
         self.question.setVisible(on)
         for part in (self.status, self.reset_all, self.cancel):
             part.setVisible(not on)
@@ -1297,7 +603,6 @@ class SettingsDialog(QDialog):
         self.tree.itemSelectionChanged.connect(self._on_tree)
         self.page.edited.connect(self._on_edited)
         self.page.reset_asked.connect(self._on_reset)
-        self.page.section_reset_asked.connect(self._on_section_reset)
         self.profile_row.chosen.connect(self._choose_profile)
         self.profile_row.save_asked.connect(self._ask_save_profile)
         self.profile_row.delete_asked.connect(self._delete_profile)

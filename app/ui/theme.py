@@ -1,17 +1,13 @@
-"""Sizes, fonts and style sheet of every window, and which of the two colour schemes is in use; the colours are in ``palette``.
-
-A change of scheme reaches everything that is open: painters look their colours up, style sheets set by ``set_sheet`` are set anew,
-and a widget that keeps something made of colours (a pixmap, a plot's pens, rich text) has a method ``follow_theme`` for it.
-
-The colours of every window and overlay picture, as names. No Qt here, so that pictures can be drawn without a window.
+"""Colours, sizes, fonts and style sheet of every window, in two schemes: dark and light.
 
 State and overlay colours come from the palette of Okabe and Ito (2008), which stays distinct under every common colour blindness;
-states are told by letter and shape as well. Text colours keep a contrast of at least 4.5 : 1 on the panels (tested).
+states have a letter and a shape as well. Text has a contrast of at least 4.5 : 1 on the panels (tested). A colour keeps its hue and
+its meaning in both schemes; in the light one it is dark enough to be read on white, and what is written on it (``INK``) is white.
 
-There are two schemes, dark and light. A colour keeps its hue and its meaning in both; in the light one it is dark enough to be read
-on white, and what is written on it (``INK``) is white. The names of this module (``palette.TEXT``) are those of the scheme in use:
-look them up when you paint, or keep a role's name and ask ``of``. What lies over a camera picture does not depend on the windows:
-its colours are ``ON_PICTURE``.
+Module attributes such as ``theme.TEXT`` are those of the scheme in use: read them when painting, or keep a role's name and call
+``of``. What is drawn over a camera picture has the colours ``ON_PICTURE`` in both schemes. A change of scheme reaches everything
+that is open: style sheets set by ``set_sheet`` are set again, and widgets that keep something made of colours (a pixmap, a plot's
+pens, rich text) have a method ``follow_theme``.
 """
 
 from __future__ import annotations
@@ -120,49 +116,24 @@ STATE_COLOUR: dict[PoseState | None, str] = {
     None: DARK.TEXT_FAINT,
 }
 
-# The scheme in use; ``use`` changes them all.
-WINDOW = DARK.WINDOW
-PANEL = DARK.PANEL
-RAISED = DARK.RAISED
-LINE = DARK.LINE
-TEXT = DARK.TEXT
-TEXT_DIM = DARK.TEXT_DIM
-TEXT_FAINT = DARK.TEXT_FAINT
-INK = DARK.INK
-FAULT = DARK.FAULT
-ORANGE = DARK.ORANGE
-SKY = DARK.SKY
-GREEN = DARK.GREEN
-YELLOW = DARK.YELLOW
-VERMILLION = DARK.VERMILLION
-PURPLE = DARK.PURPLE
-VESSEL = DARK.VESSEL
-ROBOT = DARK.ROBOT
-ROBOT_VECTOR = DARK.ROBOT_VECTOR
-VESSEL_VECTOR = DARK.VESSEL_VECTOR
-HEAD = DARK.HEAD
-NEAREST = DARK.NEAREST
-THETA = DARK.THETA
-D_HEAD = DARK.D_HEAD
-D_TAIL = DARK.D_TAIL
-ROUTE = DARK.ROUTE
-GHOST = DARK.GHOST
-TARGET = DARK.TARGET
-ALLOWED = DARK.ALLOWED
-SIM = DARK.SIM
-LIVE = DARK.LIVE
-PLAYBACK = DARK.PLAYBACK
+# The colours of the scheme in use; ``use_scheme`` sets them all.
+WINDOW = PANEL = RAISED = LINE = TEXT = TEXT_DIM = TEXT_FAINT = INK = FAULT = ""
+ORANGE = SKY = GREEN = YELLOW = VERMILLION = PURPLE = SIM = LIVE = PLAYBACK = ""
+VESSEL = ROBOT = ROBOT_VECTOR = VESSEL_VECTOR = HEAD = NEAREST = THETA = D_HEAD = D_TAIL = ROUTE = GHOST = TARGET = ALLOWED = ""
 
 _ROLES = frozenset(field.name for field in fields(Scheme))
 _current = DARK
 
 
-def use(scheme: Scheme) -> None:
-    """Take another scheme for all windows. ``theme.apply_theme`` does it, and has everything painted anew."""
+def use_scheme(scheme: Scheme) -> None:
+    """Set the colours of all windows; ``apply_theme`` calls it, and has everything painted again."""
     global _current  # noqa: PLW0603 - there is one screen, and one scheme for it
     _current = scheme
     globals().update(asdict(scheme))
     STATE_COLOUR[None] = scheme.TEXT_FAINT
+
+
+use_scheme(DARK)
 
 
 def current() -> Scheme:
@@ -296,7 +267,7 @@ def apply_theme(application: QApplication, theme: str = Theme.DARK) -> None:
         application.setFont(font(Size.BODY))
         hints.colorSchemeChanged.connect(lambda _scheme: _follow_desktop(application))
     application.setProperty(_CHOSEN, str(theme))
-    _take_scheme(application, _scheme_of(Theme(theme), hints.colorScheme()))
+    _apply_scheme(application, _scheme_of(Theme(theme), hints.colorScheme()))
 
 
 def chosen(application: QApplication) -> str:
@@ -317,11 +288,11 @@ def _scheme_of(theme: Theme, desktop: Qt.ColorScheme) -> Scheme:
 
 def _follow_desktop(application: QApplication) -> None:
     if application.property(_CHOSEN) == Theme.SYSTEM:
-        _take_scheme(application, _scheme_of(Theme.SYSTEM, application.styleHints().colorScheme()))
+        _apply_scheme(application, _scheme_of(Theme.SYSTEM, application.styleHints().colorScheme()))
 
 
-def _take_scheme(application: QApplication, scheme: Scheme) -> None:
-    use(scheme)
+def _apply_scheme(application: QApplication, scheme: Scheme) -> None:
+    use_scheme(scheme)
     application.setPalette(_palette())
     application.setStyleSheet(sheet(_STYLE_SHEET))
     for widget in application.allWidgets():

@@ -123,7 +123,7 @@ def make_window(qtbot: QtBot, bench: FakeBench, engines: list[FakeEngine]) -> It
     yield make
     for window in windows:
         window.close()
-        assert not window._thread.isRunning()
+        assert not window.rig.engine.isRunning()
 
 
 @pytest.fixture

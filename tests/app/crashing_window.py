@@ -39,7 +39,7 @@ def main() -> None:
     config = Config.model_validate({"record": {"folder": str(folder / "sessions"), "ring_s": 0}})
     engine = FakeEngine()
     window = OperatorWindow(config, lambda _config: engine, RigKind.SIM)
-    watch = CrashWatch(folder / "crashes", lambda: window.config.model_dump(mode="json"))
+    watch = CrashWatch(folder / "crashes", lambda: window.rig.config.model_dump(mode="json"))
     watch.install()
     side = WindowServices(window, folder, watch)
     window.show()

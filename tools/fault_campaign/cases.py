@@ -1608,7 +1608,7 @@ def bring_to(window: OperatorWindow, wanted: Mode) -> bool:
     """Do what an operator does to get there: servos on (the twin's are), destination, arm, deadman, hand over."""
     from app.ui.texts import OperatorStep
 
-    desk = window.desk
+    desk = window.controls
 
     def is_in(*modes: Mode) -> bool:
         return desk.view is not None and desk.view.mode in modes
@@ -1619,23 +1619,23 @@ def bring_to(window: OperatorWindow, wanted: Mode) -> bool:
     until_s = time.monotonic() + _PATIENCE_S
     while not is_in(wanted) and time.monotonic() < until_s:
         if is_in(Mode.ADVISORY) and wanted is not Mode.ADVISORY:
-            desk.hold_deadman(False)
+            desk.deadman.hold("mouse", False)
             if desk.view is not None and desk.view.latched is not None:
-                desk.take(OperatorStep.ACKNOWLEDGE)
+                desk.ask_step(OperatorStep.ACKNOWLEDGE)
             if until(lambda: desk.view is not None and not desk.view.against_arming, 5.0):
-                desk.take(OperatorStep.ARM)
+                desk.ask_step(OperatorStep.ARM)
         elif is_in(Mode.ARMED, Mode.HOLD) and wanted is Mode.AUTONOMOUS:
-            desk.hold_deadman(True)
+            desk.deadman.hold("mouse", True)
             if until(lambda: desk.view is not None and not desk.view.against_hand_over and bool(desk.view.deadman), 2.0):
-                desk.take(OperatorStep.HAND_OVER)
+                desk.ask_step(OperatorStep.HAND_OVER)
         until(lambda: is_in(wanted), 0.5)
     return is_in(wanted)
 
 
 def record(window: OperatorWindow) -> bool:
     """Begin to record; True when the first frames are written."""
-    window._recorder.toggle()
-    return until(lambda: window._recorder.status.frames > 3)
+    window.recorder.toggle()
+    return until(lambda: window.recorder.status.frames > 3)
 
 
 def run_and_close(folder: Path, wanted: str) -> int:
@@ -1666,17 +1666,17 @@ def worker_dies(kit: Kit) -> Observation:
         problems += [] if record(window) else ["nothing was recorded"]
         problems += [] if bring_to(window, Mode.AUTONOMOUS) else ["the program did not get to drive"]
         made[-1].broken = True
-        problems += [] if until(lambda: window._phase is EnginePhase.FAULT) else ["the window does not tell"]
+        problems += [] if until(lambda: window.rig.phase is EnginePhase.FAULT) else ["the window does not tell"]
         notice = window.panels.notice
         shown = notice.isVisibleTo(window)
         problems += [] if shown else ["no notice is shown"]
-        problems += [] if window.pilot is None else ["there is still somebody who drives"]
+        problems += [] if window.rig.pilot is None else ["there is still somebody who drives"]
         made[-1].broken = False
-        folder = window._recorder.status.folder
-        window.restart()
-        again = until(lambda: window._phase is EnginePhase.RUNNING and window.desk.view is not None)
+        folder = window.recorder.status.folder
+        window.rig.restart()
+        again = until(lambda: window.rig.phase is EnginePhase.RUNNING and window.controls.view is not None)
         problems += [] if again else ["it could not be started again"]
-        view = window.desk.view
+        view = window.controls.view
         latched = view.latched.cause if view is not None and view.latched is not None else None
         problems += [] if latched is Cause.WORKER_DEAD else [f"after the new start {latched or 'nothing'} is latched"]
     finally:
@@ -1695,11 +1695,11 @@ def hung_window(kit: Kit) -> Observation:
     try:
         problems += [] if record(window) else ["nothing was recorded"]
         problems += [] if bring_to(window, Mode.AUTONOMOUS) else ["the program did not get to drive"]
-        folder = window._recorder.status.folder
+        folder = window.recorder.status.folder
         slept_s = time.monotonic()
         QTimer.singleShot(0, lambda: time.sleep(_SLEEP_S))
         until(lambda: time.monotonic() > slept_s + _SLEEP_S + 0.3)
-        view = window.desk.view
+        view = window.controls.view
         latched = view.latched.cause if view is not None and view.latched is not None else None
         problems += [] if latched is Cause.WINDOW_HUNG else [f"latched is {latched or 'nothing'}"]
         said = [line for line in window.panels.events.lines if ALERTS[Cause.WINDOW_HUNG].text in line]

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[3]
 PROGRAM = """
 import os, signal, sys, time
 from PySide6.QtCore import QTimer
-from app import operator_window
+from app.operator import window as operator_window
 from app.operator.window import OperatorWindow
 from app.ui.window_base import make_application, quit_on_signal
 from core.config.models import Config

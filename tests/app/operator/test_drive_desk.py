@@ -11,6 +11,7 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
+from tests.app.widgets.test_servo_widgets import bus
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.manual_drive import Motion
@@ -25,7 +26,6 @@ from core.devices import DeviceError, EndOfStream
 from hardware.rig import RigKind
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, until
-from tests.app.widgets.test_servo_widgets import bus
 
 Key = Qt.Key
 
@@ -69,7 +69,7 @@ def test_alerts_are_shown_logged_and_heard(
     running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heard: list[str] = []
-    monkeypatch.setattr(running.desk.sounds, "play", heard.append)
+    monkeypatch.setattr(running.controls.sounds, "play", heard.append)
     latched = Fault(Cause.TRACKING, "left off by 1.8 mm")
     engine.pilot.view = drive_view(mode=Mode.STOPPED, permitted=None, latched=latched, active=(latched,), servos_on=False)
     engine.pilot.alerts = [Alert(Cause.TRACKING, ALERTS[Cause.TRACKING], latched.detail, 0, "stop")]
@@ -101,7 +101,7 @@ def test_the_speed_by_hand_reaches_the_pilot_and_that_of_the_next_rig(
     until(qtbot, lambda: len(engines) == 1 and engines[0].pilot.speed == 1.0)
     window.panels.jog.speed_changed.emit(0.2)
     assert engines[0].pilot.speed == 0.2
-    window.restart()
+    window.rig.restart()
     until(qtbot, lambda: len(engines) == 2 and engines[1].pilot.speed == 0.2)
 
 
@@ -119,15 +119,15 @@ def test_what_a_rig_that_is_closed_still_says_is_nothing_of_the_next_ones(
     rigs = iter([engine])
     window = make_window(lambda _config: next(rigs, None) or FakeEngine(bench))
     window.start()
-    until(qtbot, lambda: window.desk.view is not None)
+    until(qtbot, lambda: window.controls.view is not None)
     heard: list[str] = []
     recorder = window.recorder
-    monkeypatch.setattr(recorder, "alert", lambda alert, _time_s: heard.append(alert.detail))
+    monkeypatch.setattr(recorder, "keep_alert", lambda alert, _time_s: heard.append(alert.detail))
     opened = recorder.open_rig
     monkeypatch.setattr(recorder, "open_rig", lambda *about: (heard.append("the next rig"), opened(*about)))
     engine.pilot.alerts = [Alert(Cause.TRACKING, ALERTS[Cause.TRACKING], "the last word")]
     try:
-        window.restart()
+        window.rig.restart()
         engine.pilot.alerts = [Alert(Cause.TRACKING, ALERTS[Cause.TRACKING], "while it is closed")]
         until(qtbot, lambda: not engine.pilot.alerts)
         assert heard == ["the last word", "the next rig"]
@@ -145,13 +145,13 @@ def test_the_keys_on_the_screen_work_wherever_those_of_the_keyboard_do(
     window.start()
     cap = window.panels.jog._caps[Motion.RETRACT]
     assert not cap.isEnabled()
-    until(qtbot, lambda: window.phase is EnginePhase.RUNNING and cap.isEnabled())
+    until(qtbot, lambda: window.rig.phase is EnginePhase.RUNNING and cap.isEnabled())
     assert window.panels.jog.toolTip() == ""
     engine.silent = False
     until(qtbot, lambda: window.shown_tick is not None)
     assert cap.isEnabled()
     engine.fail_with = DeviceError("gone")
-    until(qtbot, lambda: window.phase is EnginePhase.FAULT and not cap.isEnabled())
+    until(qtbot, lambda: window.rig.phase is EnginePhase.FAULT and not cap.isEnabled())
     assert window.panels.jog.toolTip() == "Fault"
 
 
@@ -184,7 +184,7 @@ def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBen
     qtbot.keyClick(window, Key.Key_W)
     qtbot.keyClick(window, Key.Key_Space)
     qtbot.wait(120)
-    assert window.desk.view is None
+    assert window.controls.view is None
 
 
 # ---- once the pilot is gone
@@ -195,15 +195,17 @@ def fails(_window: OperatorWindow, engine: FakeEngine) -> None:
 
 
 def is_opened_anew(window: OperatorWindow, _engine: FakeEngine) -> None:
-    window.restart()
+    window.rig.restart()
 
 
 def is_another_one(window: OperatorWindow, _engine: FakeEngine) -> None:
-    window.use_config(window.config.model_copy(update={"rig": window.config.rig.model_copy(update={"name": "bench 2"})}))
+    window.rig.use_config(
+        window.rig.config.model_copy(update={"rig": window.rig.config.rig.model_copy(update={"name": "bench 2"})})
+    )
 
 
 def is_lent(window: OperatorWindow, _engine: FakeEngine) -> None:
-    window.lend("the wizard has camera and servos")
+    window.rig.lend("the wizard has camera and servos")
 
 
 WAITING, CLOSED = ("waiting for the rig", "Waiting for the rig."), ("no rig is open", "No rig is open. F5 opens it again.")
@@ -243,7 +245,7 @@ def test_nothing_says_who_drives_once_the_rig_is_over(
         assert not any(part.isEnabled() for part in (panels.mode_bar.main, panels.mode_bar.second, panels.mode_bar.deadman))
         assert not panels.mode_bar.deadman.is_lit
         assert panels.servos.bus_text.startswith("no servo bus")
-        assert window.desk.view is None
+        assert window.controls.view is None
     finally:
         may_open.set()
 
@@ -255,7 +257,7 @@ def test_a_recording_that_is_over_still_has_no_robot(make_window: MakeWindow, be
     window.start()
     until(qtbot, lambda: window.panels.mode.who == "pictures only")
     engine.fail_with = EndOfStream("the last picture was shown")
-    until(qtbot, lambda: window.phase is EnginePhase.ENDED)
+    until(qtbot, lambda: window.rig.phase is EnginePhase.ENDED)
     qtbot.wait(120)  # two looks
     assert window.panels.mode.who == "pictures only"
 

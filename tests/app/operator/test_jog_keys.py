@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QLineEdit, QMenu, QPlai
 from pytestqt.qtbot import QtBot
 
 from app.operator.manual_drive import KEYS, PERIOD_MS, REPEAT_MS, DeadmanKey, JogKeys, Motion
-from app.settings.dialog import NumberEdit
+from app.settings.fields import NumberEdit
 from core.config.safety import SafetyConfig
 from core.control.motion import AT_REST, Jog
 

@@ -90,7 +90,7 @@ def test_marked_look_stays_marked_when_it_is_chosen_again(window: OperatorWindow
 def test_nothing_is_broken_off_for_a_look(
     window: OperatorWindow, opened: list[TwinConfig], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(window, "at_work", lambda: "the robot is armed: disarm it first")
+    monkeypatch.setattr(window.rig, "work_in_progress", lambda: "the robot is armed: disarm it first")
     _entries(window)["Turbid gel"].trigger()
     assert len(opened) == 1
     assert window.panels.toast.text() == "The look stays as it is: the robot is armed: disarm it first"
@@ -103,12 +103,12 @@ def test_unknown_look_of_a_configuration_is_not_marked(make_window: MakeWindow, 
 
 
 def test_nothing_can_be_chosen_while_another_rig_is_open(window: OperatorWindow, opened: list[TwinConfig], qtbot: QtBot) -> None:
-    twin = window.config
+    twin = window.rig.config
     rig = twin.rig.model_copy(update={"name": "camera", "camera": "webcam", "robot": "none"})
-    window.use_config(twin.model_copy(update={"rig": rig}))
+    window.rig.use_config(twin.model_copy(update={"rig": rig}))
     assert not any(action.isEnabled() for action in _entries(window).values())
     qtbot.keyClick(window, Qt.Key.Key_L)
-    window.use_config(twin)
+    window.rig.use_config(twin)
     assert all(action.isEnabled() for action in _entries(window).values())
     until(qtbot, lambda: window.shown_tick is not None)
     assert {other.look for other in opened} == {None}

@@ -192,10 +192,10 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     qtbot.keyPress(window, Key.Key_D)
     assert window.panels.picker is not None
     window.panels.picker.chosen.emit("tree")
-    assert window._phase is EnginePhase.STARTING
+    assert window.rig.phase is EnginePhase.STARTING
     assert not window.panels.live._picture.isVisible(), "the old world is not shown as the new one"
     assert window._target is None
-    assert window.desk.jog.held == frozenset()
+    assert window.controls.jog.held == frozenset()
     until(qtbot, lambda: window.shown_tick is not None)
     assert opened == ["s_curve", "tree"]
     assert engines[0].closed.is_set()
@@ -216,7 +216,7 @@ def test_window_stays_alive_while_a_phantom_is_opened(make_window: MakeWindow, b
     window = make_window(open_slowly)
     turns: list[EnginePhase] = []
     timer = QTimer()
-    timer.timeout.connect(lambda: turns.append(window._phase))
+    timer.timeout.connect(lambda: turns.append(window.rig.phase))
     timer.timeout.connect(lambda: turned_often.set() if len(turns) >= 20 else None)
     timer.start(1)
     window.start()
@@ -303,7 +303,7 @@ def test_no_snapshot_of_a_picture_that_is_not_live(
     engine.silent = False
     until(qtbot, lambda: running.panels.badge.title != "No new picture")
     engine.fail_with = EndOfStream("the end")
-    until(qtbot, lambda: running._phase is EnginePhase.ENDED)
+    until(qtbot, lambda: running.rig.phase is EnginePhase.ENDED)
     qtbot.keyClick(running, Key.Key_P)
     assert running.panels.toast.text() == "No snapshot: the picture is not live"
     assert not (tmp_path / "shots").exists()
@@ -316,8 +316,8 @@ def test_nothing_is_held_any_more_after_the_end(
     qtbot.keyPress(running, Key.Key_D)
     qtbot.keyPress(running, Key.Key_W)
     engine.fail_with = error
-    until(qtbot, lambda: running._phase in (EnginePhase.ENDED, EnginePhase.FAULT))
-    assert running.desk.jog.held == frozenset()
+    until(qtbot, lambda: running.rig.phase in (EnginePhase.ENDED, EnginePhase.FAULT))
+    assert running.controls.jog.held == frozenset()
     assert running.panels.jog.readout.startswith("bend –")
 
 
@@ -341,7 +341,7 @@ def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench
     window.panels.show_tick = spy  # type: ignore[method-assign]
     window._pace._due_s = time.monotonic() + 60.0  # no picture's time comes before the end
     window.start()
-    until(qtbot, lambda: window._phase is EnginePhase.ENDED)
+    until(qtbot, lambda: window.rig.phase is EnginePhase.ENDED)
     assert shown == [3]
     assert window.panels.live._picture.isVisible()
 

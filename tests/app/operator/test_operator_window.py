@@ -49,14 +49,14 @@ def test_window_is_there_at_once_and_says_what_it_waits_for(make_window: MakeWin
     gate.set()
     until(qtbot, lambda: window.shown_tick is not None)
     assert opened == [True]
-    assert not window.panels.notice.isVisible()
+    until(qtbot, lambda: not window.panels.notice.isVisible())
 
 
 def test_stop_before_the_first_rig_is_opened_is_kept_for_it(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
     engine = FakeEngine(bench)
     window = make_window(lambda _config: engine)
     window.start()
-    window.desk.stop()
+    window.controls.stop()
     until(qtbot, lambda: window.shown_tick is not None)
     assert engine.pilot.acts[0] is Act.STOP
 
@@ -66,7 +66,7 @@ def test_stop_in_the_moment_in_which_a_rig_is_opened_is_not_lost(
 ) -> None:
     found = iter([None, engine.pilot])
     monkeypatch.setattr(EngineThread, "pilot", property(lambda _self: next(found)))
-    running.desk.ask(Act.STOP)
+    running.controls.ask(Act.STOP)
     monkeypatch.undo()
     assert engine.pilot.acts == [Act.STOP]
 
@@ -80,11 +80,11 @@ def test_a_rig_that_is_lent_before_it_was_opened_stays_lent(make_window: MakeWin
 
     window = make_window(open_engine)
     window.start()
-    window.lend("the rig is being set up")
+    window.rig.lend("the rig is being set up")
     until(qtbot, lambda: "being set up" in window.panels.notice.text)
     qtbot.wait(200)  # longer than the window takes to paint itself
     assert opened == []
-    window.use_config(window.config)
+    window.rig.use_config(window.rig.config)
     until(qtbot, lambda: window.shown_tick is not None)
     assert len(opened) == 1
 
@@ -98,8 +98,8 @@ def test_a_rig_that_is_changed_before_it_was_opened_is_opened_once(make_window: 
 
     window = make_window(open_engine)
     window.start()
-    twin = window.config.twin.model_copy(update={"phantom": "y_branch"})
-    window.use_config(window.config.model_copy(update={"twin": twin}))
+    twin = window.rig.config.twin.model_copy(update={"phantom": "y_branch"})
+    window.rig.use_config(window.rig.config.model_copy(update={"twin": twin}))
     until(qtbot, lambda: window.shown_tick is not None)
     qtbot.wait(200)  # longer than the window takes to paint itself
     assert opened == ["y_branch"]
@@ -132,7 +132,7 @@ def test_millimetres_are_those_of_the_calibrated_rig(
     until(qtbot, lambda: "mm" in window.panels.bars.texts[0])
     until(qtbot, lambda: "mm" in window.panels.clearance.text)
     assert window.panels.clearance._pixels_per_mm == pytest.approx(2.5, rel=0.01)
-    window.use_config(config)
+    window.rig.use_config(config)
     until(qtbot, lambda: "px" in window.panels.clearance.text and "mm" not in window.panels.clearance.text)
     assert "mm" not in window.panels.bars.texts[0], "nobody has measured any, beside each other neither"
 
@@ -178,15 +178,15 @@ def test_fault_is_one_visible_line_and_f5_starts_again(make_window: MakeWindow, 
 def test_f5_breaks_no_armed_rig_off(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, mode: Mode) -> None:
     """Once more it is free as soon as the rig shows nothing new: F5 is the way out then."""
     engine.pilot.view = DriveView(0.0, mode=mode)
-    until(qtbot, lambda: running.desk.view is not None and running.desk.view.mode is mode)
-    orders = running.orders
+    until(qtbot, lambda: running.controls.view is not None and running.controls.view.mode is mode)
+    orders = running.rig.orders
     qtbot.keyClick(running, Key.Key_F5)
     assert "The rig stays as it is: the robot is armed: disarm it first" in running.panels.toast.text()
-    assert (running.orders, running.phase) == (orders, EnginePhase.RUNNING)
+    assert (running.rig.orders, running.rig.phase) == (orders, EnginePhase.RUNNING)
     engine.silent = True
     until(qtbot, lambda: running.panels.badge.title == "No new picture")
     qtbot.keyClick(running, Key.Key_F5)
-    assert running.orders == orders + 1
+    assert running.rig.orders == orders + 1
 
 
 def test_fault_while_running_blanks_everything(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -332,9 +332,9 @@ def test_it_can_be_closed_at_any_moment(
     if moment in ("while running", "while switching", "while a key is held", "while a snapshot is written", "in full screen"):
         until(qtbot, lambda: window.shown_tick is not None)
     if moment == "before the first picture":
-        until(qtbot, lambda: window._phase is EnginePhase.RUNNING)
+        until(qtbot, lambda: window.rig.phase is EnginePhase.RUNNING)
     if moment == "after a fault":
-        until(qtbot, lambda: window._phase is EnginePhase.FAULT)
+        until(qtbot, lambda: window.rig.phase is EnginePhase.FAULT)
     if moment == "while switching":
         assert window.panels.picker is not None
         window.panels.picker.roll()
@@ -345,7 +345,7 @@ def test_it_can_be_closed_at_any_moment(
     if moment == "in full screen":
         qtbot.keyClick(window, Key.Key_F11)
     assert window.close()
-    assert not window._thread.isRunning()
+    assert not window.rig.engine.isRunning()
     assert not window.isVisible()
     assert all(engine.closed.is_set() for engine in engines)
     if moment == "while a key is held":

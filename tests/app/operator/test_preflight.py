@@ -57,16 +57,16 @@ def done(desk: PreflightModel, qtbot: QtBot) -> None:
 def test_arming_waits_for_the_checks_and_then_is_granted_for_some_minutes(qtbot: QtBot) -> None:
     bench = Bench()
     desk = bench.desk(says(GOOD, LOW))
-    assert not desk.may_take(OperatorStep.ARM)
+    assert not desk.may_ask(OperatorStep.ARM)
     assert desk.preflight.is_running
     assert "some seconds" in bench.asked[0]
     done(desk, qtbot)
     assert desk.preflight.headline == "Ready: 3 of 4 checks good, 1 to note"
-    assert desk.may_take(OperatorStep.ARM)
+    assert desk.may_ask(OperatorStep.ARM)
     bench.now_s += KEPT_S - 1.0
-    assert desk.may_take(OperatorStep.ARM)
+    assert desk.may_ask(OperatorStep.ARM)
     bench.now_s += 2.0
-    assert not desk.may_take(OperatorStep.ARM), "too long ago"
+    assert not desk.may_ask(OperatorStep.ARM), "too long ago"
     assert desk.preflight.is_running
     desk.close()
 
@@ -76,10 +76,10 @@ def test_a_red_check_refuses_with_its_reason_and_what_to_do(qtbot: QtBot) -> Non
     desk = bench.desk(says(GOOD, BAD))
     desk.begin()
     done(desk, qtbot)
-    assert not desk.may_take(OperatorStep.ARM)
+    assert not desk.may_ask(OperatorStep.ARM)
     assert bench.asked == ["Not armed. Self-test: it gives no pose. What to do: git checkout -- resources/models"]
     for step in OperatorStep:
-        assert desk.may_take(step) is (step is not OperatorStep.ARM)
+        assert desk.may_ask(step) is (step is not OperatorStep.ARM)
 
 
 def test_another_model_needs_new_checks_and_another_phantom_does_not(qtbot: QtBot) -> None:
@@ -96,7 +96,7 @@ def test_another_model_needs_new_checks_and_another_phantom_does_not(qtbot: QtBo
 
 def test_without_a_robot_nothing_is_in_the_way() -> None:
     bench = Bench(view=None)
-    assert bench.desk(says(BAD)).may_take(OperatorStep.ARM), "the pilot is not there to refuse; the window says so itself"
+    assert bench.desk(says(BAD)).may_ask(OperatorStep.ARM), "the pilot is not there to refuse; the window says so itself"
     assert bench.asked == []
 
 
@@ -114,7 +114,7 @@ def test_checks_that_cannot_be_made_are_no_good_checks(command: list[str], why: 
     desk.begin()
     done(desk, qtbot)
     assert why in desk.preflight.headline
-    assert not desk.may_take(OperatorStep.ARM)
+    assert not desk.may_ask(OperatorStep.ARM)
     desk.close()
 
 
@@ -174,7 +174,7 @@ def test_the_list_that_opens_by_itself_does_not_lie_over_stop(running: OperatorW
     running.resize(*size)
     qtbot.wait(30)
     stop = running.panels.mode_bar.stop
-    desk = PreflightModel(lambda: running.config, lambda: running.desk.view, running, command=says(GOOD))
+    desk = PreflightModel(lambda: running.rig.config, lambda: running.controls.view, running, command=says(GOOD))
     shown = PreflightList(desk, running, stop)
     shown.open_list()
     with_title = shown.geometry().adjusted(0, -30, 0, 0)
@@ -187,15 +187,15 @@ def test_the_list_that_opens_by_itself_does_not_lie_over_stop(running: OperatorW
 def test_in_the_window_f6_reaches_the_pilot_only_after_the_checks(
     running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
 ) -> None:
-    desk = PreflightModel(lambda: running.config, lambda: running.desk.view, running, command=says(GOOD))
-    running.may_take = desk.may_take
-    until(qtbot, lambda: running.desk.view is not None)
-    running.take(OperatorStep.ARM)
+    desk = PreflightModel(lambda: running.rig.config, lambda: running.controls.view, running, command=says(GOOD))
+    running.rig.add_guard(desk.may_ask)
+    until(qtbot, lambda: running.controls.view is not None)
+    running.ask_step(OperatorStep.ARM)
     assert Act.ARM not in engine.pilot.acts
     done(desk, qtbot)
-    running.take(OperatorStep.ARM)
+    running.ask_step(OperatorStep.ARM)
     assert engine.pilot.acts[-1] is Act.ARM
-    running.desk.stop()
+    running.controls.stop()
     assert engine.pilot.acts[-1] is Act.STOP
     desk.close()
 

@@ -36,13 +36,13 @@ def test_one_key_begins_and_ends_a_session(running: OperatorWindow, engine: Fake
     bar = running.panels.record_bar
     assert bar.text == "Record F9"
     qtbot.keyClick(running, Key.Key_F9)
-    until(qtbot, lambda: running._recorder.status.frames >= 5)
+    until(qtbot, lambda: running.recorder.status.frames >= 5)
     until(qtbot, lambda: bar.accessibleName() == "Recording")
     running.panels.live.clicked.emit(500.0, 280.0)
     engine.pilot.alerts = [Alert(Cause.DEADMAN, ALERTS[Cause.DEADMAN])]
     until(qtbot, lambda: not engine.pilot.alerts)
     qtbot.keyClick(running, Key.Key_F9)
-    until(qtbot, lambda: running._recorder.status.saved is not None and bar.accessibleName() == "Record")
+    until(qtbot, lambda: running.recorder.status.saved is not None and bar.accessibleName() == "Record")
     (session,) = sessions(tmp_path / "sessions")
     reader = SessionReader(session)
     assert reader.wait(10.0)
@@ -61,7 +61,7 @@ def test_one_key_begins_and_ends_a_session(running: OperatorWindow, engine: Fake
 
 def test_closing_the_window_ends_the_session_properly(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
     running.panels.record_bar.clicked.emit()
-    until(qtbot, lambda: running._recorder.status.frames >= 3)
+    until(qtbot, lambda: running.recorder.status.frames >= 3)
     running.close()
     (session,) = sessions(tmp_path / "sessions")
     reader = SessionReader(session)
@@ -149,12 +149,12 @@ def test_nothing_to_save_is_said(running: OperatorWindow, qtbot: QtBot) -> None:
 
 def test_the_key_of_another_phantom_does_not_end_a_recording(running: OperatorWindow, qtbot: QtBot) -> None:
     """It lies among those that drive."""
-    before = running.config.twin.phantom
+    before = running.rig.config.twin.phantom
     qtbot.keyClick(running, Key.Key_F9)
     until(qtbot, lambda: running.recorder.status.recording)
     assert running.panels.picker is not None
     running.panels.picker.chosen.emit("y_branch")
-    assert running.config.twin.phantom == before
+    assert running.rig.config.twin.phantom == before
     assert "The phantom stays as it is: a session is being recorded" in running.panels.toast.text()
     assert running.recorder.status.recording
     qtbot.keyClick(running, Key.Key_F9)
@@ -163,11 +163,11 @@ def test_the_key_of_another_phantom_does_not_end_a_recording(running: OperatorWi
 def test_nor_does_f5(running: OperatorWindow, qtbot: QtBot) -> None:
     qtbot.keyClick(running, Key.Key_F9)
     until(qtbot, lambda: running.recorder.status.recording)
-    orders = running.orders
+    orders = running.rig.orders
     qtbot.keyClick(running, Key.Key_F5)
     assert "The rig stays as it is: a session is being recorded" in running.panels.toast.text()
     assert running.recorder.status.recording
-    assert running.orders == orders
+    assert running.rig.orders == orders
     qtbot.keyClick(running, Key.Key_F9)
 
 
@@ -176,7 +176,7 @@ def test_a_folder_that_cannot_be_written_stops_the_recording_visibly(
 ) -> None:
     (tmp_path / "sessions").write_text("a file where the folder should be")
     qtbot.keyClick(running, Key.Key_F9)
-    until(qtbot, lambda: running._recorder.status.problem != "")
+    until(qtbot, lambda: running.recorder.status.problem != "")
     until(qtbot, lambda: "stopped" in running.panels.record_bar.text)
     assert "Recording stopped" in running.panels.toast.text()
     assert engine.pilot.faults[-1].cause is Cause.RECORDING_STOPPED
@@ -197,8 +197,8 @@ def test_after_a_fault_of_the_program_in_the_recorder_the_next_key_records_again
         assert said == "Recording stopped: unexpected RuntimeError: nobody has thought of this", "not that all is saved"
         assert any("Session saved" in line for line in running.panels.events.lines), "what was recorded until then"
     qtbot.keyClick(running, Key.Key_F9)
-    until(qtbot, lambda: running._recorder.status.frames >= 3)
-    assert running._recorder.status.problem == ""
+    until(qtbot, lambda: running.recorder.status.frames >= 3)
+    assert running.recorder.status.problem == ""
 
 
 def test_a_recorder_that_was_closed_does_not_live_again(running: OperatorWindow, tmp_path: Path) -> None:
@@ -212,7 +212,7 @@ def test_a_recorder_that_was_closed_does_not_live_again(running: OperatorWindow,
 
 
 def restart(window: OperatorWindow) -> None:
-    window.restart()
+    window.rig.restart()
 
 
 def choose_phantom(window: OperatorWindow) -> None:
@@ -233,13 +233,13 @@ def test_no_picture_of_the_old_rig_is_kept_as_one_of_the_new(
     until(qtbot, lambda: window.shown_tick is not None)
     kept: list[Tick] = []
     stopped: list[bool] = []
-    monkeypatch.setattr(window._thread, "on_tick", kept.append)
+    monkeypatch.setattr(window.rig.engine, "on_tick", kept.append)
 
     def open_rig(*_about: object) -> None:
         kept.clear()
         time.sleep(0.15)  # several pictures long
         assert kept == []
-        stopped.append(window.stop_opening())
+        stopped.append(window.rig.engine.stop_opening())
 
     monkeypatch.setattr(window.recorder, "open_rig", open_rig)
     again(window)

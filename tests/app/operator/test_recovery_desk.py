@@ -63,7 +63,7 @@ def test_a_cut_session_is_offered_with_its_loss_and_recovered_into_a_copy(
     copies: list[Path] = []
     desk.said.connect(lambda line, _: said.append(line))
     desk.recovered.connect(lambda copy, _words: copies.append(copy))
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
     # 12 frames 0.1 s apart, one row gone: its picture is there, but nobody knows what it showed
     assert "0.1 s are lost (rows: 1, pictures: 0)" in strip.text
@@ -84,15 +84,15 @@ def test_a_session_that_is_not_wanted_is_not_offered_again(
     desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path
 ) -> None:
     session = cut(tmp_path / "sessions")
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: "Never" in strip.answers, timeout=LONG_MS)
     strip.answers["Never"].click()
     assert Declined(tmp_path / "state" / "declined.json").names() == {session.name}
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: desk._work.pending == 0)
     qtbot.wait(50)
     assert not strip.isVisible()
-    desk.look(again=True)  # from the menu: it was declined, not forgotten
+    desk.search(again=True)  # from the menu: it was declined, not forgotten
     qtbot.waitUntil(lambda: strip.isVisible() and "Recover" in strip.answers, timeout=LONG_MS)
 
 
@@ -100,9 +100,9 @@ def test_what_is_found_after_closing_starts_nothing(
     desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path
 ) -> None:
     cut(tmp_path / "sessions")
-    desk.look()
+    desk.search()
     desk.close()
-    desk._on_looked("look", [CutSession(tmp_path, "cut", 1)])
+    desk._on_found("look", [CutSession(tmp_path, "cut", 1)])
     assert desk._child is None
     assert not strip.isVisible()
 
@@ -113,7 +113,7 @@ def test_not_now_goes_on_to_the_next_one_and_asks_again_at_the_next_start(
     first = cut(tmp_path / "sessions")
     time.sleep(1.1)  # sessions are named by the second
     second = cut(tmp_path / "sessions")
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: "(1 of 2)" in strip.text, timeout=LONG_MS)
     assert first.name in strip.text
     strip.answers["Not now"].click()
@@ -121,7 +121,7 @@ def test_not_now_goes_on_to_the_next_one_and_asks_again_at_the_next_start(
     assert second.name in strip.text
     strip.answers["\N{MULTIPLICATION SIGN}"].click()
     assert not Declined(tmp_path / "state" / "declined.json").names()
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: "(1 of 2)" in strip.text, timeout=LONG_MS)
 
 
@@ -132,7 +132,7 @@ def test_what_cannot_be_recovered_is_said_and_can_be_declined(
     (session / "frames.jsonl").write_bytes(b"\0" * 500)
     for video in session.glob("video_*"):
         video.write_bytes(b"\0" * 500)
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: "cannot be recovered" in strip.text, timeout=LONG_MS)
     assert "nothing left to recover" in strip.text
     strip.answers["Never"].click()
@@ -165,14 +165,14 @@ def test_a_process_that_says_nothing_is_no_word_against_the_session_and_can_be_t
     copies: list[Path] = []
     desk.recovered.connect(lambda copy, _words: copies.append(copy))
     if what == "recovering":
-        desk.look()
+        desk.search()
         qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
     with monkeypatch.context() as broken:
         broken.setattr(recording, "command_of", lambda *_: command)
         if what == "recovering":
             strip.answers["Recover"].click()
         else:
-            desk.look()
+            desk.search()
         qtbot.waitUntil(lambda: "Try again" in strip.answers, timeout=LONG_MS)
         assert told in strip.text
         assert session.name in strip.text
@@ -194,12 +194,12 @@ def test_a_session_that_could_not_be_looked_at_is_asked_for_again_at_the_next_st
     cut(tmp_path / "sessions")
     with monkeypatch.context() as broken:
         broken.setattr(recording, "command_of", lambda *_: ["/nowhere/python"])
-        desk.look()
+        desk.search()
         qtbot.waitUntil(lambda: "Not now" in strip.answers, timeout=LONG_MS)
         strip.answers["Not now"].click()
     assert not strip.isVisible()
     assert not Declined(tmp_path / "state" / "declined.json").names()
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
 
 
@@ -208,11 +208,11 @@ def test_a_folder_that_is_not_there_and_whole_sessions_offer_nothing(
 ) -> None:
     said: list[str] = []
     desk.said.connect(lambda line, _: said.append(line))
-    desk.look()
+    desk.search()
     qtbot.waitUntil(lambda: desk._work.pending == 0)
     whole = record(tmp_path / "sessions", (tick_of(index, 100.0 + index / 10) for index in range(3)))
     assert not is_being_written(whole)
-    desk.look(again=True)
+    desk.search(again=True)
     qtbot.waitUntil(lambda: bool(said))
     assert "No cut session" in said[0]
     assert strip.text == ""

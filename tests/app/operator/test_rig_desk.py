@@ -107,7 +107,7 @@ def test_no_camera_is_looked_for_while_the_robot_is_armed(
 
     monkeypatch.setattr("app.operator.rig_menu.find_devices", look)
     desk = _desk(window)
-    pilot = window.pilot
+    pilot = window.rig.pilot
     assert pilot is not None
     pilot.view = DriveView(0.0, mode=Mode.AUTONOMOUS)  # type: ignore[misc]
     until(qtbot, lambda: desk.hindrance() != "")
@@ -151,7 +151,7 @@ def test_a_rig_of_another_kind_is_opened_in_this_window(window: OperatorWindow, 
     assert panels.notice.text.startswith("Starting: real bench")
     until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
     qtbot.keyClick(window, Qt.Key.Key_R)  # another phantom
-    assert window.config.rig.name == "real bench"
+    assert window.rig.config.rig.name == "real bench"
     window.recorder.toggle()
     until(qtbot, lambda: window.recorder.status.recording)
     window.recorder.toggle()
@@ -170,9 +170,9 @@ def test_a_rig_of_another_kind_is_opened_in_this_window(window: OperatorWindow, 
 def test_the_banner_tells_when_a_rig_with_servos_takes_the_place_of_one_that_looks(window: OperatorWindow) -> None:
     looks = load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}})
     drives = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": "/dev/ttyUSB0"}})
-    window.use_config(looks)
+    window.rig.use_config(looks)
     assert "no servos" in window.panels.banner.toolTip()
-    window.use_config(drives)
+    window.rig.use_config(drives)
     assert "move real servos" in window.panels.banner.toolTip()
 
 
@@ -216,8 +216,8 @@ def test_a_rig_without_a_file_has_nowhere_to_keep_a_port(window: OperatorWindow)
     _desk(window).ask_port()
     assert "save one first" in window.panels.toast.text()
     window.choose_target(100.0, 100.0)
-    assert window._thread._engine is not None
-    assert window._thread._engine.targets[-1] == (100.0, 100.0)
+    assert window.rig.engine._engine is not None
+    assert window.rig.engine._engine.targets[-1] == (100.0, 100.0)
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,8 @@ def test_nobody_takes_the_rig_away_while_it_matters(
 ) -> None:
     write_rig(make_rig(load_config(), "bench 1", KNOWN))
     desk = _desk(window)
-    monkeypatch.setattr(type(window.desk), "view", property(lambda _self: view))
+    window.controls._timer.stop()
+    window.controls.view = view
     for action in (lambda: desk.choose("bench 1"), desk.new, desk.calibrate, lambda: desk.choose_camera(FoundCamera("twin", "t"))):
         action()
     assert why in desk.hindrance()
@@ -263,7 +264,7 @@ def test_the_wizard_gets_a_rig_that_is_closed_and_gives_it_back(window: Operator
 def test_an_order_in_between_gives_up_the_wizard_and_says_so(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
     desk = _desk(window)
     desk.new()
-    window.restart()  # F5, before the rig is closed
+    window.rig.restart()  # F5, before the rig is closed
     until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
     assert desk.wizard is None
     assert "ask for the wizard again" in window.panels.toast.text()
@@ -286,7 +287,7 @@ def test_a_rig_that_cannot_be_opened_leaves_the_wizard_its_turn(
 
     window = make_window(fail, load_config(overrides={"record": {"ring_s": 0, "folder": str(tmp_path / "sessions")}}))
     window.start()
-    until(qtbot, lambda: window.phase is EnginePhase.STARTING)
+    until(qtbot, lambda: window.rig.phase is EnginePhase.STARTING)
     desk = _desk(window)
     desk.new()
     go_on.set()
@@ -298,7 +299,7 @@ def test_a_rig_that_cannot_be_opened_leaves_the_wizard_its_turn(
 def test_what_was_opened_while_the_wizard_was_leaving_stays(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
     desk, go_on = _left_with_a_driver_that_hangs(window, qtbot)
     assert "Waiting for the wizard" in desk.hindrance()
-    window.restart()  # F5
+    window.rig.restart()  # F5
     until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
     go_on.set()
     until(qtbot, lambda: desk.hindrance() == "")

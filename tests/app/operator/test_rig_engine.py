@@ -9,8 +9,6 @@ from types import SimpleNamespace
 from typing import cast
 
 import pytest
-from tests.core.test_control import _Camera
-from tests.core.test_pipeline import DrawnNetwork, _draw_tapered, frame
 
 from app.operator import rig_engine
 from app.operator.rig_engine import EngineMaker, RigEngine
@@ -27,6 +25,8 @@ from core.perception.pipeline import Pipeline
 from core.types import Frame, Point, Reason, Refusal, Scene
 from hardware.rig import Rig, RigKind
 from hardware.twin.process import PrestartedProcesses
+from tests.core.control.test_control import _Camera
+from tests.core.perception.test_pipeline import DrawnNetwork, _draw_tapered, frame
 from tests.core.pilot_bench import Robot
 
 

@@ -118,10 +118,10 @@ def test_a_session_names_the_model_that_was_chosen_while_something_was_tried_out
     told: list[PerceptionConfig] = []
     monkeypatch.setattr(at.window.recorder, "open_rig", lambda config, _kind: told.append(config.perception))
     at.edit(D_ALLOW, "12")
-    config = at.window.config
+    config = at.window.rig.config
     segmentation = config.perception.segmentation.model_copy(update={"model": "own_1"})
     perception = config.perception.model_copy(update={"segmentation": segmentation})
-    at.window.use_config(config.model_copy(update={"perception": perception}))
+    at.window.rig.use_config(config.model_copy(update={"perception": perception}))
     until(qtbot, lambda: at.tried() == [12.0] and len(at.engines) == 2)
     assert [(one.segmentation.model, one.pose.d_allow_px) for one in told] == [("default", 12.0), ("own_1", 6.0), ("own_1", 12.0)]
     assert at.engine.perceptions[0].segmentation.model == "own_1"
@@ -162,7 +162,7 @@ def test_what_is_saved_stays_and_is_written(at: Bench) -> None:
     at.desk.dialog.save.click()
     assert at.desk.dialog is None
     assert at.tried()[-1] == 9.0
-    assert at.window.config.perception.pose.d_allow_px == 9.0
+    assert at.window.rig.config.perception.pose.d_allow_px == 9.0
     assert read_settings(at.path).config.perception.pose.d_allow_px == 9.0
     assert str(at.path) in at.window.panels.toast.text()
     assert len(at.configs) == 1, "no rig was opened anew"
@@ -185,7 +185,7 @@ def test_what_was_saved_without_a_restart_waits_for_the_next_one(at: Bench, qtbo
     at.edit("record.codec", "lossless")
     assert at.desk.dialog is not None
     at.desk.dialog.save.click()
-    assert at.window.config.advice.fast_mm_s == 8.0, "what is recorded says what acts"
+    assert at.window.rig.config.advice.fast_mm_s == 8.0, "what is recorded says what acts"
     assert at.window.panels.picker is not None
     at.window.panels.picker.chosen.emit("tree")
     until(qtbot, lambda: len(at.configs) == 2)
@@ -196,7 +196,7 @@ def test_what_was_saved_without_a_restart_waits_for_the_next_one(at: Bench, qtbo
 
 def test_other_limits_reach_a_rig_that_is_started_while_they_are_tried_out(at: Bench, qtbot: QtBot) -> None:
     at.edit(D_ALLOW, "9")
-    at.window.restart()
+    at.window.rig.restart()
     until(qtbot, lambda: len(at.engines) == 2 and bool(at.engine.perceptions))
     assert at.tried() == [9.0]
 
@@ -220,14 +220,14 @@ def test_nothing_changes_while_the_robot_is_armed(at: Bench, qtbot: QtBot, mode:
 
 def test_nobody_arms_while_something_is_tried_out(at: Bench) -> None:
     at.edit(D_ALLOW, "9")
-    at.window.take(OperatorStep.ARM)
+    at.window.ask_step(OperatorStep.ARM)
     assert Act.ARM not in at.engine.pilot.acts
     assert "tried out" in at.window.panels.toast.text()
-    at.window.take(OperatorStep.DISARM)
+    at.window.ask_step(OperatorStep.DISARM)
     assert Act.DISARM in at.engine.pilot.acts
     assert at.desk.dialog is not None
     at.desk.dialog.reject()
-    at.window.take(OperatorStep.ARM)
+    at.window.ask_step(OperatorStep.ARM)
     assert Act.ARM in at.engine.pilot.acts
 
 
@@ -238,7 +238,7 @@ def test_after_saving_a_rig_that_stopped_looks_stopped(
     at = Bench(make_window, bench, tmp_path)
     until(qtbot, lambda: at.window.shown_tick is not None)
     at.engine.fail_with = DeviceError("camera: cable out")
-    until(qtbot, lambda: at.window._phase is EnginePhase.FAULT)
+    until(qtbot, lambda: at.window.rig.phase is EnginePhase.FAULT)
     at.engine.set_perception = lambda _config: False  # type: ignore[method-assign]
     panels = at.window.panels
     assert panels.notice.isVisible()
@@ -302,7 +302,7 @@ def test_what_is_recorded_names_the_thresholds_in_force(at: Bench, monkeypatch: 
 
 def test_the_last_frame_is_understood_anew_when_the_rig_is_over(at: Bench, qtbot: QtBot) -> None:
     at.engine.fail_with = EndOfStream("the end")
-    until(qtbot, lambda: at.window._phase is EnginePhase.ENDED)
+    until(qtbot, lambda: at.window.rig.phase is EnginePhase.ENDED)
     at.engine.set_perception = lambda config: False  # type: ignore[method-assign]
     assert at.window.panels.badge.letter == "-"
     at.edit(D_ALLOW, "9")
@@ -332,7 +332,7 @@ def test_unknown_keys_and_comments_survive_and_are_told(
     text = "# mine\nfuture = 1\n[perception.pose]\nd_allow_px = 7 # measured\n"
     at = Bench(make_window, bench, tmp_path, text)
     assert "unknown key" in at.window.panels.toast.text()
-    assert at.window.config.perception.pose.d_allow_px == 7.0
+    assert at.window.rig.config.perception.pose.d_allow_px == 7.0
     at.edit(D_ALLOW, "8")
     assert at.desk.dialog is not None
     at.desk.dialog.save.click()
@@ -360,7 +360,7 @@ def test_what_the_rig_file_keeps_is_shown_as_it_is_in_force_and_not_edited(
     dialog = at.desk.dialog
     assert dialog is not None
     path = write_rig(make_rig(load_config(overrides={"servos": {"max_pull_mm": 5.0}}), "bench 1", None), tmp_path / "bench 1.toml")
-    at.window.use_config(with_rig(at.window.config, read_rig(path), path))
+    at.window.rig.use_config(with_rig(at.window.rig.config, read_rig(path), path))
     until(qtbot, lambda: dialog.draft.value("servos.max_pull_mm") == 5.0)
     dialog.go_to("servos.max_pull_mm")
     pull = dialog.page.fields["servos.max_pull_mm"]
@@ -386,26 +386,26 @@ def test_what_was_saved_before_a_rig_file_was_chosen_does_not_reach_it(at: Bench
     at.desk.dialog.save.click()
     path = write_rig(make_rig(load_config(), "bench 1", None), tmp_path / "bench 1.toml")
     rig = read_rig(path)
-    at.window.use_config(with_rig(at.window.config, rig, path))
+    at.window.rig.use_config(with_rig(at.window.rig.config, rig, path))
     until(qtbot, lambda: len(at.configs) == 2)
     assert (at.configs[1].servos, at.configs[1].advice.fast_mm_s) == (rig.servos, 9.0)
 
 
 def test_what_somebody_edits_in_the_rig_file_acts_when_the_rig_is_started_again(at: Bench, tmp_path: Path, qtbot: QtBot) -> None:
     path = write_rig(make_rig(load_config(), "bench 1", None), tmp_path / "bench 1.toml")
-    at.window.use_config(with_rig(at.window.config, read_rig(path), path))
+    at.window.rig.use_config(with_rig(at.window.rig.config, read_rig(path), path))
     until(qtbot, lambda: len(at.configs) == 2)
     assert at.window.panels.picker is not None
     at.window.panels.picker.chosen.emit("y_junction")
     until(qtbot, lambda: len(at.configs) == 3)
     file = path.read_text(encoding="utf-8")
     path.write_text(file.replace("max_pull_mm = 2.0", "max_pull_mm = 4.5"), encoding="utf-8")
-    at.window.restart()
+    assert at.window.rig.reread_config().servos.max_pull_mm == 4.5, "Calibrate begins with it, too"
+    at.window.rig.restart()
     until(qtbot, lambda: len(at.configs) == 4)
     assert (at.configs[3].servos.max_pull_mm, at.configs[3].twin.phantom) == (4.5, "y_junction")
-    assert at.window.read_rig_again(at.configs[2]).servos.max_pull_mm == 4.5, "Calibrate begins with it, too"
     path.write_text("[servos", encoding="utf-8")
-    at.window.restart()
+    at.window.rig.restart()
     until(qtbot, lambda: len(at.configs) == 5)
     assert at.configs[4] == at.configs[3], "whoever opens it tells what is wrong"
 

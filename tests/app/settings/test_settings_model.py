@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.settings.dialog import SettingsDraft, as_text, search, with_changes
+from app.settings.draft import SettingsDraft, as_text, search, with_changes
 from core.config.models import Config, load_config
 from core.config.schema import Effect, schema
 
@@ -95,7 +95,7 @@ def test_marks_count_what_differs_from_the_default(draft: SettingsDraft) -> None
     assert [draft.changed_in(SECTIONS[key]) for key in ("perception.pose", "perception", "safety")] == [2, 2, 0]
     draft.set_entry(D_ALLOW, "6")
     assert not draft.is_changed(D_ALLOW)
-    draft.reset_section(SECTIONS["perception"])
+    draft.reset(setting.key for setting in SECTIONS["perception"].all_settings())
     assert not draft.is_dirty
 
 
@@ -104,7 +104,7 @@ def test_a_section_whose_values_need_each_other_is_reset_as_a_whole() -> None:
     draft = SettingsDraft(tight)
     draft.reset(["safety.pose_hold_s"])
     assert draft.section_error("safety")
-    draft.reset_section(SECTIONS["safety"])
+    draft.reset(setting.key for setting in SECTIONS["safety"].all_settings())
     assert draft.config == load_config()
 
 

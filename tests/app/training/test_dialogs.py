@@ -28,7 +28,8 @@ from pytestqt.qtbot import QtBot
 from app.operator.preflight import PreflightModel
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
-from app.settings.dialog import SettingsDialog, SettingsDraft
+from app.settings.dialog import SettingsDialog
+from app.settings.draft import SettingsDraft
 from app.training.dialog import TrainingDialog, TrainingPhase, TrainingState
 from app.ui import theme
 from app.widgets.messages import Offer, OfferButton, OfferStrip

@@ -233,7 +233,7 @@ def side(running: OperatorWindow, tmp_path: Path) -> Iterator[WindowServices]:
 
 
 def choose(side: WindowServices, name: str) -> None:
-    side.models.renew()
+    side.models.update_entries()
     action = next(one for one in side.models._actions if isinstance(one, QAction) and one.text().startswith(name))
     action.trigger()
 
@@ -243,25 +243,25 @@ def test_another_model_is_used_only_after_the_question(side: WindowServices, run
     choose(side, "own_1")
     strip = running.panels.offers
     assert "Use model own_1 instead of default?" in strip.text
-    assert running.config.perception.segmentation.model == "default"
+    assert running.rig.config.perception.segmentation.model == "default"
     strip.answers["No"].click()
-    assert running.config.perception.segmentation.model == "default"
+    assert running.rig.config.perception.segmentation.model == "default"
     choose(side, "own_1")
     strip.answers["Use own_1"].click()
-    assert running.config.perception.segmentation.model == "own_1"
+    assert running.rig.config.perception.segmentation.model == "own_1"
     until(qtbot, lambda: running.shown_tick is not None)
-    side.models.renew()
+    side.models.update_entries()
     assert [one.text().split(",")[0].split(":")[0] for one in side.models._actions if one.isChecked()] == ["own_1"]
 
 
 def test_no_other_model_while_armed(side: WindowServices, running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     install("own_1")
     engine.pilot.view = DriveView(0.0, mode=Mode.ARMED)
-    until(qtbot, lambda: running.desk.view is not None and running.desk.view.mode is Mode.ARMED)
+    until(qtbot, lambda: running.controls.view is not None and running.controls.view.mode is Mode.ARMED)
     choose(side, "own_1")
     assert running.panels.offers.text == ""
     assert "disarm first" in running.panels.toast.text()
-    assert running.config.perception.segmentation.model == "default"
+    assert running.rig.config.perception.segmentation.model == "default"
 
 
 def test_no_other_model_when_it_was_armed_after_the_question(
@@ -270,9 +270,9 @@ def test_no_other_model_when_it_was_armed_after_the_question(
     install("own_1")
     choose(side, "own_1")
     engine.pilot.view = DriveView(0.0, mode=Mode.AUTONOMOUS)
-    until(qtbot, lambda: running.desk.view is not None and running.desk.view.mode is Mode.AUTONOMOUS)
+    until(qtbot, lambda: running.controls.view is not None and running.controls.view.mode is Mode.AUTONOMOUS)
     running.panels.offers.answers["Use own_1"].click()
-    assert running.config.perception.segmentation.model == "default"
+    assert running.rig.config.perception.segmentation.model == "default"
 
 
 def test_the_annotator_window_trains_on_its_own_open_file(qtbot: QtBot, tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_the_wizards_servos_are_stopped(
     until(qtbot, lambda: rigs.wizard is not None and not rigs.wizard.desk.is_busy)
     assert rigs.wizard is not None
     desk = rigs.wizard.desk
-    desk.open_camera(running.config)
+    desk.open_camera(running.rig.config)
     until(qtbot, lambda: desk.bench is not None and not desk.is_busy)
     bench = desk.bench
     assert bench is not None
@@ -121,7 +121,7 @@ def test_without_servos_nothing_is_said_to_be_stopped(
     running: OperatorWindow, engine: FakeEngine, side: WindowServices, watch: CrashWatch, qtbot: QtBot
 ) -> None:
     engine.fail_with = DeviceError("the camera is gone")
-    until(qtbot, lambda: running.phase is EnginePhase.FAULT)
+    until(qtbot, lambda: running.rig.phase is EnginePhase.FAULT)
     meet_an_error(watch)
     assert engine.pilot.acts == []
     assert box_of(running, qtbot).startswith("No servos were in use, so there was nothing to stop.")

@@ -70,7 +70,7 @@ def test_curves_that_lie_in_one_chart_differ_for_a_deuteranope_in_the_light() ->
 
 def test_states_and_overlays_never_change() -> None:
     states = dict(theme.STATE_COLOUR)
-    theme.use(LIGHT)
+    theme.use_scheme(LIGHT)
     assert {state: theme.STATE_COLOUR[state] for state in PoseState} == {state: states[state] for state in PoseState}
     assert theme.STATE_COLOUR[None] == LIGHT.TEXT_FAINT
     assert ON_PICTURE is DARK
@@ -80,7 +80,7 @@ def test_states_and_overlays_never_change() -> None:
 
 def test_names_of_the_module_are_those_of_the_scheme_in_use() -> None:
     for scheme in (LIGHT, DARK):
-        theme.use(scheme)
+        theme.use_scheme(scheme)
         assert theme.current() is scheme
         for role in ROLES:
             assert getattr(theme, role) == getattr(scheme, role) == theme.of(role)
