@@ -84,7 +84,7 @@ def _calibrated(
 ) -> list[tuple[str, tuple[ConfidenceCalibration, int, float]]]:
     """Calibrate the model in this folder; returns titles and the other arguments of ``_table``, without and with mirroring."""
     from core.evaluation.accuracy import TrueMasks, score_set
-    from core.evaluation.confidence import describe_confidence, fit, fit_familiarity, is_right, signatures_in
+    from core.evaluation.confidence import describe_confidence, fit, fit_out_of_distribution, is_right, signatures_in
     from core.learning.model_writer import write_calibration
     from core.perception.inference import open_segmenter
     from core.perception.model_file import sha256_of
@@ -112,7 +112,7 @@ def _calibrated(
     signed = [one for one in bar.track(looked, total=len(pictures), description="kinds of pictures") if one is not None]
     left_out.tell(len(pictures) - len(left_out) if scores else 0)
     known, signatures = [picture for picture, _ in signed], np.array([signature for _, signature in signed])
-    familiarity = fit_familiarity(known, signatures, config.working_size_px, described | {"knows": list(frames.knows)})
+    familiarity = fit_out_of_distribution(known, signatures, config.working_size_px, described | {"knows": list(frames.knows)})
     again = open_sights(config, recalibrating=True)[1].segment
     looks = again.looks if isinstance(again, TipRefinement) else 1
     write_calibration(model, *[calibration for _, (calibration, _, _) in tables], second_looks=looks, familiarity=familiarity)

@@ -1,7 +1,4 @@
-"""How well perception agrees with the twin's truth, frame by frame and in sum. Errors in working pixels and degrees.
-
-Which labelled frames a model finds hard, so that training can show them more often.
-"""
+"""How well perception agrees with the twin's truth, frame by frame and in sum. Errors in working pixels and degrees."""
 
 from __future__ import annotations
 
@@ -21,13 +18,11 @@ from core.perception.pose import room_px
 from core.perception.segmentation import Segmenter
 from core.types import Frame, Image, Mask, Point, Reason, Scene
 
-WRONG_DEG, WRONG_PX = 10.0, 15.0
-"""An answer is wrong whose theta or whose head is off by more."""
-TOSS_UP_PX = 0.25
-"""Where the true head and tail would have another state so near beside, nobody can tell which one it is."""
+WRONG_DEG, WRONG_PX = 10.0, 15.0  # an answer whose theta or head is off by more is wrong
+TOSS_UP_PX = 0.25  # a pose that is so near to another state is a toss-up
 _CONFIDENT_FROM = QualityConfig().confident_from
-_STATES, _LENGTH_PX = PoseConfig(), VectorConfig().robot_length_px
-"""By which the truth has its states."""
+_STATES, _LENGTH_PX = PoseConfig(), VectorConfig().robot_length_px  # that the truth's states are made with
+_LEAST_DIFFICULTY = 0.02  # of a frame that is known by heart: it may still be drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +44,13 @@ class FrameScore:
     confidence: float
     evidence: tuple[float, ...] | None = None
     is_measured: bool = True
-    """False: nobody has told whether there is a pose, or which, so that no answer is right or wrong."""
+    """False: the truth does not say whether there is a pose, so that no answer is right or wrong."""
     true_room_px: float | None = None
-    """How far the true pose is from another state (``room_px``); None where its distances are not told."""
+    """How far the true pose is from another state (``room_px``); None where the truth has no distances."""
 
 
 class TrueMasks:
-    """Stands in for the network and gives the true masks of the frame at hand: what remains is the geometry's own error."""
+    """A segmenter that gives the true masks of the current frame: what remains is the error of the geometry."""
 
     engine = "true masks"
 
@@ -126,9 +121,9 @@ def score_set(
     masks: TrueMasks,
     on_unreadable: Callable[[DatasetError], None],
 ) -> Iterator[FrameScore]:
-    """Perceive every frame by itself and score it; `masks` is told the true masks first, for a pipeline that runs on them.
+    """Perceive every frame by itself and score it; `masks` gets the true masks first, for a pipeline that runs on them.
 
-    Frames that cannot be read are told to `on_unreadable` and left out.
+    Frames that cannot be read go to `on_unreadable` and are left out.
     """
     for sample in samples:
         try:
@@ -138,14 +133,10 @@ def score_set(
             continue
         masks.show(vessel, robot)
         scene = pipeline.perceive_single(Frame(0, 0.0, image))
-        size = _working_size(scene)
+        size = round(scene.source_size[0] * scene.scale), round(scene.source_size[1] * scene.scale)
+        if scene.masks is not None:
+            size = scene.masks.vessel.shape[1], scene.masks.vessel.shape[0]
         yield score_frame(sample.stem, scene, _at_size(vessel, size), _at_size(robot, size), truth[sample.stem])
-
-
-def _working_size(scene: Scene) -> tuple[int, int]:
-    if scene.masks is not None:
-        return scene.masks.vessel.shape[1], scene.masks.vessel.shape[0]
-    return round(scene.source_size[0] * scene.scale), round(scene.source_size[1] * scene.scale)
 
 
 def _at_size(mask: Mask, size: tuple[int, int]) -> Mask:
@@ -168,7 +159,7 @@ def _statistics(values: Sequence[float]) -> dict[str, float] | None:
 def summarise(scores: Sequence[FrameScore], confident_from: float = _CONFIDENT_FROM) -> dict[str, Any]:
     """Sums over frames: "expected" are those whose truth has a pose, "empty" those without any robot, "poseless" the rest.
 
-    Of frames that nobody has measured only the masks count. "Wrong" is an answer beyond ``WRONG_DEG`` or ``WRONG_PX``, "confident"
+    Of frames that were not measured only the masks count. "Wrong" is an answer beyond ``WRONG_DEG`` or ``WRONG_PX``, "confident"
     one that is at least as sure as `confident_from`. A "toss-up" is a state to which another one is nearer than ``TOSS_UP_PX``.
     """
     expected = [s for s in scores if s.expected]
@@ -269,16 +260,12 @@ def _pearson(pairs: Sequence[tuple[float, float]]) -> float | None:
     return float(np.corrcoef(columns)[0, 1])
 
 
-_LEAST = 0.02
-"""Of a frame that is known by heart: it may still be drawn."""
-
-
 def difficulty(sample: Sample, segment: Segmenter) -> float:
-    """1 - Dice of the robot plus half of 1 - Dice of the vessel, at least ``_LEAST``; raises DatasetError.
+    """1 - Dice of the robot plus half of 1 - Dice of the vessel, at least ``_LEAST_DIFFICULTY``; raises DatasetError.
 
     The vessel counts half: it is seen in nearly every frame, and where the robot is lost nothing can be answered.
     """
     image, vessel, robot = sample.load(WORKING_SIZE_PX)
     vessel_probability, robot_probability = segment(image)
     lost = 1 - dice(robot_probability >= 0.5, robot) + 0.5 * (1 - dice(vessel_probability >= 0.5, vessel))
-    return max(_LEAST, lost)
+    return max(_LEAST_DIFFICULTY, lost)

@@ -1,7 +1,4 @@
-"""From scored frames to a calibrated confidence, and how far it can be believed.
-
-From pictures that a model should know to what is familiar to it (``core/perception/out_of_distribution.py``).
-"""
+"""From scored frames to a calibrated confidence, and from known pictures to the limit of out-of-distribution ones."""
 
 from __future__ import annotations
 
@@ -26,10 +23,8 @@ from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures
 from core.perception.segmentation import Segmenter, recognise, to_working
 from core.types import Reason
 
-WRONG_THETA_DEG, WRONG_HEAD_PX = 5.0, 15.0
-"""An answer is wrong when theta or head is off by more than this, or when there is no robot at all."""
-_LEAST = 20
-"""Right and wrong answers that a fit needs."""
+WRONG_THETA_DEG, WRONG_HEAD_PX = 5.0, 15.0  # an answer is wrong when theta or head is off by more, or when there is no robot
+_LEAST = 20  # right and wrong answers that a fit needs
 
 
 class CalibrationError(UserError):
@@ -44,7 +39,7 @@ def is_right(score: FrameScore) -> bool:
 
 
 def check_frames(number: int) -> None:
-    """Raise CalibrationError where so few frames could not be enough, whatever is answered: said before they are looked at."""
+    """Raise CalibrationError, before frames are perceived, where so few could not be enough whatever is answered."""
     if number < 2 * _LEAST:
         needed = f"a calibration needs {_LEAST} right and {_LEAST} wrong answers"
         raise CalibrationError(f"{number} frames: {needed}; give it more frames (synth --count)")
@@ -53,7 +48,7 @@ def check_frames(number: int) -> None:
 def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: dict[str, Any]) -> ConfidenceCalibration:
     """Fit a calibration on the evidence of answered frames (N, F) and whether each answer was right.
 
-    `evidence` is with or without the swings, but the same in all rows.
+    `evidence` is with or without the threshold sensitivity, but the same in all rows.
 
     Raises
     ------
@@ -157,13 +152,11 @@ def _refused(score: FrameScore) -> FrameScore:
 
 LEAST = 40
 """Pictures that a fit needs."""
-_AXES = 16
-_PICTURES_PER_AXIS = 8
-_LIMIT_SHARE = 0.995
-_LEAST_SCALE = 1e-2
-_LEAST_HALF = 10
-_NEIGHBOURS = 16
-"""Where nobody tells which pictures show the same, so many in a row are taken to."""
+_AXES, _PICTURES_PER_AXIS = 16, 8  # most principal directions, and pictures needed for each
+_LIMIT_SHARE = 0.995  # of known pictures lie below the limit
+_LEAST_SCALE = 1e-2  # added to the scale of a signature's value
+_LEAST_HALF = 10  # pictures in each half of a split
+_NEIGHBOURS = 16  # pictures in a row that are taken to show the same phantom where no seed says so
 
 
 class OutOfDistributionError(UserError):
@@ -205,7 +198,7 @@ def signatures_in(
 
     Raises
     ------
-    FamiliarityError
+    OutOfDistributionError
         The segmenter tells no signatures.
     """
     for picture in pictures:
@@ -228,7 +221,7 @@ def signatures_in(
 
 
 def check_known(pictures: Sequence[KnownPicture]) -> None:
-    """Raise FamiliarityError where so few pictures could not be enough, whatever they show: said before they are looked at."""
+    """Raise OutOfDistributionError, before pictures are read, where so few could not be enough whatever they show."""
     _check_number(len(pictures), "pictures")
 
 
@@ -237,17 +230,17 @@ def _check_number(number: int, of: str) -> None:
         raise OutOfDistributionError(f"{number} {of}; {LEAST} are needed; give it more (synth --count)")
 
 
-def fit_familiarity(
+def fit_out_of_distribution(
     pictures: Sequence[KnownPicture], signatures: NDArray[np.float32], working_size_px: int, fitted_on: dict[str, Any]
 ) -> OutOfDistributionReference:
     """Fit where the signatures (N, F) of N known pictures lie.
 
-    The limit is what 995 of 1000 pictures keep to (the farthest one of few) when they are judged by the other half of their groups:
-    of pictures that were fitted to, or whose like were, it would be too narrow for any new one.
+    The limit is what 995 of 1000 pictures keep to (of few, the one at the largest distance) when each half of the groups is judged
+    by a fit to the other half: pictures that were fitted to would make it too narrow.
 
     Raises
     ------
-    FamiliarityError
+    OutOfDistributionError
         There are less than ``LEAST``, or all are the same.
     """
     _check_number(len(signatures), "pictures show a vessel")
@@ -256,14 +249,13 @@ def fit_familiarity(
     limit = float(np.quantile(np.concatenate(apart), _LIMIT_SHARE))
     if limit <= 0.0:
         raise OutOfDistributionError("all pictures are the same; give it pictures that differ as those of the rig do")
-    return _Fit(signatures).familiarity(limit, working_size_px, fitted_on | {"pictures": len(signatures)})
+    return _Fit(signatures).reference(limit, working_size_px, fitted_on | {"pictures": len(signatures)})
 
 
 def _first_half(pictures: Sequence[KnownPicture]) -> NDArray[np.bool_]:
     """Every other group of each folder; of a folder with one group its first pictures.
 
-    Each folder's kind has to be in both halves: judged by pictures among which there are none of its kind, it would be taken for
-    the limit of all.
+    Each folder's kind must be in both halves: judged without any of its kind, it would set the limit for all.
     """
     first = np.zeros(len(pictures), np.bool_)
     for folder in dict.fromkeys(picture.folder for picture in pictures):
@@ -293,10 +285,9 @@ class _Fit:
         self._across = np.array([max(float(share[axes:].sum()), smallest)])
 
     def distance(self, signatures: NDArray[np.float32]) -> NDArray[np.float64]:
-        """``Familiarity.distance`` of what was fitted."""
-        return self.familiarity(1.0, 1, {}).distance(signatures)
+        return self.reference(1.0, 1, {}).distance(signatures)
 
-    def familiarity(self, limit: float, working_size_px: int, fitted_on: dict[str, Any]) -> OutOfDistributionReference:
+    def reference(self, limit: float, working_size_px: int, fitted_on: dict[str, Any]) -> OutOfDistributionReference:
         numbers = packed(self._mean, self._scale, self._directions, self._spread, self._across)
         return OutOfDistributionReference(
             size=len(self._mean),

@@ -1,9 +1,4 @@
-"""From a table of manual and algorithmic measures to the figures of the paper's evaluation (METHOD section 7).
-
-What a reader should know of the rows that are evaluated: what is missing in them, and which angles go to the other side.
-
-Where the columns of a table stand, however their headings are spelt: Angle 1, ANGLE-1, angle_1 (deg) are one.
-"""
+"""From a table of manual and algorithmic measures to the figures of the paper's evaluation (METHOD section 7)."""
 
 from __future__ import annotations
 
@@ -19,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.devices import UserError
 from core.evaluation.metrics import (
@@ -33,65 +27,6 @@ from core.evaluation.metrics import (
     too_few_words,
 )
 from core.types import PoseState
-
-_APART_DEG = 15.0
-_ALIKE_DEG = SHARE_EDGES_PERCENT[1] / 100 * RANGE_DEG
-_NAMED = 5
-
-
-def missing_notes(rows: Sequence[Measurement]) -> list[str]:
-    """How many rows are not among the figures because a measure is missing, and how many name no image."""
-    columns = {
-        "angle": [(row.manual_angle_deg is not None, row.algorithm_angle is not None) for row in rows],
-        "state": [(row.state is not None, row.algorithm_state is not None) for row in rows],
-    }
-    notes = []
-    for what, having in columns.items():
-        both = having.count((True, True))
-        if 0 < both < len(rows):
-            lacks = {
-                "the algorithmic one": having.count((True, False)),
-                "the manual one": having.count((False, True)),
-                "both": having.count((False, False)),
-            }
-            told = ", ".join(f"{which}: {count}" for which, count in lacks.items() if count)
-            notes.append(f"Rows with a manual and an algorithmic {what}: {both} of {len(rows)}; without {told}.")
-    once = sum((row.angle_1 is None) is not (row.angle_2 is None) for row in rows)
-    if once and any(row.angle_1 is not None and row.angle_2 is not None for row in rows):
-        notes.append(f"Images that were measured once by hand, and not twice: {once}.")
-    nameless = sum(not row.image for row in rows)
-    if nameless:
-        notes.append(f"Rows that name no image: {nameless}; whether one is there twice cannot be seen.")
-    return notes
-
-
-def other_side_notes(rows: Sequence[Measurement]) -> list[str]:
-    """Angles that are alike as soon as one of them is measured to the other side: 180 degrees minus it, or with the other sign.
-
-    They are told and not turned: an algorithm that takes the tail for the head errs in just this way.
-    """
-    pairs = {
-        "manual and algorithmic angle": [(row.image, row.manual_angle_deg, row.algorithm_angle) for row in rows],
-        "the two manual angles": [(row.image, row.angle_1, row.angle_2) for row in rows],
-    }
-    notes = []
-    for what, measures in pairs.items():
-        turned = [image for image, a, b in measures if a is not None and b is not None and _is_other_side(a, b)]
-        if turned:
-            named = ", ".join(image or "without a name" for image in turned[:_NAMED]) + (", ..." if len(turned) > _NAMED else "")
-            notes.append(
-                f"Images on which {what} are more than {_APART_DEG:g}° apart, but alike with one of them measured to the "
-                f"other side (180° minus it, or its sign changed): {len(turned)} ({named}). They are taken as they are; "
-                "look at them."
-            )
-    return notes
-
-
-def _is_other_side(one_deg: float, other_deg: float) -> bool:
-    apart = abs(one_deg - other_deg)
-    turned = min(abs(one_deg + other_deg), abs(RANGE_DEG - one_deg - other_deg))
-    return apart > _APART_DEG and turned <= _ALIKE_DEG
-
 
 _UNIT = re.compile(r"[(\[][^)\]]*[)\]]|°")
 
@@ -127,8 +62,7 @@ def _plain(heading: str) -> str:
 
 
 _FULL_TURN_DEG = 360.0
-_MOST_DIGITS = 6
-"""Of how many measures an angle is the mean."""
+_MOST_DIGITS = 6  # of a count of measures
 
 
 class EvaluationError(UserError):
@@ -177,7 +111,16 @@ def read_measurements(path: Path) -> list[Measurement]:
     EvaluationError
         With file, line and column in one line. An image that is there twice is refused: it would count twice.
     """
-    text = _text_of(path)
+    try:
+        data = path.read_bytes()
+        # UTF-16 is what spreadsheets call Unicode text.
+        text = data.decode("utf-16" if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig")
+    except FileNotFoundError:
+        raise EvaluationError(f"{path}: no such file") from None
+    except OSError as error:
+        raise EvaluationError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise EvaluationError(f"{path}: not a text file in UTF-8; save the table as CSV (UTF-8)") from None
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         raise EvaluationError(f"{path}: empty; needs the columns {', '.join(COLUMNS)}")
@@ -189,61 +132,42 @@ def read_measurements(path: Path) -> list[Measurement]:
         filled = ((table.line_num, cells) for cells in table if any(map(str.strip, cells)))
         if said:
             next(filled, None)
-        place = _places(path, [cell.strip() for cell in next(filled, (0, [""]))[1]])
-        rows = {line: _measurement(f"{path}: line {line}", cells, place, separator) for line, cells in filled}
+        header = [cell.strip() for cell in next(filled, (0, [""]))[1]]
+        try:
+            place = places(header, COLUMNS, _MAY_BE)
+        except ValueError as error:
+            raise EvaluationError(f"{path}: {error}") from None
+        rows = {}
+        for line, cells in filled:
+            where = f"{path}: line {line}"
+            if len(cells) > len(header) and any(map(str.strip, cells[len(header) :])):
+                raise EvaluationError(f"{where}: {len(cells)} cells under {len(header)} columns")
+            text_of = {name: cells[at].strip() if at < len(cells) else "" for name, at in place.items()}
+            rows[line] = _measurement(where, text_of, has_decimal_comma=separator != ",")
     except csv.Error as error:
         raise EvaluationError(f"{path}: line {table.line_num}: not valid CSV ({error})") from None
     if not rows:
         raise EvaluationError(f"{path}: has a header but no rows")
-    _check_once(path, rows)
-    return list(rows.values())
-
-
-def _text_of(path: Path) -> str:
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise EvaluationError(f"{path}: no such file") from None
-    except OSError as error:
-        raise EvaluationError(f"{path}: cannot be read ({error.strerror})") from None
-    try:
-        # UTF-16 is what spreadsheets call Unicode text.
-        return data.decode("utf-16" if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig")
-    except UnicodeDecodeError:
-        raise EvaluationError(f"{path}: not a text file in UTF-8; save the table as CSV (UTF-8)") from None
-
-
-def _places(path: Path, header: list[str]) -> dict[str, int]:
-    """Where each column stands, and under "" how many there are."""
-    try:
-        return places(header, COLUMNS, _MAY_BE) | {"": len(header)}
-    except ValueError as error:
-        raise EvaluationError(f"{path}: {error}") from None
-
-
-def _check_once(path: Path, rows: Mapping[int, Measurement]) -> None:
-    """Raise EvaluationError where an image has two rows; pictures of several sessions may be called alike."""
     first: dict[tuple[str | None, str], int] = {}
     for line, row in rows.items():
-        before = first.setdefault((row.group, row.image), line)
+        before = first.setdefault((row.group, row.image), line)  # pictures of several sessions may be called alike
         if row.image and before != line:
             raise EvaluationError(
                 f"{path}: line {line}: image {row.image!r} is in line {before} already; give it one row, with a second manual "
                 "measure as angle_2, and images of one name different groups"
             )
+    return list(rows.values())
 
 
-def _measurement(where: str, cells: list[str], place: dict[str, int], separator: str) -> Measurement:
-    if len(cells) > place[""] and any(map(str.strip, cells[place[""] :])):
-        raise EvaluationError(f"{where}: {len(cells)} cells under {place['']} columns")
-    text = {name: cells[at].strip() if at < len(cells) else "" for name, at in place.items() if name}
+def _measurement(where: str, text: Mapping[str, str], *, has_decimal_comma: bool) -> Measurement:
+    """A row of a table from its cells by column; raises EvaluationError."""
 
     def angle(name: str) -> float | None:
         if not text[name]:
             return None
         try:
             plain = text[name].removesuffix("°").replace("\N{MINUS SIGN}", "-")
-            value = float(plain if separator == "," else plain.replace(",", ".")) if "_" not in plain else math.nan
+            value = float(plain.replace(",", ".") if has_decimal_comma else plain) if "_" not in plain else math.nan
         except ValueError:
             value = math.nan
         if not abs(value) <= _FULL_TURN_DEG:
@@ -326,50 +250,91 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     counts = np.array([row.counts for row in twice_rows], np.float64).reshape(-1, 2)
     labelled = [row for row in rows if row.state is not None and row.algorithm_state is not None]
     measured = [row for row in rows if row.manual_angle_deg is not None and row.algorithm_angle is not None]
-    manual, algorithm = [str(row.state) for row in labelled], [str(row.algorithm_state) for row in labelled]
-    metrics = {
-        "images": _counts(rows),
-        "intervals": _drawn(measured if measured else labelled),
-        "angle": angle_metrics(pairs.manual_deg, pairs.algorithm_deg, seed, _members(measured)),
-        "state": state_metrics(manual, algorithm, seed, _members(labelled)),
-        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed, _members(twice_rows), counts),
-    }
     parts = {"angle": measured, "state": labelled, "manual": twice_rows}
-    notes = _interval_notes({name: part for name, part in parts.items() if are_too_few(_members(part))})
+    group = {name: members([row.group for row in part]) for name, part in parts.items()}
+    manual, algorithm = [str(row.state) for row in labelled], [str(row.algorithm_state) for row in labelled]
+    by_hand = [row for row in rows if row.manual_angle_deg is not None or row.state is not None]
+    answered = sum(row.algorithm_angle is not None or row.algorithm_state is not None for row in by_hand)
+    drawn = group["angle" if measured else "state"]
+    known_groups = {row.group for row in measured or labelled if row.group is not None}
+    metrics: dict[str, Any] = {
+        "images": {"n": len(rows), "measured": len(by_hand), "answered": answered, "unanswered": len(by_hand) - answered},
+        "intervals": {
+            "drawn": "images" if drawn is None else "nothing" if are_too_few(drawn) else "groups",
+            "groups": len(known_groups),
+        },
+        "angle": angle_metrics(pairs.manual_deg, pairs.algorithm_deg, seed, group["angle"]),
+        "state": state_metrics(manual, algorithm, seed, group["state"]),
+        "manual": repeat_metrics(twice[:, 0], twice[:, 1], seed, group["manual"], counts),
+    }
+    notes = []
+    if without := [name for name in parts if are_too_few(group[name])]:
+        known = max(len({row.group for row in parts[name] if row.group is not None}) for name in without)
+        words = [_OF[name] for name in without]
+        what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+        notes.append(too_few_words(f"intervals of {what}", known))
     notes += missing_notes(rows) + other_side_notes(rows)
     return metrics | {"notes": notes + _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
 
 
-def _members(rows: Sequence[Measurement]) -> NDArray[np.int64] | None:
-    return members([row.group for row in rows])
-
-
-def _drawn(rows: Sequence[Measurement]) -> dict[str, Any]:
-    """What the bootstrap draws ("nothing": too few groups for an interval), and how many groups are known (0: none)."""
-    group = _members(rows)
-    drawn = "images" if group is None else "nothing" if are_too_few(group) else "groups"
-    return {"drawn": drawn, "groups": len({row.group for row in rows if row.group is not None})}
-
-
 _OF = {"angle": "angles", "state": "states", "manual": "manual measures"}
+_APART_DEG = 15.0  # angles further apart may have been measured to different sides
+_ALIKE_DEG = SHARE_EDGES_PERCENT[1] / 100 * RANGE_DEG  # if they are so near once one is turned
+_NAMED = 5  # images named in a note
 
 
-def _interval_notes(without: Mapping[str, Sequence[Measurement]]) -> list[str]:
-    """Why there are no intervals, and of what."""
-    if not without:
-        return []
-    known = max(len({row.group for row in rows if row.group is not None}) for rows in without.values())
-    return [too_few_words(f"intervals of {_listed([_OF[name] for name in without])}", known)]
+def missing_notes(rows: Sequence[Measurement]) -> list[str]:
+    """How many rows are not among the figures because a measure is missing, and how many name no image."""
+    columns = {
+        "angle": [(row.manual_angle_deg is not None, row.algorithm_angle is not None) for row in rows],
+        "state": [(row.state is not None, row.algorithm_state is not None) for row in rows],
+    }
+    notes = []
+    for what, having in columns.items():
+        both = having.count((True, True))
+        if 0 < both < len(rows):
+            lacks = {
+                "the algorithmic one": having.count((True, False)),
+                "the manual one": having.count((False, True)),
+                "both": having.count((False, False)),
+            }
+            told = ", ".join(f"{which}: {count}" for which, count in lacks.items() if count)
+            notes.append(f"Rows with a manual and an algorithmic {what}: {both} of {len(rows)}; without {told}.")
+    once = sum((row.angle_1 is None) is not (row.angle_2 is None) for row in rows)
+    if once and any(row.angle_1 is not None and row.angle_2 is not None for row in rows):
+        notes.append(f"Images that were measured once by hand, and not twice: {once}.")
+    nameless = sum(not row.image for row in rows)
+    if nameless:
+        notes.append(f"Rows that name no image: {nameless}; whether one is there twice cannot be seen.")
+    return notes
 
 
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+def other_side_notes(rows: Sequence[Measurement]) -> list[str]:
+    """Angles that are alike as soon as one of them is measured to the other side: 180 degrees minus it, or with the other sign.
+
+    They are reported and not changed: an algorithm that takes the tail for the head errs in just this way.
+    """
+    pairs = {
+        "manual and algorithmic angle": [(row.image, row.manual_angle_deg, row.algorithm_angle) for row in rows],
+        "the two manual angles": [(row.image, row.angle_1, row.angle_2) for row in rows],
+    }
+    notes = []
+    for what, measures in pairs.items():
+        turned = [image for image, a, b in measures if a is not None and b is not None and _is_other_side(a, b)]
+        if turned:
+            named = ", ".join(image or "without a name" for image in turned[:_NAMED]) + (", ..." if len(turned) > _NAMED else "")
+            notes.append(
+                f"Images on which {what} are more than {_APART_DEG:g}° apart, but alike with one of them measured to the "
+                f"other side (180° minus it, or its sign changed): {len(turned)} ({named}). They are taken as they are; "
+                "look at them."
+            )
+    return notes
 
 
-def _counts(rows: Sequence[Measurement]) -> dict[str, int]:
-    manual = [row for row in rows if row.manual_angle_deg is not None or row.state is not None]
-    answered = sum(row.algorithm_angle is not None or row.algorithm_state is not None for row in manual)
-    return {"n": len(rows), "measured": len(manual), "answered": answered, "unanswered": len(manual) - answered}
+def _is_other_side(one_deg: float, other_deg: float) -> bool:
+    apart = abs(one_deg - other_deg)
+    turned = min(abs(one_deg + other_deg), abs(RANGE_DEG - one_deg - other_deg))
+    return apart > _APART_DEG and turned <= _ALIKE_DEG
 
 
 def _angle_notes(metrics: dict[str, Any], rows: Sequence[Measurement]) -> list[str]:

@@ -1,14 +1,8 @@
-"""How well two measures of an angle agree: bias, spread, correlation, limits of agreement, intraclass correlation. In degrees.
+"""Agreement of two measures of an angle and of two labellings, with seeded bootstrap intervals (percentile method). In degrees.
 
-Statistics run along the last axis, so that one call computes all bootstrap resamples. What is undefined is NaN in arrays and
-None in the dictionaries that leave this module.
-
-How well two labellings agree: confusion, precision and recall, kappa, and both indices named after Fowlkes and Mallows.
-
-Seeded bootstrap intervals (percentile method). Rows are drawn one by one, or, where they come in groups, by whole groups.
-
-Frames of one session or of one phantom are alike: drawn one by one they would make the intervals too narrow. So groups are drawn
-wherever they are known; where they are too few to tell how groups differ, there is no interval.
+Statistics run along the last axis, so that one call computes all bootstrap resamples. What is undefined is NaN in arrays and None
+in the dictionaries that leave this module. Images of one session or phantom are alike: drawn one by one they would make the
+intervals too narrow. Whole groups are drawn where they are known; where there are too few, there is no interval.
 """
 
 from __future__ import annotations
@@ -23,13 +17,16 @@ from scipy.stats import ConstantInputWarning, NearConstantInputWarning, pearsonr
 
 Floats = NDArray[np.float64]
 
+Group = NDArray[np.int64] | None
+"""The number of each row's group, shape (n,); None: rows are drawn one by one."""
+
 RESAMPLES = 2000
-MIN_GROUPS = 10
-"""With fewer groups than this their own spread is not known well enough: no interval is given then."""
-_DEFINED = 0.9
-"""A statistic that is undefined in more resamples than the rest of these has no interval."""
-_BLOCK = 500_000
-"""Values drawn at once: keeps the memory of large sets small."""
+MIN_GROUPS = 10  # with fewer groups their own spread is not known well enough for an interval
+_DEFINED = 0.9  # least share of the resamples in which a statistic with an interval is defined
+_BLOCK = 500_000  # values drawn at once, to limit the memory
+RANGE_DEG = 180.0
+SHARE_EDGES_PERCENT = (0, 4, 8, 12, 16)
+LIMITS_SD = 1.96  # Bland-Altman limits of agreement lie so many standard deviations from the mean error
 
 
 def interval_95(values: Floats) -> list[float] | None:
@@ -54,7 +51,7 @@ def wilson_95(share: float, n: int) -> list[float]:
     return [max(0.0, low) if share > 0 else 0.0, min(1.0, high) if share < 1 else 1.0]
 
 
-def share_interval(share: float, n: int, group: NDArray[np.int64] | None, drawn: list[float] | None) -> list[float] | None:
+def share_interval(share: float, n: int, group: Group, drawn: list[float] | None) -> list[float] | None:
     """The interval of a share of n rows: Wilson's where they are independent, else the one that was `drawn` from whole groups.
 
     Of none or all of the rows every draw gives the same, as if nothing were uncertain: then Wilson's, of the number of groups.
@@ -66,11 +63,10 @@ def share_interval(share: float, n: int, group: NDArray[np.int64] | None, drawn:
     return drawn if 0.0 < share < 1.0 else wilson_95(share, len(np.unique(group)))
 
 
-def members(groups: Sequence[Hashable | None]) -> NDArray[np.int64] | None:
-    """The number of each row's group, shape (n,); None when the rows are to be drawn one by one, since no group is known,
-    or each of many rows is of another one.
+def members(groups: Sequence[Hashable | None]) -> Group:
+    """Groups as numbers; None where no group is known, or each of many rows is of another one.
 
-    A row without a group (None) is one of its own.
+    A row without a group (None) is a group of its own.
     """
     if all(group is None for group in groups):
         return None
@@ -81,13 +77,13 @@ def members(groups: Sequence[Hashable | None]) -> NDArray[np.int64] | None:
     return np.array([numbers[name] for name in names], np.int64)
 
 
-def are_too_few(group: NDArray[np.int64] | None) -> bool:
+def are_too_few(group: Group) -> bool:
     """Whether groups are known, but not enough of them for an interval."""
     return group is not None and len(np.unique(group)) < MIN_GROUPS
 
 
 def too_few_words(what: str, groups: int) -> str:
-    """Why there are none of these intervals, in one sentence: of so many groups that are known."""
+    """One sentence that says why there are no intervals of `what`."""
     return (
         f"No {what}: the images are of {groups} group{'s' if groups != 1 else ''} (sessions or phantoms), "
         f"and images of one are alike; intervals need {MIN_GROUPS} groups."
@@ -98,7 +94,7 @@ def bootstrap_rows(
     statistics: Callable[..., Mapping[str, Floats]],
     columns: tuple[Floats, ...],
     seed: int,
-    group: NDArray[np.int64] | None = None,
+    group: Group = None,
 ) -> dict[str, list[float] | None]:
     """95 % intervals of statistics of rows.
 
@@ -125,7 +121,7 @@ def bootstrap_rows(
     return {name: interval_95(np.concatenate(parts)) for name, parts in collected.items()}
 
 
-def _draws(n: int, group: NDArray[np.int64] | None, rng: np.random.Generator) -> Iterator[NDArray[np.int64]]:
+def _draws(n: int, group: Group, rng: np.random.Generator) -> Iterator[NDArray[np.int64]]:
     """Row numbers of some resamples at a time, shape (R, rows). Groups of several sizes make resamples of several lengths."""
     if group is None:
         left = RESAMPLES
@@ -143,14 +139,6 @@ def _draws(n: int, group: NDArray[np.int64] | None, rng: np.random.Generator) ->
         step = max(1, _BLOCK // int(length))
         for first in range(0, len(alike), step):
             yield np.stack([np.concatenate([rows_of[number] for number in one]) for one in alike[first : first + step]])
-
-
-Group = NDArray[np.int64] | None
-
-RANGE_DEG = 180.0
-SHARE_EDGES_PERCENT = (0, 4, 8, 12, 16)
-LIMITS_SD = 1.96
-"""Bland-Altman limits of agreement lie so many standard deviations from the mean error."""
 
 
 def icc_absolute(ratings: Floats) -> Floats:
@@ -252,7 +240,7 @@ def within_subject(measures: Sequence[Sequence[Sequence[float]]], seed: int = 0,
 
     Parameters
     ----------
-    measures : by image, by rater: his measures of it, in degrees. Who measured it once says nothing.
+    measures : by image, by rater: the measures of it, in degrees. A single measure says nothing.
     seed : of the bootstrap interval; whole images are drawn, or whole groups of them.
     group : of each image, as in ``bootstrap_rows``.
 
@@ -311,20 +299,21 @@ def _with_intervals(statistics: Any, columns: tuple[Floats, ...], seed: int, gro
     return {"n": n} | point | {"ci95": {name: intervals[name] if point[name] is not None else None for name in point}}
 
 
-_AVERAGED = ("precision", "recall", "f1")
+_AVERAGED, _KINDS = ("precision", "recall", "f1"), ("macro", "weighted")
+_OVERALL = ("accuracy", "kappa", "fowlkes_mallows_pairs", "fowlkes_mallows_macro")
 
 
 def kappa(true: Sequence[str], found: Sequence[str]) -> float | None:
     """Cohen's kappa of two labellings; None when both know one label only, where chance alone agrees."""
-    from sklearn.metrics import cohen_kappa_score  # a second, which whoever only trains or drives need not wait for
+    from sklearn.metrics import cohen_kappa_score  # takes a second to import
 
     return float(cohen_kappa_score(list(true), list(found))) if len({*true, *found}) > 1 else None
 
 
 def fowlkes_mallows_pairs(true: Sequence[str], found: Sequence[str]) -> float | None:
-    """The pair-counting index: of all pairs of images, how alike the two labellings put them together.
+    """The pair-counting index: how alike two labellings group pairs of images, whatever the labels are called.
 
-    It compares groupings, blind to the labels' names; None when one of the labellings puts no two images together.
+    None when one of the labellings puts no two images together.
     """
     if any(len(set(labels)) == len(labels) for labels in (true, found)):
         return None
@@ -373,9 +362,7 @@ def _mean_of_defined(values: Floats) -> Floats:
     return np.asarray(np.where(count > 0, np.where(defined, values, 0.0).sum(1) / np.maximum(count, 1), np.nan))
 
 
-def state_metrics(
-    manual: Sequence[str], algorithm: Sequence[str], seed: int = 0, group: NDArray[np.int64] | None = None
-) -> dict[str, Any]:
+def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0, group: Group = None) -> dict[str, Any]:
     """Statistics of the algorithm's states against the manual ones, with 95 % intervals under ``ci95``.
 
     They are of the bootstrap, that of the accuracy as ``share_interval`` says.
@@ -384,25 +371,30 @@ def state_metrics(
     ----------
     manual, algorithm : labels of the same n images.
     seed : of the bootstrap.
-    group : of each image, as ``bootstrap.members`` numbers them: whole groups are drawn, and of too few there is no interval.
-        None: single images.
+    group : of each image, as in ``bootstrap_rows``.
 
     Returns
     -------
     dict
         As ``metrics.json`` has it. ``labels`` are those that occur on either side; ``confusion`` has manual rows and algorithm
-        columns. Precision of a class that the algorithm never gave is None and counts as 0 in the averages, or never to find a
-        class would be better than to find a part of it; recall of one that nobody saw is None and left out of them.
+        columns. Precision of a class that the algorithm never gave is None and counts as 0 in the averages (else never to find a
+        class would be better than to find a part of it); recall of a class without a manual label is None and left out of them.
         ``fowlkes_mallows_pairs`` is the pair-counting index, ``fowlkes_mallows_macro`` the mean over the classes of
         ``sqrt(precision * recall)``, the formula of the paper's table, with 0 for a class without a hit.
     """
     n, labels = len(manual), sorted(set(manual) | set(algorithm))
     if n == 0:
-        return _nothing()
+        averages = {kind: dict.fromkeys(_AVERAGED) for kind in _KINDS}
+        empty: dict[str, Any] = {"n": 0, "labels": [], "confusion": []}
+        ci95 = dict.fromkeys((*_OVERALL, "macro_f1", "weighted_f1"))
+        return empty | dict.fromkeys(_OVERALL) | {"per_class": {}} | averages | {"ci95": ci95}
+    from sklearn.metrics import precision_recall_fscore_support
+
     rows_columns = np.array([(labels.index(m), labels.index(a)) for m, a in zip(manual, algorithm, strict=True)]).T
     confusion = np.zeros((len(labels), len(labels)), np.int64)
     np.add.at(confusion, tuple(rows_columns), 1)
-    classes = np.array(_scores(manual, algorithm, labels))
+    # Precision, recall and F1 (rows) of each class, NaN where undefined.
+    classes = np.array(precision_recall_fscore_support(list(manual), list(algorithm), labels=labels, zero_division=np.nan)[:3])
     rows = [{name: _defined(value) for name, value in zip(_AVERAGED, column, strict=True)} for column in classes.T]
     per_class_fm = np.sqrt(classes[0] * classes[1])
     point: dict[str, Any] = {
@@ -427,9 +419,7 @@ def state_metrics(
     return counts | point | {"per_class": per_class} | averages | {"ci95": ci95}
 
 
-def _drawn_tables(
-    confusion: NDArray[np.int64], rows_columns: NDArray[np.int64], seed: int, group: NDArray[np.int64] | None
-) -> NDArray[np.int64]:
+def _drawn_tables(confusion: NDArray[np.int64], rows_columns: NDArray[np.int64], seed: int, group: Group) -> NDArray[np.int64]:
     """Confusion tables of the resamples, shape (R, k, k)."""
     rng = np.random.default_rng(seed)
     if group is None:
@@ -441,16 +431,6 @@ def _drawn_tables(
     np.add.at(tables, (numbers, *rows_columns), 1)
     drawn = rng.multinomial(count, np.full(count, 1.0 / count), RESAMPLES)
     return np.asarray(np.tensordot(drawn, tables, 1), np.int64)
-
-
-_KINDS = ("macro", "weighted")
-
-
-def _scores(manual: Sequence[str], algorithm: Sequence[str], labels: list[str]) -> Any:
-    """Precision, recall and F1 of each class, NaN where undefined."""
-    from sklearn.metrics import precision_recall_fscore_support
-
-    return precision_recall_fscore_support(list(manual), list(algorithm), labels=labels, zero_division=np.nan)[:3]
 
 
 def _averages(classes: Floats, weights: NDArray[Any]) -> dict[str, float | None]:
@@ -467,11 +447,3 @@ def _averages(classes: Floats, weights: NDArray[Any]) -> dict[str, float | None]
 
 def _defined(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _nothing() -> dict[str, Any]:
-    names = ("accuracy", "kappa", "fowlkes_mallows_pairs", "fowlkes_mallows_macro")
-    averages = {kind: dict.fromkeys(_AVERAGED) for kind in _KINDS}
-    empty: dict[str, Any] = {"n": 0, "labels": [], "confusion": []}
-    ci95 = dict.fromkeys((*names, "macro_f1", "weighted_f1"))
-    return empty | dict.fromkeys(names) | {"per_class": {}} | averages | {"ci95": ci95}

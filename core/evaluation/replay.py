@@ -1,7 +1,4 @@
-"""Two perceptions of the same frames, compared: what was recorded (before) and what is perceived now (after). Pure.
-
-The frames of a replay in sum: of one session, or of many without their frames being kept. Pure.
-"""
+"""Two perceptions of the same frames, compared: what was recorded (before) and what is perceived now (after)."""
 
 from __future__ import annotations
 
@@ -18,7 +15,7 @@ from core.session.codec import RecordedRow
 from core.session.manifest import Event, EventKind
 from core.types import Point, PoseState, Reason, Scene
 
-_NO_POSE_DEG = 180.0
+_NO_POSE_DEG = 180.0  # size of a change by which a pose was lost or gained
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +92,7 @@ def seen(scene: Scene) -> FrameResult:
 class RecordedTargets:
     """The operator's destination of each recorded frame, in source pixels.
 
-    A row that was perceived as far as its path tells it for sure: its route ends there. Where there is none, the events say what
-    was chosen last. ``of`` takes the rows in their order.
+    A route ends there; where a row has no route, the newest event says what was chosen. ``of`` takes the rows in their order.
     """
 
     def __init__(self, events: Iterable[Event]) -> None:
@@ -181,8 +177,8 @@ class ReplayTally:
     gained: Counter[str]
     lost: Counter[str]
     other_reason: int
-    confidence: tuple[Floats, Floats]
-    latency_ms: tuple[Floats, Floats]
+    confidence: tuple[Floats, ...]
+    latency_ms: tuple[Floats, ...]
 
     @classmethod
     def of(cls, changes: Sequence[Change]) -> ReplayTally:
@@ -190,7 +186,7 @@ class ReplayTally:
         table = np.zeros((len(STATES), len(STATES)), np.int64)
         for change in changes:
             table[STATES.index(change.before.state or "-"), STATES.index(change.after.state or "-")] += 1
-        sides = tuple([change.before if name == "before" else change.after for change in changes] for name in _SIDES)
+        before, after = [change.before for change in changes], [change.after for change in changes]
         return cls(
             len(changes),
             _values(abs(c.theta_deg) for c in changes if c.theta_deg is not None),
@@ -199,8 +195,8 @@ class ReplayTally:
             Counter(c.after.reason.value for c in changes if c.before.state is not None and c.after.reason is not None),
             Counter(c.before.reason.value for c in changes if c.after.state is not None and c.before.reason is not None),
             sum(c.kind == "other reason" for c in changes),
-            (_confidence(sides[0]), _confidence(sides[1])),
-            (_latency_ms(sides[0]), _latency_ms(sides[1])),
+            tuple(_values(one.confidence for one in side if one.state is not None) for side in (before, after)),
+            tuple(_values(one.total_ms for one in side if one.total_ms is not None) for side in (before, after)),
         )
 
     def __add__(self, other: ReplayTally) -> ReplayTally:
@@ -245,20 +241,12 @@ class ReplayTally:
         }
 
 
-def _confidence(side: Sequence[FrameResult]) -> Floats:
-    return _values(seen.confidence for seen in side if seen.state is not None)
-
-
-def _latency_ms(side: Sequence[FrameResult]) -> Floats:
-    return _values(seen.total_ms for seen in side if seen.total_ms is not None)
-
-
 def _values(values: Iterable[float]) -> Floats:
     return np.fromiter(values, np.float64)
 
 
-def _joined(first: tuple[Floats, Floats], second: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    return np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]])
+def _joined(first: tuple[Floats, ...], second: tuple[Floats, ...]) -> tuple[Floats, ...]:
+    return tuple(np.concatenate(pair) for pair in zip(first, second, strict=True))
 
 
 def _spread(values: Floats) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from app.annotator.sources import default_store, image_files
 from core.annotation.store import DEFAULT_NAME
 from core.devices import UserError
 from core.learning.dataset import write_png
-from tests.core.session_data import QUICK, number_in, record, tick_of
+from tests.core.session_data import QUICK, record, tick_of
 
 
 def test_a_link_that_leads_nowhere_keeps_nobody_from_the_rest(tmp_path: Path) -> None:
@@ -100,23 +100,6 @@ def test_a_damaged_frame_is_left_out_and_no_neighbour_taken_for_it(tmp_path: Pat
     video.write_bytes(data)
     assert [path.name for path in image_files([video], 4)] == ["run_000000.png", "run_000020.png", "run_000030.png"]
     assert "run.mkv: 1 of 4 chosen frames are lost or damaged: left out" in capsys.readouterr().err
-
-
-def test_what_a_decoder_conceals_in_a_session_is_not_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    session = record(tmp_path, (tick_of(index, 100.0 + index / 30) for index in range(60)))
-    video = session / "video_0000.mkv"
-    with av.open(str(video)) as container:
-        packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
-    data = bytearray(video.read_bytes())
-    position, size = packets[20]
-    data[position + size // 2] ^= 0xFF
-    video.write_bytes(data)
-    files = image_files([session], 60)
-    assert 20 <= len(files) < 60
-    assert {path.stem for path in files} & {f"video_0000_{place:06d}" for place in range(20, 30)} == set()
-    assert "chosen frames are lost or damaged: left out" in capsys.readouterr().err
-    for path in files:
-        assert number_in(cv2.imread(str(path))[:, :, ::-1]) == int(path.stem[-6:])
 
 
 def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.core.test_classification import label_pairs
 
 from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
 from core.evaluation.paper import (
@@ -23,6 +22,7 @@ from core.evaluation.paper import (
     verdict,
     wanted_images,
 )
+from tests.core.evaluation.test_classification import label_pairs
 
 HEADER = "image,angle_1,angle_2,state,algorithm_angle,algorithm_state"
 ROW = "a.png,10,12,B,14.5,C"

@@ -12,7 +12,14 @@ from pydantic import ValidationError
 
 from core.config.models import PerceptionConfig, TwinConfig
 from core.devices import UserError
-from core.evaluation.confidence import LEAST, KnownPicture, OutOfDistributionError, find_known, fit_familiarity, signatures_in
+from core.evaluation.confidence import (
+    LEAST,
+    KnownPicture,
+    OutOfDistributionError,
+    find_known,
+    fit_out_of_distribution,
+    signatures_in,
+)
 from core.learning.dataset import DatasetError, write_png
 from core.learning.model_writer import save_model, save_with_second_look, write_calibration
 from core.perception.inference import OpenVinoSegmenter, TorchSegmenter
@@ -43,7 +50,7 @@ def shown(count: int, groups: list[int] | None = None, folder: str = "set") -> l
 
 
 def fitted(signatures: np.ndarray, groups: list[int] | None = None) -> OutOfDistributionReference:
-    return fit_familiarity(shown(len(signatures), groups), signatures, 640, {})
+    return fit_out_of_distribution(shown(len(signatures), groups), signatures, 640, {})
 
 
 def test_a_signature_is_the_mean_over_all_and_over_the_vessel() -> None:
@@ -60,7 +67,7 @@ def test_a_signature_is_the_mean_over_all_and_over_the_vessel() -> None:
 
 
 def test_new_pictures_of_the_known_kind_are_familiar_and_others_are_not() -> None:
-    familiarity = fit_familiarity(shown(400), known(400), 640, {"set": "drawn"})
+    familiarity = fit_out_of_distribution(shown(400), known(400), 640, {"set": "drawn"})
     assert familiarity.fitted_on == {"set": "drawn", "pictures": 400}
     assert familiarity.distance(known(400)).mean() == pytest.approx(1.0, abs=0.1)
     fresh = familiarity.distance(known(2000, seed=1)) / familiarity.limit
@@ -104,7 +111,7 @@ def test_another_folder_of_one_rig_does_not_open_the_door_to_everything(count: i
     rig[5] = 6.0
     signatures = np.concatenate([known(400), known(count, seed=1) + rig])
     pictures = [*shown(400), *shown(count, [0] * count, "rig")]
-    familiarity = fit_familiarity(pictures, signatures, 640, {})
+    familiarity = fit_out_of_distribution(pictures, signatures, 640, {})
     assert (familiarity.distance(known(200, seed=2) + rig) / familiarity.limit > 1.0).mean() < 0.1, "it is known"
     rig[5], rig[7] = 0.0, 6.0
     assert (familiarity.distance(known(200, seed=2) + rig) / familiarity.limit > 1.0).mean() > 0.9, "others are not"

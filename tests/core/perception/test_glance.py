@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core.config.models import PerceptionConfig, TrackingConfig
-from core.evaluation.confidence import KnownPicture, fit_familiarity
+from core.evaluation.confidence import KnownPicture, fit_out_of_distribution
 from core.perception.pipeline import Pipeline, Sight
 from core.perception.roi import RoiSelector, cells_of, has_changed, look
 from core.perception.segmentation import Recognised, window_around
@@ -273,7 +273,7 @@ class Kind(Colours):
 def test_a_window_tells_nothing_of_the_kind_and_who_is_refused_for_it_is_looked_at_whole() -> None:
     signatures = np.random.default_rng(0).normal(size=(100, 4)).astype(np.float32)
     network = Kind(signatures[0])
-    familiarity = fit_familiarity([KnownPicture(Path(), Path(), index) for index in range(100)], signatures, 640, {})
+    familiarity = fit_out_of_distribution([KnownPicture(Path(), Path(), index) for index in range(100)], signatures, 640, {})
     pipeline = Pipeline(network, CONFIG, glance=Sight(network), familiarity=familiarity)
     scenes = [see(pipeline, 0.05 * index, picture(300 + 4 * index)) for index in range(3)]
     assert [scene.window is None for scene in scenes] == [True, False, False]
