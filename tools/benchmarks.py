@@ -27,9 +27,9 @@ from app.operator.rig_engine import leaving_a_core
 from app.operator.window import OperatorWindow
 from app.ui.texts import OperatorStep
 from core.config.models import Config, PursuitConfig, TwinConfig, choose_model, load_config
+from core.control.look_ahead import look_ahead
 from core.control.modes import DRIVING_MODES, Mode
 from core.control.motion import AT_REST, Jog
-from core.control.pursuit import look_ahead
 from core.devices import UserError
 from core.evaluation.metrics import MIN_GROUPS, RESAMPLES
 from core.perception.centerline import plan_route

@@ -63,11 +63,12 @@ from core.annotation.store import DEFAULT_NAME, AnnotationStore, ItemKey, find_i
 from core.config.files import Profiles
 from core.config.models import Config, PerceptionConfig, load_config
 from core.config.safety import ServosConfig
+from core.control.drive_view import DriveView
 from core.control.engine import Engine
 from core.control.health import ModelReport
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST, Jog
-from core.control.pilot import PERIOD_S, DriveView, Pilot
+from core.control.pilot import PERIOD_S, Pilot
 from core.control.policies import make_policy
 from core.devices import UserError
 from core.learning.dataset import write_png

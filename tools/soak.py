@@ -223,7 +223,7 @@ class SoakRig:
             self._writer.add_event(event_of_alert(alert, news.view.time_s))
         before, self._recorded = self._recorded, self._writer.status()
         for fault in faults_between(before, self._recorded):
-            self.pilot.report(fault)
+            self.pilot.report_fault(fault)
 
     def close(self) -> LeftOver | None:
         """End the rig as F5 or a crash does; what the next one takes over."""

@@ -33,9 +33,10 @@ from app.widgets.event_log import LogKind
 from core.config.models import Config
 from core.config.safety import JointName
 from core.control.alerts import Alert
+from core.control.drive_view import DriveView
 from core.control.modes import ARMED_MODES, Act
 from core.control.motion import AT_REST, Jog
-from core.control.pilot import DriveView, Pilot
+from core.control.pilot import Pilot
 from core.types import Point
 from hardware.inputs.gamepad import Gamepad, GamepadError, GamepadState
 from hardware.inputs.pedal import Pedal, PedalError, PedalReport

@@ -33,7 +33,7 @@ from core.config.calibration import CalibrationConfig
 from core.config.models import Config, PerceptionConfig
 from core.config.rig_file import RigFileError, calibration_of, scaled
 from core.control.alerts import Alert
-from core.control.pilot import DriveView
+from core.control.drive_view import DriveView
 from core.types import Frame, Scene, Tick
 from hardware.rig import RigKind
 from hardware.servos.bus_ipc import BusStatus

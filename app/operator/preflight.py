@@ -15,8 +15,8 @@ from app.ui.texts import OperatorStep, sentence
 from app.ui.workers import ChildProcess, module_of
 from core.config.models import Config
 from core.control.alerts import ALERTS
-from core.control.faults import AREA, REACTION, Area, Reaction
-from core.control.pilot import DriveView
+from core.control.drive_view import DriveView
+from core.control.faults import Area
 from hardware.preflight.checks import Check
 from hardware.preflight.preflight import Level, level_of
 
@@ -86,8 +86,8 @@ def live_findings(view: DriveView | None) -> tuple[PreflightFinding, ...]:
         return ()
     found = []
     for area, name in ((Area.CAMERA, tr("camera's pictures")), (Area.SERVOS, tr("servos' answers"))):
-        faults = [fault for fault in view.active if AREA[fault.cause] is area]
-        held = [fault for fault in faults if REACTION[fault.cause] >= Reaction.HOLD]
+        faults = [fault for fault in view.active if fault.cause.area is area]
+        held = [fault for fault in faults if fault.holds]
         worst = next(iter(held or faults), None)
         if worst is None:
             found.append(PreflightFinding(name, Level.GOOD, tr("no fault")))

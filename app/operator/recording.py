@@ -21,8 +21,8 @@ from app.widgets.messages import Offer, OfferButton
 from core.annotation.store import DEFAULT_NAME
 from core.config.models import Config
 from core.control.alerts import Alert
+from core.control.drive_view import DriveView
 from core.control.faults import Cause
-from core.control.pilot import DriveView
 from core.files import write_whole
 from core.session.manifest import About, Event, EventKind, about_rig, event_of_alert, event_of_target
 from core.session.recovery import CutSession, find_cut_sessions
@@ -179,7 +179,7 @@ class Recorder(QObject):
         self.changed.emit(now)
         if (pilot := self._engine.pilot) is not None:
             for fault in faults_between(before, now):
-                pilot.report(fault)
+                pilot.report_fault(fault)
         if now.saved is not None and now.saved != before.saved:
             self.said.emit(tr("Session saved: {saved}", saved=now.saved), False)
         if now.notices != before.notices:

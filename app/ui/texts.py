@@ -16,10 +16,10 @@ from app.ui.i18n import ENGLISH, language_in_use, mark, tr, tr_text
 from core.config.models import PoseConfig
 from core.config.rig_file import RigFile
 from core.control.alerts import ALERTS, AlertKey
-from core.control.faults import AREA, REACTION, Area, Cause, Fault, Reaction
+from core.control.drive_view import DriveView
+from core.control.faults import Area, Cause
 from core.control.gate import Source
 from core.control.modes import Mode
-from core.control.pilot import DriveView
 from core.types import Advice, Pose, PoseState, Reason, Refusal, Scene, Speed
 
 DEADMAN_KEY = "Shift"
@@ -131,7 +131,7 @@ def next_step(view: DriveView) -> NextStep:
     if view.busy:
         return NextStep(OperatorStep.SERVOS_ON, False, sentence(view.busy).rstrip(".。"), tr("this takes a moment"))
     if not view.servos_on:
-        faults = tuple(fault.cause for fault in view.active if AREA[fault.cause] is Area.SERVOS and _holds(fault))
+        faults = tuple(fault.cause for fault in view.active if fault.cause.area is Area.SERVOS and fault.holds)
         rest = tr("press {key}: they are checked with the torque off, then tighten the wires", key=OperatorStep.SERVOS_ON.value.key)
         if faults:
             step = _refused(OperatorStep.SERVOS_ON, faults)
@@ -157,10 +157,6 @@ def sentence(text: str) -> str:
     return tr("{sentence}.", sentence=f"{shown[0].upper()}{shown[1:]}") if shown else ""
 
 
-def _holds(fault: Fault) -> bool:
-    return REACTION[fault.cause] >= Reaction.HOLD
-
-
 def _refused(step: OperatorStep, reasons: tuple[AlertKey, ...], other: OperatorStep | None = None) -> NextStep:
     first = ALERTS[reasons[0]]
     # servos that are in trouble can still be checked: that is the way out
@@ -177,7 +173,7 @@ def _acknowledge(view: DriveView) -> NextStep:
         )
     cause = view.latched.cause
     # a fault of servos in use that is still there latches again at once
-    remains = view.servos_on and AREA[cause] is Area.SERVOS and any(fault.cause is cause for fault in view.active)
+    remains = view.servos_on and cause.area is Area.SERVOS and any(fault.cause is cause for fault in view.active)
     return NextStep(OperatorStep.ACKNOWLEDGE, not remains, ALERTS[cause].text, ALERTS[cause].what_to_do, (cause,))
 
 
@@ -193,7 +189,7 @@ def _hand_over(view: DriveView) -> NextStep:
 
 
 def _interrupted(view: DriveView) -> NextStep:
-    causes = tuple(fault.cause for fault in view.active if _holds(fault))
+    causes = tuple(fault.cause for fault in view.active if fault.holds)
     back, again = OperatorStep.TAKE_BACK.value.key, OperatorStep.HAND_OVER.value.key
     if causes:
         first = ALERTS[causes[0]]

@@ -20,8 +20,8 @@ from app.widgets.basics import OnResize
 from app.widgets.painting import FieldLook, PaintedWidget, Sign, draw_text, paint_sign, set_colours, text_width
 from core.config.models import RESOURCES
 from core.control.alerts import Alert, AlertKey, Priority
+from core.control.drive_view import DriveView
 from core.control.faults import Cause
-from core.control.pilot import DriveView
 
 FULL, COMPACT = 44, 26
 """Heights of a row with two lines and with one, px."""

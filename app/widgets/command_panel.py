@@ -18,8 +18,8 @@ from app.ui.workers import Pace
 from app.widgets.basics import ScrollKeys, card_note
 from app.widgets.painting import LEFT, NONE, RIGHT, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
 from app.widgets.servo_table import TONE_ROLE, Cell, Tone
+from core.control.drive_view import DriveView
 from core.control.gate import RejectReason, Source
-from core.control.pilot import DriveView
 from core.types import Command
 
 if TYPE_CHECKING:

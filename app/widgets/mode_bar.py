@@ -41,8 +41,8 @@ from app.widgets.painting import (
     set_colours,
     text_width,
 )
+from core.control.drive_view import DriveView
 from core.control.modes import ARMED_MODES, Mode
-from core.control.pilot import DriveView
 
 # a button has the colour of the mode that it leads to
 _ROLE = {

@@ -1,23 +1,25 @@
-"""What people read and hear: one table of texts, and a queue that throttles repeats. Pure.
+"""Alerts: the lines that the operator reads and hears, and how often: faults, refused requests, gate rejections and notes.
 
-A fault that the program reacted to, a request that was refused and a command that the gate rejected all have their line here. The
-sound is a name; files belong to the window. Alert fatigue makes people ignore alarms: only what ends or interrupts a motion sounds,
-and the same line comes again only after its cooldown.
+A sound is a name; its file belongs to the window. To avoid alarm fatigue only what ends or interrupts a motion sounds, and the same
+line comes again only after its cooldown.
 """
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 
-from core.control.faults import REACTION, Cause, Reaction
-from core.control.gate import RejectReason
-from core.control.modes import Hindrance
+from core.control.faults import Area, Cause, Fault, Reaction
+from core.control.gate import Rejection, RejectReason, Source
+from core.control.modes import ARMED_MODES, DRIVING_MODES, Decision, Hindrance, Mode, SupervisorState
+from core.control.motion import Jog
+from core.control.robot import SentMotion
 
 
 class Note(StrEnum):
-    """What is worth a line without being a fault or a refusal."""
+    """Lines that are neither a fault nor a refusal."""
 
     REACHED = "destination reached"
     AT_END = "joint at its end"
@@ -29,7 +31,7 @@ AlertKey = Cause | Hindrance | RejectReason | Note
 
 
 class Priority(IntEnum):
-    """How urgent; higher comes first."""
+    """Higher comes first."""
 
     HINT = 0
     WARNING = 1
@@ -55,62 +57,7 @@ _STYLE: dict[Reaction, tuple[Priority, str | None, float]] = {
     Reaction.DISARM: (Priority.DISARM, "disarm", 5.0),
     Reaction.STOP: (Priority.STOP, "stop", 5.0),
 }
-
-_FAULT_TEXTS: dict[Cause, tuple[str, str]] = {
-    Cause.STOP_PRESSED: ("STOP pressed", "acknowledge, check the servos, arm again; an emergency needs the power cut"),
-    Cause.PORT_LOST: ("Servo port lost", "plug the servo cable in, check the servos, then acknowledge"),
-    Cause.SERVO_ALERT: ("A servo reports a hardware error", "free the wire, restart the servo, acknowledge, then zero it"),
-    Cause.TRACKING: ("A servo does not follow: jam or slack wire", "look for a jam or a slack wire, then acknowledge"),
-    Cause.STRAINED: ("A servo draws too much current", "free the wire or what it moves, let it cool, then acknowledge"),
-    Cause.TORQUE_ON: ("The torque is not proven to be off", "cut the servos' power; until they say so it is tried again"),
-    Cause.SERVOS_WRONG: ("Servos are not as configured", "compare ids, model and mode with the configuration"),
-    Cause.CLOCK: ("The clock jumped or the computer slept", "check the robot, acknowledge, arm again"),
-    Cause.SERVO_SILENT: ("A servo does not answer", "check its cable and power, then acknowledge"),
-    Cause.BUS_NOISE: ("Too many bad packets from the servos", "check plugs and shielding of the servo cable, then acknowledge"),
-    Cause.BUS_DEAD: ("Nothing heard from the servo bus", "acknowledge, then switch the servos on: that starts it again"),
-    Cause.REBOOTED: ("A servo restarted and lost its zero", "acknowledge, then zero the servos again"),
-    Cause.WATCHDOG: ("The servos' watchdog tripped", "check the servos, then acknowledge"),
-    Cause.HOT: ("A servo is too hot", "let it cool, lower the pretension, then acknowledge"),
-    Cause.VOLTAGE_LOW: ("The servos' supply voltage is too low", "check the power supply, then acknowledge"),
-    Cause.WINDOW_HUNG: ("The window does not answer", "acknowledge when it answers again; restart it if it does not"),
-    Cause.WORKER_DEAD: ("The perception worker stopped", "start again with F5, then acknowledge"),
-    Cause.CAMERA_LOST: ("Camera lost", "plug the camera in and start again, then acknowledge"),
-    Cause.CAMERA_FROZEN: ("The camera gives the same picture", "start the camera again, then acknowledge"),
-    Cause.WRONG_FORMAT: ("The camera's picture has the wrong format", "set the camera's size and colour format, then acknowledge"),
-    Cause.CAMERA_MOVED: ("The camera was moved", "put it back, or start again with F5, then acknowledge"),
-    Cause.FRAMES_LOST_LONG: ("Too many camera frames lost", "check the USB port and cable, then acknowledge"),
-    Cause.MODEL_UNFIT: ("The model is missing or damaged", "put the model back or choose another one in the configuration"),
-    Cause.SEVERAL_ROBOTS: ("Several robots in view", "leave one robot in the picture, then acknowledge"),
-    Cause.OUTSIDE_VESSEL: ("The robot seems outside the vessel", "look at the phantom; retract by hand, then acknowledge"),
-    Cause.NOT_FINITE_REPEATED: ("Perception gave broken results", "start again with F5, then acknowledge"),
-    Cause.COMMANDS_REJECTED: ("The program's commands were rejected", "acknowledge; if it comes again, report it with the log"),
-    Cause.HEAD_LOST_LONG: ("The robot's head is lost", "bring the robot back into view by hand, then acknowledge"),
-    Cause.POSE_LOST: ("No pose for half a second", "wait for a pose or drive by hand, then acknowledge"),
-    Cause.BUS_SILENT: ("The servo bus is silent", "wait a moment; if it stays, check the cable"),
-    Cause.CAMERA_SILENT: ("No new picture from the camera", "wait a moment; if it stays, check the cable"),
-    Cause.IMAGE_BLACK: ("The picture is black", "take the lens cap off or switch the lamp on"),
-    Cause.IMAGE_WHITE: ("The picture is overexposed", "dim the lamp or lower the exposure"),
-    Cause.FRAMES_LOST: ("Many camera frames are lost", "check the USB port and cable"),
-    Cause.NOT_FINITE: ("Perception gave a broken result", "wait for the next picture"),
-    Cause.COMMAND_REJECTED: ("The gate rejected a command", "wait a moment, or drive by hand"),
-    Cause.HEAD_LOST: ("The robot's head is out of sight", "bring the robot back into view by hand"),
-    Cause.HEAD_JUMP: ("The head jumped in the picture", "wait for the next pictures"),
-    Cause.BRANCH_UNCLEAR: ("Two branches fit", "click the destination in the picture"),
-    Cause.POOR_VIEW: ("Robot or vessel not clearly seen", "improve light and focus, remove what covers them"),
-    Cause.CONFIDENCE_LOW: ("Perception is not sure enough", "improve light and focus, or drive by hand"),
-    Cause.UNKNOWN_KIND: ("The picture is of an unknown kind", "teach the model pictures of this rig, or drive by hand"),
-    Cause.POSE_STALE: ("The pose is too old", "wait a moment; close other programs if it stays"),
-    Cause.NO_TARGET: ("No way to a destination", "click a destination ahead of the robot"),
-    Cause.DEADMAN: ("Deadman released", "press it again at once, or hand over again"),
-    Cause.FRAMES_DROPPED: ("The camera drops frames", "check the USB port and cable"),
-    Cause.OUT_OF_ORDER: ("The camera's pictures come out of order", "nothing to do: late ones are left out; check the driver"),
-    Cause.WARM: ("A servo is getting hot", "pause soon and let it cool"),
-    Cause.VOLTAGE_SAGS: ("The servos' supply voltage sags", "check the power supply"),
-    Cause.DISK_LOW: ("The disk is nearly full", "make room or end the recording"),
-    Cause.DISK_FULL: ("Disk full: recording stopped", "make room and record again; driving goes on"),
-    Cause.RECORDING_STOPPED: ("The recording stopped", "do what it says and record again; driving goes on"),
-    Cause.RECORDER_BEHIND: ("The recorder drops frames", "close other programs or record at a lower rate"),
-}
+"""Priority, sound and cooldown of a fault by its reaction."""
 
 _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Note.REACHED: ("Destination reached", "you drive again: choose the next one, or go on by hand"),
@@ -150,21 +97,16 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     RejectReason.OFF_COURSE: ("A joint was pushed off its course", "look for a jam; then drive on"),
 }
 
-
-def _spec(words: tuple[str, str], style: tuple[Priority, str | None, float]) -> AlertSpec:
-    return AlertSpec(words[0], words[1], *style)
-
-
 ALERTS: dict[AlertKey, AlertSpec] = {
-    **{cause: _spec(words, _STYLE[REACTION[cause]]) for cause, words in _FAULT_TEXTS.items()},
-    **{key: _spec(words, (Priority.HINT, None, 2.0)) for key, words in _HINTS.items()},
+    **{cause: AlertSpec(cause.text, cause.what_to_do, *_STYLE[cause.reaction]) for cause in Cause},
+    **{key: AlertSpec(*words, Priority.HINT, None, 2.0) for key, words in _HINTS.items()},
 }
-"""Every line that there is."""
+"""All lines. Those of faults come from the fault table (``faults.Cause``)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Alert:
-    """A line to show now. ``detail`` is the measured value; ``repeats`` counts how often it was held back since the last time."""
+    """A line to show now. ``detail`` is the measured value; ``repeats`` counts how often it was suppressed since the last time."""
 
     key: AlertKey
     spec: AlertSpec
@@ -173,51 +115,104 @@ class Alert:
     sound: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AlertQueue:
-    """When each line was last shown, and how often it was held back since."""
-
-    shown_s: dict[AlertKey, float] = field(default_factory=dict)
-    held_back: dict[AlertKey, int] = field(default_factory=dict)
+_MOST_ALERTS = 200
+"""Alerts that are kept until the window takes them."""
+_NO_ALERT = frozenset({RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE, RejectReason.NO_COMMAND, RejectReason.OUT_OF_ORDER})
+"""Rejections that happen in normal driving."""
 
 
-def raise_alerts(
-    queue: AlertQueue,
-    raised: Iterable[tuple[AlertKey, str]],
-    now_s: float,
-    *,
-    armed: bool,
-    driving: bool = True,
-    changed: bool = False,
-) -> tuple[AlertQueue, tuple[Alert, ...]]:
-    """Which of the `raised` lines, (key, detail) each, to show now.
+class AlertReporter:
+    """Throttles repeats and keeps alerts until they are taken. All methods may be called from any thread."""
 
-    Parameters
-    ----------
-    armed : else only a stop sounds.
-    driving : whether the program drives, or did: else nothing is held, and nothing sounds as if it were.
-    changed : the mode has changed with them: what has ended a motion is told each time.
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._alerts: list[Alert] = []
+        self._shown_s: dict[AlertKey, float] = {}
+        self._suppressed: dict[AlertKey, int] = {}
 
-    Returns
-    -------
-    tuple
-        The queue after it, and the alerts, most urgent first; the same line not again within its cooldown. At most one of them, the
-        most urgent that has one, sounds.
-    """
-    shown_s, held_back = dict(queue.shown_s), dict(queue.held_back)
-    alerts: list[Alert] = []
-    for key, detail in raised:
-        spec = ALERTS[key]
-        # on a clock that went back the cooldown says nothing
-        is_told_again = changed and spec.priority >= Priority.HOLD
-        if not is_told_again and key in shown_s and 0.0 <= now_s - shown_s[key] < spec.cooldown_s:
-            held_back[key] = held_back.get(key, 0) + 1
-            continue
-        is_heard = armed and (driving or spec.priority is not Priority.HOLD)
-        sound = spec.sound if is_heard or spec.priority is Priority.STOP else None
-        alerts.append(Alert(key, spec, detail, held_back.pop(key, 0), sound))
-        shown_s[key] = now_s
-    alerts.sort(key=lambda alert: -alert.spec.priority)
-    sounding = next((place for place, alert in enumerate(alerts) if alert.sound is not None), None)
-    quiet = [alert if place == sounding else replace(alert, sound=None) for place, alert in enumerate(alerts)]
-    return AlertQueue(shown_s, held_back), tuple(quiet)
+    def take(self) -> tuple[Alert, ...]:
+        """The alerts since the last call."""
+        with self._lock:
+            alerts, self._alerts = tuple(self._alerts), []
+            return alerts
+
+    def report_refusal(self, reason: Hindrance, detail: str) -> None:
+        """A request is refused: reported each time, without a sound."""
+        with self._lock:
+            self._alerts.append(Alert(reason, ALERTS[reason], detail))
+
+    def report(
+        self, raised: Iterable[tuple[AlertKey, str]], now_s: float, mode: Mode = Mode.ADVISORY, *, changed: bool = False
+    ) -> None:
+        """Report lines, (key, detail) each, most urgent first; the same line not again within its cooldown.
+
+        At most one of them sounds, the most urgent that has a sound: while disarmed only a stop, and a hold only while the program
+        drives.
+
+        Parameters
+        ----------
+        mode : before these lines.
+        changed : the mode has changed with them: what has ended a motion is reported each time.
+        """
+        with self._lock:
+            alerts: list[Alert] = []
+            for key, detail in raised:
+                spec = ALERTS[key]
+                always = changed and spec.priority >= Priority.HOLD
+                # a clock that went back ends the cooldown
+                if not always and key in self._shown_s and 0.0 <= now_s - self._shown_s[key] < spec.cooldown_s:
+                    self._suppressed[key] = self._suppressed.get(key, 0) + 1
+                    continue
+                is_heard = mode in ARMED_MODES and (mode in DRIVING_MODES or spec.priority is not Priority.HOLD)
+                sound = spec.sound if is_heard or spec.priority is Priority.STOP else None
+                alerts.append(Alert(key, spec, detail, self._suppressed.pop(key, 0), sound))
+                self._shown_s[key] = now_s
+            alerts.sort(key=lambda alert: -alert.spec.priority)
+            sounding = next((place for place, alert in enumerate(alerts) if alert.sound is not None), None)
+            alerts = [alert if place == sounding else replace(alert, sound=None) for place, alert in enumerate(alerts)]
+            self._alerts = [*self._alerts, *alerts][-_MOST_ALERTS:]
+
+    def report_turn(
+        self,
+        before: SupervisorState,
+        state: SupervisorState,
+        decision: Decision,
+        jog: Jog,
+        sent: SentMotion | None,
+        kept_back: Rejection | None,
+        now_s: float,
+    ) -> None:
+        """Report a turn of the pilot: the state `before` and after it, the decision, and what became of controls and command."""
+        raised: list[tuple[AlertKey, str]] = [(f.cause, f.detail) for f in decision.raised if _matters(f, before)]
+        raised += [(reason, "") for refused in decision.refused for reason in refused.reasons]
+        permitted = decision.permitted
+        if not jog.is_rest and permitted is None:
+            if decision.mode is Mode.STOPPED:
+                raised.append((Hindrance.IS_STOPPED, ""))
+            elif decision.latched is not None:
+                raised.append((Hindrance.UNACKNOWLEDGED, ""))
+            elif not state.health.servos_ready:
+                raised.append((Hindrance.SERVOS_UNCHECKED, ""))
+        if sent is not None and permitted is not None:
+            if sent.rejection is not None and sent.rejection not in _NO_ALERT:
+                raised.append((sent.rejection, ""))
+            # the program bends to the end of a tendon's travel in normal driving; at the end of the feed it gets nowhere
+            by_program = permitted is Source.PROGRAM and jog.is_rest
+            at_end = [name for name in sent.at_end if not by_program or name == "advance"]
+            if at_end and (by_program or not jog.is_rest):
+                raised.append((Note.AT_END, ", ".join(at_end)))
+        is_moving = not jog.is_rest or decision.mode in DRIVING_MODES
+        if kept_back is not None and permitted is not None and is_moving and kept_back.reason not in _NO_ALERT:
+            raised.append((kept_back.reason, kept_back.detail))
+        self.report(raised, now_s, before.mode, changed=decision.mode is not before.mode)
+
+
+def _matters(fault: Fault, before: SupervisorState) -> bool:
+    """Whether a fault is worth an alert: in ADVISORY the screen shows perception's doubts anyway, and servos that are off endanger
+    nothing."""
+    cause = fault.cause
+    if before.mode in ARMED_MODES or cause in {Cause.STOP_PRESSED, Cause.SERVOS_WRONG, Cause.TORQUE_ON}:
+        return True
+    if cause.area is Area.SERVOS or cause is Cause.CLOCK:
+        return before.health.servos_ready
+    return cause.area is Area.HOST and cause.reaction is Reaction.WARN

@@ -96,7 +96,7 @@ class Engine:
         if self.pilot is None:
             advice, sent = self._policy(scene), None
         else:
-            advice = self.pilot.see(frame, scene, status, has_target=has_target)
+            advice = self.pilot.update_scene(frame, scene, status, has_target=has_target)
             sent = self.pilot.view.sent
         return Tick(frame, scene, advice, sent, status, self._dropped, self._rate())
 
@@ -111,7 +111,7 @@ class Engine:
                 raise
             self.problem = str(error)
             if self.pilot is not None:
-                self.pilot.report(Fault(Cause.CAMERA_LOST, self.problem))
+                self.pilot.report_fault(Fault(Cause.CAMERA_LOST, self.problem))
             time.sleep(max(0.0, timeout_s - (time.monotonic() - before_s)))
             return None
         if frame is not None:
@@ -150,7 +150,7 @@ class Engine:
         self.problem = f"the camera's picture is {frame.image.dtype} {shape}, not 8-bit RGB: set its colour format"
         if self.pilot is not None:
             scene = Scene(frame.index, frame.captured_s, (0, 0), 1.0, refusal=Refusal(Reason.UNREADABLE, self.problem))
-            self.pilot.see(frame, scene, None, has_target=False)
+            self.pilot.update_scene(frame, scene, None, has_target=False)
 
     def _is_late(self, frame: Frame) -> bool:
         """Overtaken by a newer one, by number and by time: a camera that was opened again counts anew, but at a later time."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from core.config.models import PursuitConfig
 from core.control.health import FrameReport, RouteState
-from core.control.pursuit import look_ahead
+from core.control.look_ahead import look_ahead
 from core.types import Advice, Frame, Image, Point, Reason, Scene
 
 _EVERY_S = 0.4

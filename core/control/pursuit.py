@@ -1,11 +1,8 @@
-"""A policy that looks ahead along the route: curvature-limited steering, slow before bends and bifurcations, gentle to the wall.
+"""Pure pursuit along the route: curvature-limited steering, slow before bends and bifurcations, backs off from walls.
 
 Everything is taken from the picture: the head and its direction from the robot's path, the way from the operator's route or,
-without one, from the centerline's piece. Contact force is used where the rig reports it (the twin does).
-
-Does the head move as it is fed, how hard does it press, how far is it to be taken back? Small memories of the pursuit policy.
-
-The way ahead of the head: what a policy that looks ahead takes from a scene. Angles in degrees, lengths in working px.
+without one, from the centerline's piece. Contact force is used where the rig reports it (the twin does). Progress monitors tell
+whether the head moves as it is fed and how hard it presses.
 """
 
 from __future__ import annotations
@@ -13,213 +10,55 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from core import geometry
 from core.config.models import AdviceConfig, PursuitConfig
-from core.types import Advice, Mask, Point, Points, RobotStatus, Scene, Speed, VesselGraph
+from core.control.look_ahead import LookAhead, limited, look_ahead
+from core.types import Advice, Point, RobotStatus, Scene, Speed
 
-_BEHIND_DEG = 100.0
-"""The way lies behind the head when it leaves it at more than this angle."""
-_IN_SIGHT_DEG, _IN_SIGHT_PX = 60.0, 90.0
-"""Where the way goes on within this angle and distance of the head, and nothing is between, it is not behind."""
-_ON_ROUTE_PX = 2.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LookAhead:
-    """The way ahead of the head, in working px.
-
-    ``points`` (N, 2) from the place beside the ``head``, or, where that leads back, from the place in sight ahead of it;
-    ``left_px`` to the ``target`` (None: no target); ``error_deg`` the turn that is missing, positive to the right; ``behind`` when
-    the way leaves backwards; ``turn_deg`` the sharpest turn within the preview; ``junction_px`` the distance to the next
-    bifurcation on it (None: none in the preview); ``wall`` how much of the room beside the centerline the head has used (1: it
-    touches the wall).
-    """
-
-    head: Point
-    points: Points
-    left_px: float | None
-    target: Point | None
-    error_deg: float
-    behind: bool
-    turn_deg: float
-    junction_px: float | None
-    wall: float
-
-
-def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, rounding_px: float = 0.0) -> LookAhead | None:
-    """What lies ahead in a scene, on a way whose corners are rounded over `rounding_px`; None when it has no pose."""
-    if scene.pose is None or scene.path is None or scene.centerline is None:
-        return None
-    head = scene.path.head
-    points = scene.route.points if scene.route is not None else _ahead_of(scene.centerline.piece, head)
-    left_px = scene.route.length_px if scene.route is not None else None
-    if len(points) < 2:
-        return None
-    heading = _heading(scene.path.points, config.heading_px)
-    rounded = geometry.smooth(geometry.resample(points, 2.0), rounding_px / 2.0) if rounding_px > 0.0 else points
-    goal = _goal(rounded, head, look_ahead_px)
-    straight_deg = _angle_deg(heading, _step(head, goal))
-    foot, first = rounded[0], geometry.cut(rounded, 0.0, 6.0)[-1]
-    # A head that has to turn into a branch beside it has the way across, not behind: one that leads back also begins backwards.
-    back_deg = min(abs(straight_deg), abs(_angle_deg(heading, _step(foot, first))))
-    behind = left_px is not None and left_px > config.arrive_px and back_deg > _BEHIND_DEG
-    arc_deg = _angle_deg(_step(foot, first), _step(foot, goal)) if not behind else 0.0
-    if behind and scene.masks is not None:
-        # In the wide lumen of a bifurcation the other branch's centerline can be the nearer one: the way then seems to lead back,
-        # though the head already looks into the right branch.
-        seen_px = _in_sight(points, head, heading, scene.masks.vessel, look_ahead_px)
-        if seen_px is not None:
-            points, behind = geometry.cut(points, seen_px, math.inf), False
-            goal = float(points[0][0]), float(points[0][1])
-            straight_deg = _angle_deg(heading, _step(head, goal))
-            left_px = math.dist(head, goal) + float(geometry.arc_length(points)[-1])
-    error_deg = straight_deg - config.follow_arc * max(-45.0, min(45.0, arc_deg))
-    radius_px, robot_px = scene.centerline.radius_px, scene.path.radius_px
-    away_px = math.hypot(head[0] - scene.centerline.nearest[0], head[1] - scene.centerline.nearest[1])
-    return LookAhead(
-        head=head,
-        points=points,
-        left_px=left_px,
-        target=scene.route.target if scene.route is not None else None,
-        error_deg=limited(error_deg, _sharpest_deg(look_ahead_px, config)),
-        behind=behind,
-        turn_deg=_turn_deg(points, config.preview_px),
-        junction_px=_junction_px(scene.vessel_graph, points, config.preview_px),
-        wall=away_px / max(radius_px - robot_px, 0.25 * radius_px, 1.0),
-    )
-
-
-def _ahead_of(piece: Points, head: Point) -> Points:
-    return geometry.cut(piece, geometry.nearest(piece, head)[1], math.inf)
-
-
-def _heading(path: Points, length_px: float) -> Point:
-    """Direction of the robot's end, from the whole stretch and not from its two end points."""
-    along = geometry.arc_length(path)
-    end = geometry.resample(geometry.cut(path, float(along[-1]) - length_px, math.inf), 2.0)
-    half = max(1, len(end) // 2)
-    back, front = end[:half].mean(axis=0), end[-half:].mean(axis=0)
-    return float(front[0] - back[0]), float(front[1] - back[1])
-
-
-def _goal(points: Points, head: Point, distance_px: float) -> Point:
-    """The first point of the way that is `distance_px` from the head; the way goes straight on beyond its end.
-
-    A head far beside the way looks farther ahead, at 45 degrees at most: its foot on the way would lie across, and look as if it
-    were behind a head that is turned a little outwards.
-    """
-    distance_px = max(distance_px, math.sqrt(2.0) * math.hypot(points[0][0] - head[0], points[0][1] - head[1]))
-    line = geometry.resample(points, 2.0)
-    last, before = line[-1], line[max(0, len(line) - 6)]
-    length = float(np.hypot(*(last - before)))
-    if length > 0.0:
-        line = np.vstack([line, last + (last - before) / length * np.arange(2.0, 3.0 * distance_px, 2.0)[:, None]])
-    far = np.hypot(line[:, 0] - head[0], line[:, 1] - head[1]) >= distance_px
-    found = line[int(np.argmax(far))] if far.any() else line[-1]
-    return float(found[0]), float(found[1])
-
-
-def _in_sight(points: Points, head: Point, heading: Point, vessel: Mask, least_px: float) -> float | None:
-    """How far along the way its first place ahead of the head lies to which a straight line stays in the lumen; None: nowhere."""
-    line = geometry.resample(points, 2.0)
-    for position, (x, y) in zip(geometry.arc_length(line), line.tolist(), strict=True):
-        away_px = math.hypot(x - head[0], y - head[1])
-        if not least_px <= away_px <= _IN_SIGHT_PX or abs(_angle_deg(heading, (x - head[0], y - head[1]))) > _IN_SIGHT_DEG:
-            continue
-        between = np.rint(np.linspace(head, (x, y), math.ceil(away_px) + 1)).astype(int)
-        across, down = between[:, 0].clip(0, vessel.shape[1] - 1), between[:, 1].clip(0, vessel.shape[0] - 1)
-        if vessel[down, across].all():
-            return float(position)
-    return None
-
-
-def _turn_deg(points: Points, preview_px: float) -> float:
-    """Largest angle between the way's first direction and any later one within the preview."""
-    line = geometry.resample(geometry.cut(points, 0.0, preview_px), 5.0)
-    if len(line) < 4:
-        return 0.0
-    steps = line[2:] - line[:-2]
-    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    return float(np.degrees(headings.max() - headings.min()))
-
-
-def _junction_px(graph: VesselGraph | None, points: Points, preview_px: float) -> float | None:
-    if graph is None or len(graph.nodes) == 0:
-        return None
-    degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
-    line = geometry.cut(points, 0.0, preview_px)
-    found = []
-    for x, y in graph.nodes[degree >= 3].tolist():
-        away_px, position, _ = geometry.nearest(line, (x, y))
-        if away_px <= _ON_ROUTE_PX:
-            found.append(position)
-    return min(found, default=None)
-
-
-def _sharpest_deg(look_ahead_px: float, config: PursuitConfig) -> float:
-    """The angle to a point at the look-ahead distance on the tightest arc that is steered for."""
-    return math.degrees(math.asin(min(1.0, look_ahead_px / (2.0 * config.min_bend_radius_px))))
-
-
-def _step(start: Points | Point, end: Points | Point) -> Point:
-    return float(end[0] - start[0]), float(end[1] - start[1])
-
-
-def _angle_deg(start: Point, end: Point) -> float:
-    """Signed angle from one direction to another, positive to the right on screen."""
-    return math.degrees(math.atan2(start[0] * end[1] - start[1] * end[0], start[0] * end[0] + start[1] * end[1]))
-
-
-def limited(value: float, limit: float) -> float:
-    """`value`, at most `limit` to either side of zero."""
-    return max(-limit, min(limit, value))
-
-
-_FAR_MM = 60.0
-"""Farther than this the robot is not taken back for a branch that it missed."""
+_MOST_BACK_MM = 60.0
+"""Longest way back from a missed branch."""
 _RAISE = 1.25
-_FORGET_PX = 60.0
+"""Factor by which a back-off raises the contact limit."""
+_PAST_PX = 60.0
+"""A head that is so far past the place of a back-off has the first contact limit again."""
 _STILL_MM_S = 0.3
 """Servos at rest measure a little motion, too."""
 _STATUS_GAP_S = 0.5
-"""What happened between two statuses farther apart is not known."""
+"""What happened between two statuses further apart is not known."""
 _SHORTEST_S = 0.02
 """Frames and statuses come no faster than this: two that do are one moment, and a way divided by it would be a wild speed."""
 _REST_S = 0.3
-"""Who is not fed for so long rests; a shorter pause is one of the measurement."""
-_FARTHER_PX = 6.0
+"""A robot that is not fed for so long rests; a shorter pause is one of the measurement."""
+_PROGRESS_PX = 6.0
+"""The head has come further when the way left is shorter by this."""
 _SAME_BRANCH_PX = 100.0
 """The way left jumps by the lumen's width where the head changes from one branch's centerline to the other's."""
 
 
 class WallContactMonitor:
-    """Tells a head that meets the wall from a body that leans on it.
+    """Detects a head that meets the wall by a contact force that rises faster than the body's own.
 
     The longer a body lies in a winding vessel, the harder it leans on the wall, at any speed: going slow because of that only makes
-    it lean longer. What matters is a force that *rises* faster than the body's own, which the average over the way fed follows.
+    it lean longer. So the force is compared with its average over the way fed.
     """
 
     def __init__(self, config: PursuitConfig) -> None:
         self._config = config
-        self._lean_n: float | None = None
+        self._average_n: float | None = None
 
     def rises(self, contact_n: float | None, fed_mm: float) -> bool:
-        """Take in one frame, `fed_mm` after the last; `contact_n` is None where the rig does not know it."""
+        """Update with a frame `fed_mm` after the last; `contact_n` is None where the rig does not measure it."""
         if contact_n is None:
             return False
-        before_n = contact_n if self._lean_n is None else self._lean_n
-        self._lean_n = contact_n + (before_n - contact_n) * math.exp(-abs(fed_mm) / self._config.lean_mm)
-        return contact_n > self._lean_n + self._config.contact_slow_n
+        before_n = contact_n if self._average_n is None else self._average_n
+        self._average_n = contact_n + (before_n - contact_n) * math.exp(-abs(fed_mm) / self._config.lean_mm)
+        return contact_n > self._average_n + self._config.contact_slow_n
 
 
 class ContactLimit:
     """The contact force above which the robot backs off, if it still rises.
 
-    A long body in a winding vessel leans on the wall wherever its head is: backing off would not get it out of there. Where a force
-    rises again and again at the same place, each back-off raises the limit a little, up to the hard one, which always counts, until
-    the head has come well past that place.
+    Each back-off at the same place raises the limit a little, up to the hard one, which always counts, until the head has come well
+    past that place: a body that leans on the wall of a winding vessel does so wherever its head is.
     """
 
     def __init__(self, config: PursuitConfig) -> None:
@@ -228,8 +67,8 @@ class ContactLimit:
         self._raised_at_px: float | None = None
 
     def exceeded(self, contact_n: float | None, rises: bool, left_px: float | None) -> bool:
-        """Whether to back off; `contact_n` is None where the rig does not know it, ``rises`` is what ``Lean`` says of it."""
-        if self._raised_at_px is not None and left_px is not None and left_px < self._raised_at_px - _FORGET_PX:
+        """Whether to back off; `contact_n` is None where the rig does not measure it, `rises` is ``WallContactMonitor.rises``."""
+        if self._raised_at_px is not None and left_px is not None and left_px < self._raised_at_px - _PAST_PX:
             self._limit_n, self._raised_at_px = self._config.contact_back_off_n, None
         if contact_n is None or contact_n <= self._limit_n or not (rises or contact_n > self._config.contact_limit_n):
             return False
@@ -238,11 +77,11 @@ class ContactLimit:
         return True
 
 
-class Feed:
-    """How fast the robot is fed, and how far since the last frame: measured between two of its statuses, by their own times.
+class FeedMonitor:
+    """Measures the feed between two statuses of the robot, by their own times.
 
-    Frames and statuses do not come in step. A frame that finds the status of the one before knows nothing new of the feed; taken
-    for a rest, it would hide for ever that a robot is fed and does not move.
+    Frames and statuses do not come in step. A frame that finds the status of the one before has no new information on the feed;
+    taken for a rest, it would hide that a robot is fed and does not move.
     """
 
     def __init__(self) -> None:
@@ -269,31 +108,34 @@ class Feed:
         return self._speed_mm_s, fed_mm if self._speed_mm_s else 0.0
 
 
-class Stall:
-    """Notices that the robot is fed but neither the way left shrinks nor the head moves.
+class StallMonitor:
+    """Detects that the robot is fed but neither the way left shrinks nor the head moves.
 
     Both: where the way bends sharply a head slides sideways before it goes on, and one that shakes against a wall does not move on.
+    ``lost_mm`` is what was fed without effect at the last stall.
     """
 
     def __init__(self, config: PursuitConfig) -> None:
         self._config = config
-        self._start: tuple[float, Point] | None = None
-        self._fed_mm = 0.0
-        self._watched_s = 0.0
         self._rested_s = 0.0
         self._blind_s = 0.0
         self.lost_mm = 0.0
-        """What was fed in vain when it was last told."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin with the next frame."""
+        self._start: tuple[float, Point] | None = None
+        self._fed_mm = self._watched_s = 0.0
 
     def update(self, left_px: float | None, head: Point, speed_mm_s: float, elapsed_s: float) -> bool:
-        """Take in one frame; True when there was no progress for the configured time.
+        """Update with a frame; True when there was no progress for the configured time.
 
         Without a target, or a way to it, it cannot tell; a frame or two in which the way was not found change nothing.
         """
         self._rested_s = 0.0 if speed_mm_s else self._rested_s + elapsed_s
         self._blind_s = 0.0 if left_px is not None else self._blind_s + elapsed_s
         if speed_mm_s < 0.0 or max(self._rested_s, self._blind_s) >= _REST_S:
-            self.forget()
+            self.reset()
             return False
         if self._start is None:
             if speed_mm_s and left_px is not None:
@@ -307,82 +149,67 @@ class Stall:
         self.lost_mm = self._fed_mm
         fed_px = self._fed_mm * self._config.pixels_per_mm
         stuck = max(before_px - left_px, math.dist(before, head)) < self._config.stuck_share * fed_px
-        self.forget()
+        self.reset()
         self._start = left_px, head
         return stuck
 
-    def forget(self) -> None:
-        """Watch anew, from the next frame on."""
-        self._start, self._fed_mm, self._watched_s = None, 0.0, 0.0
-
 
 class RetryCounter:
-    """How often the robot was taken back without its head having come farther since; feeding on would only press and buckle it.
+    """Counts back-offs without progress of the head since; feeding on would only press and buckle the robot.
 
-    Where the head is counts only where it was taken back: there it stood still, and no single frame beside a branch, from where the
-    way left seems shorter, hides what it comes farther later. A frame in which no way was found tells nothing.
+    The head's place counts only at a back-off: there it stood still, and no single frame beside a branch, from where the way left
+    seems shorter, hides later progress. A frame in which no way was found has no information.
     """
 
     def __init__(self) -> None:
+        self._target: Point | None = None
+        self.reset()
+
+    def reset(self) -> None:
         self.count = 0
         self._nearest_px: float | None = None
-        self._target: Point | None = None
 
-    def forget(self) -> None:
-        """It may be tried again."""
-        self.count, self._nearest_px = 0, None
-
-    def see(self, way: LookAhead) -> None:
-        """Take in where the robot is to go: for another target it may be tried again."""
+    def update(self, way: LookAhead) -> None:
+        """Another target resets the count."""
         if way.left_px is None:
             return
         if way.target != self._target:
-            self.forget()
+            self.reset()
         self._target = way.target
 
     def add(self, way: LookAhead) -> None:
-        """Taken back once more. Without a way to a target nobody knows whether the head came farther, and nothing is counted."""
+        """The robot backs off once more."""
         if way.left_px is None:
             return
-        if self._nearest_px is None or way.left_px < self._nearest_px - _FARTHER_PX:
+        if self._nearest_px is None or way.left_px < self._nearest_px - _PROGRESS_PX:
             self.count, self._nearest_px = 1, way.left_px
         else:
             self.count += 1
 
 
-class TargetMissMonitor:
-    """How often the same branch was missed for the same target; a head that cannot bend that far would miss it for ever."""
+class MissCounter:
+    """Counts how often the same branch was missed for the same target: a head that cannot bend that far would miss it for ever."""
 
     def __init__(self) -> None:
         self.count = 0
         self._left_px = 0.0
         self._target: Point | None = None
 
-    def forget(self) -> None:
-        """It may be tried again."""
-        self.count = 0
-
     def add(self, way: LookAhead) -> None:
         """Missed once more."""
-        self._check(way)
-        self.count += 1
+        self.count = self.count_at(way) + 1
         self._left_px, self._target = way.left_px or 0.0, way.target
 
-    def at(self, way: LookAhead) -> int:
-        """How often the branch here was missed."""
-        self._check(way)
-        return self.count
-
-    def _check(self, way: LookAhead) -> None:
-        if way.left_px is None:
-            return  # a frame in which no way was found tells nothing
-        if way.target != self._target or abs(way.left_px - self._left_px) > _SAME_BRANCH_PX:
+    def count_at(self, way: LookAhead) -> int:
+        """How often the branch here was missed; another target or branch resets the count."""
+        if way.left_px is not None and (way.target != self._target or abs(way.left_px - self._left_px) > _SAME_BRANCH_PX):
             self.count = 0
+        return self.count
 
 
 @dataclass(slots=True)
 class BackOff:
-    """A way back of ``distance_mm``, counted from where the reason for it is gone."""
+    """A way back of ``distance_mm``, counted from where its reason is gone."""
 
     why: str
     distance_mm: float
@@ -390,24 +217,24 @@ class BackOff:
     _moved_mm: float = field(default=0.0, init=False)
 
     def done(self, still: bool, moved_mm: float) -> bool:
-        """Whether it has gone far enough; `still`: the reason for it is still there; `moved_mm`: since the last call."""
+        """Whether it has gone far enough; `still`: the reason is still there; `moved_mm`: since the last call."""
         self._moved_mm += max(0.0, moved_mm)
         self._cleared_mm = 0.0 if still else self._cleared_mm + max(0.0, moved_mm)
-        return self._cleared_mm >= self.distance_mm or self._moved_mm >= _FAR_MM
+        return self._cleared_mm >= self.distance_mm or self._moved_mm >= _MOST_BACK_MM
 
 
 _UNFOLLOWED_S = 1.0
-"""Who does not take the robot back for so long meant something else; if the reason is gone, the advice is, too."""
+"""An operator who does not take the robot back for so long has other plans; if the reason is gone, the advice is, too."""
 _STRANDED_S = 3.0
-"""Who is advised to go back for so long and does not move at all cannot: the feed is at the end of its travel, say."""
+"""A robot that is advised to go back for so long and does not move cannot: the feed is at the end of its travel, say."""
 _LONGEST_S = 0.15
 """A frame counts for no longer than this, so that after a pause no single one decides."""
 _PAUSE_S = 0.5
-"""What was watched before such a pause says nothing of what comes after it."""
+"""A longer pause between frames resets the stall monitor."""
 
 
 class Pursuit:
-    """Look-ahead steering with a memory: smoothed steering, and backing off from walls and missed branches until there is room."""
+    """Pure pursuit with smoothed steering, which backs off from walls and missed branches until there is room."""
 
     def __init__(self, config: PursuitConfig, advice: AdviceConfig) -> None:
         self._config = config
@@ -415,17 +242,17 @@ class Pursuit:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the past."""
+        """Forget the frames before."""
         self._speed_mm_s = 0.0
         self._steer_deg = 0.0
         self._last_s: float | None = None
-        self._stall = Stall(self._config)
-        self._contact = ContactLimit(self._config)
-        self._lean = WallContactMonitor(self._config)
-        self._misses = TargetMissMonitor()
-        self._tries = RetryCounter()
-        self._feed = Feed()
-        self._back: BackOff | None = None
+        self._stall = StallMonitor(self._config)
+        self._contact_limit = ContactLimit(self._config)
+        self._wall_contact = WallContactMonitor(self._config)
+        self._misses = MissCounter()
+        self._retries = RetryCounter()
+        self._feed = FeedMonitor()
+        self._back_off: BackOff | None = None
         self._behind_s = 0.0
         self._unfollowed_s = 0.0
         self._still_s = 0.0
@@ -434,13 +261,13 @@ class Pursuit:
         self._is_miss_counted = False
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
-        """Advice for a scene; `status` adds the contact force and how fast the robot is really fed. None when there is no pose.
+        """Advice for a scene; `status` adds the contact force and the measured feed. None when there is no pose.
 
-        Of a robot that does not do what is advised, although it is `followed`, more is concluded than of one that others drive.
+        Only a robot that is `followed`, driven by this advice, is concluded to be stranded.
         """
         config = self._config
         ahead_px = config.look_ahead_px + config.look_ahead_s * max(0.0, self._speed_mm_s) * config.pixels_per_mm
-        # Who missed a branch has turned too late: each new try begins to turn earlier.
+        # a missed branch was turned into too late: each new try begins to turn earlier
         way = look_ahead(scene, ahead_px, config, self._misses.count * config.rounding_px)
         if way is None:
             return None
@@ -448,71 +275,81 @@ class Pursuit:
         self._last_s = scene.captured_s
         elapsed_s = min(since_s, _LONGEST_S)
         if since_s > _PAUSE_S:
-            self._stall.forget()
+            self._stall.reset()
             self._behind_s = 0.0
         contact_n = status.wall_contact_n if status is not None else None
-        # Counted down, not forgotten: where head and branch lie in a wide bifurcation, single frames still see the way ahead.
+        # counted down, not reset: where head and branch lie in a wide bifurcation, single frames still see the way ahead
         self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
-        self._smooth(way.error_deg, since_s)
+        wanted_deg = limited(config.gain * way.error_deg, self._words.max_steer_deg)
+        keep = math.exp(-since_s / config.smoothing_s) if config.smoothing_s > 0.0 and since_s > 0.0 else 0.0
+        self._steer_deg = keep * self._steer_deg + (1.0 - keep) * wanted_deg
         fed_mm_s, fed_mm = self._feed.update(status, self._speed_mm_s, elapsed_s)
         stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)
-        self._tries.see(way)
-        gave_up = self._back is None and (self._misses.count >= config.most_misses or self._tries.count >= config.most_tries)
-        otherwise = fed_mm_s >= 0.0 if self._back is not None else gave_up and fed_mm_s != 0.0
-        self._unfollowed_s = self._unfollowed_s + elapsed_s if otherwise else 0.0
-        still = followed and self._back is not None and way.behind and fed_mm_s == 0.0
-        self._still_s = self._still_s + elapsed_s if still else 0.0
+        self._retries.update(way)
+        is_backing = self._back_off is not None
+        gave_up = not is_backing and (self._misses.count >= config.most_misses or self._retries.count >= config.most_tries)
+        is_unfollowed = fed_mm_s >= 0.0 if is_backing else gave_up and fed_mm_s != 0.0
+        self._unfollowed_s = self._unfollowed_s + elapsed_s if is_unfollowed else 0.0
+        is_still = followed and is_backing and way.behind and fed_mm_s == 0.0
+        self._still_s = self._still_s + elapsed_s if is_still else 0.0
         self._is_stranded = self._is_stranded and way.behind and fed_mm_s == 0.0 and way.target == self._stranded_for
         self._is_miss_counted = self._is_miss_counted and self._behind_s > 0.0
-        rises = self._lean.rises(contact_n, fed_mm)
-        return self._backing(way, contact_n, rises, stuck, fed_mm) or self._given_up(way) or self._forward(way, rises)
+        rises = self._wall_contact.rises(contact_n, fed_mm)
+        return (
+            self._backing_advice(way, contact_n, rises, stuck, fed_mm)
+            or self._give_up_advice(way)
+            or self._forward_advice(way, rises)
+        )
 
-    def _backing(self, way: LookAhead, contact_n: float | None, rises: bool, stuck: bool, fed_mm: float) -> Advice | None:
-        """Backwards while there is a reason to, which one picture alone never is; None to go on. `fed_mm` since the last frame."""
+    def _backing_advice(self, way: LookAhead, contact_n: float | None, rises: bool, stuck: bool, fed_mm: float) -> Advice | None:
+        """Backwards while there is a reason to, which one picture alone never is; None to go on."""
         config = self._config
+        stranded = "the robot cannot go back any farther: take over, or choose another destination"
         if self._is_stranded:
-            return self._advise(0.0, 0.0, "the robot cannot go back any farther: take over, or choose another destination")
-        if self._back is None:
+            return self._advise(0.0, 0.0, stranded)
+        if self._back_off is None:
             if way.behind and self._behind_s < config.behind_s:
                 return self._advise(0.0, 0.0, "the way seems to lie behind the head: looking again")
             if way.behind:
-                if not self._is_miss_counted:  # the same one, whoever has driven meanwhile
+                if not self._is_miss_counted:  # the same miss, whichever source has driven meanwhile
                     self._misses.add(way)
                 self._is_miss_counted = True
-                self._back = BackOff("the way to the target branches off behind the head", config.retry_mm)
-            elif self._contact.exceeded(contact_n, rises, way.left_px):
-                self._tries.add(way)
-                self._back = BackOff(f"the robot presses against the wall with {contact_n or 0.0:.2f} N", config.back_off_mm / 2)
+                self._back_off = BackOff("the way to the target branches off behind the head", config.retry_mm)
+            elif self._contact_limit.exceeded(contact_n, rises, way.left_px):
+                self._retries.add(way)
+                why = f"the robot presses against the wall with {contact_n or 0.0:.2f} N"
+                self._back_off = BackOff(why, config.back_off_mm / 2)
             elif stuck:
-                self._tries.add(way)
-                # All that was fed in vain lies bent behind the head.
-                self._back = BackOff("the robot is fed but its head does not move", max(config.back_off_mm, self._stall.lost_mm))
+                self._retries.add(way)
+                # all that was fed without effect lies bent behind the head
+                self._back_off = BackOff(
+                    "the robot is fed but its head does not move", max(config.back_off_mm, self._stall.lost_mm)
+                )
             else:
                 return None
         if self._still_s > _STRANDED_S:
-            self._back, self._still_s, self._is_stranded, self._stranded_for = None, 0.0, True, way.target
-            return self._backing(way, contact_n, rises, stuck, fed_mm)
+            self._back_off, self._still_s, self._is_stranded, self._stranded_for = None, 0.0, True, way.target
+            return self._advise(0.0, 0.0, stranded)
         is_unfollowed = self._unfollowed_s > _UNFOLLOWED_S and not way.behind
-        is_done = self._back.done(way.behind, -fed_mm)
+        is_done = self._back_off.done(way.behind, -fed_mm)
         if is_unfollowed or is_done:
-            self._back, self._unfollowed_s = None, 0.0
+            self._back_off, self._unfollowed_s = None, 0.0
             self._is_miss_counted = self._is_miss_counted and not is_done
             return None
-        steer_deg = 0.0 if way.behind else self._steer_deg
-        # The way back is free, the head follows its own body: only time is lost here, and the body leans meanwhile.
-        return self._advise(-self._words.fast_mm_s, steer_deg, f"backing off: {self._back.why}")
+        # the way back is free, since the head follows its own body: going slow would only let the body lean longer
+        return self._advise(-self._words.fast_mm_s, 0.0 if way.behind else self._steer_deg, f"backing off: {self._back_off.why}")
 
-    def _given_up(self, way: LookAhead) -> Advice | None:
-        if self._unfollowed_s > _UNFOLLOWED_S:
-            self._misses.forget()  # the operator goes on by hand
-            self._tries.forget()
-        if (count := self._misses.at(way)) >= self._config.most_misses:
+    def _give_up_advice(self, way: LookAhead) -> Advice | None:
+        if self._unfollowed_s > _UNFOLLOWED_S:  # the operator goes on by hand
+            self._misses.count = 0
+            self._retries.reset()
+        if (count := self._misses.count_at(way)) >= self._config.most_misses:
             return self._advise(0.0, 0.0, f"missed the branch {count} times: take over, or choose another destination")
-        if (count := self._tries.count) >= self._config.most_tries:
+        if (count := self._retries.count) >= self._config.most_tries:
             return self._advise(0.0, 0.0, f"came no farther in {count} tries: take over, or choose another destination")
         return None
 
-    def _forward(self, way: LookAhead, rises: bool) -> Advice:
+    def _forward_advice(self, way: LookAhead, rises: bool) -> Advice:
         config, words = self._config, self._words
         limits = [(words.fast_mm_s, "along the route")]
         if way.turn_deg > config.gentle_turn_deg:
@@ -520,7 +357,7 @@ class Pursuit:
         if way.junction_px is not None:
             limits.append((words.moderate_mm_s, "a bifurcation ahead"))
         if abs(self._steer_deg) > config.slow_steer_deg:
-            # No jump where it begins: an error that trembles about the limit must not make the feed stutter.
+            # no step where it begins: an error that trembles about the limit must not make the feed stutter
             share = (config.slow_steer_deg / abs(self._steer_deg)) ** 2
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
         if way.wall > config.wall_share:
@@ -532,18 +369,13 @@ class Pursuit:
         speed_mm_s, why = min(limits)
         return self._advise(speed_mm_s, self._steer_deg, why)
 
-    def _smooth(self, error_deg: float, elapsed_s: float) -> None:
-        wanted = limited(self._config.gain * error_deg, self._words.max_steer_deg)
-        keep = math.exp(-elapsed_s / self._config.smoothing_s) if self._config.smoothing_s > 0.0 and elapsed_s > 0.0 else 0.0
-        self._steer_deg = keep * self._steer_deg + (1.0 - keep) * wanted
-
     def _advise(self, speed_mm_s: float, steer_deg: float, why: str) -> Advice:
         self._speed_mm_s = speed_mm_s
         return Advice(speed_word(abs(speed_mm_s), self._words), speed_mm_s, steer_deg, why)
 
 
 def speed_word(speed_mm_s: float, config: AdviceConfig) -> Speed:
-    """The paper's word nearest to a speed; STOP for none."""
+    """The paper's word nearest to a speed; STOP for zero."""
     if speed_mm_s == 0.0:
         return Speed.STOP
     words = {

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from core.config.safety import JointName
+from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
-from core.control.health import BusReport
 from core.devices import Robot
 from core.types import Command
 

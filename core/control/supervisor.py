@@ -22,20 +22,9 @@ from collections.abc import Collection, Sequence, Set
 from dataclasses import replace
 
 from core.config.safety import SafetyConfig, ServosConfig
-from core.control.faults import AREA, CAUSES, REACTION, RECHECK, Area, Cause, Fault, Reaction, worst
+from core.control.faults import Area, Cause, Fault, Reaction, first_fault, worst
 from core.control.gate import Source
-from core.control.health import (
-    DeadmanReport,
-    Health,
-    Report,
-    RouteState,
-    deadman_down,
-    deadman_held,
-    disarmed,
-    driving_faults,
-    faults_now,
-    take,
-)
+from core.control.health import DeadmanReport, Health, Report, RouteState
 from core.control.modes import (
     ARMED_MODES,
     DRIVING_MODES,
@@ -108,42 +97,37 @@ def _listen(
     driving = state.mode in DRIVING_MODES
 
     def faults(health: Health) -> dict[Cause, Fault]:
-        found = faults_now(health, now_s, servos, safety) + (driving_faults(health, now_s, safety) if driving else [])
-        return {fault.cause: fault for fault in found}
+        return {fault.cause: fault for fault in health.faults(now_s, servos, safety, driving=driving)}
 
     health = replace(state.health, reported=())
     active = faults(health)
     brought: dict[Cause, Fault] = {}
     for report in reports:
-        health = take(health, report, armed=state.mode in ARMED_MODES, now_s=now_s, servos=servos, safety=safety)
+        health = health.update(report, armed=state.mode in ARMED_MODES, now_s=now_s, servos=servos, safety=safety)
         before, active = active, faults(health)
         brought |= {cause: fault for cause, fault in active.items() if cause not in before}
         # another one may be held: as of when this was said, for in a late tick that one's next word is still to come
-        is_let_go = isinstance(report, DeadmanReport) and not (report.pressed or deadman_held(health, report.at_s(now_s), safety))
+        is_let_go = isinstance(report, DeadmanReport) and not (report.pressed or health.deadman_held(report.at_s(now_s), safety))
         if driving and is_let_go:
             brought[Cause.DEADMAN] = Fault(Cause.DEADMAN)
     return health, tuple((brought | active).values())
 
 
-def _holds(fault: Fault) -> bool:
-    return REACTION[fault.cause] >= Reaction.HOLD
-
-
 def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyConfig) -> SupervisorState:
     """The state after the active faults had their effect. Servos not `in_use` hinder arming, but there is nothing to stop."""
     state = _note_unwell(state, now_s)
-    faults = tuple(fault for fault in state.active if in_use or AREA[fault.cause] is not Area.SERVOS)
-    recheck = any(fault.cause in RECHECK for fault in state.active)
+    faults = tuple(fault for fault in state.active if in_use or fault.cause.area is not Area.SERVOS)
+    recheck = any(fault.cause.recheck for fault in state.active)
     stop, disarm = worst(faults, Reaction.STOP), worst(faults, Reaction.DISARM)
     if state.mode is Mode.ADVISORY:
         # what was known of the servos is forgotten with the clock: they are off, and the operator is told
-        told = (fault for fault in faults if AREA[fault.cause] is Area.SERVOS or (in_use and fault.cause is Cause.CLOCK))
+        told = (fault for fault in faults if fault.cause.area is Area.SERVOS or (in_use and fault.cause is Cause.CLOCK))
         disarm = worst(tuple(told), Reaction.DISARM)
     if stop is not None:
         state, recheck = _leave(state, Mode.STOPPED, stop, now_s), True
     elif disarm is not None and state.mode is not Mode.STOPPED:
         state = _leave(state, Mode.ADVISORY, disarm, now_s)
-    elif state.mode is Mode.AUTONOMOUS and any(_holds(fault) for fault in faults):
+    elif state.mode is Mode.AUTONOMOUS and any(fault.holds for fault in faults):
         # soon after the last one it is the same hold, or a fault that comes and goes would never end
         again = state.resumed_s is not None and now_s - state.resumed_s < safety.hold_repeat_s
         state = replace(state, mode=Mode.HOLD, hold_since_s=state.hold_since_s if again else now_s, well_since_s=None)
@@ -153,12 +137,12 @@ def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyCon
         state = replace(state, health=replace(state.health, servo_problems=None))
     if state.mode in ARMED_MODES and not state.health.servos_ready:
         # No fault: the operator has asked for something that they must be checked after.
-        state = replace(state, mode=Mode.ADVISORY, health=disarmed(state.health))
+        state = replace(state, mode=Mode.ADVISORY, health=state.health.disarmed())
     return state
 
 
 def _note_unwell(state: SupervisorState, now_s: float) -> SupervisorState:
-    areas = {AREA[fault.cause] for fault in state.active if _holds(fault)}
+    areas = {fault.cause.area for fault in state.active if fault.holds}
     if Area.CAMERA in areas:
         state = replace(state, camera_unwell_s=now_s)
     if Area.PERCEPTION in areas or not state.health.frames.well:
@@ -168,12 +152,12 @@ def _note_unwell(state: SupervisorState, now_s: float) -> SupervisorState:
 
 def _leave(state: SupervisorState, mode: Mode, fault: Fault, now_s: float) -> SupervisorState:
     """Out of autonomy; the first cause is kept."""
-    return replace(state, mode=mode, health=disarmed(state.health), latched=state.latched or Latched(fault, now_s))
+    return replace(state, mode=mode, health=state.health.disarmed(), latched=state.latched or Latched(fault, now_s))
 
 
 def _clear_hold(state: SupervisorState, now_s: float, safety: SafetyConfig) -> SupervisorState:
     """Back to autonomy when all was well for the dwell time, soon enough after the hold began."""
-    if any(_holds(fault) for fault in state.active):
+    if any(fault.holds for fault in state.active):
         return replace(state, well_since_s=None)
     since_s = state.well_since_s if state.well_since_s is not None else now_s
     if now_s - since_s >= safety.hold_dwell_s and not _hold_expired(state, now_s, safety):
@@ -204,7 +188,7 @@ def _obey(
     if state.mode in DRIVING_MODES and not acts.isdisjoint({Act.INPUT, Act.TAKE_BACK}):
         state = replace(state, mode=Mode.ARMED)
     if state.mode in ARMED_MODES and Act.DISARM in acts:
-        state = replace(state, mode=Mode.ADVISORY, health=disarmed(state.health))
+        state = replace(state, mode=Mode.ADVISORY, health=state.health.disarmed())
     return state, tuple(refused)
 
 
@@ -216,9 +200,9 @@ def _against_arming(state: SupervisorState, now_s: float, safety: SafetyConfig) 
         reasons.append(Hindrance.ALREADY_ARMED)
     if state.latched is not None:
         reasons.append(Hindrance.UNACKNOWLEDGED)
-    active = [fault.cause for fault in state.active if _holds(fault)]
+    active = [fault.cause for fault in state.active if fault.holds]
     reasons += active
-    areas = {AREA[cause] for cause in active}
+    areas = {cause.area for cause in active}
     if Area.CAMERA not in areas and now_s - state.camera_unwell_s < safety.healthy_s:
         reasons.append(Hindrance.CAMERA_SETTLING)
     if Area.PERCEPTION not in areas and now_s - state.perception_unwell_s < safety.healthy_s:
@@ -238,13 +222,13 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
         reasons.append(Hindrance.ALREADY_AUTONOMOUS)
     if state.health.servo_problems is None:
         reasons.append(Hindrance.SERVOS_UNCHECKED)
-    reasons += [fault.cause for fault in state.active if _holds(fault) and AREA[fault.cause] is not Area.OPERATOR]
+    reasons += [fault.cause for fault in state.active if fault.holds and fault.cause.area is not Area.OPERATOR]
     if state.health.frames.route is RouteState.NONE:
         reasons.append(Hindrance.NO_DESTINATION)
     if state.health.frames.route is RouteState.BEHIND:
         reasons.append(Hindrance.DESTINATION_BEHIND)
-    if not deadman_held(state.health, now_s, safety):
-        down = deadman_down(state.health, now_s, safety)
+    if not state.health.deadman_held(now_s, safety):
+        down = state.health.deadman_down(now_s, safety)
         reasons.append(Hindrance.DEADMAN_HELD_BEFORE if down else Hindrance.DEADMAN_NOT_HELD)
     if state.input_s is not None and now_s - state.input_s < safety.operator_quiet_s:
         reasons.append(Hindrance.OPERATOR_DRIVING)
@@ -264,11 +248,11 @@ def _decide(
     state: SupervisorState, before: Collection[Fault], refused: tuple[RequestRefused, ...], now_s: float, safety: SafetyConfig
 ) -> Decision:
     known = {fault.cause for fault in before}
-    blank = [fault for fault in state.active if _holds(fault) and AREA[fault.cause] in {Area.CAMERA, Area.PERCEPTION}]
+    blank = [fault for fault in state.active if fault.holds and fault.cause.area in {Area.CAMERA, Area.PERCEPTION}]
     return Decision(
         mode=state.mode,
         permitted=_permitted(state),
-        blanked=min(blank, key=lambda fault: CAUSES.index(fault.cause), default=None),
+        blanked=first_fault(blank),
         writes_blocked=state.mode is Mode.STOPPED,
         hold_expired=_hold_expired(state, now_s, safety),
         latched=state.latched.fault if state.latched is not None else None,
@@ -283,8 +267,8 @@ def _permitted(state: SupervisorState) -> Source | None:
         return None
     if state.mode is Mode.AUTONOMOUS:
         return Source.PROGRAM
-    causes = [fault.cause for fault in state.active if _holds(fault)]
+    causes = [fault.cause for fault in state.active if fault.holds]
     if state.latched is not None:
         causes.append(state.latched.fault.cause)
     by_hand = state.mode in {Mode.ADVISORY, Mode.ARMED}
-    return Source.OPERATOR if by_hand and all(AREA[cause] is not Area.SERVOS for cause in causes) else None
+    return Source.OPERATOR if by_hand and all(cause.area is not Area.SERVOS for cause in causes) else None

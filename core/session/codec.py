@@ -18,10 +18,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, PlainSerializer, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import Source
 from core.control.modes import Hindrance, Mode
-from core.control.pilot import DriveView
 from core.types import (
     Advice,
     Centerline,

@@ -23,9 +23,9 @@ from core.config.calibration import CalibrationConfig
 from core.config.models import Config
 from core.config.rig_file import RigFileError, calibration_of
 from core.control.alerts import Alert
+from core.control.drive_view import DriveView
 from core.control.gate import Source
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Mode
-from core.control.pilot import DriveView
 from core.devices import UserError
 from core.files import write_whole
 from core.perception.model_file import ModelError, model_folder, read_model_info

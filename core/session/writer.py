@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from core.config.models import RecordConfig, sessions_folder
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
-from core.control.pilot import DriveView
 from core.session.codec import light_tick, row_of
 from core.session.files import EncodedFrame, SessionFiles
 from core.session.manifest import About, Event, EventKind, SessionError, events_between

@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from core.config.safety import JointConfig, JointName, SafetyConfig, ServosConfig
-from core.control.faults import REACTION, Cause, Fault, Reaction, worst
+from core.control.bus_monitor import BusMonitor, BusReport
+from core.control.faults import Cause, Fault, Reaction, worst
 from core.control.gate import (
     Clamp,
     GateState,
@@ -21,7 +22,6 @@ from core.control.gate import (
     measurement_problem,
     outside_envelope,
 )
-from core.control.health import BusReport, BusWatch, bus_faults, see_bus
 from core.control.joints import Joints, joint_goals
 from core.types import Command
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
@@ -101,7 +101,7 @@ class BusGuard:
         self.rejections: Counter[RejectReason] = Counter()
         self.clamp_count = 0
         self.followed: BusOrder | None = None
-        self._watch = BusWatch()
+        self._watch = BusMonitor()
         self._gate = GateState()
         self._one_step = OneStep(servos.joints)
         self._tracking = TrackingMonitor(servos.joints, safety)
@@ -123,13 +123,13 @@ class BusGuard:
         """Evaluate one cycle's readings; the fault that ends the motion, when one is going on and must end."""
         report = report_of(readings, armed=self.armed, errors=errors)
         self.restarts += sum(isinstance(reading, MissingServo) and reading.restarted for reading in readings)
-        self._watch = see_bus(self._watch, report, now_s, self._servos, self._safety)
+        self._watch = self._watch.update(report, now_s, self._servos, self._safety)
         # a whole set of positions replaces the last one; one with gaps does not
         found = [(r.position_mm, r.time_s) for r in readings if isinstance(r, ServoState) and r.position_mm is not None]
         if readings and len(found) == len(readings):
             self._before = self._measurement
             self._measurement = JointMeasurement(tuple(at for at, _ in found), min(time_s for _, time_s in found))
-        faults = bus_faults(self._watch, now_s, self._servos, self._safety)
+        faults = self._watch.faults(now_s, self._servos, self._safety)
         if self.armed:
             faults += self._motion_faults(beat, now_s)
         self._cycle_s = now_s
@@ -154,14 +154,14 @@ class BusGuard:
 
     def lose_port(self) -> Fault:
         """The servos' state is unknown from now on; returns the fault."""
-        self._watch, self._measurement, self._before = BusWatch(), None, None
+        self._watch, self._measurement, self._before = BusMonitor(), None, None
         fault = Fault(Cause.PORT_LOST)
         self._activate([fault])
         return fault
 
     def end_motion(self, fault: Fault) -> None:
         """Disarmed, and the first cause latched; a fault that stops also blocks arming until it is acknowledged."""
-        self.stopped = self.stopped or REACTION[fault.cause] is Reaction.STOP
+        self.stopped = self.stopped or fault.cause.reaction is Reaction.STOP
         self.latched = self.latched or fault
         if fault.cause is Cause.STOP_PRESSED:
             self.fault_counts[fault.cause] += 1
@@ -188,7 +188,7 @@ class BusGuard:
             reasons.append(f"acknowledge first: {_text(self.latched)}")
         if self.armed:
             reasons.append("already armed")
-        hinder = [f for f in self.active if REACTION[f.cause] >= Reaction.HOLD and f.cause not in _MENDED_BY_ARMING]
+        hinder = [f for f in self.active if f.holds and f.cause not in _MENDED_BY_ARMING]
         reasons += [_text(fault) for fault in hinder]
         # No goal leads from outside the envelope, so nothing would ever move. Joints without a zero have no positions.
         at = self._measurement
@@ -200,7 +200,7 @@ class BusGuard:
 
     def set_armed(self, now_s: float) -> None:
         """The driver has armed the servos. Orders from before do not count."""
-        self._watch = BusWatch()
+        self._watch = BusMonitor()
         self._gate, self._measurement, self._before = GateState(), None, None
         self._written_mm = None
         self._tracking.reset()

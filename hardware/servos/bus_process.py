@@ -24,7 +24,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from core.config.safety import SafetyConfig, ServosConfig
-from core.control.faults import REACTION, Cause, Fault, Reaction
+from core.control.faults import Cause, Fault, Reaction
 from hardware.servos.bus_guard import BusGuard
 from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, Request
 from hardware.servos.dynamixel_bus import ServoBus
@@ -267,7 +267,7 @@ class BusLoop:
     def _end_motion(self, fault: Fault) -> None:
         """Goal = measured; no more goals. A fault that stops may switch the torque off, too."""
         self._guard.end_motion(fault)
-        if REACTION[fault.cause] is Reaction.STOP and self._servos.torque_off_on_stop:
+        if fault.cause.reaction is Reaction.STOP and self._servos.torque_off_on_stop:
             self._release.request()
         if not self._bus.is_open:
             return

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
+from core.control.bus_monitor import BusReport
 from core.control.faults import Cause, Fault
 from core.control.gate import Rejection, Source
-from core.control.health import BusReport
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import BusGuard, report_of

@@ -12,8 +12,8 @@ from dataclasses import replace
 from core.calibration.servos import zero_advice
 from core.config.calibration import ZeroConfig
 from core.config.safety import JointName, SafetyConfig, ServosConfig
+from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, Source
-from core.control.health import BusReport
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
 from hardware.processes import DeviceProcess

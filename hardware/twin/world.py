@@ -20,8 +20,8 @@ import numpy as np
 
 from core.config.models import PerceptionConfig, TwinConfig
 from core.config.safety import JOINT_NAMES, JointName, SafetyConfig
+from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
-from core.control.health import BusReport
 from core.control.robot import SentMotion
 from core.devices import DeviceError, Latest
 from core.perception.centerline import plan_route

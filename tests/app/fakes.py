@@ -13,11 +13,11 @@ from pytestqt.qtbot import QtBot
 
 from core.config.models import PerceptionConfig, PoseConfig
 from core.control.alerts import Alert
+from core.control.drive_view import DriveNews, DriveView
 from core.control.faults import Fault
 from core.control.gate import Source
 from core.control.modes import Act, Mode
 from core.control.motion import Jog
-from core.control.pilot import DriveNews, DriveView
 from core.types import (
     Advice,
     Centerline,
@@ -256,7 +256,7 @@ class FakePilot:
     def window_alive(self) -> None:
         self.beats += 1
 
-    def report(self, fault: Fault) -> None:
+    def report_fault(self, fault: Fault) -> None:
         self.faults.append(fault)
 
     def news(self) -> DriveNews:

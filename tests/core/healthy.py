@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from core.config.safety import SafetyConfig, ServosConfig
-from core.control.health import Beat, BusReport, DeadmanReport, FrameReport, ModelReport, Part, RouteState, ServosChecked
+from core.control.bus_monitor import BusReport
+from core.control.health import Beat, DeadmanReport, FrameReport, ModelReport, Part, RouteState, ServosChecked
 from core.control.modes import Act, Decision, Event, Mode, SupervisorState
 from core.control.supervisor import supervise
 

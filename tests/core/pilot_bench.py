@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from core.config.models import Config
+from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, Source
-from core.control.health import BusReport, ModelReport
+from core.control.health import ModelReport
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST
 from core.control.pilot import PERIOD_S, LeftOver, Pilot
@@ -153,7 +154,7 @@ class Bench:
                 frame = Frame(self.index, self.now_s - 0.03, image)
                 self.pilot.frame_arrived(frame)
                 scene = self.scene(scene_at(self.index, frame.captured_s))
-                self.shown = self.pilot.see(frame, scene, None, has_target=scene.route is not None)
+                self.shown = self.pilot.update_scene(frame, scene, None, has_target=scene.route is not None)
             self.pilot.window_alive()
             self.pilot.worker_alive()
             self.pilot.deadman("key", self.held)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from core.config.models import RecordConfig
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import Source
 from core.control.modes import Hindrance, Mode
-from core.control.pilot import DriveView
 from core.session.manifest import About
 from core.session.writer import SessionWriter
 from core.types import (

@@ -13,7 +13,7 @@ import pytest
 from PySide6.QtCore import QObject
 from pytestqt.qtbot import QtBot
 
-from core.control.pilot import DriveView
+from core.control.drive_view import DriveView
 from core.types import Frame, Scene, Tick
 from tools import benchmarks
 from tools.benchmarks import WindowWatch

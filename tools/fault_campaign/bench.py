@@ -30,11 +30,12 @@ from numpy.typing import NDArray
 from app.commands.progress import Interrupt, check_can_write, progress_bar
 from core.config.models import Config
 from core.control.alerts import Alert
+from core.control.drive_view import DriveView
 from core.control.engine import Engine, Perceive
 from core.control.health import ModelReport
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST
-from core.control.pilot import PERIOD_S, DriveView, LeftOver, Pilot
+from core.control.pilot import PERIOD_S, LeftOver, Pilot
 from core.control.policies import make_policy
 from core.devices import CameraLost
 from core.evaluation.accuracy import TrueMasks
@@ -287,7 +288,7 @@ class FaultBench:
             self.writer.add_event(event_of_alert(alert, news.view.time_s))
         before, self._recorded = self._recorded, self.writer.status()
         for fault in faults_between(before, self._recorded):
-            self.pilot.report(fault)
+            self.pilot.report_fault(fault)
 
     # ---- what an operator does
 

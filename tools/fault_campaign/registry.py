@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Protocol
 
 from core.control.alerts import ALERTS, AlertKey
+from core.control.drive_view import DriveView
 from core.control.faults import Cause
 from core.control.modes import DRIVING_MODES, Mode
-from core.control.pilot import DriveView
 from core.devices import UserError
 from core.session.manifest import Event, EventKind
 from tools.fault_campaign.bench import FaultBench

@@ -18,10 +18,10 @@ from app.operator.manual_drive import Motion
 from app.operator.window import OperatorWindow
 from core.config.models import Config
 from core.control.alerts import ALERTS, Alert
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import Source
 from core.control.modes import Act, Mode
-from core.control.pilot import DriveView
 from core.devices import DeviceError, EndOfStream
 from hardware.rig import RigKind
 from tests.app.conftest import MakeWindow

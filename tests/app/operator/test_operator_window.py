@@ -17,9 +17,9 @@ from app.ui import theme
 from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import Config, load_config
 from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
+from core.control.drive_view import DriveView
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST
-from core.control.pilot import DriveView
 from core.devices import DeviceError, EndOfStream
 from core.types import Reason, Refusal
 from hardware.rig import RigKind

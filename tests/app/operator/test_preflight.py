@@ -18,9 +18,9 @@ from app.ui.texts import OperatorStep
 from app.ui.workers import module_of
 from app.widgets.preflight_list import PreflightList
 from core.config.models import Config
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.modes import Act
-from core.control.pilot import DriveView
 from hardware.preflight.preflight import Level
 from tests.app.fakes import FakeEngine, until
 

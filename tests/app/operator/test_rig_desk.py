@@ -18,9 +18,9 @@ from app.operator.window import OperatorWindow
 from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import Config, load_config
 from core.config.rig_file import make_rig, read_rig, rig_path, with_rig, write_rig
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.modes import Mode
-from core.control.pilot import DriveView
 from core.devices import DeviceError
 from core.session.manifest import read_manifest
 from hardware.calibration.bench import CalibrationBench

@@ -36,7 +36,7 @@ from app.widgets.messages import Offer, OfferButton, OfferStrip
 from app.widgets.preflight_list import PreflightList
 from core.config.files import Profiles
 from core.config.models import Config, load_config
-from core.control.pilot import DriveView
+from core.control.drive_view import DriveView
 from hardware.calibration.bench import CalibrationBench
 from hardware.cameras.kinds import FoundCamera
 from hardware.rig import FoundDevices

@@ -23,8 +23,8 @@ from app.operator.window import OperatorWindow
 from app.training.dialog import TrainingDialog, TrainingJob, TrainingPhase, Wish, collect_from_file, name_problem
 from core.annotation.exchange import FEWEST
 from core.annotation.store import FoundImage, StoredAnnotation
+from core.control.drive_view import DriveView
 from core.control.modes import Mode
-from core.control.pilot import DriveView
 from core.perception.model_file import MODELS, model_folder, own_models, read_model_info
 from tests.app.annotated import annotate_masks
 from tests.app.fakes import FakeEngine, until

@@ -17,9 +17,9 @@ from app.operator.startup import WindowServices
 from app.operator.window import OperatorWindow
 from app.ui.crash_report import CrashWatch
 from core.config.models import Config
+from core.control.drive_view import DriveView
 from core.control.gate import Source
 from core.control.modes import Act, Mode
-from core.control.pilot import DriveView
 from core.devices import DeviceError
 from hardware.calibration.bench import CalibrationBench
 from tests.app.conftest import MakeWindow

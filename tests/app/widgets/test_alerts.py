@@ -20,10 +20,10 @@ from pytestqt.qtbot import QtBot
 from app.widgets.alerts import BRIEF_S, LINGER_S, LOOK, SOUNDS, AlertSounds, AlertStrip
 from core.config.models import RESOURCES
 from core.control.alerts import ALERTS, Alert, AlertKey, Priority
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import RejectReason, Source
 from core.control.modes import Hindrance, Mode
-from core.control.pilot import DriveView
 from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
 

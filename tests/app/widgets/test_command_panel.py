@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from app.widgets.command_panel import MAX_ENTRIES, ClampLog, CommandPanel
+from core.control.drive_view import DriveView
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Limit
-from core.control.pilot import DriveView
 from core.types import Advice, Command, Speed
 from tests.app.bus_status import MINUS, bus
 from tests.app.hand_clock import Clock

@@ -14,9 +14,9 @@ from app.widgets.alerts import AlertStrip
 from app.widgets.event_log import MOST_ROWS, EventLog, LogKind
 from app.widgets.mode_bar import HEIGHT, ModeBar
 from core.control.alerts import ALERTS, Alert, AlertKey
+from core.control.drive_view import DriveView
 from core.control.gate import Source
 from core.control.modes import Mode
-from core.control.pilot import DriveView
 from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
 

@@ -14,10 +14,10 @@ from pytestqt.qtbot import QtBot
 from app.ui.texts import STOP_KEY, OperatorStep, Undriven, next_step, who_drives
 from app.widgets.mode_bar import DOUBLE_PRESS_S, HEIGHT, MODE_LOOK, REASON_DWELL_S, ModeBadge, ModeBar
 from core.control.alerts import ALERTS, AlertKey
+from core.control.drive_view import DriveView
 from core.control.faults import CAUSES, Cause, Fault
 from core.control.gate import Source
 from core.control.modes import Hindrance, Mode
-from core.control.pilot import DriveView
 from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
 

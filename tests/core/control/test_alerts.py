@@ -1,17 +1,20 @@
-"""One table of texts, and repeats held back."""
+"""One table of texts, and repeats that are suppressed."""
 
 from __future__ import annotations
 
 import pytest
 
-from core.control.alerts import ALERTS, Alert, AlertKey, AlertQueue, Note, Priority, raise_alerts
-from core.control.faults import REACTION, Cause, Reaction
+from core.control.alerts import ALERTS, Alert, AlertKey, AlertReporter, Note, Priority
+from core.control.faults import Cause, Reaction
 from core.control.gate import RejectReason
-from core.control.modes import Hindrance
+from core.control.modes import Hindrance, Mode
 
 
-def _raise(queue: AlertQueue, *keys: AlertKey, at_s: float, armed: bool = True) -> tuple[AlertQueue, tuple[Alert, ...]]:
-    return raise_alerts(queue, [(key, "") for key in keys], at_s, armed=armed)
+def _report(
+    reporter: AlertReporter, *keys: AlertKey, at_s: float, mode: Mode = Mode.AUTONOMOUS, changed: bool = False
+) -> tuple[Alert, ...]:
+    reporter.report([(key, "") for key in keys], at_s, mode, changed=changed)
+    return reporter.take()
 
 
 def test_the_table_has_a_line_for_every_cause_refusal_and_rejection() -> None:
@@ -40,7 +43,7 @@ def test_every_line_fits_says_what_to_do_and_ends_without_a_stop(key: AlertKey) 
 )
 def test_urgency_and_sound_follow_from_the_reaction(reaction: Reaction, priority: Priority, sound: str | None) -> None:
     for cause in Cause:
-        if REACTION[cause] is reaction:
+        if cause.reaction is reaction:
             assert (ALERTS[cause].priority, ALERTS[cause].sound) == (priority, sound)
 
 
@@ -49,69 +52,61 @@ def test_hints_are_silent() -> None:
     assert {ALERTS[key].priority for key in (*Hindrance, *RejectReason, *Note)} == {Priority.HINT}
 
 
-def test_the_same_line_comes_again_only_after_its_cooldown_and_says_how_often_it_was_held_back() -> None:
-    queue, first = _raise(AlertQueue(), Cause.HEAD_JUMP, at_s=10.0)
-    assert [alert.repeats for alert in first] == [0]
+def test_the_same_line_comes_again_only_after_its_cooldown_and_says_how_often_it_was_suppressed() -> None:
+    reporter = AlertReporter()
+    assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=10.0)] == [0]
     for at_s in (10.0, 11.0, 12.99):
-        queue, held_back = _raise(queue, Cause.HEAD_JUMP, at_s=at_s)
-        assert held_back == ()
-    queue, again = _raise(queue, Cause.HEAD_JUMP, at_s=13.0)
-    assert [alert.repeats for alert in again] == [3]
-    _, later = _raise(queue, Cause.HEAD_JUMP, at_s=16.0)
-    assert [alert.repeats for alert in later] == [0]
+        assert _report(reporter, Cause.HEAD_JUMP, at_s=at_s) == ()
+    assert [alert.key for alert in _report(reporter, Cause.HEAD_JUMP, Cause.STOP_PRESSED, at_s=12.995)] == [Cause.STOP_PRESSED]
+    assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=13.0)] == [4]
+    assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=16.0)] == [0]
 
 
-def test_another_line_is_not_held_back() -> None:
-    queue, _ = _raise(AlertQueue(), Cause.HEAD_JUMP, at_s=10.0)
-    _, alerts = _raise(queue, Cause.HEAD_JUMP, Cause.STOP_PRESSED, at_s=10.1)
-    assert [alert.key for alert in alerts] == [Cause.STOP_PRESSED]
+def test_a_clock_that_goes_back_suppresses_nothing() -> None:
+    reporter = AlertReporter()
+    _report(reporter, Cause.HEAD_JUMP, at_s=1000.0)
+    assert len(_report(reporter, Cause.HEAD_JUMP, at_s=5.0)) == 1
 
 
-def test_the_most_urgent_comes_first_and_only_it_sounds() -> None:
-    _, alerts = _raise(AlertQueue(), Cause.DISK_LOW, Cause.HEAD_JUMP, Cause.SEVERAL_ROBOTS, Cause.POOR_VIEW, at_s=1.0)
+@pytest.mark.parametrize(
+    ("keys", "mode", "sounds"),
+    [
+        ((Cause.DISK_LOW,), Mode.AUTONOMOUS, [None]),
+        ((Cause.DISK_LOW, Cause.HEAD_JUMP, Cause.SEVERAL_ROBOTS), Mode.AUTONOMOUS, ["disarm", None, None]),
+        ((Cause.HEAD_LOST,), Mode.HOLD, ["hold"]),
+        ((Cause.HEAD_LOST,), Mode.ARMED, [None]),
+        ((Cause.SEVERAL_ROBOTS,), Mode.ARMED, ["disarm"]),
+        ((Cause.SEVERAL_ROBOTS, Cause.HEAD_JUMP), Mode.ADVISORY, [None, None]),
+        ((Cause.STOP_PRESSED, Cause.SEVERAL_ROBOTS), Mode.ADVISORY, ["stop", None]),
+    ],
+)
+def test_only_the_most_urgent_sounds_and_only_what_ended_or_interrupted_a_motion(
+    keys: tuple[Cause, ...], mode: Mode, sounds: list[str | None]
+) -> None:
+    assert [alert.sound for alert in _report(AlertReporter(), *keys, at_s=1.0, mode=mode)] == sounds
+
+
+def test_the_most_urgent_comes_first_otherwise_the_order_is_kept() -> None:
+    alerts = _report(AlertReporter(), Cause.DISK_LOW, Cause.HEAD_JUMP, Cause.SEVERAL_ROBOTS, Cause.POOR_VIEW, at_s=1.0)
     assert [alert.key for alert in alerts] == [Cause.SEVERAL_ROBOTS, Cause.HEAD_JUMP, Cause.POOR_VIEW, Cause.DISK_LOW]
-    assert [alert.sound for alert in alerts] == ["disarm", None, None, None]
-
-
-def test_a_silent_line_does_not_take_the_sound() -> None:
-    _, alerts = _raise(AlertQueue(), Cause.DISK_LOW, at_s=1.0)
-    assert [alert.sound for alert in alerts] == [None]
-
-
-def test_while_nothing_is_armed_only_a_stop_sounds() -> None:
-    _, quiet = _raise(AlertQueue(), Cause.SEVERAL_ROBOTS, Cause.HEAD_JUMP, at_s=1.0, armed=False)
-    assert [alert.sound for alert in quiet] == [None, None]
-    _, loud = _raise(AlertQueue(), Cause.STOP_PRESSED, Cause.SEVERAL_ROBOTS, at_s=1.0, armed=False)
-    assert [alert.sound for alert in loud] == ["stop", None]
-
-
-def test_a_clock_that_goes_back_holds_nothing_back() -> None:
-    queue, _ = _raise(AlertQueue(), Cause.HEAD_JUMP, at_s=1000.0)
-    assert len(_raise(queue, Cause.HEAD_JUMP, at_s=5.0)[1]) == 1
 
 
 def test_the_detail_and_the_text_go_with_the_alert() -> None:
-    _, alerts = raise_alerts(AlertQueue(), [(Cause.HOT, "up 71 °C")], 1.0, armed=True)
-    assert alerts == (Alert(Cause.HOT, ALERTS[Cause.HOT], "up 71 °C", 0, "disarm"),)
-
-
-def test_the_queue_that_was_given_is_not_changed() -> None:
-    queue = AlertQueue()
-    _raise(queue, Cause.HEAD_JUMP, at_s=1.0)
-    assert queue == AlertQueue()
+    reporter = AlertReporter()
+    reporter.report([(Cause.HOT, "up 71 °C")], 1.0, Mode.ARMED)
+    assert reporter.take() == (Alert(Cause.HOT, ALERTS[Cause.HOT], "up 71 °C", 0, "disarm"),)
 
 
 def test_a_stop_on_the_screen_does_not_pass_for_an_emergency_stop() -> None:
     assert "power cut" in ALERTS[Cause.STOP_PRESSED].what_to_do
 
 
-def test_what_ends_a_motion_is_told_each_time_and_nothing_sounds_held_that_was_not() -> None:
-    stop, lost = [(Cause.STOP_PRESSED, "")], [(Cause.HEAD_LOST, "")]
-    queue, first = raise_alerts(AlertQueue(), stop, 20.0, armed=True, changed=True)
-    queue, again = raise_alerts(queue, stop, 24.0, armed=False, changed=True)
-    _, held_down = raise_alerts(queue, stop, 24.1, armed=False)
-    assert [alert.sound for alert in (*first, *again)] == ["stop", "stop"]
-    assert held_down == ()
-    queue, by_hand = raise_alerts(AlertQueue(), lost, 0.0, armed=True, driving=False)
-    _, driven = raise_alerts(queue, lost, 2.5, armed=True, changed=True)
-    assert [alert.sound for alert in (*by_hand, *driven)] == [None, "hold"]
+def test_what_ends_a_motion_is_reported_each_time() -> None:
+    reporter = AlertReporter()
+    for at_s, mode, changed, sounds in (
+        (20.0, Mode.ARMED, True, ["stop"]),
+        (24.0, Mode.ADVISORY, True, ["stop"]),
+        (24.1, Mode.STOPPED, False, []),
+    ):
+        alerts = _report(reporter, Cause.STOP_PRESSED, at_s=at_s, mode=mode, changed=changed)
+        assert [alert.sound for alert in alerts] == sounds

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from core.config.safety import SafetyConfig, ServosConfig
+from core.control.bus_monitor import BusMonitor, BusReport
 from core.control.faults import Cause, Fault
-from core.control.health import BusReport, BusWatch, bus_faults, checked, see_bus
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 CYCLE_S = 1.0 / 64.0  # no rounding
@@ -14,16 +14,16 @@ def _misses(*joints: int) -> tuple[int, ...]:
     return tuple(int(joint in joints) for joint in range(7))
 
 
-def _watched(reports: list[BusReport], watch: BusWatch | None = None, start_s: float = 0.0) -> tuple[BusWatch, float]:
+def _watched(reports: list[BusReport], watch: BusMonitor | None = None, start_s: float = 0.0) -> tuple[BusMonitor, float]:
     """The watch after a report in each cycle, and the time of the last one."""
-    watch, now_s = watch or BusWatch(), start_s
+    watch, now_s = watch or BusMonitor(), start_s
     for now_s in (start_s + CYCLE_S * n for n in range(len(reports))):
-        watch = see_bus(watch, reports[round((now_s - start_s) / CYCLE_S)], now_s, SERVOS, SAFETY)
+        watch = watch.update(reports[round((now_s - start_s) / CYCLE_S)], now_s, SERVOS, SAFETY)
     return watch, now_s
 
 
-def _faults(watch: BusWatch, now_s: float) -> list[Fault]:
-    return bus_faults(watch, now_s, SERVOS, SAFETY)
+def _faults(watch: BusMonitor, now_s: float) -> list[Fault]:
+    return watch.faults(now_s, SERVOS, SAFETY)
 
 
 # --- silent in turns -------------------------------------------------------------------------------------------------------------
@@ -89,4 +89,4 @@ def test_reports_of_servos_that_follow_nobody_are_counted_in_a_row() -> None:
     assert _watched([])[0].disarmed_run == 0
     assert _watched([off, off, off])[0].disarmed_run == 3
     assert _watched([off, off, on])[0].disarmed_run == 0
-    assert checked(_watched([off, off])[0]).disarmed_run == 0
+    assert _watched([off, off])[0].checked().disarmed_run == 0

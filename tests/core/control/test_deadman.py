@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from core.control.health import FORGOTTEN_S, Deadman, DeadmanReport, is_held, see_deadman
+from core.config.safety import SafetyConfig
+from core.control.health import FORGOTTEN_S, Deadman, DeadmanReport, Health
 
 TIMEOUT_S = 0.078125
 STEP_S = 0.0625
@@ -19,7 +20,7 @@ def _heard(script: str) -> Deadman:
             continue
         now_s += STEP_S
         if what != "_":
-            deadman = see_deadman(deadman, {"-": False, "D": True, "?": None}[what], now_s, armed=armed)
+            deadman = deadman.update({"-": False, "D": True, "?": None}[what], now_s, armed=armed)
     return deadman
 
 
@@ -53,9 +54,9 @@ def test_a_press_counts_when_it_began_while_armed_from_a_release_that_was_told(s
 
 
 def test_a_deadman_is_forgotten_only_after_more_than_half_a_second() -> None:
-    held = see_deadman(see_deadman(Deadman(), False, 1.0, armed=True), True, 1.0, armed=True)
-    assert see_deadman(held, True, 1.0 + FORGOTTEN_S, armed=True).counts
-    assert not see_deadman(held, True, 1.0 + FORGOTTEN_S + 0.0078125, armed=True).counts
+    held = Deadman().update(False, 1.0, armed=True).update(True, 1.0, armed=True)
+    assert held.update(True, 1.0 + FORGOTTEN_S, armed=True).counts
+    assert not held.update(True, 1.0 + FORGOTTEN_S + 0.0078125, armed=True).counts
 
 
 @pytest.mark.parametrize(
@@ -70,9 +71,9 @@ def test_it_is_down_only_while_it_tells_so(script: str, down: bool) -> None:
 def test_one_that_is_held_is_enough_and_one_that_is_only_down_is_none() -> None:
     held, stuck, up = _heard("A-D"), _heard("-DA"), _heard("A--")
     now_s = 8.0 + 2 * STEP_S
-    assert is_held([up, stuck, held], now_s, TIMEOUT_S)
-    assert not is_held([up, stuck], now_s, TIMEOUT_S)
-    assert not is_held([], now_s, TIMEOUT_S)
+    safety = SafetyConfig(deadman_timeout_s=TIMEOUT_S)
+    for deadmen, is_held in (({0: up, 1: stuck, 2: held}, True), ({0: up, 1: stuck}, False), ({}, False)):
+        assert Health(deadmen=deadmen).deadman_held(now_s, safety) is is_held
 
 
 def test_what_was_said_counts_from_then_and_never_from_the_future() -> None:

@@ -10,37 +10,18 @@ import pytest
 
 from core.config.models import Config, ConfigError, load_config
 from core.config.safety import SafetyConfig
+from core.control.bus_monitor import BusMonitor, BusReport
 from core.control.faults import Cause, Fault, Reaction, worst
 from core.control.gate import RejectReason
-from core.control.health import (
-    Beat,
-    BusReport,
-    BusWatch,
-    FrameReport,
-    FrameWatch,
-    GateReport,
-    Health,
-    Part,
-    RouteState,
-    ServosBusy,
-    ServosChecked,
-    bus_faults,
-    disarmed,
-    faults_now,
-    frame_faults,
-    see_arrival,
-    see_bus,
-    see_frame,
-    take,
-)
+from core.control.health import Beat, FrameMonitor, FrameReport, GateReport, Health, Part, RouteState, ServosBusy, ServosChecked
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S
 
 
-def _watch(*reports: FrameReport, now_s: float | None = None) -> FrameWatch:
-    watch = FrameWatch()
+def _watch(*reports: FrameReport, now_s: float | None = None) -> FrameMonitor:
+    watch = FrameMonitor()
     for report in reports:
-        watch = see_frame(watch, report, report.captured_s if now_s is None else now_s, SAFETY)
+        watch = watch.update(report, report.captured_s if now_s is None else now_s, SAFETY)
     return watch
 
 
@@ -52,9 +33,9 @@ def _good(count: int, first: int = 0, **changes: object) -> list[FrameReport]:
     ]
 
 
-def _causes(watch: FrameWatch, now_s: float | None = None) -> set[Cause]:
+def _causes(watch: FrameMonitor, now_s: float | None = None) -> set[Cause]:
     newest_s = watch.newest.captured_s if watch.newest is not None else 0.0
-    return {fault.cause for fault in frame_faults(watch, newest_s if now_s is None else now_s, SAFETY)}
+    return {fault.cause for fault in watch.faults(newest_s if now_s is None else now_s, SAFETY)}
 
 
 # --- frames ----------------------------------------------------------------------------------------
@@ -74,16 +55,16 @@ def test_ages_of_frame_and_pose(age_s: float, causes: set[Cause]) -> None:
 
 
 def test_a_living_camera_with_slow_perception_is_no_silent_camera() -> None:
-    watch = see_arrival(_watch(*_good(1)), 0.3, 0.3)
+    watch = _watch(*_good(1)).arrived(0.3, 0.3)
     assert _causes(watch, 0.4) == {Cause.POSE_STALE}
-    assert _causes(see_arrival(FrameWatch(), 0.0, 0.0), 0.1) == {Cause.POSE_LOST}
-    assert frame_faults(see_arrival(FrameWatch(), 0.0, 0.0), 0.1, SAFETY) == [Fault(Cause.POSE_LOST, "no pose yet")]
+    assert _causes(FrameMonitor().arrived(0.0, 0.0), 0.1) == {Cause.POSE_LOST}
+    assert FrameMonitor().arrived(0.0, 0.0).faults(0.1, SAFETY) == [Fault(Cause.POSE_LOST, "no pose yet")]
 
 
 @pytest.mark.parametrize("captured_s", [0.2, 0.1, 0.51, math.nan, math.inf, -math.inf])
 def test_an_arrival_that_is_older_or_from_the_future_is_ignored(captured_s: float) -> None:
-    watch = see_arrival(FrameWatch(), 0.2, 0.2)
-    assert see_arrival(watch, captured_s, 0.5) == watch
+    watch = FrameMonitor().arrived(0.2, 0.2)
+    assert watch.arrived(captured_s, 0.5) == watch
 
 
 def test_results_out_of_order_are_dropped_and_counted() -> None:
@@ -106,12 +87,12 @@ def test_a_camera_that_was_opened_again_counts_from_the_beginning() -> None:
 
 @pytest.mark.parametrize("captured_s", [math.nan, math.inf, 5.001])
 def test_a_frame_from_the_future_is_a_broken_result(captured_s: float) -> None:
-    watch = see_frame(_watch(*_good(1), now_s=5.0), replace(_good(1)[0], index=1, captured_s=captured_s), 5.0, SAFETY)
+    watch = _watch(*_good(1), now_s=5.0).update(replace(_good(1)[0], index=1, captured_s=captured_s), 5.0, SAFETY)
     assert watch.newest is not None
     assert watch.newest.index == 0
     assert Cause.NOT_FINITE in _causes(watch, 0.1)
     assert not watch.well
-    again = see_frame(watch, replace(_good(1)[0], index=2, captured_s=math.nan), 5.0, SAFETY)
+    again = watch.update(replace(_good(1)[0], index=2, captured_s=math.nan), 5.0, SAFETY)
     assert again.broken_run == 2
 
 
@@ -235,30 +216,30 @@ def test_loss_that_stays_for_half_a_second_is_loss_for_long() -> None:
 
 def test_the_details_are_measured_values() -> None:
     watch = _watch(*_good(1, delivered=20, lost=20, drift_px=9.4, confidence=0.3))
-    assert frame_faults(watch, 0.2, SAFETY) == [
+    assert watch.faults(0.2, SAFETY) == [
         Fault(Cause.CAMERA_SILENT, "newest frame 200 ms old"),
         Fault(Cause.POSE_STALE, "200 ms old"),
         Fault(Cause.CAMERA_MOVED, "by 9 px (at most 6 px)"),
         Fault(Cause.FRAMES_LOST, "50 %"),
         Fault(Cause.CONFIDENCE_LOW, "30 % (at least 50 %)"),
     ]
-    assert [fault.detail for fault in frame_faults(watch, 0.6, SAFETY)][:2] == ["newest frame 600 ms old", "600 ms old"]
-    dropped = frame_faults(_watch(*_good(1, delivered=26, lost=4)), 0.0, SAFETY)
+    assert [fault.detail for fault in watch.faults(0.6, SAFETY)][:2] == ["newest frame 600 ms old", "600 ms old"]
+    dropped = _watch(*_good(1, delivered=26, lost=4)).faults(0.0, SAFETY)
     assert dropped == [Fault(Cause.FRAMES_DROPPED, "13 %")]
 
 
 # --- the bus ---------------------------------------------------------------------------------------
 
 
-def _bus(*reports: tuple[float, BusReport]) -> BusWatch:
-    watch = BusWatch()
+def _bus(*reports: tuple[float, BusReport]) -> BusMonitor:
+    watch = BusMonitor()
     for now_s, report in reports:
-        watch = see_bus(watch, report, now_s, SERVOS, SAFETY)
+        watch = watch.update(report, now_s, SERVOS, SAFETY)
     return watch
 
 
-def _bus_causes(watch: BusWatch, now_s: float) -> list[Cause]:
-    return [fault.cause for fault in bus_faults(watch, now_s, SERVOS, SAFETY)]
+def _bus_causes(watch: BusMonitor, now_s: float) -> list[Cause]:
+    return [fault.cause for fault in watch.faults(now_s, SERVOS, SAFETY)]
 
 
 def _one(value: object, rest: object) -> tuple[object, ...]:
@@ -337,7 +318,7 @@ def test_a_restarted_servo_stays_restarted() -> None:
 
 def test_the_details_name_the_joints() -> None:
     bad = BusReport(True, _one(4, 0), 7, _one(0x21, 0), _one(71.0, 66.0), _one(9.9, 10.8), _one(2.0, 0.0))  # type: ignore[arg-type]
-    assert bus_faults(_bus((0.0, bad)), 0.2, SERVOS, SAFETY) == [
+    assert _bus((0.0, bad)).faults(0.2, SERVOS, SAFETY) == [
         Fault(Cause.BUS_SILENT, "for 200 ms"),
         Fault(Cause.BUS_NOISE, "7 in 1 s (at most 5)"),
         Fault(Cause.SERVO_SILENT, "up"),
@@ -346,7 +327,7 @@ def test_the_details_name_the_joints() -> None:
         Fault(Cause.HOT, "up 71 °C"),
         Fault(Cause.VOLTAGE_LOW, "up 9.9 V"),
     ]
-    assert bus_faults(_bus((0.0, GOOD_BUS)), 0.6, SERVOS, SAFETY) == [Fault(Cause.BUS_DEAD, "silent for 600 ms")]
+    assert _bus((0.0, GOOD_BUS)).faults(0.6, SERVOS, SAFETY) == [Fault(Cause.BUS_DEAD, "silent for 600 ms")]
 
 
 # --- hosts, model, gate ----------------------------------------------------------------------------
@@ -354,12 +335,12 @@ def test_the_details_name_the_joints() -> None:
 
 def _take(health: Health, *reports: Beat | GateReport, now_s: float = 0.0, armed: bool = True) -> Health:
     for report in reports:
-        health = take(health, report, armed=armed, now_s=now_s, servos=SERVOS, safety=SAFETY)
+        health = health.update(report, armed=armed, now_s=now_s, servos=SERVOS, safety=SAFETY)
     return health
 
 
 def _host_faults(health: Health, now_s: float) -> dict[Cause, str]:
-    return {fault.cause: fault.detail for fault in faults_now(health, now_s, SERVOS, SAFETY)}
+    return {fault.cause: fault.detail for fault in health.faults(now_s, SERVOS, SAFETY)}
 
 
 def test_signs_of_life_are_told_apart() -> None:
@@ -399,7 +380,7 @@ def test_only_a_command_that_goes_through_ends_the_row_of_broken_ones() -> None:
     assert Cause.COMMAND_REJECTED not in ended
 
 
-@pytest.mark.parametrize("ends", [lambda health: _take(health, GateReport(None)), disarmed])
+@pytest.mark.parametrize("ends", [lambda health: _take(health, GateReport(None)), Health.disarmed])
 def test_a_row_of_broken_commands_begins_with_none(ends: Callable[[Health], Health]) -> None:
     broken = [GateReport(RejectReason.OVER_RATE)] * (SAFETY.broken_results - 1)
     again = _take(ends(_take(Health(), *broken)), *broken)
@@ -408,17 +389,17 @@ def test_a_row_of_broken_commands_begins_with_none(ends: Callable[[Health], Heal
 
 
 def test_only_servos_that_are_as_configured_are_no_longer_restarted() -> None:
-    restarted = take(Health(), replace(GOOD_BUS, rebooted=True), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    restarted = Health().update(replace(GOOD_BUS, rebooted=True), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
     for problems, is_over in ((("advance has another model",), False), ((), True)):
-        health = take(restarted, ServosChecked(problems), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+        health = restarted.update(ServosChecked(problems), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
         assert (Cause.REBOOTED not in _host_faults(health, 0.0)) is is_over
 
 
 def test_the_bus_may_be_silent_over_a_request_only_while_the_servos_are_off() -> None:
-    heard = take(Health(), GOOD_BUS, armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
-    on = take(heard, ServosChecked(()), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    heard = Health().update(GOOD_BUS, armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    on = heard.update(ServosChecked(()), armed=False, now_s=0.0, servos=SERVOS, safety=SAFETY)
     for health, is_excused in ((heard, True), (on, False)):
-        busy = take(health, ServosBusy(), armed=False, now_s=5.0, servos=SERVOS, safety=SAFETY)
+        busy = health.update(ServosBusy(), armed=False, now_s=5.0, servos=SERVOS, safety=SAFETY)
         assert (Cause.BUS_DEAD not in _host_faults(busy, 5.0)) is is_excused
 
 
@@ -426,12 +407,12 @@ def _bus_goes_quiet(health: Health, ended: Fault | None) -> Health:
     """As many reports of a bus process that is not armed as make it sure."""
     report = replace(GOOD_BUS, armed=False, ended=ended)
     for number in range(SAFETY.missed_answers):
-        health = take(health, report, armed=True, now_s=number * TICK_S, servos=SERVOS, safety=SAFETY)
+        health = health.update(report, armed=True, now_s=number * TICK_S, servos=SERVOS, safety=SAFETY)
     return health
 
 
 def test_servos_that_the_bus_process_has_disarmed_are_off_for_its_reason_or_for_none() -> None:
-    on = take(Health(), ServosChecked(()), armed=True, now_s=0.0, servos=SERVOS, safety=SAFETY)
+    on = Health().update(ServosChecked(()), armed=True, now_s=0.0, servos=SERVOS, safety=SAFETY)
     quiet = _bus_goes_quiet(on, None)
     assert (quiet.servos_ready, quiet.reported) == (False, (Fault(Cause.SERVOS_WRONG, "the servo process is not armed"),))
     hot = Fault(Cause.HOT, "advance: 71 C")

@@ -26,7 +26,7 @@ class Turned:
         self.turns += 1
         self.turned.release()
 
-    def report(self, fault: Fault) -> None:
+    def report_fault(self, fault: Fault) -> None:
         self.reported.append(fault)
 
     def close(self) -> None:

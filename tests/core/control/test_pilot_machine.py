@@ -354,7 +354,7 @@ class PilotMachine:
         pixels[0, 0] = bench.index % 251
         frame = Frame(bench.index, scene.captured_s, pixels)
         bench.pilot.frame_arrived(frame)
-        bench.pilot.see(frame, scene, None, has_target=scene.route is not None)
+        bench.pilot.update_scene(frame, scene, None, has_target=scene.route is not None)
 
     def _tick(self) -> None:
         robot, before = self.robot, self.robot.motion.motion

@@ -14,9 +14,10 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
+from core.control.bus_monitor import BusReport
 from core.control.faults import Cause, Fault
 from core.control.gate import GateState, GateStep, GoalRequest, JointMeasurement, Source, gate_step
-from core.control.health import Beat, BusReport, DeadmanReport, FrameReport, GateReport, RouteState, ServosChecked
+from core.control.health import Beat, DeadmanReport, FrameReport, GateReport, RouteState, ServosChecked
 from core.control.joints import joint_goals
 from core.control.modes import Act, Decision, Event, Mode
 from core.types import Command, Reason

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from core.config.models import PursuitConfig
-from core.control.pursuit import BackOff, ContactLimit, Feed, LookAhead, RetryCounter, Stall, TargetMissMonitor
+from core.control.look_ahead import LookAhead
+from core.control.pursuit import BackOff, ContactLimit, FeedMonitor, MissCounter, RetryCounter, StallMonitor
 from core.types import RobotStatus
 
 
 def test_stall_tells_only_after_its_time_and_only_without_progress() -> None:
-    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
     assert not stall.update(100.0, (0, 0), 5.0, 5.0), "what was before it began to watch does not count"
     assert not stall.update(100.0, (0, 0), 5.0, 0.5)
     assert stall.update(98.0, (2, 0), 5.0, 0.5)  # 2 px of the 15 px that were fed
@@ -25,7 +26,7 @@ def test_stall_tells_only_after_its_time_and_only_without_progress() -> None:
 
 @pytest.mark.parametrize(("rest_s", "is_told"), [(0.2, True), (0.4, False)])
 def test_only_a_real_rest_lets_stall_watch_anew(rest_s: float, is_told: bool) -> None:
-    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
     told = []
     for _ in range(4):
         told += [stall.update(100.0, (0, 0), 5.0, 0.1) for _ in range(5)]
@@ -33,7 +34,7 @@ def test_only_a_real_rest_lets_stall_watch_anew(rest_s: float, is_told: bool) ->
     assert any(told) is is_told
 
 
-def fed(feed: Feed, frames_s: list[float], bus_s: float, speed_mm_s: float = 6.0) -> list[tuple[float, float]]:
+def fed(feed: FeedMonitor, frames_s: list[float], bus_s: float, speed_mm_s: float = 6.0) -> list[tuple[float, float]]:
     """What is known of a feed of `speed_mm_s` at each frame, of statuses that come every `bus_s`."""
     found, before_s = [], frames_s[0]
     for now_s in frames_s:
@@ -48,14 +49,14 @@ def fed(feed: Feed, frames_s: list[float], bus_s: float, speed_mm_s: float = 6.0
 @pytest.mark.parametrize("bus_s", [0.02, 0.04, 0.05])
 def test_the_feed_is_known_though_frames_and_statuses_do_not_come_in_step(fps: float, bus_s: float) -> None:
     frames_s = [5.0 + 0.001 + k / fps for k in range(round(3 * fps))]
-    found = fed(Feed(), frames_s, bus_s)
+    found = fed(FeedMonitor(), frames_s, bus_s)
     known = found[round(0.2 * fps) :]
     assert [speed for speed, _ in known] == pytest.approx([6.0] * len(known))
     assert sum(way for _, way in found) == pytest.approx(6.0 * (frames_s[-1] - frames_s[0]), abs=6.0 * 2 * bus_s)
 
 
 def test_a_robot_that_tells_nothing_any_more_is_not_taken_to_be_fed() -> None:
-    feed = Feed()
+    feed = FeedMonitor()
     fed(feed, [1.0, 1.1, 1.2], 0.1)
     still = RobotStatus(1.2, 7.2, 0.0, (0.0,) * 4, (0.0,) * 4)
     assert [feed.update(still, 0.0, 0.1)[0] for _ in range(8)][-1] == 0.0
@@ -65,7 +66,7 @@ def test_a_robot_that_tells_nothing_any_more_is_not_taken_to_be_fed() -> None:
 
 
 def test_two_frames_of_one_moment_make_no_wild_speed() -> None:
-    feed = Feed()
+    feed = FeedMonitor()
     feed.update(RobotStatus(1.0, 50.0, 0.0, (0.0,) * 4, (0.0,) * 4), 4.0, 0.03)
     speed, _ = feed.update(RobotStatus(1.0, 50.2, 0.0, (0.0,) * 4, (0.0,) * 4), 4.0, 0.001)
     assert speed == pytest.approx(10.0)
@@ -78,7 +79,7 @@ def way(left_px: float | None, target: tuple[float, float] | None = (380.0, 100.
 
 @pytest.mark.parametrize("blind_s", [0.1, 0.2])
 def test_frames_without_a_way_hide_no_stall(blind_s: float) -> None:
-    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
     told = []
     for k in range(60):
         told.append(stall.update(None if 0 < k % 9 <= round(blind_s / 0.1) else 100.0, (0, 0), 5.0, 0.1))
@@ -90,26 +91,26 @@ def test_tries_count_where_the_head_stood_and_no_farther_place_that_one_frame_sa
     tries = RetryCounter()
     counts = []
     for left_px in (200.0, 198.0, None, 197.0, 150.0, 149.0, 148.0):
-        tries.see(way(left_px))
-        tries.see(way(60.0))  # one frame beside a branch
+        tries.update(way(left_px))
+        tries.update(way(60.0))  # one frame beside a branch
         tries.add(way(left_px))
         counts.append(tries.count)
     assert counts == [1, 2, 2, 3, 1, 2, 3]
-    tries.see(way(None))
+    tries.update(way(None))
     assert tries.count == 3
-    tries.see(way(100.0, (5.0, 5.0)))
+    tries.update(way(100.0, (5.0, 5.0)))
     assert tries.count == 0, "another target"
 
 
 def test_misses_outlive_a_frame_without_a_way() -> None:
-    misses = TargetMissMonitor()
+    misses = MissCounter()
     misses.add(way(150.0))
-    assert [misses.at(way(None)), misses.at(way(140.0))] == [1, 1]
-    assert misses.at(way(140.0, (5.0, 5.0))) == 0
+    assert [misses.count_at(way(None)), misses.count_at(way(140.0))] == [1, 1]
+    assert misses.count_at(way(140.0, (5.0, 5.0))) == 0
 
 
 def test_a_head_that_slides_sideways_is_not_stuck() -> None:
-    stall = Stall(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
+    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
     assert not stall.update(100.0, (50, 0), 5.0, 0.5)
     assert not stall.update(100.0, (50, 1), 5.0, 0.5)
     assert not stall.update(99.0, (50, 4), 5.0, 0.5)

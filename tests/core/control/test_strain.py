@@ -9,8 +9,8 @@ from dataclasses import replace
 import pytest
 
 from core.config.safety import SafetyConfig, ServosConfig
-from core.control.faults import REACTION, Cause, Reaction
-from core.control.health import BusWatch, bus_faults, see_bus
+from core.control.bus_monitor import BusMonitor
+from core.control.faults import Cause, Reaction
 from tests.core.healthy import GOOD_BUS
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
@@ -22,12 +22,12 @@ def seconds_until_strained(
     current_ma: Current, servos: ServosConfig = SERVOS, cycle_s: float = CYCLE_S, most_s: float = 3.0
 ) -> float | None:
     """When the fault comes, from the first reading on; `current_ma` of the third joint by cycle. None: not within `most_s`."""
-    watch = BusWatch()
+    watch = BusMonitor()
     for n in range(round(most_s / cycle_s)):
         now_s = 64.0 + n * cycle_s
         report = replace(GOOD_BUS, currents_ma=(40.0, 40.0, current_ma(n), None, 40.0, 40.0, 40.0))
-        watch = see_bus(watch, report, now_s, servos, SAFETY)
-        faults = [fault for fault in bus_faults(watch, now_s, servos, SAFETY) if fault.cause is Cause.STRAINED]
+        watch = watch.update(report, now_s, servos, SAFETY)
+        faults = [fault for fault in watch.faults(now_s, servos, SAFETY) if fault.cause is Cause.STRAINED]
         if faults:
             assert faults[0].detail.startswith("up up to ")
             assert faults[0].detail.endswith("(at most 600 mA)")
@@ -36,7 +36,7 @@ def seconds_until_strained(
 
 
 def test_it_stops() -> None:
-    assert REACTION[Cause.STRAINED] is Reaction.STOP
+    assert Cause.STRAINED.reaction is Reaction.STOP
 
 
 @pytest.mark.parametrize("current_ma", [601.0, -601.0, 2300.0, math.nan])
@@ -97,10 +97,10 @@ def test_a_strain_after_long_spikes_is_seen_as_soon() -> None:
 
 def test_a_late_status_is_no_strain() -> None:
     """Two readings beyond the limit with a pause between them tell nothing of that time."""
-    watch, high = BusWatch(), replace(GOOD_BUS, currents_ma=(900.0,) * 7)
+    watch, high = BusMonitor(), replace(GOOD_BUS, currents_ma=(900.0,) * 7)
     for now_s in (0.0, 0.02, 0.5, 0.52):
-        watch = see_bus(watch, high, now_s, SERVOS, SAFETY)
-        assert Cause.STRAINED not in [fault.cause for fault in bus_faults(watch, now_s + 0.1, SERVOS, SAFETY)]
+        watch = watch.update(high, now_s, SERVOS, SAFETY)
+        assert Cause.STRAINED not in [fault.cause for fault in watch.faults(now_s + 0.1, SERVOS, SAFETY)]
 
 
 @pytest.mark.parametrize("bus_hz", [200.0, 20.0, 5.0])
@@ -112,7 +112,7 @@ def test_a_bus_of_any_rate_sees_it(bus_hz: float) -> None:
 
 
 def test_it_is_over_when_the_current_is() -> None:
-    watch = BusWatch()
+    watch = BusMonitor()
     for n in range(40):
-        watch = see_bus(watch, replace(GOOD_BUS, currents_ma=(900.0 if n < 30 else 40.0,) * 7), n * CYCLE_S, SERVOS, SAFETY)
+        watch = watch.update(replace(GOOD_BUS, currents_ma=(900.0 if n < 30 else 40.0,) * 7), n * CYCLE_S, SERVOS, SAFETY)
     assert watch.strained == ""

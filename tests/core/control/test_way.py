@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from core.config.models import PursuitConfig
-from core.control.pursuit import look_ahead
+from core.control.look_ahead import look_ahead
 from core.types import Masks, Scene
 from tests.core.driving_scenes import FORK, STRAIGHT, scene_at
 

@@ -9,9 +9,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from core.control.drive_view import DriveView
 from core.control.frame_reports import is_sound
 from core.control.modes import Mode
-from core.control.pilot import DriveView
 from core.session.codec import (
     InvalidRecord,
     RecordedRow,

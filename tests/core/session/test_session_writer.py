@@ -19,9 +19,9 @@ import av
 import numpy as np
 import pytest
 
+from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.modes import Mode
-from core.control.pilot import DriveView
 from core.evaluation.replay import event_target
 from core.session import files as session_files
 from core.session import writer as session_writer

@@ -1,0 +1,208 @@
+"""Health of the servo bus: a report per cycle in, active faults out. Pure.
+
+A motor's current ripples, and starting a motor takes a peak. So what counts as strain is half a second in which most readings are
+above the limit, with pauses no longer than those of a ripple.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
+from core.control.faults import Cause, Fault
+
+
+@dataclass(frozen=True, slots=True)
+class BusReport:
+    """One cycle of the bus; tuples are per joint, in the order of JOINT_NAMES, and empty when not read in this cycle.
+
+    Attributes
+    ----------
+    misses : answers missed in a row by now.
+    errors : bad packets (CRC, garbage, short) since the last report, after the retry.
+    hardware_errors : the servos' register 70.
+    tracking_mm : goal minus measured position.
+    currents_ma : None for a servo that reports none.
+    armed, ended : whether the bus process follows commands, and why it does not any more.
+    torque_off : all servos have said since the last report that their torque is off.
+    torque_problem : why a torque-off that was requested is not proven yet.
+    """
+
+    port_open: bool = True
+    misses: Sequence[int] = ()
+    errors: int = 0
+    hardware_errors: Sequence[int] = ()
+    temperatures_c: Sequence[float] = ()
+    voltages_v: Sequence[float] = ()
+    tracking_mm: Sequence[float] = ()
+    currents_ma: Sequence[float | None] = ()
+    rebooted: bool = False
+    watchdog_tripped: bool = False
+    armed: bool = True
+    ended: Fault | None = None
+    torque_off: bool = False
+    torque_problem: str = ""
+
+
+STRAIN_S = 0.5
+"""So long a current must be above the limit."""
+_RIPPLE_S, _RIPPLE_CYCLES = 0.06, 2.5
+"""Longest pause of a ripple, in seconds and in cycles of the bus; the longer of both counts."""
+_ROUNDING_S = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class CurrentSample:
+    """The amounts of the seven currents (mA) at a moment; None where a servo reports none, or did not answer."""
+
+    time_s: float
+    currents_ma: tuple[float | None, ...]
+
+
+def _strain(samples: Sequence[CurrentSample], servos: ServosConfig) -> str:
+    """The first joint that is strained as of the newest sample, and by how much; "" for none.
+
+    NaN counts as too much; a missing reading counts as none, and proves nothing.
+    """
+    pause_s = _longest_pause_s(servos) + _ROUNDING_S
+    for place, name in enumerate(JOINT_NAMES):
+        found = [(s.time_s, ma) for s in samples if place < len(s.currents_ma) and (ma := s.currents_ma[place]) is not None]
+        above = [(time_s, ma) for time_s, ma in found if not ma <= servos.max_current_ma]
+        starts = [time_s for time_s, _ in above if above[-1][0] - time_s >= STRAIN_S - _ROUNDING_S]
+        if not starts:
+            continue
+        run = [*(time_s for time_s, _ in above if time_s >= starts[-1]), samples[-1].time_s]
+        if max(after - before for before, after in zip(run, run[1:], strict=False)) > pause_s:
+            continue
+        since = [ma for time_s, ma in found if time_s >= starts[-1]]
+        over = [ma for time_s, ma in above if time_s >= starts[-1]]
+        if 2 * len(over) >= len(since):
+            lasted_ms = 1000.0 * (above[-1][0] - starts[-1])
+            return f"{name} up to {max(over):.0f} mA for {lasted_ms:.0f} ms (at most {servos.max_current_ma:.0f} mA)"
+    return ""
+
+
+def _longest_pause_s(servos: ServosConfig) -> float:
+    return max(_RIPPLE_S, _RIPPLE_CYCLES / servos.bus_hz)
+
+
+@dataclass(frozen=True, slots=True)
+class BusMonitor:
+    """State of the bus. What a report leaves out keeps its last reading.
+
+    Attributes
+    ----------
+    reported_s : of the last report; None: there was none yet.
+    disarmed_run : reports in a row in which the bus process was not armed.
+    gap_run, gaps : cycles in a row in which not all servos have answered (time says nothing: the process may have been suspended),
+        and the joints whose answers were missed in them.
+    """
+
+    reported_s: float | None = None
+    newest: BusReport = BusReport()
+    errors: tuple[tuple[float, int], ...] = ()
+    astray_since_s: float | None = None
+    astray: str = ""
+    currents: tuple[CurrentSample, ...] = ()
+    strained: str = ""
+    rebooted: bool = False
+    disarmed_run: int = 0
+    gap_run: int = 0
+    gaps: frozenset[str] = frozenset()
+
+    def update(self, report: BusReport, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> BusMonitor:
+        """The state after a report. A restarted servo counts as restarted until the servos are checked again."""
+        errors = tuple(entry for entry in self.errors if now_s - entry[0] <= safety.bus_errors_window_s)
+        if report.errors > 0:
+            errors = (*errors, (now_s, report.errors))
+        since_s, astray = self.astray_since_s, self.astray
+        if report.tracking_mm:
+            astray = _first_astray(report.tracking_mm, servos.tracking_error_mm)
+            since_s = (since_s if since_s is not None else now_s) if astray else None
+        currents, strained = self.currents, self.strained
+        if report.currents_ma:
+            oldest_s = STRAIN_S + 2.0 * _longest_pause_s(servos)
+            newest_ma = CurrentSample(now_s, tuple(None if ma is None else abs(ma) for ma in report.currents_ma))
+            currents = (*(sample for sample in currents if 0.0 <= now_s - sample.time_s <= oldest_s), newest_ma)
+            strained = _strain(currents, servos)
+        gap_run, gaps = self.gap_run, self.gaps
+        if report.misses:
+            missing = {name for name, misses in zip(JOINT_NAMES, report.misses, strict=False) if misses > 0}
+            gap_run, gaps = (gap_run + 1, gaps | missing) if missing else (0, frozenset())
+        newest = replace(
+            report,
+            hardware_errors=report.hardware_errors or self.newest.hardware_errors,
+            temperatures_c=report.temperatures_c or self.newest.temperatures_c,
+            voltages_v=report.voltages_v or self.newest.voltages_v,
+        )
+        disarmed_run = 0 if report.armed else self.disarmed_run + 1
+        rebooted = self.rebooted or report.rebooted
+        return BusMonitor(now_s, newest, errors, since_s, astray, currents, strained, rebooted, disarmed_run, gap_run, gaps)
+
+    def busy(self, now_s: float) -> BusMonitor:
+        """The state while the bus is busy with a request: its silence is no fault."""
+        return replace(self, reported_s=now_s)
+
+    def checked(self) -> BusMonitor:
+        """The state after all servos were found, checked and, if restarted, zeroed."""
+        return replace(self, rebooted=False, disarmed_run=0)
+
+    def armed(self) -> BusMonitor:
+        """The state after all servos were checked and armed: what arming repairs is over, though no report has said so yet."""
+        repaired = replace(self.newest, watchdog_tripped=False, torque_problem="")
+        return replace(self.checked(), newest=repaired)
+
+    def faults(self, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> list[Fault]:
+        """The active faults of the servos and their bus. NaN counts as too hot or too low."""
+        newest = self.newest
+        found: list[tuple[Cause, str | bool]] = []
+        age_s = math.inf if self.reported_s is None else now_s - self.reported_s
+        if age_s > safety.bus_disarm_s:
+            found.append((Cause.BUS_DEAD, "no report yet" if math.isinf(age_s) else f"silent for {1000 * age_s:.0f} ms"))
+        elif age_s > safety.bus_hold_s:
+            found.append((Cause.BUS_SILENT, f"for {1000 * age_s:.0f} ms"))
+        found.append((Cause.PORT_LOST, not newest.port_open))
+        # before the silence that it causes: the first one is what the operator reads
+        bad = sum(count for time_s, count in self.errors if now_s - time_s <= safety.bus_errors_window_s)
+        if bad > safety.bus_errors:
+            found.append((Cause.BUS_NOISE, f"{bad} in {safety.bus_errors_window_s:g} s (at most {safety.bus_errors})"))
+        if silent := _listed(newest.misses, lambda misses: misses >= safety.missed_answers, ""):
+            found.append((Cause.SERVO_SILENT, silent))
+        elif self.gap_run > safety.bus_disarm_s * servos.bus_hz:
+            # each one answers often enough, but the positions of all seven, which the motion needs, are never there
+            names = ", ".join(name for name in JOINT_NAMES if name in self.gaps)
+            found.append((Cause.SERVO_SILENT, f"in turns, {names}: not all in one cycle for {safety.bus_disarm_s:g} s"))
+        is_astray = self.astray_since_s is not None and now_s - self.astray_since_s >= safety.tracking_time_s
+        warm_c = servos.max_temperature_c - safety.temperature_warn_margin_c
+        low_v = servos.min_voltage_v + safety.voltage_warn_margin_v
+        hot = _listed(newest.temperatures_c, lambda c: not c < servos.max_temperature_c, " {:.0f} °C")
+        low = _listed(newest.voltages_v, lambda v: not v > servos.min_voltage_v, " {:.1f} V")
+        found += [
+            (Cause.SERVO_ALERT, _listed(newest.hardware_errors, lambda bits: bits != 0, " {:#04x}")),
+            (Cause.TRACKING, is_astray and self.astray),
+            (Cause.STRAINED, self.strained),
+            (Cause.TORQUE_ON, newest.torque_problem),
+            (Cause.REBOOTED, self.rebooted),
+            (Cause.WATCHDOG, newest.watchdog_tripped),
+            (Cause.HOT, hot),
+            (Cause.WARM, not hot and _listed(newest.temperatures_c, lambda c: not c < warm_c, " {:.0f} °C")),
+            (Cause.VOLTAGE_LOW, low),
+            (Cause.VOLTAGE_SAGS, not low and _listed(newest.voltages_v, lambda v: not v > low_v, " {:.1f} V")),
+        ]
+        return [Fault(cause, "" if told is True else told) for cause, told in found if told]
+
+
+def _listed(values: Sequence[Any], is_bad: Callable[[Any], bool], how: str) -> str:
+    """The joints whose value is bad, with the value as text."""
+    return ", ".join(f"{name}{how.format(value)}" for name, value in zip(JOINT_NAMES, values, strict=False) if is_bad(value))
+
+
+def _first_astray(tracking_mm: Sequence[float], limit_mm: float) -> str:
+    """The first joint that is too far from its goal; NaN counts as too far."""
+    for name, error_mm in zip(JOINT_NAMES, tracking_mm, strict=False):
+        if not abs(error_mm) <= limit_mm:
+            return f"{name} off by {error_mm:.2f} mm (at most {limit_mm:g} mm)"
+    return ""

@@ -1,0 +1,165 @@
+"""The look-ahead of pure pursuit: what lies ahead of the head on the way. Angles in degrees, lengths in working px."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from core import geometry
+from core.config.models import PursuitConfig
+from core.types import Mask, Point, Points, Scene, VesselGraph
+
+_BEHIND_DEG = 100.0
+"""The way lies behind the head when it leaves it at more than this angle."""
+_IN_SIGHT_DEG, _IN_SIGHT_PX = 60.0, 90.0
+"""Where the way continues within this angle and distance of the head, with free lumen between, it is not behind."""
+_ON_ROUTE_PX = 2.0
+"""A node of the vessel graph within this distance of the way lies on it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LookAhead:
+    """The way ahead of the head, in working px.
+
+    Attributes
+    ----------
+    points : (N, 2) from the place beside the ``head``, or, where that leads back, from the place in sight ahead of it.
+    left_px : way left to the ``target``; None: no target.
+    error_deg : the missing turn, positive to the right.
+    behind : the way leaves backwards.
+    turn_deg : sharpest turn within the preview.
+    junction_px : distance to the next bifurcation on the way; None: none within the preview.
+    wall : share of the room beside the centerline that the head has used; 1: it touches the wall.
+    """
+
+    head: Point
+    points: Points
+    left_px: float | None
+    target: Point | None
+    error_deg: float
+    behind: bool
+    turn_deg: float
+    junction_px: float | None
+    wall: float
+
+
+def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, rounding_px: float = 0.0) -> LookAhead | None:
+    """What lies ahead in a scene, on a way whose corners are rounded over `rounding_px`; None when it has no pose."""
+    if scene.pose is None or scene.path is None or scene.centerline is None:
+        return None
+    head, piece = scene.path.head, scene.centerline.piece
+    if scene.route is not None:
+        points, left_px, target = scene.route.points, scene.route.length_px, scene.route.target
+    else:
+        points, left_px, target = geometry.cut(piece, geometry.nearest(piece, head)[1], math.inf), None, None
+    if len(points) < 2:
+        return None
+    heading = _heading(scene.path.points, config.heading_px)
+    rounded = geometry.smooth(geometry.resample(points, 2.0), rounding_px / 2.0) if rounding_px > 0.0 else points
+    goal = _goal(rounded, head, look_ahead_px)
+    straight_deg = _angle_deg(heading, _step(head, goal))
+    start, first = rounded[0], geometry.cut(rounded, 0.0, 6.0)[-1]
+    # for a head that has to turn into a branch beside it the way lies across, not behind: a way back also begins backwards
+    back_deg = min(abs(straight_deg), abs(_angle_deg(heading, _step(start, first))))
+    behind = left_px is not None and left_px > config.arrive_px and back_deg > _BEHIND_DEG
+    arc_deg = _angle_deg(_step(start, first), _step(start, goal)) if not behind else 0.0
+    if behind and scene.masks is not None:
+        # in the wide lumen of a bifurcation the other branch's centerline can be the nearer one: the way then seems to lead back,
+        # though the head already points into the right branch
+        seen_px = _in_sight(points, head, heading, scene.masks.vessel, look_ahead_px)
+        if seen_px is not None:
+            points, behind = geometry.cut(points, seen_px, math.inf), False
+            goal = float(points[0][0]), float(points[0][1])
+            straight_deg = _angle_deg(heading, _step(head, goal))
+            left_px = math.dist(head, goal) + float(geometry.arc_length(points)[-1])
+    error_deg = straight_deg - config.follow_arc * max(-45.0, min(45.0, arc_deg))
+    # the angle to a point at the look-ahead distance on the tightest arc that is steered for
+    sharpest_deg = math.degrees(math.asin(min(1.0, look_ahead_px / (2.0 * config.min_bend_radius_px))))
+    radius_px, robot_px = scene.centerline.radius_px, scene.path.radius_px
+    away_px = math.hypot(head[0] - scene.centerline.nearest[0], head[1] - scene.centerline.nearest[1])
+    return LookAhead(
+        head=head,
+        points=points,
+        left_px=left_px,
+        target=target,
+        error_deg=limited(error_deg, sharpest_deg),
+        behind=behind,
+        turn_deg=_turn_deg(points, config.preview_px),
+        junction_px=_junction_px(scene.vessel_graph, points, config.preview_px),
+        wall=away_px / max(radius_px - robot_px, 0.25 * radius_px, 1.0),
+    )
+
+
+def _heading(path: Points, length_px: float) -> Point:
+    """Direction of the robot's end, from the whole stretch and not from its two end points."""
+    along = geometry.arc_length(path)
+    end = geometry.resample(geometry.cut(path, float(along[-1]) - length_px, math.inf), 2.0)
+    half = max(1, len(end) // 2)
+    back, front = end[:half].mean(axis=0), end[-half:].mean(axis=0)
+    return float(front[0] - back[0]), float(front[1] - back[1])
+
+
+def _goal(points: Points, head: Point, distance_px: float) -> Point:
+    """The first point of the way that is `distance_px` from the head; the way goes straight on beyond its end.
+
+    A head far beside the way takes a point at 45 degrees at most: the nearest point of the way lies across, and would look as if it
+    were behind a head that is turned a little outwards.
+    """
+    distance_px = max(distance_px, math.sqrt(2.0) * math.hypot(points[0][0] - head[0], points[0][1] - head[1]))
+    line = geometry.resample(points, 2.0)
+    last, before = line[-1], line[max(0, len(line) - 6)]
+    length = float(np.hypot(*(last - before)))
+    if length > 0.0:
+        line = np.vstack([line, last + (last - before) / length * np.arange(2.0, 3.0 * distance_px, 2.0)[:, None]])
+    far = np.hypot(line[:, 0] - head[0], line[:, 1] - head[1]) >= distance_px
+    found = line[int(np.argmax(far))] if far.any() else line[-1]
+    return float(found[0]), float(found[1])
+
+
+def _in_sight(points: Points, head: Point, heading: Point, vessel: Mask, least_px: float) -> float | None:
+    """Arc length of the way's first place ahead of the head to which a straight line stays in the lumen; None: there is none."""
+    line = geometry.resample(points, 2.0)
+    for position, (x, y) in zip(geometry.arc_length(line), line.tolist(), strict=True):
+        away_px = math.hypot(x - head[0], y - head[1])
+        if not least_px <= away_px <= _IN_SIGHT_PX or abs(_angle_deg(heading, (x - head[0], y - head[1]))) > _IN_SIGHT_DEG:
+            continue
+        between = np.rint(np.linspace(head, (x, y), math.ceil(away_px) + 1)).astype(int)
+        across, down = between[:, 0].clip(0, vessel.shape[1] - 1), between[:, 1].clip(0, vessel.shape[0] - 1)
+        if vessel[down, across].all():
+            return float(position)
+    return None
+
+
+def _turn_deg(points: Points, preview_px: float) -> float:
+    """Largest angle between the way's first direction and any later one within the preview."""
+    line = geometry.resample(geometry.cut(points, 0.0, preview_px), 5.0)
+    if len(line) < 4:
+        return 0.0
+    steps = line[2:] - line[:-2]
+    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    return float(np.degrees(headings.max() - headings.min()))
+
+
+def _junction_px(graph: VesselGraph | None, points: Points, preview_px: float) -> float | None:
+    if graph is None or len(graph.nodes) == 0:
+        return None
+    degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
+    line = geometry.cut(points, 0.0, preview_px)
+    found = (geometry.nearest(line, (x, y)) for x, y in graph.nodes[degree >= 3].tolist())
+    return min((position for away_px, position, _ in found if away_px <= _ON_ROUTE_PX), default=None)
+
+
+def _step(start: Points | Point, end: Points | Point) -> Point:
+    return float(end[0] - start[0]), float(end[1] - start[1])
+
+
+def _angle_deg(start: Point, end: Point) -> float:
+    """Signed angle from one direction to another, positive to the right on screen."""
+    return math.degrees(math.atan2(start[0] * end[1] - start[1] * end[0], start[0] * end[0] + start[1] * end[1]))
+
+
+def limited(value: float, limit: float) -> float:
+    """`value`, at most `limit` to either side of zero."""
+    return max(-limit, min(limit, value))
