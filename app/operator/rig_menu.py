@@ -91,7 +91,7 @@ class RigMenuController(QObject):
     def stop(self) -> bool:
         """STOP while the wizard has the servos; False: it moves none. From any thread."""
         wizard = self.wizard or self._closing
-        return wizard is not None and wizard.desk.stop()
+        return wizard is not None and wizard.model.stop()
 
     @Slot()
     def close(self) -> None:
@@ -99,9 +99,9 @@ class RigMenuController(QObject):
         wizard, self.wizard, self._closing = self.wizard or self._closing, None, None
         if wizard is not None:
             wizard.finished.disconnect(self._on_finished)
-            wizard.desk.closed.disconnect(self._on_closed)
+            wizard.model.closed.disconnect(self._on_closed)
             wizard.reject()
-            wizard.desk.wait_closed()
+            wizard.model.wait_closed()
 
     # ---- the menu
 

@@ -1,7 +1,4 @@
-"""What all pages of the rig wizard have in common: a heading, what to do, and the wizard's desk.
-
-The camera's picture in the rig wizard, with what was found drawn over it.
-"""
+"""What the pages of the rig wizard share: the camera picture with shapes over it, the page base, and small controls."""
 
 from __future__ import annotations
 
@@ -13,6 +10,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QHBoxLayout,
     QHeaderView,
     QLabel,
     QPushButton,
@@ -27,6 +25,7 @@ from app.rig_wizard.model import RigWizardModel
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from core.types import Image, Point
+from hardware.calibration.rig_draft import RigDraft
 
 _ARROW_HEAD_PX = 11.0
 
@@ -78,7 +77,7 @@ class WizardPicture(QWidget):
 
     @property
     def text(self) -> str:
-        """What stands in the place of a picture."""
+        """Shown when there is no picture."""
         return self._text
 
     @property
@@ -86,21 +85,20 @@ class WizardPicture(QWidget):
         return self._shapes
 
     def show_image(self, image: Image) -> None:
-        """Another picture, (H, W, 3)."""
+        """Show a picture, (H, W, 3)."""
         height, width = image.shape[:2]
         self._image = QImage(image.tobytes(), width, height, 3 * width, QImage.Format.Format_RGB888)
         self.update()
 
     def show_shapes(self, shapes: Sequence[Shape]) -> None:
-        """What is drawn over the picture."""
+        """Draw these over the picture."""
         self._shapes = tuple(shapes)
-        self.setAccessibleDescription(
-            ", ".join(shape.text for shape in shapes if not isinstance(shape, MeasuredLine) and shape.text)
-        )
+        texts = (shape.text for shape in shapes if not isinstance(shape, MeasuredLine) and shape.text)
+        self.setAccessibleDescription(", ".join(texts))
         self.update()
 
     def show_text(self, text: str) -> None:
-        """No picture, and why."""
+        """Show a text instead of a picture."""
         self._image, self._text = None, text
         self.update()
 
@@ -113,7 +111,7 @@ class WizardPicture(QWidget):
             self.clicked.emit(x, y)
 
     def on_screen(self, point: Point) -> Point:
-        """A place of the picture -> of the widget."""
+        """A place of the picture in widget pixels."""
         if self._image is None:
             return 0.0, 0.0
         box, zoom = self._place(self._image)
@@ -153,7 +151,9 @@ class WizardPicture(QWidget):
             start, end = QPointF(*self.on_screen(shape.start)), QPointF(*self.on_screen(shape.end))
             painter.drawLine(start, end)
             if isinstance(shape, Arrow):
-                painter.drawPolyline(_arrow_head(start, end))
+                angle = math.atan2(end.y() - start.y(), end.x() - start.x())
+                sides = [QPointF(math.cos(angle + turn), math.sin(angle + turn)) * _ARROW_HEAD_PX for turn in (0.5, -0.5)]
+                painter.drawPolyline(QPolygonF([end - sides[0], end, end - sides[1]]))
         if not isinstance(shape, MeasuredLine) and shape.text:
             self._paint_text(painter, shape, colour)
 
@@ -164,25 +164,16 @@ class WizardPicture(QWidget):
         if isinstance(shape, Arrow):
             way = at - QPointF(*self.on_screen(shape.start))
             away = QPointF(8.0 if way.x() >= -4.0 else -52.0, 16.0 if way.y() > 4.0 else -6.0)
-        place = QPointF(
-            max(4.0, min(at.x() + away.x(), self.width() - 60.0)), max(16.0, min(at.y() + away.y(), self.height() - 6.0))
-        )
+        x, y = min(at.x() + away.x(), self.width() - 60.0), min(at.y() + away.y(), self.height() - 6.0)
+        place = QPointF(max(4.0, x), max(16.0, y))
         painter.setPen(QColor(0, 0, 0, 200))
         painter.drawText(place + QPointF(1, 1), shape.text)
         painter.setPen(colour)
         painter.drawText(place, shape.text)
 
 
-def _arrow_head(start: QPointF, end: QPointF) -> QPolygonF:
-    angle = math.atan2(end.y() - start.y(), end.x() - start.x())
-    sides = [
-        end - QPointF(math.cos(angle + turn) * _ARROW_HEAD_PX, math.sin(angle + turn) * _ARROW_HEAD_PX) for turn in (0.5, -0.5)
-    ]
-    return QPolygonF([sides[0], end, sides[1]])
-
-
 _TEXT_PX = 400
-"""A page's text is a little wider."""
+"""Narrower than the text of a page, so that the height for this width is enough."""
 _HEAD_PX = 28
 
 
@@ -191,15 +182,14 @@ class WizardPage(QWidget):
 
     name = ""
     hint = ""
-    needs_servos = False
 
-    def __init__(self, desk: RigWizardModel, picture: WizardPicture) -> None:
+    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
         super().__init__()
-        self.desk, self.picture = desk, picture
+        self.model, self.picture = model, picture
         self.still: Image | None = None
-        """Shown instead of the living picture; None: that."""
+        """Shown instead of the live picture."""
         self.main: QPushButton | None = None
-        """What the page is for; it stands out until that is done."""
+        """The button of the step; it stands out until that is done."""
         self.column = QVBoxLayout(self)
         self.column.setContentsMargins(0, 0, 0, 0)
         self.column.setSpacing(theme.GAP)
@@ -207,6 +197,16 @@ class WizardPage(QWidget):
         title.setFont(theme.semi_bold(18))
         self.column.addWidget(title)
         self.column.addWidget(note(tr(self.hint)))
+
+    @property
+    def draft(self) -> RigDraft | None:
+        """The rig as far as it is known; None before a camera is open."""
+        return self.model.draft
+
+    @property
+    def has_servos(self) -> bool:
+        """Whether servos were found, and no job is running."""
+        return self.draft is not None and self.draft.found is not None and not self.model.is_busy
 
     @property
     def is_done(self) -> bool:
@@ -235,6 +235,26 @@ class WizardPage(QWidget):
     def click(self, x: float, y: float) -> None:
         """A place of the picture was clicked."""
 
+    def add_row(self, *parts: QWidget, stretched: QWidget | None = None, fill: bool = False) -> None:
+        """Widgets side by side; without `fill` they stand at the left."""
+        row = QHBoxLayout()
+        for part in parts:
+            row.addWidget(part, 1 if part is stretched else 0)
+        if not fill:
+            row.addStretch(1)
+        self.column.addLayout(row)
+
+    def run_step(self, what: str, step: Callable[[RigDraft], object]) -> None:
+        """Do a step of the draft beside the window."""
+        draft = self.draft
+        if draft is not None:
+            self.model.run(what, lambda: step(draft))
+
+
+def enable(on: bool, *controls: QWidget) -> None:
+    for control in controls:
+        control.setEnabled(on)
+
 
 def note(text: str) -> QLabel:
     """A text of several lines."""
@@ -245,8 +265,8 @@ def note(text: str) -> QLabel:
     return label
 
 
-def tell(label: QLabel, text: str) -> None:
-    """Another text for a note, with the room for all its lines: a table beside it would take that otherwise."""
+def set_note(label: QLabel, text: str) -> None:
+    """Another text for a note, with the height that it needs: a table beside it would take that otherwise."""
     label.setText(tr_text(text))
     label.setMinimumHeight(label.heightForWidth(_TEXT_PX) if text else 0)
 
@@ -259,8 +279,8 @@ def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
     return made
 
 
-def mark_main(which: QPushButton, is_main: bool) -> None:
-    """Whether a button is what comes next."""
+def set_main_button(which: QPushButton, is_main: bool) -> None:
+    """Whether a button is the next step, and stands out."""
     name = "main_button" if is_main else ""
     if which.objectName() != name:
         which.setObjectName(name)
@@ -268,9 +288,9 @@ def mark_main(which: QPushButton, is_main: bool) -> None:
         which.style().polish(which)
 
 
-def table(headings: Sequence[str], rows: int, name: str) -> QTableWidget:
-    """An empty table of texts; the last column takes what room is left."""
-    made = QTableWidget(rows, len(headings))
+def table(headings: Sequence[str], first_column: Sequence[str], name: str, *, fitted: bool = True, row_px: int = 0) -> QTableWidget:
+    """A table of texts with a row for each of `first_column`, by default as high as its rows; the last column is stretched."""
+    made = QTableWidget(len(first_column), len(headings))
     made.setHorizontalHeaderLabels(list(headings))
     made.verticalHeader().hide()
     made.setAccessibleName(name)
@@ -278,23 +298,25 @@ def table(headings: Sequence[str], rows: int, name: str) -> QTableWidget:
     made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
     made.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
     made.setTabKeyNavigation(False)
-    made.horizontalHeader().setFixedHeight(_HEAD_PX)
-    made.horizontalHeader().setHighlightSections(False)
-    made.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-    made.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    made.horizontalHeader().setStretchLastSection(True)
+    header = made.horizontalHeader()
+    header.setFixedHeight(_HEAD_PX)
+    header.setHighlightSections(False)
+    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+    header.setStretchLastSection(True)
+    for row, text in enumerate(first_column):
+        set_cell(made, row, 0, text)
+    if row_px:
+        made.verticalHeader().setDefaultSectionSize(row_px)
+    if fitted:
+        rows = made.rowCount() * made.verticalHeader().defaultSectionSize()
+        made.setFixedHeight(_HEAD_PX + rows + 2 * max(1, made.frameWidth()))
+        made.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     return made
 
 
-def fit(where: QTableWidget) -> None:
-    """As high as its rows, so that what follows stands beneath them."""
-    rows = where.rowCount() * where.verticalHeader().defaultSectionSize()
-    where.setFixedHeight(_HEAD_PX + rows + 2 * max(1, where.frameWidth()))
-    where.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-
-
-def put(where: QTableWidget, row: int, column: int, text: str) -> None:
-    """A text into a cell, which also is its tool tip."""
+def set_cell(where: QTableWidget, row: int, column: int, text: str) -> None:
+    """A text, which also is the tool tip of its cell."""
     item = QTableWidgetItem(text)
     item.setToolTip(text)
     where.setItem(row, column, item)

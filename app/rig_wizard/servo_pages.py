@@ -1,7 +1,4 @@
-"""The pages on which the servos are found, and told apart.
-
-The pages on which the wires are zeroed, and the steering is learnt.
-"""
+"""The servo pages of the rig wizard: find the servos, identify them, zero the wires, learn the steering."""
 
 from __future__ import annotations
 
@@ -9,14 +6,14 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHBoxLayout, QHeaderView, QLabel, QTableWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHeaderView, QLabel
 
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, button, fit, note, put, table, tell
+from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, button, enable, note, set_cell, set_note, table
 from app.ui.i18n import mark, tr, tr_text
 from app.widgets.painting import NONE
 from core.calibration.servos import Assignment
-from core.config.safety import JOINT_NAMES, TENDONS, JointName, ServosConfig
+from core.config.safety import JOINT_NAMES, TENDONS, JointName
 from core.devices import UserError
 from hardware.calibration.rig_draft import RigDraft
 from hardware.rig import with_port
@@ -39,13 +36,13 @@ _MODEL_NAMES = {
     1000: "XH430-W350", 1010: "XH430-W210", 1020: "XM430-W350", 1030: "XM430-W210", 1040: "XH430-V350", 1050: "XH430-V210",
     1060: "XL430-W250", 1070: "XC430-W150", 1080: "XC430-W240", 1120: "XM540-W270", 1130: "XM540-W150",
 }  # fmt: skip
-"""As printed on the servo (Robotis e-Manual), by the number that it tells."""
+"""As printed on the servo (Robotis e-Manual), by the model number that it reports."""
 _ID_PX, _DIRECTION_PX = 66, 80
 _DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
 
 
 class PortPage(WizardPage):
-    """Which port the servos hang on, and who answers there."""
+    """Which port the servos are connected to, and which of them answer."""
 
     name = mark("Port and servos")
     hint = mark(
@@ -53,37 +50,32 @@ class PortPage(WizardPage):
         "number and model; nothing moves. Without servos the rig only looks."
     )
 
-    def __init__(self, desk: RigWizardModel, picture: WizardPicture) -> None:
-        super().__init__(desk, picture)
+    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
+        super().__init__(model, picture)
         self.ports = QComboBox()
         self.ports.setAccessibleName(tr("Servo port"))
-        self.search_button = button(tr("&Search"), self._search)
-        row = QHBoxLayout()
-        row.addWidget(QLabel(tr("Port")))
-        row.addWidget(self.ports, 1)
-        row.addWidget(self.search_button)
-        self.column.addLayout(row)
-        self.servos = table((tr("ID"), tr("Model")), 0, tr("Servos found"))
-        self.main = self.search_button
+        self.main = self.search_button = button(tr("&Search"), self._search)
+        self.add_row(QLabel(tr("Port")), self.ports, self.search_button, stretched=self.ports, fill=True)
+        self.servos = table((tr("ID"), tr("Model")), (), tr("Servos found"), fitted=False)
         self.column.addWidget(self.servos, 1)
         self.result = note("")
         self.column.addWidget(self.result)
 
     @property
     def is_done(self) -> bool:
-        return self.desk.draft is not None and self.desk.draft.found is not None
+        return self.draft is not None and self.draft.found is not None
 
     def enter(self) -> None:
-        # Another bench may have been opened since, or an adapter plugged in.
+        """List the ports: another bench may have been opened since, or an adapter plugged in."""
         chosen = self.ports.currentData()
         self.ports.clear()
-        self._fill_ports()
+        self._list_ports()
         if chosen is not None and (place := self.ports.findData(chosen)) >= 0:
             self.ports.setCurrentIndex(place)
         self.refresh()
 
-    def _fill_ports(self) -> None:
-        bench = self.desk.bench
+    def _list_ports(self) -> None:
+        bench = self.model.bench
         if bench is not None and bench.config.rig.camera == "twin":
             self.ports.addItem(tr("the twin's own servos"), bench.port)
             return
@@ -96,20 +88,19 @@ class PortPage(WizardPage):
         self.ports.setCurrentIndex(max(0, self.ports.findData(known)))
 
     def refresh(self) -> None:
-        draft = self.desk.draft
-        for control in (self.ports, self.search_button):
-            control.setEnabled(draft is not None and not self.desk.is_busy)
+        draft = self.draft
+        enable(draft is not None and not self.model.is_busy, self.ports, self.search_button)
         found = draft.found if draft is not None else None
         servos = found.servos if found is not None else ()
         self.servos.setRowCount(len(servos))
         for row, servo in enumerate(servos):
-            put(self.servos, row, 0, str(servo.id))
             name = _MODEL_NAMES.get(servo.model)
-            put(self.servos, row, 1, f"{name}  ({servo.model})" if name is not None else str(servo.model))
-        tell(self.result, "" if found is None else tr("{count} servos at {baud} baud.", count=len(servos), baud=found.baud))
+            set_cell(self.servos, row, 0, str(servo.id))
+            set_cell(self.servos, row, 1, f"{name}  ({servo.model})" if name is not None else str(servo.model))
+        set_note(self.result, "" if found is None else tr("{count} servos at {baud} baud.", count=len(servos), baud=found.baud))
 
     def _search(self) -> None:
-        draft, bench = self.desk.draft, self.desk.bench
+        draft, bench = self.draft, self.model.bench
         if draft is None or bench is None:
             return
         port = self.ports.currentData()
@@ -118,14 +109,14 @@ class PortPage(WizardPage):
             bench.port = port
         if port is None:
             draft.found = None
-            self.desk.said.emit(tr("a rig without servos: the pages about servos have nothing to do"))
-            self.desk.changed.emit()
+            self.model.message.emit(tr("a rig without servos: the pages about servos have nothing to do"))
+            self.model.changed.emit()
             return
-        self.desk.run(tr("searching the servos"), draft.search_servos)
+        self.model.run(tr("searching the servos"), draft.search_servos)
 
 
 class IdentifyPage(WizardPage):
-    """Who is who, and which way is forward: by itself, or by hand."""
+    """Which servo moves which joint, and which way is forward: found automatically, or by hand."""
 
     name = mark("Wiggle and direction")
     hint = mark(
@@ -133,115 +124,98 @@ class IdentifyPage(WizardPage):
         "robot's head must be in the picture, with room on both sides. STOP (Space) ends it at any moment. By hand: wiggle one, "
         "watch, and say what it is."
     )
-    needs_servos = True
 
-    def __init__(self, desk: RigWizardModel, picture: WizardPicture) -> None:
-        super().__init__(desk, picture)
-        self.rows = table((tr("Joint"), tr("ID"), tr("Direction"), tr("Seen")), len(JOINT_NAMES), tr("Joints and their servos"))
-        self.rows.verticalHeader().setDefaultSectionSize(30)
+    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
+        super().__init__(model, picture)
+        headings, joints = (tr("Joint"), tr("ID"), tr("Direction"), tr("Seen")), [tr(_JOINT_TEXT[name]) for name in JOINT_NAMES]
+        self.rows = table(headings, joints, tr("Joints and their servos"), row_px=30)
         self._ids: list[QComboBox] = []
         self._signs: list[QComboBox] = []
-        self._fill(self.rows)
+        for row, joint in enumerate(joints):
+            self._add_choosers(row, joint)
+        self.rows.setCurrentCell(0, 0)
         for place, width in ((1, _ID_PX), (2, _DIRECTION_PX)):
             self.rows.horizontalHeader().setSectionResizeMode(place, QHeaderView.ResizeMode.Fixed)
             self.rows.setColumnWidth(place, width)
-        fit(self.rows)
         self.column.addWidget(self.rows)
-        self.auto_button = button(tr("&Find automatically"), self._identify)
-        self.main = self.auto_button
-        self.wiggle_button = button(
-            tr("&Wiggle the chosen"), self._wiggle, tr("Turn the servo of the chosen row both ways by 1.5 mm")
-        )
+        self.main = self.auto_button = button(tr("&Find automatically"), self._identify)
+        tip = tr("Turn the servo of the chosen row both ways by 1.5 mm")
+        self.wiggle_button = button(tr("&Wiggle the chosen"), self._wiggle, tip)
         self.swap_button = button(tr("Swap &up and down"), self._swap, tr("One camera cannot tell them apart"))
         self.right_button = button(tr("&Yes, it rises"), self._confirm, tr("Up and down are right as they stand in the table"))
-        for parts in ((self.auto_button,), (self.wiggle_button, self.swap_button, self.right_button)):
-            row = QHBoxLayout()
-            for part in parts:
-                row.addWidget(part)
-            self.column.addLayout(row)
+        self.add_row(self.auto_button, fill=True)
+        self.add_row(self.wiggle_button, self.swap_button, self.right_button, fill=True)
         self.result = note("")
         self.column.addWidget(self.result)
         self.column.addStretch(1)
         self._shown: tuple[Assignment, ...] | None = None
         self._known_ids: tuple[int, ...] = ()
-        self._draft: RigDraft | None = None
+        self._known_draft: RigDraft | None = None
+
+    def _add_choosers(self, row: int, joint: str) -> None:
+        ids, signs = QComboBox(), QComboBox()
+        ids.setAccessibleName(tr("Servo of {joint}", joint=joint))
+        ids.setToolTip(tr("Number of the servo on the bus"))
+        signs.setAccessibleName(tr("Direction of {joint}", joint=joint))
+        signs.setToolTip(
+            tr("Which way the servo turns to pull the wire, or to go forward: + as it counts, \N{MINUS SIGN} against it")
+        )
+        for text, sign in _DIRECTIONS:
+            signs.addItem(text, sign)
+        for column, control, kept in ((1, ids, self._ids), (2, signs, self._signs)):
+            control.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+            control.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            control.setMinimumContentsLength(2)
+            control.activated.connect(lambda _index: self._set_by_hand())
+            self.rows.setCellWidget(row, column, control)
+            kept.append(control)
+        set_cell(self.rows, row, 3, "")
 
     @property
     def is_done(self) -> bool:
-        return self.desk.draft is not None and bool(self.desk.draft.assignments)
-
-    def _fill(self, rows: QTableWidget) -> None:
-        for row, name in enumerate(JOINT_NAMES):
-            put(rows, row, 0, tr(_JOINT_TEXT[name]))
-            ids, signs = QComboBox(), QComboBox()
-            ids.setAccessibleName(tr("Servo of {joint}", joint=tr(_JOINT_TEXT[name])))
-            signs.setAccessibleName(tr("Direction of {joint}", joint=tr(_JOINT_TEXT[name])))
-            signs.setToolTip(
-                tr("Which way the servo turns to pull the wire, or to go forward: + as it counts, \N{MINUS SIGN} against it")
-            )
-            ids.setToolTip(tr("Number of the servo on the bus"))
-            for text, sign in _DIRECTIONS:
-                signs.addItem(text, sign)
-            for control in (ids, signs):
-                control.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-                control.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
-                control.setMinimumContentsLength(2)
-                control.activated.connect(lambda _index: self._by_hand())
-            self._ids.append(ids)
-            self._signs.append(signs)
-            rows.setCellWidget(row, 1, ids)
-            rows.setCellWidget(row, 2, signs)
-            put(rows, row, 3, "")
-        rows.setCurrentCell(0, 0)
+        return self.draft is not None and bool(self.draft.assignments)
 
     def refresh(self) -> None:
-        draft = self.desk.draft
-        found = draft.found if draft is not None else None
-        free = found is not None and not self.desk.is_busy
-        for control in (self.auto_button, self.wiggle_button, self.swap_button, *self._ids, *self._signs):
-            control.setEnabled(free)
+        draft = self.draft
+        enable(self.has_servos, self.auto_button, self.wiggle_button, self.swap_button, self.right_button, *self._ids, *self._signs)
         assumed = draft is not None and any(one.assumed for one in draft.assignments)
         self.right_button.setVisible(assumed)
-        self.right_button.setEnabled(free)
-        if draft is None or found is None:
-            tell(self.result, tr("Search the servos first."))
+        if draft is None or draft.found is None:
+            set_note(self.result, tr("Search the servos first."))
             return
-        if (self._known_ids, self._draft) != (found.ids, draft):
-            self._known_ids, self._draft, self._shown = found.ids, draft, ()
-            joints = draft.config.servos.joints
-            spare = [servo_id for servo_id in found.ids if servo_id not in {joint.id for joint in joints}]
-            for row, (ids, joint) in enumerate(zip(self._ids, joints, strict=True)):
-                ids.clear()
-                for servo_id in found.ids:
-                    ids.addItem(str(servo_id), servo_id)
-                first = joint.id if joint.id in found.ids or not spare else spare.pop(0)
-                ids.setCurrentIndex(max(0, ids.findData(first)))
-                self._signs[row].setCurrentIndex(self._signs[row].findData(joint.sign))
-                put(self.rows, row, 3, "")
+        if (self._known_ids, self._known_draft) != (draft.found.ids, draft):
+            self._known_ids, self._known_draft, self._shown = draft.found.ids, draft, ()
+            self._list_servos(draft)
         if draft.assignments != self._shown:
-            self._show(draft.assignments)
-        text = _UP_OR_DOWN if assumed else ""
-        tell(
-            self.result,
-            text or ("" if self.is_done else tr("Not told apart yet; what stands in the table is the configuration's.")),
-        )
+            self._shown = tuple(draft.assignments)
+            for row, one in enumerate(draft.assignments):
+                self._ids[row].setCurrentIndex(self._ids[row].findData(one.id))
+                self._signs[row].setCurrentIndex(self._signs[row].findData(one.sign))
+                set_cell(self.rows, row, 3, tr_text(one.seen) + (tr(" (assumed)") if one.assumed else ""))
+        not_yet = "" if self.is_done else tr("Not told apart yet; what stands in the table is the configuration's.")
+        set_note(self.result, _UP_OR_DOWN if assumed else not_yet)
 
-    def _show(self, assignments: Sequence[Assignment]) -> None:
-        self._shown = tuple(assignments)
-        for row, one in enumerate(assignments):
-            self._ids[row].setCurrentIndex(self._ids[row].findData(one.id))
-            self._signs[row].setCurrentIndex(self._signs[row].findData(one.sign))
-            put(self.rows, row, 3, tr_text(one.seen) + (tr(" (assumed)") if one.assumed else ""))
+    def _list_servos(self, draft: RigDraft) -> None:
+        """Offer the servos that were found; each joint has that of the configuration, or one that no joint has."""
+        joints, found = draft.config.servos.joints, draft.found.ids if draft.found is not None else ()
+        spare = [servo_id for servo_id in found if servo_id not in {joint.id for joint in joints}]
+        for row, (ids, joint) in enumerate(zip(self._ids, joints, strict=True)):
+            ids.clear()
+            for servo_id in found:
+                ids.addItem(str(servo_id), servo_id)
+            first = joint.id if joint.id in found or not spare else spare.pop(0)
+            ids.setCurrentIndex(max(0, ids.findData(first)))
+            self._signs[row].setCurrentIndex(self._signs[row].findData(joint.sign))
+            set_cell(self.rows, row, 3, "")
 
     def _identify(self) -> None:
-        if self.desk.draft is not None:
-            self.desk.run(tr("telling the servos apart"), self.desk.draft.identify)
+        self.run_step(tr("telling the servos apart"), RigDraft.identify)
 
     def _wiggle(self) -> None:
-        draft, row = self.desk.draft, self.rows.currentRow()
-        if draft is not None and row >= 0:
+        row = self.rows.currentRow()
+        if self.draft is not None and row >= 0:
             servo_id = int(self._ids[row].currentData())
-            self.desk.run(tr("wiggling servo {servo_id}", servo_id=servo_id), lambda: draft.wiggle(servo_id))
+            self.run_step(tr("wiggling servo {servo_id}", servo_id=servo_id), lambda draft: draft.wiggle(servo_id))
 
     def _swap(self) -> None:
         up, down = JOINT_NAMES.index("up"), JOINT_NAMES.index("down")
@@ -249,40 +223,40 @@ class IdentifyPage(WizardPage):
             first, second = boxes[up].currentIndex(), boxes[down].currentIndex()
             boxes[up].setCurrentIndex(second)
             boxes[down].setCurrentIndex(first)
-        self._by_hand(mark("swapped by hand"), ("up", "down"))
+        self._set_by_hand(mark("swapped by hand"), ("up", "down"))
 
     def _confirm(self) -> None:
-        if self.desk.draft is not None:
-            self.desk.draft.confirm()
-            self.desk.changed.emit()
+        if self.draft is not None:
+            self.draft.confirm()
+            self.model.changed.emit()
 
-    def _by_hand(self, seen: str = mark("set by hand"), changed: Sequence[str] | None = None) -> None:
-        """Take over what stands in the table."""
-        draft = self.desk.draft
+    def _set_by_hand(self, seen: str = mark("set by hand"), changed: Sequence[str] = ()) -> None:
+        """Take the assignments from the table."""
+        draft = self.draft
         if draft is None:
             return
         before = {one.name: one for one in draft.assignments}
-        if not before:  # as the rig's file has it: what was assumed there nobody has confirmed by touching another row
-            earlier = draft.assumed
-            kept = (Assignment(one.name, one.id, one.sign, mark("set by hand"), one.name in earlier) for one in draft.servos.joints)
+        if not before:  # as in the rig's file: what was assumed there stays assumed for the rows that are not touched
+            earlier, hand = draft.assumed, mark("set by hand")
+            kept = (Assignment(one.name, one.id, one.sign, hand, one.name in earlier) for one in draft.servos.joints)
             before = {one.name: one for one in kept}
         made = []
         for row, name in enumerate(JOINT_NAMES):
-            servo_id, sign = int(self._ids[row].currentData()), self._signs[row].currentData()
-            old = before.get(name)
-            is_same = old is not None and (old.id, old.sign) == (servo_id, sign) and name not in (changed or ())
+            servo_id, sign, old = int(self._ids[row].currentData()), self._signs[row].currentData(), before.get(name)
+            is_same = old is not None and (old.id, old.sign) == (servo_id, sign) and name not in changed
             made.append(old if is_same and old is not None else Assignment(name, servo_id, sign, seen))
         try:
             draft.set_assignments(made)
         except UserError as error:
-            self.desk.failed.emit(str(error))
-        self.desk.changed.emit()
+            self.model.failed.emit(str(error))
+        self.model.changed.emit()
 
 
 _NUDGE_MM = 0.1
 _ARROW_PX = 70.0
 _SAME_DEG = 20.0
 """Tendons that pull so nearly the same way share an arrow."""
+_LARGE_ROLL_DEG, _LARGE_DISAGREEMENT_DEG = 10.0, 8.0
 
 
 class ZeroPage(WizardPage):
@@ -294,11 +268,10 @@ class ZeroPage(WizardPage):
         "there it is left, taut and without tension: zero. A wire that the camera cannot judge is set by eye: choose it, and "
         "tighten or loosen it."
     )
-    needs_servos = True
 
-    def __init__(self, desk: RigWizardModel, picture: WizardPicture) -> None:
-        super().__init__(desk, picture)
-        self.find_button = button(tr("&Find automatically"), self._find)
+    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
+        super().__init__(model, picture)
+        self.main = self.find_button = button(tr("&Find automatically"), self._find)
         self.tendon = QComboBox()
         self.tendon.addItems([tr("tendon {name}", name=tr_text(name)) for name in TENDONS])
         self.tendon.setAccessibleName(tr("Tendon to set by eye"))
@@ -310,64 +283,49 @@ class ZeroPage(WizardPage):
         self.pretension.setAccessibleName(tr("Pretension"))
         self.pretension.setToolTip(tr("Pull of every wire while the robot is straight, so that none hangs"))
         self.pretension.valueChanged.connect(self._set_pretension)
-        self.rows = table((tr("Tendon"), tr("Was slack by")), len(TENDONS), tr("Slack of the tendons"))
-        for row, name in enumerate(TENDONS):
-            put(self.rows, row, 0, tr_text(name))
-        fit(self.rows)
-        self.main = self.find_button
+        headings, names = (tr("Tendon"), tr("Was slack by")), [tr_text(name) for name in TENDONS]
+        self.rows = table(headings, names, tr("Slack of the tendons"))
         self.column.addWidget(self.find_button)
         self.column.addWidget(self.rows)
-        for parts in ((self.tendon, self.tighten, self.loosen), (QLabel(tr("Pretension")), self.pretension)):
-            row_of = QHBoxLayout()
-            for part in parts:
-                row_of.addWidget(part)
-            row_of.addStretch(1)
-            self.column.addLayout(row_of)
+        self.add_row(self.tendon, self.tighten, self.loosen)
+        self.add_row(QLabel(tr("Pretension")), self.pretension)
         self.result = note("")
         self.column.addWidget(self.result)
         self.column.addStretch(1)
 
     @property
     def is_done(self) -> bool:
-        return self.desk.draft is not None and self.desk.draft.are_zeros_known
+        return self.draft is not None and self.draft.are_zeros_known
 
     def refresh(self) -> None:
-        draft = self.desk.draft
-        ready = draft is not None and draft.found is not None and not self.desk.is_busy
-        for control in (self.find_button, self.tendon, self.tighten, self.loosen, self.pretension):
-            control.setEnabled(ready)
+        draft = self.draft
+        enable(self.has_servos, self.find_button, self.tendon, self.tighten, self.loosen, self.pretension)
         if draft is not None:
-            self._show_pretension(draft.config.servos)
+            with QSignalBlocker(self.pretension):  # within what the envelope of every wire allows
+                tendons = draft.config.servos.joints[: len(TENDONS)]
+                low, high = max(0.0, *(one.low_mm for one in tendons)), min(5.0, *(one.high_mm for one in tendons))
+                self.pretension.setRange(low, high)
+                self.pretension.setValue(draft.config.servos.pretension_mm)
         zeros = draft.zeros if draft is not None else None
         for row in range(len(TENDONS)):
-            put(self.rows, row, 1, NONE if zeros is None else f"{zeros.slack_mm[row]:+.2f} mm")
+            set_cell(self.rows, row, 1, NONE if zeros is None else f"{zeros.slack_mm[row]:+.2f} mm")
         if draft is None or draft.found is None:
-            tell(self.result, tr("Search the servos first."))
+            set_note(self.result, tr("Search the servos first."))
         elif not draft.assignments:
-            tell(self.result, tr("The servos were not told apart: the configuration's ids and directions are used."))
+            set_note(self.result, tr("The servos were not told apart: the configuration's ids and directions are used."))
         else:
-            tell(self.result, "\n".join(tr_text(problem) for problem in zeros.problems) if zeros is not None else "")
+            set_note(self.result, "\n".join(tr_text(problem) for problem in zeros.problems) if zeros is not None else "")
 
     def _find(self) -> None:
-        if self.desk.draft is not None:
-            self.desk.run(tr("looking where the wires are taut"), self.desk.draft.find_zeros)
+        self.run_step(tr("looking where the wires are taut"), RigDraft.find_zeros)
 
     def _nudge(self, way_mm: float) -> None:
-        draft = self.desk.draft
-        if draft is not None:
-            name = TENDONS[self.tendon.currentIndex()]
-            self.desk.run(tr("moving tendon {name}", name=tr_text(name)), lambda: draft.nudge(name, way_mm))
-
-    def _show_pretension(self, servos: ServosConfig) -> None:
-        """As it is, within what every wire's envelope allows."""
-        with QSignalBlocker(self.pretension):
-            tendons = servos.joints[: len(TENDONS)]
-            self.pretension.setRange(max(0.0, *(one.low_mm for one in tendons)), min(5.0, *(one.high_mm for one in tendons)))
-            self.pretension.setValue(servos.pretension_mm)
+        name = TENDONS[self.tendon.currentIndex()]
+        self.run_step(tr("moving tendon {name}", name=tr_text(name)), lambda draft: draft.nudge(name, way_mm))
 
     def _set_pretension(self, pretension_mm: float) -> None:
-        if self.desk.draft is not None and not self.desk.is_busy:
-            self.desk.draft.set_pretension(pretension_mm)
+        if self.draft is not None and not self.model.is_busy:
+            self.draft.set_pretension(pretension_mm)
 
 
 class SteeringPage(WizardPage):
@@ -378,72 +336,65 @@ class SteeringPage(WizardPage):
         "The joints are zeroed where they stand. Then each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has "
         "shown its way. The robot must have room on both sides."
     )
-    needs_servos = True
 
-    def __init__(self, desk: RigWizardModel, picture: WizardPicture) -> None:
-        super().__init__(desk, picture)
-        self.learn_button = button(tr("&Learn"), self._learn)
-        self.rows = table(
-            (tr("Tendon"), tr("Direction of the head"), tr("Way per mm of wire")), len(TENDONS), tr("Steering directions")
-        )
-        for row, name in enumerate(TENDONS):
-            for column, text in enumerate((tr_text(name), NONE, NONE)):
-                put(self.rows, row, column, text)
+    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
+        super().__init__(model, picture)
+        self.main = self.learn_button = button(tr("&Learn"), self._learn)
+        headings = (tr("Tendon"), tr("Direction of the head"), tr("Way per mm of wire"))
+        self.rows = table(headings, [tr_text(name) for name in TENDONS], tr("Steering directions"))
+        for row in range(len(TENDONS)):
+            for column in (1, 2):
+                set_cell(self.rows, row, column, NONE)
         self.result = note("")
-        fit(self.rows)
-        self.main = self.learn_button
-        self.column.addWidget(self.learn_button)
-        self.column.addWidget(self.rows)
-        self.column.addWidget(self.result)
+        for widget in (self.learn_button, self.rows, self.result):
+            self.column.addWidget(widget)
         self.column.addStretch(1)
 
     @property
     def is_done(self) -> bool:
-        return self.desk.draft is not None and self.desk.draft.steering is not None
+        return self.draft is not None and self.draft.steering is not None
 
     def refresh(self) -> None:
-        draft = self.desk.draft
-        self.learn_button.setEnabled(draft is not None and draft.found is not None and not self.desk.is_busy)
+        draft = self.draft
+        self.learn_button.setEnabled(self.has_servos)
         steering = draft.steering if draft is not None else None
         if steering is None:
-            tell(self.result, "" if draft is not None and draft.found is not None else tr("Search the servos first."))
+            set_note(self.result, "" if draft is not None and draft.found is not None else tr("Search the servos first."))
             return
         for row, tendon in enumerate(steering.tendons):
             direction = tr("out of the picture") if tendon.direction_deg is None else f"{tendon.direction_deg:.0f}°"
-            put(self.rows, row, 1, direction)
-            put(self.rows, row, 2, f"{tendon.px_per_mm:.1f} px/mm")
+            set_cell(self.rows, row, 1, direction)
+            set_cell(self.rows, row, 2, f"{tendon.px_per_mm:.1f} px/mm")
         lines = [tr("Directions in the picture: 0° to the right, 90° down.")]
-        if abs(steering.roll_deg) > 10.0:
-            turn = -steering.roll_deg
+        roll, off = steering.roll_deg, steering.disagreement_deg
+        if abs(roll) > _LARGE_ROLL_DEG:
             lines.append(
                 tr(
                     "The robot is rolled by {roll:+.0f}°: turn it by {turn:+.0f}° in its holder, and learn again.",
-                    roll=steering.roll_deg,
-                    turn=turn,
+                    roll=roll,
+                    turn=-roll,
                 )
             )
-        if steering.disagreement_deg > 8.0:
-            lines.append(
-                tr("Way and heading disagree by {angle:.0f}°: does the head lie against a wall?", angle=steering.disagreement_deg)
-            )
-        tell(self.result, "\n".join(lines))
+        if off > _LARGE_DISAGREEMENT_DEG:
+            lines.append(tr("Way and heading disagree by {angle:.0f}°: does the head lie against a wall?", angle=off))
+        set_note(self.result, "\n".join(lines))
 
     def shapes(self) -> Sequence[Shape]:
-        draft = self.desk.draft
+        draft = self.draft
         head = draft.head_px if draft is not None else None
         if draft is None or draft.steering is None or head is None:
             return ()
-        named: dict[int, list[str]] = {}
+        named: dict[int, list[tuple[str, float]]] = {}
         for tendon in draft.steering.tendons:
             if tendon.direction_deg is not None:
-                named.setdefault(round(tendon.direction_deg / _SAME_DEG), []).append(tendon.name)
+                same = named.setdefault(round(tendon.direction_deg / _SAME_DEG), [])
+                same.append((tendon.name, math.radians(tendon.direction_deg)))
         arrows = []
-        for names in named.values():
-            angle = math.radians(next(t.direction_deg or 0.0 for t in draft.steering.tendons if t.name == names[0]))
+        for tendons in named.values():
+            angle = tendons[0][1]
             end = head[0] + _ARROW_PX * math.cos(angle), head[1] + _ARROW_PX * math.sin(angle)
-            arrows.append(Arrow(head, end, ", ".join(names)))
+            arrows.append(Arrow(head, end, ", ".join(name for name, _ in tendons)))
         return arrows
 
     def _learn(self) -> None:
-        if self.desk.draft is not None:
-            self.desk.run(tr("learning the steering"), self.desk.draft.learn_steering)
+        self.run_step(tr("learning the steering"), RigDraft.learn_steering)

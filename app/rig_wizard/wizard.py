@@ -1,7 +1,4 @@
-"""The rig wizard: camera, scale and lens, servos, zero, steering, one page each, with STOP always in reach.
-
-Last page of the rig wizard: what was found, what was left out, and what to keep in mind.
-"""
+"""The rig wizard: camera, scale and lens, servos, zero, steering, one page each, with STOP always within reach."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ from PySide6.QtWidgets import (
 from app.operator.manual_drive import StopKeys
 from app.rig_wizard.camera_pages import CameraPage, ScalePage
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import WizardPage, WizardPicture, button, mark_main, note
+from app.rig_wizard.pages_base import WizardPage, WizardPicture, button, note, set_main_button
 from app.rig_wizard.servo_pages import IdentifyPage, PortPage, SteeringPage, ZeroPage
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
@@ -36,17 +33,17 @@ from app.ui.window_base import is_asked_to_end
 from app.widgets.basics import Card, StillWheel, takes_enter
 from app.widgets.messages import QuestionStrip
 from app.widgets.mode_bar import StopButton
-from core.config.rig_file import RigFile, RigFileError
+from core.config.rig_file import RigFile, RigFileError, write_rig
 
 
 class SummaryPage(WizardPage):
-    """Shows the rig as it will be saved; ``rig_name`` tells its name."""
+    """Shows the rig as it will be saved: what was found, what was left out, what to remember."""
 
     name = mark("Save")
     hint = mark("This is what will be saved. A step that was left out can be done later: menu Rig, Calibrate.")
 
-    def __init__(self, desk: RigWizardModel, picture: WizardPicture, rig_name: Callable[[], str]) -> None:
-        super().__init__(desk, picture)
+    def __init__(self, model: RigWizardModel, picture: WizardPicture, rig_name: Callable[[], str]) -> None:
+        super().__init__(model, picture)
         self._rig_name = rig_name
         self.text = QPlainTextEdit()
         self.text.setReadOnly(True)
@@ -57,12 +54,7 @@ class SummaryPage(WizardPage):
 
     def rig(self) -> RigFile | None:
         """The rig; None before a camera is open. Raises RigFileError."""
-        draft = self.desk.draft
-        return draft.rig_file(self._rig_name()) if draft is not None else None
-
-    @property
-    def is_done(self) -> bool:
-        return False
+        return self.draft.rig_file(self._rig_name()) if self.draft is not None else None
 
     def refresh(self) -> None:
         try:
@@ -70,16 +62,10 @@ class SummaryPage(WizardPage):
         except RigFileError as error:
             self.text.setPlainText(str(error))
             return
-        draft = self.desk.draft
-        if rig is None or draft is None:
+        if rig is None or self.draft is None:
             return
-        lines = [
-            f"{rig.name}: {rig_line(rig)}",
-            "",
-            *calibration_lines(rig),
-            "",
-            *dict.fromkeys(tr_text(line) for line in draft.notes),
-        ]
+        notes = dict.fromkeys(tr_text(line) for line in self.draft.notes)
+        lines = [f"{rig.name}: {rig_line(rig)}", "", *calibration_lines(rig), "", *notes]
         if rig.robot != "none":
             lines.append(tr("Zero is lost whenever the servos are switched off: zero them again then, with slack wires."))
         self.text.setPlainText("\n".join(lines))
@@ -91,43 +77,43 @@ _FRAME = QSize(16, 56)
 _STEPS_PX, _CONTROLS_PX = 190, 450
 _STEP_LINE_PX, _SIGN_PX = 30, 16
 _TICK = QPolygonF([QPointF(2.5, 8.5), QPointF(6.5, 12.5), QPointF(13.5, 4.0)])
-_LOOK_EVERY_MS = 50
+_PICTURE_EVERY_MS = 50
 _FIELDS = (QAbstractSpinBox, QLineEdit, QComboBox)
-"""Where something is typed or chosen: Esc leaves them, and not the dialog."""
+"""Esc leaves one of these fields first, then the dialog."""
 
 
 class RigWizard(QDialog):
     """Makes or calibrates a rig. ``saved`` carries its name.
 
     Next leads through the pages in their order, and is called Skip on a page whose step was not done. Space is STOP, except in a
-    text field while no job runs. Whoever leaves with something found and not saved is asked; ``reject`` asks nobody.
+    text field while no job runs. Leaving with unsaved results asks first; ``reject`` does not ask.
 
     Parameters
     ----------
-    desk : closed when the dialog is.
+    model : closed when the dialog is.
     rig_name : empty for a new rig.
     """
 
     saved = Signal(str)
 
-    def __init__(self, desk: RigWizardModel, rig_name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, model: RigWizardModel, rig_name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.desk = desk
-        desk.setParent(self)
+        self.model = model
+        model.setParent(self)
         self.setWindowTitle(tr("Calibrate {name}", name=rig_name) if rig_name else tr("New rig"))
         self.setModal(True)
         theme.set_sheet(self, theme.FORM_SHEET)
         self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.picture = WizardPicture()
         self.picture.show_text(tr("No camera yet"))
-        self.camera_page = CameraPage(desk, self.picture, rig_name)
+        self.camera_page = CameraPage(model, self.picture, rig_name)
         self.camera_page.ask = self._ask
-        self.scale_page = ScalePage(desk, self.picture)
-        self.port_page = PortPage(desk, self.picture)
-        self.identify_page = IdentifyPage(desk, self.picture)
-        self.zero_page = ZeroPage(desk, self.picture)
-        self.steering_page = SteeringPage(desk, self.picture)
-        self.summary_page = SummaryPage(desk, self.picture, lambda: self.camera_page.rig_name)
+        self.scale_page = ScalePage(model, self.picture)
+        self.port_page = PortPage(model, self.picture)
+        self.identify_page = IdentifyPage(model, self.picture)
+        self.zero_page = ZeroPage(model, self.picture)
+        self.steering_page = SteeringPage(model, self.picture)
+        self.summary_page = SummaryPage(model, self.picture, lambda: self.camera_page.rig_name)
         self.pages: tuple[WizardPage, ...] = (
             self.camera_page,
             self.scale_page,
@@ -147,15 +133,14 @@ class RigWizard(QDialog):
         self.question.closed.connect(self._on_answered)
         self._lay_out()
         StillWheel(self)
-        self.stop_button.asked.connect(desk.stop)
-        self._stop_keys = StopKeys(self, lambda: desk.is_busy, desk.stop)  # servos are open while a job runs only
-        desk.said.connect(self._say)
-        desk.failed.connect(lambda line: self._say(line, is_fault=True))
-        desk.changed.connect(self._refresh)
+        self.stop_button.asked.connect(model.stop)
+        self._stop_keys = StopKeys(self, lambda: model.is_busy, model.stop)  # servos are open only while a job runs
+        model.message.connect(self._show_message)
+        model.failed.connect(lambda line: self._show_message(line, is_fault=True))
+        model.changed.connect(self._refresh)
         self.picture.clicked.connect(self._on_picture_clicked)
-        self._timer = QTimer(self)
-        self._timer.setInterval(_LOOK_EVERY_MS)
-        self._timer.timeout.connect(self._look)
+        self._timer = QTimer(self, interval=_PICTURE_EVERY_MS)
+        self._timer.timeout.connect(self._update_picture)
         self._timer.start()
         self._shown_frame: object = None
         self._go(0)
@@ -174,30 +159,27 @@ class RigWizard(QDialog):
         """The next page; on the last one: save."""
         if self.page is self.summary_page:
             self._save()
-        elif self.page.may_leave and not self.desk.is_busy:
+        elif self.page.may_leave and not self.model.is_busy:
             self._go(self.stack.currentIndex() + 1)
 
     def back(self) -> None:
         """The page before."""
-        if self.stack.currentIndex() > 0 and not self.desk.is_busy:
+        if self.stack.currentIndex() > 0 and not self.model.is_busy:
             self._go(self.stack.currentIndex() - 1)
 
-    def stop(self) -> None:
-        """STOP, from whoever has one: key, button, pedal, gamepad."""
-        self.desk.stop()
-
     def ask_to_leave(self) -> None:
-        """Close the dialog; with something found and not saved only after a question in place of the line at the foot."""
-        if not self._has_news():
+        """Close the dialog; with unsaved results only after a question in place of the line at the foot."""
+        draft = self.model.draft
+        if draft is None or not draft.has_news:
             self.reject()
         elif not self.question.text:
             self._ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
 
     def done(self, result: int) -> None:
-        """The dialog closes, whichever way: nothing moves any more, camera and port are free."""
+        """The dialog closes: nothing moves any more, camera and port become free."""
         self._timer.stop()
         self._stop_keys.detach()
-        self.desk.close()
+        self.model.close()
         super().done(result)
 
     def follow_theme(self) -> None:
@@ -217,20 +199,14 @@ class RigWizard(QDialog):
             self.ask_to_leave()
         event.setAccepted(not self.isVisible())
 
-    # ---- inside
-
     def _on_escape(self) -> None:
-        """Back by one step: the question, the field, the dialog."""
+        """Leave the question, the field, or the dialog."""
         if self.question.text:
             self.question.cancel()
         elif isinstance(self.focusWidget(), _FIELDS):
             self.setFocus()
         else:
             self.ask_to_leave()
-
-    def _has_news(self) -> bool:
-        draft = self.desk.draft
-        return draft is not None and draft.has_news
 
     @Slot()
     def _on_answered(self) -> None:
@@ -242,7 +218,7 @@ class RigWizard(QDialog):
         self.question.ask(question, answer, action)
 
     def _show_question(self, on: bool) -> None:
-        """In place of the line and of Cancel: the question has one of its own, which goes on with the wizard."""
+        """In place of the line and of Cancel: the question has its own Cancel, which returns to the wizard."""
         self.question.setVisible(on)
         for part in (self.line, self.cancel_button):
             part.setVisible(not on)
@@ -283,7 +259,7 @@ class RigWizard(QDialog):
     def _go(self, index: int) -> None:
         self.page.leave()
         self.question.cancel()
-        self._say("")  # what was said belonged to the page before
+        self._show_message("")  # the message was about the page before
         self.stack.setCurrentIndex(index)
         self.page.enter()
         self._refresh()
@@ -294,7 +270,7 @@ class RigWizard(QDialog):
 
     @Slot()
     def _refresh(self) -> None:
-        busy, page = self.desk.is_busy, self.page
+        busy, page = self.model.is_busy, self.page
         page.refresh()
         for row, other in enumerate(self.pages):
             item = self.steps.item(row)
@@ -305,20 +281,19 @@ class RigWizard(QDialog):
             font.setBold(other is page)
             item.setFont(font)
         is_last = page is self.summary_page
-        self.next_button.setText(
-            tr("&Save") if is_last else tr("&Next") if page.is_done or page is self.camera_page else tr("&Skip")
-        )
-        self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.desk.draft is not None))
+        goes_on = page.is_done or page is self.camera_page
+        self.next_button.setText(tr("&Save") if is_last else tr("&Next") if goes_on else tr("&Skip"))
+        self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.model.draft is not None))
         self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
-        mark_main(self.next_button, is_last or page.is_done)
+        set_main_button(self.next_button, is_last or page.is_done)
         if page.main is not None:
-            mark_main(page.main, not page.is_done)
+            set_main_button(page.main, not page.is_done)
         if busy:
-            work = tr_text(self.desk.busy)
-            self._say(f"{work[0].upper()}{work[1:]} ...")
+            work = tr_text(self.model.busy)
+            self._show_message(f"{work[0].upper()}{work[1:]} ...")
         elif self.message.endswith(" ..."):
-            self._say("")
-        self._look(anew=True)
+            self._show_message("")
+        self._update_picture(is_forced=True)
 
     def _sign(self, is_done: bool, *, is_here: bool) -> QIcon:
         """A tick, or a point for the page in front."""
@@ -329,8 +304,8 @@ class RigWizard(QDialog):
         painter = QPainter(pixmap)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if is_done:
-            pen = QPen(QColor(theme.ALLOWED), 2.2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
-            painter.setPen(pen)
+            round_ends = (Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+            painter.setPen(QPen(QColor(theme.ALLOWED), 2.2, *round_ends))
             painter.drawPolyline(_TICK)
         elif is_here:
             painter.setPen(Qt.PenStyle.NoPen)
@@ -340,19 +315,19 @@ class RigWizard(QDialog):
         return QIcon(pixmap)
 
     @Slot(str)
-    def _say(self, text: str, is_fault: bool = False) -> None:
+    def _show_message(self, text: str, is_fault: bool = False) -> None:
         if is_fault:
-            self.question.cancel()  # what went wrong must be read
+            self.question.cancel()  # the fault must be seen
         theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
         self.line.setText(tr_text(text))
         self.line.setAccessibleName(text)
 
-    def _look(self, anew: bool = False) -> None:
-        """The newest picture, or the page's still."""
-        bench, still = self.desk.bench, self.page.still
+    def _update_picture(self, is_forced: bool = False) -> None:
+        """Show the newest picture, or that of the page."""
+        bench, still = self.model.bench, self.page.still
         self.picture.show_shapes(self.page.shapes())
         if still is not None:
-            if still is not self._shown_frame or anew:
+            if still is not self._shown_frame or is_forced:
                 self._shown_frame = still
                 self.picture.show_image(still)
             return
@@ -361,7 +336,7 @@ class RigWizard(QDialog):
         frame = bench.feed.newest
         if bench.feed.problem is not None:
             self.picture.show_text(bench.feed.problem)
-        elif frame is not None and (frame is not self._shown_frame or anew):
+        elif frame is not None and (frame is not self._shown_frame or is_forced):
             self._shown_frame = frame
             self.picture.show_image(frame.image)
 
@@ -370,10 +345,10 @@ class RigWizard(QDialog):
             rig = self.summary_page.rig()
             if rig is None:
                 return
-            path = self.desk.save(rig)
+            path = write_rig(rig)
         except RigFileError as error:
-            self._say(str(error), is_fault=True)
+            self._show_message(str(error), is_fault=True)
             return
-        self._say(tr("Saved: {path}", path=path))
+        self._show_message(tr("Saved: {path}", path=path))
         self.saved.emit(rig.name)
         self.accept()

@@ -78,7 +78,7 @@ def _left_with_a_driver_that_hangs(window: OperatorWindow, qtbot: QtBot) -> tupl
 
     desk = RigMenuController(window, hang, lambda _config: lambda frame: make_scene())
     desk.new()
-    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
+    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.model.is_busy)
     assert desk.wizard is not None
     desk.wizard.camera_page.name_edit.setText("bench 7")
     desk.wizard.camera_page.open_button.click()
@@ -254,7 +254,7 @@ def test_the_wizard_gets_a_rig_that_is_closed_and_gives_it_back(window: Operator
     assert desk.wizard is not None
     assert desk.wizard.isModal()
     assert len(opened) == 1
-    until(qtbot, lambda: not desk.wizard.desk.is_busy)
+    until(qtbot, lambda: not desk.wizard.model.is_busy)
     desk.wizard.reject()
     assert desk.wizard is None
     until(qtbot, lambda: len(opened) == 2)
@@ -320,7 +320,7 @@ def test_a_rig_that_the_wizard_still_holds_is_waited_for(window: OperatorWindow,
 def test_a_saved_rig_is_opened(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
     desk = _desk(window)
     desk.new()
-    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
+    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.model.is_busy)
     wizard = desk.wizard
     assert wizard is not None
     wizard.camera_page.name_edit.setText("bench 7")
@@ -340,7 +340,7 @@ def test_calibrating_begins_with_what_is_known(window: OperatorWindow, opened: l
     desk.choose("bench 1")
     until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
     desk.calibrate()
-    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
+    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.model.is_busy)
     assert desk.wizard is not None
     assert desk.wizard.windowTitle() == "Calibrate bench 1"
     assert desk.wizard.camera_page.rig_name == "bench 1"
@@ -361,12 +361,12 @@ def test_the_pedals_and_gamepads_stop_reaches_the_wizard(qtbot: QtBot) -> None:
 def test_at_the_programs_end_the_wizard_gives_everything_back(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
     desk = _desk(window)
     desk.new()
-    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.desk.is_busy)
+    until(qtbot, lambda: desk.wizard is not None and not desk.wizard.model.is_busy)
     wizard = desk.wizard
     assert wizard is not None
     wizard.camera_page.open_button.click()
-    until(qtbot, lambda: wizard.desk.bench is not None and not wizard.desk.is_busy)
+    until(qtbot, lambda: wizard.model.bench is not None and not wizard.model.is_busy)
     desk.close()
     desk.close()
-    assert wizard.desk.bench is None
+    assert wizard.model.bench is None
     assert len(opened) == 1  # no rig is opened again

@@ -66,12 +66,12 @@ def make_wizard(qtbot: QtBot) -> Iterator[MakeWizard]:
     def make(
         name: str = "", config: Config | None = None, known: CalibrationConfig | None = None, opener: Callable[..., object] = _open
     ) -> RigWizard:
-        desk = RigWizardModel(config or load_config(), known, opener, lambda _config: lambda frame: make_scene())  # type: ignore[arg-type]
-        wizard = RigWizard(desk, name)
+        model = RigWizardModel(config or load_config(), known, opener, lambda _config: lambda frame: make_scene())  # type: ignore[arg-type]
+        wizard = RigWizard(model, name)
         qtbot.addWidget(wizard)
         made.append(wizard)
         wizard.show()
-        until(qtbot, lambda: not desk.is_busy)
+        until(qtbot, lambda: not model.is_busy)
         return wizard
 
     yield make
@@ -89,11 +89,11 @@ def opened(make_wizard: MakeWizard, qtbot: QtBot) -> RigWizard:
 def _open_camera(wizard: RigWizard, qtbot: QtBot) -> None:
     qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
     _idle(wizard, qtbot)
-    assert wizard.desk.bench is not None
+    assert wizard.model.bench is not None
 
 
 def _idle(wizard: RigWizard, qtbot: QtBot) -> None:
-    until(qtbot, lambda: not wizard.desk.is_busy)
+    until(qtbot, lambda: not wizard.model.is_busy)
 
 
 def _to(wizard: RigWizard, page: object) -> None:
@@ -153,9 +153,9 @@ def test_the_board_gives_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
     assert not page.square.isEnabled()
     qtbot.mouseClick(page.solve_button, Qt.MouseButton.LeftButton)
     _idle(opened, qtbot)
-    assert opened.desk.draft is not None
-    assert opened.desk.draft.scale is not None
-    assert opened.desk.draft.scale.mm_per_px == pytest.approx(1.0 / 3.1, rel=0.01)
+    assert opened.model.draft is not None
+    assert opened.model.draft.scale is not None
+    assert opened.model.draft.scale.mm_per_px == pytest.approx(1.0 / 3.1, rel=0.01)
     assert "mm per pixel" in page.result.text()
     assert opened.next_button.text() == "&Next"
 
@@ -169,9 +169,9 @@ def test_two_clicks_give_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
     for place in ((100.0, 100.0), (300.0, 100.0)):
         x, y = opened.picture.on_screen(place)
         qtbot.mouseClick(opened.picture, Qt.MouseButton.LeftButton, pos=_point(x, y))
-    assert opened.desk.draft is not None
-    assert opened.desk.draft.scale is not None
-    assert opened.desk.draft.scale.mm_per_px == pytest.approx(0.4, rel=0.02)
+    assert opened.model.draft is not None
+    assert opened.model.draft.scale is not None
+    assert opened.model.draft.scale.mm_per_px == pytest.approx(0.4, rel=0.02)
     assert len(page.shapes()) == 3
     page.click(10.0, 10.0)
     page.click(12.0, 10.0)
@@ -180,7 +180,7 @@ def test_two_clicks_give_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
 
 
 def test_a_length_that_is_corrected_after_the_two_clicks_counts(opened: RigWizard, qtbot: QtBot) -> None:
-    page, draft = opened.scale_page, opened.desk.draft
+    page, draft = opened.scale_page, opened.model.draft
     assert draft is not None
     _to(opened, page)
     page.length.setValue(50.0)
@@ -262,17 +262,17 @@ def test_without_servos_their_pages_have_nothing_to_do(opened: RigWizard, qtbot:
 
 
 def _with_servos(wizard: RigWizard) -> None:
-    assert wizard.desk.draft is not None
-    assert wizard.desk.bench is not None
-    wizard.desk.bench.port = "/dev/ttyUSB0"
-    wizard.desk.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 8)))
-    wizard.desk.changed.emit()
+    assert wizard.model.draft is not None
+    assert wizard.model.bench is not None
+    wizard.model.bench.port = "/dev/ttyUSB0"
+    wizard.model.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 8)))
+    wizard.model.changed.emit()
 
 
 def test_servos_are_told_apart_by_hand(opened: RigWizard, qtbot: QtBot) -> None:
     _to(opened, opened.identify_page)
     _with_servos(opened)
-    page, draft = opened.identify_page, opened.desk.draft
+    page, draft = opened.identify_page, opened.model.draft
     assert draft is not None
     assert page.auto_button.isEnabled()
     page._signs[0].setCurrentIndex(1)
@@ -291,7 +291,7 @@ def test_touching_one_servo_confirms_no_other_one(opened: RigWizard) -> None:
     """A rig that is calibrated once more: nobody has looked which of two is up meanwhile."""
     _to(opened, opened.identify_page)
     _with_servos(opened)
-    page, draft = opened.identify_page, opened.desk.draft
+    page, draft = opened.identify_page, opened.model.draft
     assert draft is not None
     draft._assumed_earlier = ("up", "down")
     page._signs[4].activated.emit(page._signs[4].currentIndex())
@@ -305,7 +305,7 @@ def test_touching_one_servo_confirms_no_other_one(opened: RigWizard) -> None:
 def test_zero_and_steering_are_of_the_servos_they_were_found_with(opened: RigWizard, qtbot: QtBot, change: str) -> None:
     _to(opened, opened.identify_page)
     _with_servos(opened)
-    page, draft = opened.identify_page, opened.desk.draft
+    page, draft = opened.identify_page, opened.model.draft
     assert draft is not None
     named = [Assignment(joint.name, joint.id, joint.sign, "seen") for joint in draft.config.servos.joints]
     draft.zero = ZeroConfig(ticks=tuple(range(7)), slack_mm=(0.1, 0.2, 0.3, 0.4), pretension_mm=0.3)
@@ -330,12 +330,12 @@ def test_the_person_is_asked_which_of_two_is_up(opened: RigWizard, qtbot: QtBot)
     """One camera cannot tell; without an answer the rig file says that it is assumed."""
     _to(opened, opened.identify_page)
     _with_servos(opened)
-    page, draft = opened.identify_page, opened.desk.draft
+    page, draft = opened.identify_page, opened.model.draft
     assert draft is not None
     assert not page.right_button.isVisible()
     named = [Assignment(name, number, 1, "seen", assumed=name in {"up", "down"}) for number, name in enumerate(JOINT_NAMES, 1)]
     draft.set_assignments(named)
-    opened.desk.changed.emit()
+    opened.model.changed.emit()
     assert "does the head rise" in page.result.text()
     rig = draft.rig_file("bench 1")
     assert rig.calibration is not None
@@ -346,19 +346,19 @@ def test_the_person_is_asked_which_of_two_is_up(opened: RigWizard, qtbot: QtBot)
     assert [one.seen for one in draft.assignments[2:4]] == ["seen by eye"] * 2
     assert draft.calibration().assumed is None
     draft.set_assignments(named)
-    opened.desk.changed.emit()
+    opened.model.changed.emit()
     qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
     assert [(one.name, one.id) for one in draft.assignments[2:4]] == [("up", 4), ("down", 3)]
     assert draft.calibration().assumed is None, "who swaps has looked"
 
 
 def test_stop_is_heard_on_every_page(opened: RigWizard, qtbot: QtBot) -> None:
-    bench = opened.desk.bench
+    bench = opened.model.bench
     assert bench is not None
     for press in (
         lambda: qtbot.mousePress(opened.stop_button, Qt.MouseButton.LeftButton),
         lambda: qtbot.keyClick(opened, Qt.Key.Key_Space),
-        opened.stop,
+        opened.model.stop,
     ):
         bench.stop.release()
         press()
@@ -366,14 +366,14 @@ def test_stop_is_heard_on_every_page(opened: RigWizard, qtbot: QtBot) -> None:
 
 
 def test_a_rig_may_have_a_space_in_its_name_and_space_is_stop_there_while_a_job_runs(opened: RigWizard, qtbot: QtBot) -> None:
-    bench, name = opened.desk.bench, opened.camera_page.name_edit
+    bench, name = opened.model.bench, opened.camera_page.name_edit
     assert bench is not None
     opened.back()
     name.clear()
     qtbot.keyClicks(name, "left bench")
     assert name.text() == "left bench"
     assert not bench.stop.is_pressed
-    opened.desk.run("moving a servo", lambda: bench.stop.sleep(20.0))
+    opened.model.run("moving a servo", lambda: bench.stop.sleep(20.0))
     qtbot.keyClick(name, Qt.Key.Key_Space)
     assert bench.stop.is_pressed
     assert name.text() == "left bench"
@@ -381,15 +381,15 @@ def test_a_rig_may_have_a_space_in_its_name_and_space_is_stop_there_while_a_job_
 
 
 def test_stop_reaches_a_job_that_runs(opened: RigWizard, qtbot: QtBot) -> None:
-    bench = opened.desk.bench
+    bench = opened.model.bench
     assert bench is not None
-    opened.desk.run("moving a servo", lambda: bench.stop.sleep(20.0))
+    opened.model.run("moving a servo", lambda: bench.stop.sleep(20.0))
     assert not opened.next_button.isEnabled()
     assert opened.message == "Moving a servo ..."
     qtbot.mousePress(opened.stop_button, Qt.MouseButton.LeftButton)
     _idle(opened, qtbot)
     assert opened.message == "stopped: nothing moves before you go on"
-    opened.desk.run("looking", bench.stop.check)  # asking for the next step is going on
+    opened.model.run("looking", bench.stop.check)  # asking for the next step is going on
     _idle(opened, qtbot)
     assert opened.message == ""
 
@@ -398,8 +398,8 @@ def test_stop_reaches_a_job_that_runs(opened: RigWizard, qtbot: QtBot) -> None:
 
 
 def test_saved_rigs_hold_what_was_found(opened: RigWizard, qtbot: QtBot) -> None:
-    assert opened.desk.draft is not None
-    opened.desk.draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="two clicks", uncertainty_share=0.01)
+    assert opened.model.draft is not None
+    opened.model.draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="two clicks", uncertainty_share=0.01)
     _to(opened, opened.summary_page)
     assert "scale: 0.3000 mm/px" in opened.summary_page.text.toPlainText()
     assert opened.next_button.text() == "&Save"
@@ -410,8 +410,8 @@ def test_saved_rigs_hold_what_was_found(opened: RigWizard, qtbot: QtBot) -> None
     assert rig.calibration is not None
     assert rig.calibration.scale is not None
     assert rig.calibration.scale.mm_per_px == 0.3
-    assert opened.desk.wait_closed()
-    assert opened.desk.bench is None  # the camera is free again
+    assert opened.model.wait_closed()
+    assert opened.model.bench is None  # the camera is free again
 
 
 def test_a_step_that_is_left_out_keeps_what_was_known(make_wizard: MakeWizard, qtbot: QtBot) -> None:
@@ -431,10 +431,10 @@ def test_another_camera_does_not_inherit_the_calibration(make_wizard: MakeWizard
     before = load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}, "camera": {"device": "/dev/v4l/by-id/a"}})
     wizard = make_wizard("bench 1", before, known)
     for changes in ({"device": "/dev/v4l/by-id/b"}, {"width_px": 1280, "height_px": 720}):
-        wizard.desk.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update=changes)}))
+        wizard.model.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update=changes)}))
         _idle(wizard, qtbot)
         assert not wizard.scale_page.is_done
-    wizard.desk.open_camera(before)
+    wizard.model.open_camera(before)
     _idle(wizard, qtbot)
     assert wizard.scale_page.is_done
 
@@ -446,28 +446,28 @@ def test_a_camera_that_was_not_named_keeps_its_calibration_when_it_is_found(
     known = CalibrationConfig.model_validate({"made_utc": "2025-01-01T00:00:00Z", "port": {"x_share": 0.1, "y_share": 0.5}})
     before = load_config(overrides={"rig": {"camera": kind, "robot": "none"}})
     wizard = make_wizard("bench 1", before, known)
-    wizard.desk.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update={sign: "f0123456"})}))
+    wizard.model.open_camera(before.model_copy(update={"camera": before.camera.model_copy(update={sign: "f0123456"})}))
     _idle(wizard, qtbot)
-    assert wizard.desk.draft is not None
-    assert wizard.desk.draft.port == known.port
+    assert wizard.model.draft is not None
+    assert wizard.model.draft.port == known.port
 
 
 def test_opening_the_camera_anew_asks_before_it_loses_what_was_found(opened: RigWizard, qtbot: QtBot) -> None:
-    draft, page = opened.desk.draft, opened.camera_page
+    draft, page = opened.model.draft, opened.camera_page
     assert draft is not None
     draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
     page.open_button.click()
     assert opened.question.text == "Open the camera anew and lose what was found?"
     opened.question.cancel()
-    assert opened.desk.draft is draft
+    assert opened.model.draft is draft
     page.open_button.click()
     opened.question._yes.click()
     _idle(opened, qtbot)
-    assert opened.desk.draft is not draft
+    assert opened.model.draft is not draft
 
 
 def test_the_pretension_is_what_the_wires_envelopes_allow(opened: RigWizard) -> None:
-    draft, page = opened.desk.draft, opened.zero_page
+    draft, page = opened.model.draft, opened.zero_page
     assert draft is not None
     joints = tuple(joint.model_copy(update={"high_mm": 1.5}) for joint in draft.config.servos.joints)
     draft.config = draft.config.model_copy(
@@ -487,7 +487,7 @@ def test_the_ports_are_those_of_the_bench_that_is_open(
     page = wizard.port_page
     page.enter()
     assert [page.ports.itemText(k) for k in range(page.ports.count())] == ["the twin's own servos"]
-    wizard.desk.open_camera(load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}}))
+    wizard.model.open_camera(load_config(overrides={"rig": {"camera": "webcam", "robot": "none"}}))
     _idle(wizard, qtbot)
     monkeypatch.setattr(servo_pages, "find_ports", lambda: (FoundPort("/dev/serial/by-id/u2d2", "U2D2"),))
     page.enter()
@@ -511,9 +511,9 @@ LEAVING = pytest.mark.parametrize("leave", [by_escape, by_cancel, by_the_title_b
 
 
 def _find_a_scale(wizard: RigWizard) -> None:
-    assert wizard.desk.draft is not None
-    wizard.desk.draft.solve_clicks((100.0, 100.0), (500.0, 100.0), 80.0)
-    wizard.desk.changed.emit()
+    assert wizard.model.draft is not None
+    wizard.model.draft.solve_clicks((100.0, 100.0), (500.0, 100.0), 80.0)
+    wizard.model.changed.emit()
 
 
 @LEAVING
@@ -525,7 +525,7 @@ def test_what_was_found_is_not_thrown_away_without_a_question(
     assert opened.isVisible()
     assert opened.question.isVisible()
     assert opened.question.text == "Leave without saving what was found?"
-    assert opened.desk.bench is not None, "camera and servos are still here"
+    assert opened.model.bench is not None, "camera and servos are still here"
     qtbot.keyClick(opened, Qt.Key.Key_Space)
     assert opened.isVisible(), "Space is STOP, and answers nothing"
     assert opened.question.isVisible()
@@ -535,7 +535,7 @@ def test_what_was_found_is_not_thrown_away_without_a_question(
     leave(opened)
     opened.question._yes.click()
     assert not opened.isVisible()
-    until(qtbot, lambda: opened.desk.bench is None)
+    until(qtbot, lambda: opened.model.bench is None)
 
 
 def test_a_program_that_is_asked_to_end_is_not_kept_by_a_question(opened: RigWizard, qtbot: QtBot, qapp: QApplication) -> None:
@@ -543,7 +543,7 @@ def test_a_program_that_is_asked_to_end_is_not_kept_by_a_question(opened: RigWiz
     _find_a_scale(opened)
     close_all(qapp)
     assert not opened.isVisible()
-    until(qtbot, lambda: opened.desk.bench is None)
+    until(qtbot, lambda: opened.model.bench is None)
     assert not is_asked_to_end()
 
 
@@ -588,7 +588,7 @@ def test_escape_leaves_the_field_first(opened: RigWizard, qtbot: QtBot) -> None:
 
 def test_the_question_gives_way_to_another_page_and_to_what_went_wrong(opened: RigWizard) -> None:
     _find_a_scale(opened)
-    for happens in (opened.next, lambda: opened.desk.failed.emit("the port is gone")):
+    for happens in (opened.next, lambda: opened.model.failed.emit("the port is gone")):
         opened.ask_to_leave()
         assert opened.question.isVisible()
         happens()
@@ -598,7 +598,7 @@ def test_the_question_gives_way_to_another_page_and_to_what_went_wrong(opened: R
 
 
 def test_a_board_that_is_forgotten_again_leaves_nothing_to_ask_about(opened: RigWizard) -> None:
-    draft = opened.desk.draft
+    draft = opened.model.draft
     assert draft is not None
     assert not draft.has_news
     draft.views.append(BoardView(np.zeros((4, 2)), np.zeros((4, 2))))
@@ -610,8 +610,8 @@ def test_a_board_that_is_forgotten_again_leaves_nothing_to_ask_about(opened: Rig
 def test_cancel_saves_nothing_and_gives_the_camera_back(opened: RigWizard) -> None:
     opened.cancel_button.click()
     assert list_rigs() == ()
-    assert opened.desk.wait_closed()
-    assert opened.desk.bench is None
+    assert opened.model.wait_closed()
+    assert opened.model.bench is None
 
 
 def test_a_camera_without_pictures_is_none(make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -627,7 +627,7 @@ def test_a_camera_without_pictures_is_none(make_wizard: MakeWizard, qtbot: QtBot
     qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
     _idle(wizard, qtbot)
     assert "gives no pictures" in wizard.message
-    assert wizard.desk.bench is None
+    assert wizard.model.bench is None
     assert not wizard.camera_page.is_done
     wizard.next()
     assert wizard.page is wizard.camera_page
@@ -642,7 +642,7 @@ def test_a_driver_that_hangs_does_not_hold_the_window_up(make_wizard: MakeWizard
 
     wizard = make_wizard("bench 1", opener=hang)
     closed: list[bool] = []
-    wizard.desk.closed.connect(lambda: closed.append(True))
+    wizard.model.closed.connect(lambda: closed.append(True))
     qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
     wizard.cancel_button.click()  # comes back although the driver does not
     assert not wizard.isVisible()
@@ -650,4 +650,4 @@ def test_a_driver_that_hangs_does_not_hold_the_window_up(make_wizard: MakeWizard
     assert closed == []
     go_on.set()
     until(qtbot, lambda: closed == [True])
-    assert wizard.desk.bench is None
+    assert wizard.model.bench is None

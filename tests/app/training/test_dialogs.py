@@ -59,7 +59,7 @@ def wizard(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     made = RigWizard(RigWizardModel(load_config(), None, open_bench, lambda _config: lambda frame: make_scene()), "bench 1")
     qtbot.addWidget(made)
     made.show()
-    until(qtbot, lambda: not made.desk.is_busy)
+    until(qtbot, lambda: not made.model.is_busy)
     yield made
     made.reject()
 
@@ -191,23 +191,23 @@ def test_one_button_of_a_page_is_what_comes_next(wizard: RigWizard, qtbot: QtBot
     assert not _is_main(wizard.next_button)
     assert "when the camera is open" in page.problem.text()
     page.open_button.click()
-    until(qtbot, lambda: not wizard.desk.is_busy)
+    until(qtbot, lambda: not wizard.model.is_busy)
     assert not _is_main(page.open_button)
     assert _is_main(wizard.next_button)
     wizard.next()
     scale = wizard.scale_page
     for count, main in ((1, scale.take_button), (2, scale.take_button), (3, scale.solve_button)):
         scale.take_button.click()
-        until(qtbot, lambda: not wizard.desk.is_busy)
-        assert wizard.desk.draft is not None
-        assert len(wizard.desk.draft.views) == count
+        until(qtbot, lambda: not wizard.model.is_busy)
+        assert wizard.model.draft is not None
+        assert len(wizard.model.draft.views) == count
         assert [one for one in (scale.take_button, scale.solve_button, wizard.next_button) if _is_main(one)] == [main]
 
 
 def test_what_was_said_on_a_page_goes_with_it(wizard: RigWizard, qtbot: QtBot) -> None:
     wizard.camera_page.open_button.click()
-    until(qtbot, lambda: not wizard.desk.is_busy)
-    wizard.desk.said.emit("board 2: 45 of 54 corners")
+    until(qtbot, lambda: not wizard.model.is_busy)
+    wizard.model.message.emit("board 2: 45 of 54 corners")
     assert wizard.message
     wizard.next()
     assert wizard.message == ""
@@ -215,7 +215,7 @@ def test_what_was_said_on_a_page_goes_with_it(wizard: RigWizard, qtbot: QtBot) -
 
 def test_the_steps_tell_which_are_done_and_where_one_is(wizard: RigWizard, qtbot: QtBot) -> None:
     wizard.camera_page.open_button.click()
-    until(qtbot, lambda: not wizard.desk.is_busy)
+    until(qtbot, lambda: not wizard.model.is_busy)
     wizard.next()
     steps = wizard.findChild(QListWidget)
     told = [steps.item(row).data(Qt.ItemDataRole.AccessibleTextRole) for row in range(3)]
@@ -233,9 +233,9 @@ def test_size_and_rate_can_be_set_for_real_cameras_only(wizard: RigWizard) -> No
 
 def test_servos_go_by_the_name_that_is_printed_on_them(wizard: RigWizard, qtbot: QtBot) -> None:
     wizard.camera_page.open_button.click()
-    until(qtbot, lambda: not wizard.desk.is_busy)
-    assert wizard.desk.draft is not None
-    wizard.desk.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, (FoundServo(1, 1020), FoundServo(2, 4711)))
+    until(qtbot, lambda: not wizard.model.is_busy)
+    assert wizard.model.draft is not None
+    wizard.model.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, (FoundServo(1, 1020), FoundServo(2, 4711)))
     wizard.port_page.refresh()
     assert [wizard.port_page.servos.item(row, 1).text() for row in range(2)] == ["XM430-W350  (1020)", "4711"]
 
