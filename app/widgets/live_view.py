@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -51,61 +50,42 @@ class MarksLabel(QLabel):
 
 
 _NEAR_PX, _CLEAR_PX = 20, 60  # distances of the head at which the loupe leaves a corner, and from which a corner is free
-_SETTLE_S = 1.0
-_MUCH, _SHARE = 30.0, 0.5  # how much less a corner must hide to be much better: weight, and share of what is hidden now
-_COVERED = 150.0  # weight of something that lies over the loupe
 
 
 class LoupeCorner:
-    """Chooses the corner in which the loupe hides least.
+    """Chooses the corner of the loupe: the one that hides least. It leaves it only when it would hide the head or the target."""
 
-    It leaves a corner at once when the head comes near, and for a much better one only after a second: it must not jump about.
-    """
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self._corner: int | None = None
-        self._better_since_s: float | None = None
 
     def choose(
-        self, corners: Sequence[QRectF], head: QPointF, places: Points, weights: NDArray[np.float64], covers: Sequence[QRectF] = ()
+        self, corners: Sequence[QRectF], head: QPointF, target: QPointF | None, places: Points, covers: Sequence[QRectF] = ()
     ) -> int:
         """Which of `corners`.
 
         Parameters
         ----------
         corners : where the loupe would lie, on the view.
-        head : where the robot's head is.
-        places, weights : (N, 2) what there is to see, also beyond the view, and (N,) how much each matters.
+        head, target : must not be hidden.
+        places : (N, 2) what else there is to see, also beyond the view.
         covers : what lies over the loupe.
         """
-        hidden = [
-            float(weights[_within(corner, places)].sum()) + _COVERED * any(corner.intersects(cover) for cover in covers)
-            for corner in corners
-        ]
-        free = [k for k, corner in enumerate(corners) if not _grown(corner, _CLEAR_PX).contains(head)]
-        best = min(free or range(len(corners)), key=lambda k: hidden[k])
-        now = self._corner
-        if now is None or now >= len(corners) or (free and _grown(corners[now], _NEAR_PX).contains(head)):
-            self._corner, self._better_since_s = best, None
-            return best
-        if hidden[now] - hidden[best] <= max(_MUCH, _SHARE * hidden[now]):
-            self._better_since_s = None
-            return now
-        self._better_since_s = self._clock() if self._better_since_s is None else self._better_since_s
-        if self._clock() - self._better_since_s < _SETTLE_S:
-            return now
-        self._corner, self._better_since_s = best, None
-        return best
 
+        def is_free(corner: QRectF, margin_px: float) -> bool:
+            grown = corner.adjusted(-margin_px, -margin_px, margin_px, margin_px)
+            is_target = target is not None and corner.contains(target)
+            return not (grown.contains(head) or is_target or any(corner.intersects(cover) for cover in covers))
 
-def _within(rect: QRectF, places: Points) -> NDArray[np.bool_]:
-    x, y = places[:, 0], places[:, 1]
-    return np.asarray((x > rect.left()) & (x < rect.right()) & (y > rect.top()) & (y < rect.bottom()))
+        def hidden(corner: QRectF) -> int:
+            x, y = places[:, 0], places[:, 1]
+            inside = (x > corner.left()) & (x < corner.right()) & (y > corner.top()) & (y < corner.bottom())
+            return int(np.count_nonzero(inside))
 
-
-def _grown(rect: QRectF, by_px: float) -> QRectF:
-    return rect.adjusted(-by_px, -by_px, by_px, by_px)
+        if self._corner is None or not is_free(corners[self._corner], _NEAR_PX):
+            free = [k for k, corner in enumerate(corners) if is_free(corner, _CLEAR_PX)]
+            if free or self._corner is None:
+                self._corner = min(free or range(len(corners)), key=lambda k: hidden(corners[k]))
+        return self._corner
 
 
 _SPAN_PX = 110.0  # what the loupe shows, working pixels
@@ -177,8 +157,9 @@ class HeadLoupe(PaintedWidget):
             QRectF(room.width() - width - 10 if right else 10, room.height() - height - 10 if bottom else 10, width, height)
             for right, bottom in _CORNERS
         ]
-        places, weights = self._marks.places()
-        corner = self._corner.choose(corners, head, on_screen(places, to_view), weights, covers)
+        target = self._marks.target
+        target_at = None if target is None else to_view.map(QPointF(target[0] + 0.5, target[1] + 0.5))
+        corner = self._corner.choose(corners, head, target_at, on_screen(self._marks.places(), to_view), covers)
         self.setGeometry(corners[corner].toRect())
 
     def mousePressEvent(self, event: QMouseEvent) -> None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QPainter, QTransform
 
@@ -18,7 +17,6 @@ from core.types import Point, Points, Pose, Scene, Vector
 
 _MIN_STEP_PX = 5.0  # of polylines, working pixels
 _CLEAR_OFFSET_PX = 3.0  # from which on a label changes its side of the vessel line
-_WEIGHTS = {"vessel": 1.0, "robot": 2.0, "route": 3.0, "target": 200.0}  # how much it matters to see it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,14 +139,14 @@ class Marks:
         self._digits = digits
         self._shapes: SceneShapes | None = None
         self._pose: Pose | None = None
-        self._target: Point | None = None
-        self._target_note = ""
+        self.target: Point | None = None
+        self._note = ""
         self._visible = set(Layer)
         self._head_side = self._tail_side = 1.0
 
     def set_scene(self, shapes: SceneShapes | None, pose: Pose | None, target: Point | None, target_note: str = "") -> None:
         """What to draw. `target` is in source pixels; `target_note` is written beside it."""
-        self._shapes, self._pose, self._target, self._target_note = shapes, pose, target, target_note
+        self._shapes, self._pose, self.target, self._note = shapes, pose, target, target_note
         if pose is not None:
             self._head_side = _steady_side(self._head_side, pose.c_head_px)
             self._tail_side = _steady_side(self._tail_side, pose.c_tail_px)
@@ -159,9 +157,11 @@ class Marks:
     def is_on(self, layer: Layer) -> bool:
         return layer in self._visible
 
-    def places(self) -> tuple[Points, NDArray[np.float64]]:
-        """What there is to see, drawn or not, (N, 2) in source pixels, and how much each place matters (N,)."""
-        return seen_places(self._shapes, self._target)
+    def places(self) -> Points:
+        """The lines that there are to see, drawn or not, (N, 2) in source pixels."""
+        shapes = self._shapes
+        lines = () if shapes is None else (*shapes.vessel_lines, shapes.robot_line, shapes.route, shapes.ghost)
+        return np.concatenate([np.empty((0, 2)), *(line for line in lines if line is not None)])
 
     def draw(
         self, painter: QPainter, to_screen: QTransform, room: QRectF, label_px: int, *, tags: bool = True, smooth: bool = False
@@ -193,10 +193,10 @@ class Marks:
                 marks.diamond(shapes.nearest, ON_PICTURE.NEAREST, 6.0)
             if Layer.HEAD in visible and shapes.head is not None:
                 marks.ring(shapes.head, ON_PICTURE.HEAD, 8.0)
-        if Layer.ROUTE in visible and self._target is not None:
-            marks.crosshair(self._target, ON_PICTURE.TARGET, 13.0)
-            if tags and self._target_note:
-                marks.tag(self._target, self._target_note, ON_PICTURE.TARGET)
+        if Layer.ROUTE in visible and self.target is not None:
+            marks.crosshair(self.target, ON_PICTURE.TARGET, 13.0)
+            if tags and self._note:
+                marks.tag(self.target, self._note, ON_PICTURE.TARGET)
 
     def _draw_vectors(self, marks: ScenePainter, shapes: SceneShapes) -> None:
         robot, vessel = shapes.robot_vector, shapes.vessel_vector
@@ -227,18 +227,3 @@ class Marks:
 def _steady_side(side: float, offset_px: float) -> float:
     """Side of the vessel line that a label is on; it changes only when the offset is clear, or labels would flicker at zero."""
     return side if abs(offset_px) < _CLEAR_OFFSET_PX else (1.0 if offset_px > 0 else -1.0)
-
-
-def seen_places(shapes: SceneShapes | None, target: Point | None) -> tuple[Points, NDArray[np.float64]]:
-    """What there is to see in a picture: places (N, 2) in source pixels, and how much each matters (N,)."""
-    parts: list[tuple[Points, str]] = []
-    if shapes is not None:
-        parts += [(line, "vessel") for line in shapes.vessel_lines]
-        parts += [(line, "robot") for line in (shapes.robot_line,) if line is not None]
-        parts += [(line, "route") for line in (shapes.route, shapes.ghost) if line is not None]
-    if target is not None:
-        parts.append((np.array([target], np.float64), "target"))
-    if not parts:
-        return np.empty((0, 2)), np.empty(0)
-    weights = [np.full(len(line), _WEIGHTS[kind]) for line, kind in parts]
-    return np.concatenate([line for line, _ in parts]), np.concatenate(weights)

@@ -27,7 +27,6 @@ from core.types import (
     Speed,
 )
 from tests.app.fakes import FakeBench, make_pose, make_scene
-from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
 
 ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
@@ -51,68 +50,40 @@ def test_ghost_is_drawn_only_with_advice_and_goes_with_the_scene(own: Own, bench
 
 
 CORNERS = [QRectF(300, 0, 100, 80), QRectF(0, 0, 100, 80), QRectF(300, 220, 100, 80), QRectF(0, 220, 100, 80)]
-
-
+UPPER_RIGHT, UPPER_LEFT, LOWER_RIGHT, LOWER_LEFT = range(4)
 MIDDLE = QPointF(200, 150)
 
 
-@pytest.fixture
-def corner(clock: Clock) -> LoupeCorner:
-    return LoupeCorner(clock)
-
-
-def crowd(**counts: int) -> Points:
+def crowd(*counts: int) -> Points:
     """So many places in each corner."""
-    order = ("right_top", "left_top", "right_bottom", "left_bottom")
-    return np.array(
-        [CORNERS[order.index(name)].center().toTuple() for name, count in counts.items() for _ in range(count)]
-    ).reshape(-1, 2)
+    places = [corner.center().toTuple() for corner, count in zip(CORNERS, counts, strict=False) for _ in range(count)]
+    return np.array(places).reshape(-1, 2)
 
 
-def choose(corner: LoupeCorner, places: Points, head: QPointF = MIDDLE) -> int:
-    return corner.choose(CORNERS, head, places, np.ones(len(places)))
+def test_the_loupe_begins_where_it_hides_least() -> None:
+    assert LoupeCorner().choose(CORNERS, MIDDLE, None, crowd()) == UPPER_RIGHT
+    assert LoupeCorner().choose(CORNERS, MIDDLE, None, crowd(50, 20, 1, 40)) == LOWER_RIGHT
+    assert LoupeCorner().choose(CORNERS, MIDDLE, CORNERS[LOWER_RIGHT].center(), crowd(50, 20, 1, 40)) == UPPER_LEFT
 
 
-def test_it_begins_where_least_is_hidden(corner: LoupeCorner) -> None:
-    assert choose(LoupeCorner(), crowd()) == 0, "the upper right"
-    assert choose(corner, crowd(right_top=50, left_top=20, right_bottom=1, left_bottom=40)) == 2
-
-
-def test_a_corner_that_is_a_little_better_is_no_reason_to_move(corner: LoupeCorner, clock: Clock) -> None:
-    assert choose(corner, crowd(left_top=50, right_bottom=60, left_bottom=70)) == 0
-    for clock.now_s in range(100, 110):
-        assert choose(corner, crowd(right_top=50, left_top=30, right_bottom=60, left_bottom=70)) == 0
-
-
-def test_it_moves_for_a_much_better_one_once_that_has_lasted(corner: LoupeCorner, clock: Clock) -> None:
-    better_elsewhere = crowd(right_top=100, right_bottom=60, left_bottom=70)
-    assert choose(corner, crowd(left_top=9, right_bottom=9, left_bottom=9)) == 0
-    clock.now_s = 105.0
-    assert choose(corner, better_elsewhere) == 0
-    clock.now_s = 105.9
-    assert choose(corner, crowd(left_top=9, right_bottom=9, left_bottom=9)) == 0
-    clock.now_s = 106.1
-    assert choose(corner, better_elsewhere) == 0  # it counts anew
-    clock.now_s = 107.1
-    assert choose(corner, better_elsewhere) == 1
-
-
-def test_it_leaves_at_once_when_the_head_comes(corner: LoupeCorner) -> None:
-    crowded = crowd(left_top=50, right_bottom=20, left_bottom=10)
-    assert choose(corner, crowded) == 0
-    assert choose(corner, crowded, QPointF(290, 70)) == 3
-    assert choose(corner, crowded, QPointF(290, 70)) == 3
-
-
-def test_it_goes_out_of_the_way_of_what_lies_over_it(corner: LoupeCorner, clock: Clock) -> None:
-    alerts = [QRectF(12, 12, 360, 60)]
-    nothing, ones = crowd(), np.ones(0)
-    assert corner.choose(CORNERS, MIDDLE, nothing, ones) == 0
-    assert corner.choose(CORNERS, MIDDLE, nothing, ones, alerts) == 0
-    clock.now_s += 1.1
-    assert corner.choose(CORNERS, MIDDLE, nothing, ones, alerts) == 2
-    clock.now_s += 5.0
-    assert corner.choose(CORNERS, MIDDLE, nothing, ones) == 2, "they are gone, and it need not come back"
+@pytest.mark.parametrize(
+    ("head", "target", "covers", "corner"),
+    [
+        (MIDDLE, None, [], UPPER_RIGHT),
+        (QPointF(290, 70), None, [], LOWER_LEFT),
+        (MIDDLE, QPointF(350, 40), [], LOWER_LEFT),
+        (MIDDLE, None, [QRectF(12, 12, 360, 60)], LOWER_LEFT),
+    ],
+    ids=["nothing", "head", "target", "alerts"],
+)
+def test_the_loupe_leaves_its_corner_only_for_what_must_be_seen(
+    head: QPointF, target: QPointF | None, covers: list[QRectF], corner: int
+) -> None:
+    chosen = LoupeCorner()
+    assert chosen.choose(CORNERS, MIDDLE, None, crowd()) == UPPER_RIGHT
+    crowded = crowd(60, 50, 20, 10)
+    assert chosen.choose(CORNERS, head, target, crowded, covers) == corner
+    assert chosen.choose(CORNERS, MIDDLE, None, crowded) == corner, "it need not come back"
 
 
 GREY = 90
@@ -329,18 +300,14 @@ def test_labels_stay_on_their_side_when_the_offset_is_about_zero(view: LiveView)
     assert view._marks._head_side == -1.0
 
 
-def test_the_loupe_does_not_stay_below_an_alert(view: LiveView, bench: FakeBench, clock: Clock) -> None:
+def test_the_loupe_does_not_stay_below_an_alert(view: LiveView, bench: FakeBench) -> None:
     cover = QWidget(view)
     cover.setGeometry(10, 10, 620, 60)
     view.set_covers(cover)
-    view._loupe._corner = LoupeCorner(clock)
-    cover.hide()
     image, scene = bench.scene_at(0, 0.0)
-    _show(view, Frame(0, 0.0, image), scene)
     for shown in (False, True):
         cover.setVisible(shown)
-        for _ in range(3):
-            clock.now_s += 1.1
-            view._show_loupe()
+        _show(view, Frame(0, 0.0, image), scene)
+        view._show_loupe()
         assert view._loupe.isVisible()
-        assert not (shown and view._loupe.geometry().intersects(cover.geometry()))
+        assert view._loupe.geometry().intersects(cover.geometry()) is not shown
