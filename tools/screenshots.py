@@ -45,6 +45,7 @@ from app.commands.evaluate import LikePaper, run_evaluate
 from app.commands.options import ConfigOption
 from app.commands.synth import make_set
 from app.operator.preflight import PreflightModel
+from app.operator.preflight_list import PreflightList
 from app.operator.startup import WindowServices
 from app.operator.window import OperatorWindow
 from app.player.window import PlayerWindow
@@ -55,7 +56,6 @@ from app.settings.draft import SettingsDraft
 from app.training.dialog import TrainingDialog, Wish, collect_from_file
 from app.ui import theme
 from app.widgets.basics import Card
-from app.widgets.preflight_list import PreflightList
 from app.widgets.servo_table import ServoTable
 from core.annotation.masks import polygons_of
 from core.annotation.model import Annotation, ImageView, MaskTarget, measure_lines

@@ -7,7 +7,6 @@ except while a text is typed and nothing can move. The threads of gamepad and pe
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from enum import Enum
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
@@ -25,11 +24,12 @@ from PySide6.QtWidgets import (
 
 from app.operator.recording import Recorder
 from app.operator.rig_session import RigSession
-from app.ui.i18n import mark, tr, tr_text
+from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, Undriven
 from app.widgets.alerts import AlertSounds
 from app.widgets.basics import SCROLL_KEYS
 from app.widgets.event_log import LogKind
+from app.widgets.jog_panel import KEYS, Motion
 from core.config.models import Config
 from core.config.safety import JointName
 from core.control.alerts import Alert
@@ -174,33 +174,6 @@ class StopKeys(QObject):
 
 PERIOD_MS = 33
 """A held jog is repeated at this period."""
-
-
-class Motion(Enum):
-    """One direction that can be held."""
-
-    STEER_LEFT = mark("steer left")
-    STEER_RIGHT = mark("steer right")
-    ADVANCE = mark("advance")
-    RETRACT = mark("retract")
-    PITCH_UP = mark("pitch up")
-    PITCH_DOWN = mark("pitch down")
-    DELIVER = mark("sheath forward")
-    WITHDRAW = mark("sheath back")
-    STRAIGHTEN = mark("straighten the head")
-
-
-KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
-    Motion.STEER_LEFT: (Qt.Key.Key_Left, Qt.Key.Key_A),
-    Motion.STEER_RIGHT: (Qt.Key.Key_Right, Qt.Key.Key_D),
-    Motion.ADVANCE: (Qt.Key.Key_Up, Qt.Key.Key_W),
-    Motion.RETRACT: (Qt.Key.Key_Down, Qt.Key.Key_S),
-    Motion.PITCH_UP: (Qt.Key.Key_E,),
-    Motion.PITCH_DOWN: (Qt.Key.Key_Q,),
-    Motion.DELIVER: (Qt.Key.Key_PageUp,),
-    Motion.WITHDRAW: (Qt.Key.Key_PageDown,),
-    Motion.STRAIGHTEN: (Qt.Key.Key_X,),
-}
 _MOTION_OF_KEY = {key: motion for motion, keys in KEYS.items() for key in keys}
 _BY_PLACE = {
     24: Qt.Key.Key_Q, 25: Qt.Key.Key_W, 26: Qt.Key.Key_E, 38: Qt.Key.Key_A, 39: Qt.Key.Key_S, 40: Qt.Key.Key_D, 53: Qt.Key.Key_X,

@@ -20,6 +20,7 @@ from app.annotator.sources import default_store
 from app.operator.engine_thread import EnginePhase
 from app.operator.models import ModelMenu
 from app.operator.preflight import PreflightModel
+from app.operator.preflight_list import PreflightList
 from app.operator.recording import AfterSession, Declined, RecoveryController, open_file
 from app.operator.rig_session import StopOutcome
 from app.operator.window import OperatorWindow
@@ -30,7 +31,6 @@ from app.ui.i18n import tr
 from app.ui.texts import OperatorStep
 from app.ui.window_base import check_display, make_application, run_until_closed
 from app.widgets.messages import Offer, OfferButton
-from app.widgets.preflight_list import PreflightList
 from core.config.files import settings_of_windows
 from core.config.models import Config, sessions_folder
 from core.control.modes import ARMED_MODES, Mode

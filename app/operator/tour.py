@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from app.operator.manual_drive import KEYS, Motion
 from app.operator.panels import OperatorPanels
 from app.ui.actions import key_name
 from app.ui.i18n import tr
 from app.ui.texts import DEADMAN_KEY, STOP_KEY, OperatorStep
+from app.widgets.jog_panel import KEYS, Motion
 from app.widgets.tour_overlay import TourStop
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Signal
+from enum import Enum
+
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QComboBox, QGridLayout, QVBoxLayout, QWidget
 
-from app.operator.manual_drive import Motion
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.texts import tip
@@ -29,6 +30,32 @@ from core.config.safety import ServosConfig
 from core.control.motion import JogSpeeds, hand_speeds
 from core.types import RobotStatus
 
+
+class Motion(Enum):
+    """A motion of the robot that lasts as long as a key is held."""
+
+    STEER_LEFT = mark("steer left")
+    STEER_RIGHT = mark("steer right")
+    ADVANCE = mark("advance")
+    RETRACT = mark("retract")
+    PITCH_UP = mark("pitch up")
+    PITCH_DOWN = mark("pitch down")
+    DELIVER = mark("sheath forward")
+    WITHDRAW = mark("sheath back")
+    STRAIGHTEN = mark("straighten the head")
+
+
+KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
+    Motion.STEER_LEFT: (Qt.Key.Key_Left, Qt.Key.Key_A),
+    Motion.STEER_RIGHT: (Qt.Key.Key_Right, Qt.Key.Key_D),
+    Motion.ADVANCE: (Qt.Key.Key_Up, Qt.Key.Key_W),
+    Motion.RETRACT: (Qt.Key.Key_Down, Qt.Key.Key_S),
+    Motion.PITCH_UP: (Qt.Key.Key_E,),
+    Motion.PITCH_DOWN: (Qt.Key.Key_Q,),
+    Motion.DELIVER: (Qt.Key.Key_PageUp,),
+    Motion.WITHDRAW: (Qt.Key.Key_PageDown,),
+    Motion.STRAIGHTEN: (Qt.Key.Key_X,),
+}
 _LINE_PX, _BETWEEN_PX, _SMALLEST_PX = 17, 6, 10
 
 

@@ -8,12 +8,12 @@ from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QMouseEvent, QPainter
 from PySide6.QtWidgets import QMainWindow, QWidget
 
-from app.operator.manual_drive import KEYS
 from app.ui import theme
 from app.ui.actions import KeyTable, key_names, menu_tables, shown
 from app.ui.i18n import mark, tr
 from app.ui.texts import DEADMAN_KEY
 from app.widgets.basics import OnResize
+from app.widgets.jog_panel import KEYS
 from app.widgets.painting import PaintedWidget, draw_box, draw_text, text_width
 
 _MOST_WIDTH, _EDGE, _GUTTER = 1280, 28, 22

@@ -14,8 +14,8 @@ from pytestqt.qtbot import QtBot
 from tests.app.widgets.test_servo_widgets import bus
 
 from app.operator.engine_thread import EnginePhase
-from app.operator.manual_drive import Motion
 from app.operator.window import OperatorWindow
+from app.widgets.jog_panel import Motion
 from core.config.models import Config
 from core.control.alerts import ALERTS, Alert
 from core.control.drive_view import DriveView

@@ -11,8 +11,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QSpinBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.operator.manual_drive import KEYS, PERIOD_MS, REPEAT_MS, DeadmanKey, JogKeys, Motion
+from app.operator.manual_drive import PERIOD_MS, REPEAT_MS, DeadmanKey, JogKeys
 from app.settings.fields import NumberEdit
+from app.widgets.jog_panel import KEYS, Motion
 from core.config.safety import SafetyConfig
 from core.control.motion import AT_REST, Jog
 

@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.operator.preflight import KEPT_S, PreflightModel, live_findings
+from app.operator.preflight_list import PreflightList
 from app.operator.window import OperatorWindow
 from app.ui.texts import OperatorStep
 from app.ui.workers import module_of
-from app.widgets.preflight_list import PreflightList
 from core.config.models import Config
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault

@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from app.operator.preflight import PreflightModel
+from app.operator.preflight_list import PreflightList
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
 from app.settings.dialog import SettingsDialog
@@ -33,7 +34,6 @@ from app.settings.draft import SettingsDraft
 from app.training.dialog import TrainingDialog, TrainingPhase, TrainingState
 from app.ui import theme
 from app.widgets.messages import Offer, OfferButton, OfferStrip
-from app.widgets.preflight_list import PreflightList
 from core.config.files import Profiles
 from core.config.models import Config, load_config
 from core.control.drive_view import DriveView

@@ -35,10 +35,10 @@ from pytestqt.qtbot import QtBot
 from app.annotator.canvas import CANVAS_KEYS
 from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
-from app.operator.manual_drive import KEYS
 from app.player.window import PlayerWindow
 from app.ui.actions import ICON, KEY_HINT, MenuEntry, add_menu, key_name, key_names, menu_tables, mnemonic, plain, program_version
 from app.ui.texts import STOP_KEY, OperatorStep
+from app.widgets.jog_panel import KEYS
 from app.widgets.scene_overlay import Layer
 from core.annotation.model import ImageView
 from core.annotation.store import AnnotationStore, ItemKey, find_images

@@ -7,8 +7,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
-from app.operator.manual_drive import Motion
-from app.widgets.jog_panel import JogPanel
+from app.widgets.jog_panel import JogPanel, Motion
 from app.widgets.mode_bar import MouseHeld
 from core.config.models import JogConfig
 from core.config.safety import ServosConfig
