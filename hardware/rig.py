@@ -85,10 +85,7 @@ def open_rig(config: Config, ahead: PrestartedProcesses | None = None) -> Rig:
 
     `ahead` is what ``start_ahead`` gave, perhaps for another rig than this one.
 
-    Raises
-    ------
-    DeviceError, RigFileError
-        With one line that says what to do.
+    Raises DeviceError, RigFileError: with one line that says what to do.
     """
     with ExitStack() as unused:
         if ahead is not None:
@@ -298,10 +295,7 @@ def rig_config(
     source : a recording, file or folder of pictures, instead of a rig.
     own : settings of the user, over the defaults.
 
-    Raises
-    ------
-    UserError
-        For contradicting or unknown names; DeviceError for a source that cannot be read.
+    Raises UserError: for contradicting or unknown names; DeviceError for a source that cannot be read.
     """
     if rig is not None and source is not None:
         raise UserError("--source is looked at instead of a rig's camera: leave --rig out")

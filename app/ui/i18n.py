@@ -183,7 +183,6 @@ FIXED = (
     "check the pedal's power and firmware, then plug it in again",
     "set record.folder to one that can be written",
     "check the disk, or set record.folder",
-    "restart the computer; in a virtual machine check its clock source",
     "restore the model folder, or set perception.segmentation.model to another one",
     "train it with the twin's frames too, or choose another model",
     "plug the USB adapter in, or set servos.port (ls /dev/serial/by-id)",

@@ -121,10 +121,7 @@ class CalibrationBench:
 def open_bench(config: Config, perceive: Perceive) -> CalibrationBench:
     """Open the camera and, in the twin, its servos' port.
 
-    Raises
-    ------
-    DeviceError
-        With one line that says what to do; all is closed again.
+    Raises DeviceError: with one line that says what to do; all is closed again.
     """
     kind = kind_of(config.rig)
     if kind is RigKind.PLAYBACK:

@@ -166,10 +166,7 @@ class RigDraft:
     def search_servos(self, bauds: Sequence[int] | None = None) -> FoundServos:
         """Find the servos on the bench's port, and take over their speed and model.
 
-        Raises
-        ------
-        DeviceError
-            No port, nobody answers, or not seven of one model.
+        Raises DeviceError: no port, nobody answers, or not seven of one model.
         """
         servos = self.servos
         assert servos.port is not None

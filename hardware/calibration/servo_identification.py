@@ -163,12 +163,8 @@ def find_zeros(bench: ServoBench, servos: ServosConfig, say: Say) -> Zeros:
 
     A tendon that cannot be told is left where it was, and named in ``problems``.
 
-    Raises
-    ------
-    ServoError
-        Strained, stopped, or the bus is not in order: nothing goes on.
-    DeviceError
-        The camera is lost; the pair of tendons in hand is as it was.
+    Raises ServoError: strained, stopped, or the bus is not in order: nothing goes on; DeviceError: the camera is lost; the pair of
+    tendons in hand is as it was.
     """
     slack: dict[str, float] = dict.fromkeys(TENDONS, 0.0)
     problems = []

@@ -277,14 +277,7 @@ class ServoProbe:
     def move_to(self, target_mm: float) -> None:
         """Go there at the probe's speed, and wait until it is there.
 
-        Raises
-        ------
-        ProcedureStopped
-            STOP came; the servos hold.
-        Strained
-            Too much current; the torque is off.
-        ProbeFailed
-            The bus stopped the servo, or it does not get there.
+        Raises ProcedureStopped (STOP came; the servos hold), Strained (too much current; the torque is off), ProbeFailed.
         """
         target_mm = max(self._limits.low_mm, min(self._limits.high_mm, target_mm))
         until_s = time.monotonic() + abs(target_mm - self.position_mm) / self._limits.speed_mm_s + _EXTRA_S

@@ -327,10 +327,7 @@ class CameraFeed:
         ----------
         alive : called again and again while waiting; what it raises ends the wait.
 
-        Raises
-        ------
-        DeviceError
-            They do not come in time, or the camera is lost.
+        Raises DeviceError: they do not come in time, or the camera is lost.
         """
         since_s = time.monotonic()
         while True:

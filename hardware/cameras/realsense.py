@@ -80,10 +80,7 @@ def describe_device(device: Any) -> RealSenseInfo:
 def find_cameras(context: Any = None) -> list[RealSenseInfo]:
     """RealSense cameras that are plugged in and may be opened; takes a millisecond without one.
 
-    Raises
-    ------
-    DeviceError
-        When the library itself cannot look.
+    Raises DeviceError: when the library itself cannot look.
     """
     try:
         return [describe_device(device) for device in (context or rs.context()).query_devices()]
@@ -282,11 +279,6 @@ class RealSenseRecording:
     @property
     def is_live(self) -> bool:
         return False
-
-    @property
-    def recorded_with(self) -> str:
-        """The camera that it was recorded with."""
-        return describe_device(self._playback).describe() if self._playback is not None else ""
 
     def open(self) -> None:
         self.close()

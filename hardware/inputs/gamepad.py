@@ -262,11 +262,8 @@ def find_gamepad(config: GamepadConfig, *, drives: bool = False) -> tuple[int, s
 
     With `drives` it is locked: one gamepad must not drive the robots of two windows.
 
-    Raises
-    ------
-    GamepadError
-        The configured one is missing or no gamepad; ``GamepadRefused`` when it, or all that there are, is not permitted, in use or
-        has its controls elsewhere.
+    Raises GamepadError: the configured one is missing or no gamepad; ``GamepadRefused`` when it, or all that there are, is not
+    permitted, in use or has its controls elsewhere.
     """
     if config.device is not None:
         return _open(config.device, drives=drives)

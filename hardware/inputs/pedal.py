@@ -94,10 +94,8 @@ class PedalPort:
 def open_pedal_port(config: PedalConfig) -> PedalPort:
     """Open and lock the pedal's port; what has come before is dropped.
 
-    Raises
-    ------
-    PedalPortError
-        None set, missing, not permitted, not a serial port, not this speed; ``PedalPortTaken`` when another program holds it.
+    Raises PedalPortError: none set, missing, not permitted, not a serial port, not this speed; ``PedalPortTaken`` when another
+    program holds it.
     """
     if config.port is None:
         raise PedalPortError("no pedal is configured: set pedal.port to its path in /dev/serial/by-id")

@@ -48,9 +48,7 @@ def one_line(text: object, limit: int = 300) -> str:
 
 _CORES, _MEMORY_GB, _FREE_GB = 2, 3.5, 1.0
 """What the program needs at least."""
-_CLOCK_TOLERANCE, _CLOCK_WATCHED_S = 0.02, 0.05
 _BUILT_IN_YEAR = 2025
-WRONG_DATE = "the date is wrong"
 
 
 def _memory_gb() -> tuple[float, float]:
@@ -97,46 +95,16 @@ def check_disk(config: RecordConfig, usage: Callable[[Path], tuple[int, int, int
     return Check(name, True, detail)
 
 
-def check_clock(
-    monotonic: Callable[[], float] = time.monotonic,
-    reference: Callable[[], float] = time.perf_counter,
-    wall: Callable[[], float] = time.time,
-    watched_s: float = _CLOCK_WATCHED_S,
-) -> Check:
-    """The monotonic clock runs at the right rate, never backwards; the date can be true."""
-    name, advice = "clock", "restart the computer; in a virtual machine check its clock source"
-    # Each reading between two of the other clock: a process can stand still in between, and no clock is at fault then.
-    began_after, began, began_before = reference(), monotonic(), reference()
-    before = now = began
-    while reference() - began_before < watched_s:
-        now = monotonic()
-        if now < before:
-            return Check(name, False, f"the monotonic clock went back by {1e6 * (before - now):.0f} us", advice)
-        before = now
-    ended_after, ended, ended_before = reference(), monotonic(), reference()
-    at_least, at_most = (ended - began) / (ended_before - began_after), (ended - began) / (ended_after - began_before)
-    if at_most < 1.0 - _CLOCK_TOLERANCE or at_least > 1.0 + _CLOCK_TOLERANCE:
-        rate = at_most if at_most < 1.0 else at_least
-        return Check(name, False, f"the monotonic clock runs at {rate:.3f} of the real rate", advice)
+def check_clock(wall: Callable[[], float] = time.time) -> Check:
+    """The date can be true: sessions are named by it. Ages and time limits go by the monotonic clock."""
     date = time.gmtime(wall())
     detail = f"monotonic, now {time.strftime('%Y-%m-%d %H:%M', date)} UTC"
     if date.tm_year < _BUILT_IN_YEAR:
-        return Check(name, False, f"{detail}: {WRONG_DATE}, and sessions are named by it", "sudo timedatectl set-ntp true")
-    return Check(name, True, detail)
+        return Check("clock", False, f"{detail}: the date is wrong, and sessions are named by it", "sudo timedatectl set-ntp true")
+    return Check("clock", True, detail)
 
 
 LOCK = Path(__file__).resolve().parents[2] / "requirements.lock"
-
-PIN_REASONS = {
-    "pyrealsense2": "the last version that knows the L515",
-    "pyside6-essentials": "others leak on every signal or paint, and abort",
-    "shiboken6": "must be PySide6's own version",
-    "dynamixel-sdk": "versions before 4.0.5 leave stale input in the port",
-    "opencv-python-headless": "the build without a Qt of its own that would clash with PySide6",
-    "torch": "what the models were trained and tested with",
-    "openvino": "what the eight-bit network was tested with",
-}
-"""Why these must not simply be another version; ``requirements.lock`` says it at length."""
 
 _REMOVED = {"openvino-telemetry"}
 """Pinned because openvino asks for it, and removed by set-up because it reports over the network."""
@@ -187,8 +155,7 @@ def check_packages(lock: Path = LOCK, installed: Callable[[str], str] = metadata
         except metadata.PackageNotFoundError:
             found = ""
         if found != pin and not (name in _REMOVED and not found):
-            reason = PIN_REASONS.get(re.sub(r"[-_.]+", "-", name).lower(), "")
-            wrong.append(f"{name} {found or 'missing'} instead of {pin}" + (f" ({reason})" if reason else ""))
+            wrong.append(f"{name} {found or 'missing'} instead of {pin}")
     if wrong:
         return Check("packages", False, "; ".join(wrong), "rm -f .venv/.ready && make setup")
     return Check("packages", True, f"{len(pins) - len(_REMOVED & set(pins))} as pinned")
@@ -240,21 +207,13 @@ def _binaries() -> list[tuple[str, Path | None]]:
     return found
 
 
-def _is_packaged(library: str) -> bool:
-    """Whether an installed Python package brings this file, so that no package of the system could."""
-    return any(file.name == library for package in metadata.distributions() for file in package.files or [])
-
-
 def check_binaries(
-    binaries: Iterable[tuple[str, Path | None]] | None = None,
-    load: Callable[[Path], str] = load_elsewhere,
-    is_packaged: Callable[[str], bool] = _is_packaged,
+    binaries: Iterable[tuple[str, Path | None]] | None = None, load: Callable[[Path], str] = load_elsewhere
 ) -> Check:
     """The vendors' own libraries with all that they need in turn."""
     name = "vendor libraries"
-    problems, fine = [], []
-    packages: dict[str, None] = {}
-    unknown, is_damaged = "", False
+    problems, fine, packages = [], [], []
+    is_damaged = False
     for title, path in _binaries() if binaries is None else binaries:
         problem = load(path) if path is not None else "is not installed"
         if not problem:
@@ -262,19 +221,14 @@ def check_binaries(
             continue
         problems.append(f"{title}: {problem}")
         needed = re.search(r"(lib[\w.+-]+?\.so[.\d]*): cannot open shared object", problem)
-        if needed and (package := LIBRARIES.get(needed[1])):
-            packages[package] = None
-        elif needed and not is_packaged(needed[1]):
-            unknown = unknown or needed[1]
-        else:
+        if needed and needed[1] in LIBRARIES:
+            packages.append(LIBRARIES[needed[1]])
+        else:  # a damaged file, or one of an installed package
             is_damaged = True
     if not problems:
         return Check(name, True, f"{', '.join(fine)} can be loaded")
-    commands = [f"sudo apt-get install --yes --no-install-recommends {' '.join(packages)}"] if packages else []
-    commands += [RENEW] if is_damaged else []
-    fixes = [" && ".join(commands)] if commands else []
-    fixes += [f"find and install the package of {unknown}: apt-file search {unknown}"] if unknown else []
-    return Check(name, False, "; ".join(problems), "; ".join(fixes))
+    install = f"sudo apt-get install --yes --no-install-recommends {' '.join(dict.fromkeys(packages))}"
+    return Check(name, False, "; ".join(problems), " && ".join([install] * bool(packages) + [RENEW] * is_damaged))
 
 
 OF_THE_PROGRAM: tuple[Callable[[], Check], ...] = (check_python, check_packages, check_libraries, check_binaries)

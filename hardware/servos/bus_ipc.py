@@ -26,6 +26,7 @@ from core.config.safety import JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Joints
+from core.control.robot import SentMotion
 from core.types import Command
 from hardware.processes import MESSAGE_BYTES, DeviceProcess, ParentLink, SharedSlot
 from hardware.servos import dynamixel_port
@@ -85,6 +86,18 @@ class IssuedGoals:
     def kept(self) -> IssuedGoals:
         """The same while nothing new is written: these goals stay, and nothing moves."""
         return replace(self, motion=Command(self.motion.bend, self.motion.pitch), order=None)
+
+    def sent_motion(self, cycle: int, rejection: Rejection | None, at_end: tuple[JointName, ...]) -> SentMotion:
+        """What the pilot is told of it."""
+        return SentMotion(
+            cycle=cycle,
+            time_s=self.time_s,
+            motion=self.motion,
+            source=self.order.source if self.order is not None and self.order.command is not None else None,
+            captured_s=self.order.captured_s if self.order is not None else None,
+            rejection=rejection.reason if rejection is not None else None,
+            at_end=at_end,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,10 +210,7 @@ class BusClient:
     ----------
     prestarted : a process from ``start_bus``; without one, or when it has died meanwhile, one is started.
 
-    Raises
-    ------
-    BusProcessLost
-        When the process cannot be started.
+    Raises BusProcessLost: when the process cannot be started.
     """
 
     def __init__(self, servos: ServosConfig, safety: SafetyConfig, prestarted: DeviceProcess | None = None) -> None:
@@ -262,12 +272,8 @@ class BusClient:
     def request(self, what: str, timeout_s: float, **details: Any) -> None:
         """Have the bus process do something, and wait for it.
 
-        Raises
-        ------
-        ServoError
-            What kept it from being done, of the type that it had there.
-        BusProcessLost
-            The process is gone, or did not answer in time.
+        Raises ServoError: what kept it from being done, of the type that it had there; BusProcessLost: the process is gone, or did
+        not answer in time.
         """
         with self._requesting:
             self._request_id += 1

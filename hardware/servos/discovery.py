@@ -69,12 +69,7 @@ def find_servos(
     say : told what is being tried.
     check_stop : called in between; may raise to end the search.
 
-    Raises
-    ------
-    PortError
-        The port is missing, not permitted, in use, or no serial port.
-    NoAnswer
-        No servo answers at any speed.
+    Raises PortError: the port is missing, not permitted, in use, or no serial port; NoAnswer: no servo answers at any speed.
     """
     answered: dict[int, tuple[FoundServo, ...]] = {}
     for baud in bauds:

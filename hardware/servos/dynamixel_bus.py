@@ -63,10 +63,7 @@ class ServoIdentity:
 def identify(line: ServoLine, config: ServosConfig) -> tuple[ServoIdentity, ...]:
     """Ping all seven and compare them with the configuration.
 
-    Raises
-    ------
-    NoAnswer, WrongServo
-        Naming the servo. After a silence of all seven the line may have been closed.
+    Raises NoAnswer, WrongServo: naming the servo. After a silence of all seven the line may have been closed.
     """
     models = {joint.id: line.ping(joint.id) for joint in config.joints}
     for _ in range(2):
@@ -171,12 +168,8 @@ class ServoBus:
 
         A servo whose torque is on is not set up, which takes the torque off: it may hold a wire. ``arm`` does it.
 
-        Raises
-        ------
-        PortError, PortTaken
-            The port cannot be opened.
-        NoAnswer, WrongServo
-            A servo is missing, or not the one that the configuration names. The port is closed again.
+        Raises PortError, PortTaken: the port cannot be opened; NoAnswer, WrongServo: a servo is missing, or not the one that the
+        configuration names. The port is closed again.
         """
         self._line.open()
         self._reset()
@@ -206,11 +199,7 @@ class ServoBus:
     def set_zero(self, names: Sequence[JointName] | None = None) -> None:
         """The present positions become zero, of all joints or of those named. Tendons must be without tension there.
 
-        Raises
-        ------
-        NotReady
-            When armed: goals would jump. When a servo holds and counts otherwise than it will when it is set up.
-        NoAnswer
+        Raises NoAnswer, and NotReady: when armed, as goals would jump, and when a servo holds in a mode of another program.
         """
         if self.is_armed:
             raise NotReady("the servos are armed: disarm before zeroing")
@@ -233,12 +222,9 @@ class ServoBus:
 
         Raises
         ------
-        NotReady
-            A joint has no zero, has lost it by a restart, or a servo reports a hardware error.
-        WrongServo, NoAnswer, WriteRefused
-            Before the torque is touched: a servo is missing or another one. Later, the torque of all servos is off again.
-        TorqueStillOn
-            It could not be switched on everywhere, nor proven to be off again.
+        NotReady : a joint has no zero, has lost it by a restart, or a servo reports a hardware error.
+        WrongServo, NoAnswer, WriteRefused : before the torque is touched; later, the torque of all servos is off again.
+        TorqueStillOn : it could not be switched on everywhere, nor proven to be off again.
         """
         self._armed = False
         self._check_ready()
@@ -303,12 +289,7 @@ class ServoBus:
 
         No servo answers: ``ServoState.goal_mm`` of the next read tells what was taken.
 
-        Raises
-        ------
-        NotReady
-            When not armed.
-        ValueError
-            When a goal is not finite or beyond what a servo counts; nothing is sent.
+        Raises NotReady: when not armed; ValueError: when a goal is not finite or beyond what a servo counts; nothing is sent.
         """
         if not self.is_armed:
             raise NotReady("the servos are not armed: zero and arm them first")
@@ -343,12 +324,7 @@ class ServoBus:
     def let_go(self) -> None:
         """``torque_off`` on a closed bus that cannot be opened because not all seven answer: those that hear it obey.
 
-        Raises
-        ------
-        PortError, PortTaken
-            The port cannot be opened.
-        TorqueStillOn
-            When a servo still has torque, or does not tell.
+        Raises PortError, PortTaken: the port cannot be opened; TorqueStillOn: when a servo still has torque, or does not tell.
         """
         self._line.open()
         try:

@@ -136,10 +136,7 @@ class LockedPort(PortHandler):  # type: ignore[misc]
 
         pyserial's own write waits for ever, or with a time limit takes a stall of this process for a stuck port.
 
-        Raises
-        ------
-        OSError
-            When the port is gone, or does not take the packet whole though its buffer has room for many.
+        Raises OSError: when the port is gone, or does not take the packet whole though its buffer has room for many.
         """
         written = os.write(self.ser.fileno(), bytes(packet))
         if written != len(packet):
@@ -251,10 +248,7 @@ class ServoLine:
     def open(self) -> None:
         """Open and lock the port.
 
-        Raises
-        ------
-        PortError
-            Missing, not permitted, not a serial port, not this speed; ``PortTaken`` when another program holds it.
+        Raises PortError: missing, not permitted, not a serial port, not this speed; ``PortTaken`` when another program holds it.
         """
         self.close()
         port = LockedPort(self.port)

@@ -144,16 +144,7 @@ class LockStepServos:
         sent = self._guard.sent
         if sent is None or not self._guard.armed:
             return None
-        order, rejection = sent.order, self._guard.rejection
-        return SentMotion(
-            cycle=self._cycle,
-            time_s=sent.time_s,
-            motion=sent.motion,
-            source=order.source if order is not None and order.command is not None else None,
-            captured_s=order.captured_s if order is not None else None,
-            rejection=rejection.reason if rejection is not None else None,
-            at_end=self._guard.at_end,
-        )
+        return sent.sent_motion(self._cycle, self._guard.rejection, self._guard.at_end)
 
     def kept_back(self) -> Rejection | None:
         return self._guard.rejection if self._guard.armed and self._guard.sent is None else None

@@ -84,10 +84,7 @@ class ServoRobot:
     def connect(self) -> None:
         """Start the bus process, open and lock the port, check all servos. Nothing moves, and nothing is armed.
 
-        Raises
-        ------
-        ServoError
-            What is wrong with port or servos; all is closed again.
+        Raises ServoError: what is wrong with port or servos; all is closed again.
         """
         closes = self._closes
         self._disconnect()
@@ -120,10 +117,7 @@ class ServoRobot:
     def arm(self) -> None:
         """Torque on, each servo holding where it stands; from now on the permitted source's orders are followed.
 
-        Raises
-        ------
-        NotReady
-            With all reasons: not zeroed, a fault that was not acknowledged or is still there.
+        Raises NotReady: with all reasons: not zeroed, a fault that was not acknowledged or is still there.
         """
         try:
             self._connected().request("arm", _ARM_S)
@@ -193,12 +187,8 @@ class ServoRobot:
         Command
             The motion that really left the gate in the newest cycle of the bus, not more than a cycle before this order.
 
-        Raises
-        ------
-        ValueError
-            When a number is not finite; the order before stays.
-        BusProcessLost
-            Not connected, or the bus process is gone.
+        Raises ValueError: when a number is not finite; the order before stays; BusProcessLost: not connected, or the bus process
+        is gone.
         """
         if not all(math.isfinite(number) for number in (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s)):
             raise ValueError(f"command is not finite: {command}")
@@ -281,16 +271,7 @@ class ServoRobot:
         sent = self._sent(status)
         if status is None or sent is None:
             return None
-        order = sent.order
-        return SentMotion(
-            cycle=status.cycle,
-            time_s=sent.time_s,
-            motion=sent.motion,
-            source=order.source if order is not None and order.command is not None else None,
-            captured_s=order.captured_s if order is not None else None,
-            rejection=status.rejection.reason if status.rejection is not None else None,
-            at_end=status.at_end,
-        )
+        return sent.sent_motion(status.cycle, status.rejection, status.at_end)
 
     def _sent(self, status: BusStatus | None) -> IssuedGoals | None:
         if status is None or status.sent is None or not status.armed or self.failure is not None:

@@ -81,10 +81,7 @@ class RemoteTwin:
     ----------
     prestarted : a process from ``start_twin``; without one, or when it has died meanwhile, one is started.
 
-    Raises
-    ------
-    DeviceError
-        When it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
+    Raises DeviceError: when it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
 
     def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
@@ -111,13 +108,7 @@ class RemoteTwin:
         return {}
 
     def read(self, timeout_s: float) -> Frame | None:
-        """The newest frame, waiting at most `timeout_s` for one that was not given yet.
-
-        Raises
-        ------
-        DeviceError
-            The process is gone.
-        """
+        """The newest frame, waiting at most `timeout_s` for one that was not given yet. Raises DeviceError: the process is gone."""
         until_s = time.monotonic() + timeout_s
         while True:
             found = self._frames.newest()
@@ -234,10 +225,7 @@ class JointsToTwin:
 def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
     """The servos as they really are: as the twin's wiring says, whatever the program believes of them.
 
-    Raises
-    ------
-    ValueError
-        When two servos have the same id, or one has none.
+    Raises ValueError: when two servos have the same id, or one has none.
     """
     if twin.wiring is None:
         return servos

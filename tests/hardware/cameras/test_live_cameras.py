@@ -434,7 +434,6 @@ def _until_the_end(recording: RealSenseRecording) -> list[Frame | None]:
 def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
     recording = RealSenseRecording(bag, paced=False)
     recording.open()
-    assert recording.recorded_with == "Intel RealSense L515 f1, firmware 1.5.8.1, USB 3.2"
     frames = _until_the_end(recording)
     assert [frame.index for frame in frames if frame] == list(range(60))
     for frame in frames:
