@@ -36,10 +36,10 @@ from hardware.servos.discovery import BAUDS, FoundServos, find_servos
 from hardware.servos.dynamixel_port import ServoError
 
 _NOTICEABLE_PX = 1.0
-"""A lens that moves nothing farther than this in a picture 640 px wide is left alone: straightening costs a millisecond a frame."""
+"""A lens that moves nothing by more than this in a picture 640 px wide is ignored: undistorting costs a millisecond a frame."""
 
 _BOARD_MISSES = 6
-"""So many looks in a row without the board, three seconds: who only lays a hand on it must not find that things begin to move."""
+"""Pictures in a row without the board, three seconds: a hand laid on it must not start the servos."""
 _BOARD_LOOK_S, _BOARD_GONE_WITHIN_S = 0.5, 180.0
 
 Say = Callable[[str], object]
@@ -53,7 +53,7 @@ class RigDraft:
 
     Parameters
     ----------
-    bench : open; whoever opened it closes it.
+    bench : open; the caller closes it.
     config : the configuration to start from, with the rig's camera and servos.
     known : what was calibrated earlier, and stays where nothing new is found.
     """
@@ -78,7 +78,8 @@ class RigDraft:
         self.notes: list[str] = []
         self._is_displaced = False
         self._nudged: set[str] = set()
-        self._head_px: Point | None = None
+        self.head_px: Point | None = None
+        """Where the head was when the steering was learnt; None when it was not, or in an earlier calibration."""
         self._begun_with = self._findings()
         bench.set_lens(self.lens)
 
@@ -107,11 +108,11 @@ class RigDraft:
         return image, view
 
     def forget_boards(self) -> None:
-        """Begin anew."""
+        """Drop the pictures taken."""
         self.views.clear()
 
     def wait_for_no_board(self, within_s: float = _BOARD_GONE_WITHIN_S) -> None:
-        """Until the board is out of sight: no robot is seen under it. Raises BoardError when nobody takes it away."""
+        """Until the board is out of sight: no robot is seen under it. Raises BoardError when it stays."""
         ends_s, misses, is_told = time.monotonic() + within_s, 0, False
         while misses < _BOARD_MISSES:
             try:
@@ -133,7 +134,9 @@ class RigDraft:
             raise LensError("no picture of the board was taken yet")
         size = self._picture_size()
         lens = fit_lens(self.views, size)
-        bent_px = _most_bent_px(lens)
+        width, height = lens.size_px
+        border = np.array([(x, y) for x in (0.0, (width - 1) / 2, width - 1.0) for y in (0.0, (height - 1) / 2, height - 1.0)])
+        bent_px = float(np.hypot(*(distort(border, lens) - border).T).max())
         straight: Sequence[BoardView] = self.views
         if bent_px * 640.0 / max(size) > _NOTICEABLE_PX:
             self.lens = lens
@@ -144,16 +147,16 @@ class RigDraft:
             self.say(f"lens: straight enough ({bent_px:.1f} px at the border)")
         self.scale = scale_of_board(straight, size)
         self.bench.set_lens(self.lens)
-        self._tell_scale()
+        self._say_scale()
         return self.lens, self.scale
 
     def solve_clicks(self, first: Point, second: Point, length_mm: float) -> ScaleConfig:
         """The scale from two places of the (straightened) picture that are so far apart; raises ScaleError."""
         self.scale = scale_of_clicks(first, second, length_mm, self._picture_size())
-        self._tell_scale()
+        self._say_scale()
         return self.scale
 
-    def _tell_scale(self) -> None:
+    def _say_scale(self) -> None:
         assert self.scale is not None
         self.say(f"scale: {self.scale.mm_per_px:.4f} mm/px, \N{PLUS-MINUS SIGN}{100 * self.scale.uncertainty_share:.2f} %")
 
@@ -166,7 +169,7 @@ class RigDraft:
     def search_servos(self, bauds: Sequence[int] | None = None) -> FoundServos:
         """Find the servos on the bench's port, and take over their speed and model.
 
-        Raises DeviceError: no port, nobody answers, or not seven of one model.
+        Raises DeviceError: no port, no answer, or not seven of one model.
         """
         servos = self.servos
         assert servos.port is not None
@@ -194,7 +197,7 @@ class RigDraft:
         return found
 
     def wiggle(self, servo_id: int) -> None:
-        """Turn one servo both ways, for somebody who watches."""
+        """Turn one servo both ways, for the operator to watch."""
         with self._moving():
             servo_identification.wiggle(self.bench, self.servos, self._ids(), servo_id)
 
@@ -230,13 +233,13 @@ class RigDraft:
 
     @property
     def assumed(self) -> tuple[JointName, ...]:
-        """Joints whose servos nobody has told apart: the order of their ids decided."""
+        """Joints whose servos were not told apart: the order of their ids decided."""
         if not self.assignments:
             return self._assumed_earlier or ()
         return tuple(one.name for one in self.assignments if one.assumed)
 
     def confirm(self) -> None:
-        """Somebody has looked: what was assumed is right."""
+        """The operator has looked: what was assumed is right."""
         self.set_assignments([replace(one, seen="seen by eye", assumed=False) if one.assumed else one for one in self.assignments])
 
     def set_assignments(self, assignments: Sequence[Assignment]) -> None:
@@ -251,15 +254,11 @@ class RigDraft:
         self.assignments = tuple(assignments)
         before = _wiring(self.config.servos)
         self._set_servos(servo_identification.identified(self.servos, assignments))
-        if _wiring(self.config.servos) != before:
-            self._forget_motion()
-
-    def _forget_motion(self) -> None:
-        """What was found out by moving the servos, with others in their places."""
-        had = (self.zero, self.zeros, self.steering)
-        self.zero = self.zeros = self.steering = self._head_px = None
-        if any(one is not None for one in had):
-            self.say("zero and steering were found with the servos in other places: find them anew")
+        if _wiring(self.config.servos) != before:  # what was found by moving the servos was found with others in their places
+            had = (self.zero, self.zeros, self.steering)
+            self.zero = self.zeros = self.steering = self.head_px = None
+            if any(one is not None for one in had):
+                self.say("zero and steering were found with the servos in other places: find them anew")
 
     def find_zeros(self) -> servo_identification.Zeros:
         """Leave every tendon where it just becomes taut."""
@@ -273,7 +272,7 @@ class RigDraft:
         return zeros
 
     def _keep_zero(self) -> None:
-        """Remember where the servos stand, if all tendons are known to be at their zeros: the steering need not be learnt anew."""
+        """Remember where the servos stand, if all tendons are known to be at their zeros: the steering need not be learnt again."""
         if not self.are_zeros_known:
             return
         try:
@@ -295,7 +294,7 @@ class RigDraft:
 
     @contextmanager
     def _moving(self) -> Iterator[None]:
-        """A step that turns servos, and turns them back. After one that was stopped half way nobody knows where the wires are."""
+        """A step that turns servos, and turns them back. After one that was stopped half way the wires' places are unknown."""
         try:
             yield
         except BaseException as error:
@@ -313,23 +312,18 @@ class RigDraft:
         with self._moving():
             learnt = servo_identification.learn_steering(self.bench, self.servos, self.say)
         steering = learnt.steering
-        self.steering, self._head_px = steering, learnt.head_px
+        self.steering, self.head_px = steering, learnt.head_px
         self._set_zero(learnt.zero_ticks)
         self.say(f"steering: roll {steering.roll_deg:+.0f}°, way and heading {steering.disagreement_deg:.1f}° from a right angle")
         return steering
 
     def nudge(self, name: str, way_mm: float) -> None:
-        """Tighten one tendon by so much, or let it go (negative), for somebody who watches."""
+        """Tighten one tendon by so much, or let it go (negative), for the operator to watch."""
         with self._moving():  # a wire that strains lets all of them go
             servo_identification.nudge(self.bench, self.servos, name, way_mm)
             self.zero = None
             self._nudged.add(name)
         self._keep_zero()
-
-    @property
-    def head_px(self) -> Point | None:
-        """Where the head was when the steering was learnt; None when it was not, or earlier."""
-        return self._head_px
 
     def set_pretension(self, pretension_mm: float) -> None:
         """Pull of every tendon at zero bend."""
@@ -367,9 +361,3 @@ class RigDraft:
 def _wiring(servos: ServosConfig) -> tuple[tuple[int, int], ...]:
     """Which servo each joint has, and which way it turns."""
     return tuple((joint.id, joint.sign) for joint in servos.joints)
-
-
-def _most_bent_px(lens: LensConfig) -> float:
-    width, height = lens.size_px
-    border = np.array([(x, y) for x in (0.0, (width - 1) / 2, width - 1.0) for y in (0.0, (height - 1) / 2, height - 1.0)])
-    return float(np.hypot(*(distort(border, lens) - border).T).max())

@@ -1,11 +1,4 @@
-"""A picture, or a folder of pictures, as a camera: each is shown for a moment, the last one stays. Or a folder that is watched.
-
-Pictures as another program puts them into a folder.
-
-A recorded video as a camera, played at its own pace or as fast as it is read.
-
-Frames of a recording at the pace at which they were taken.
-"""
+"""Files as a camera: a folder of pictures (shown one after another, or watched for new ones) and a recorded video."""
 
 from __future__ import annotations
 
@@ -26,17 +19,14 @@ from core.learning.dataset import IMAGE_ENDINGS
 from core.session.video import NoPictures, UndecodablePicture, decoded, open_video, pictures_of, upright
 from core.types import Frame, Image
 
-_LOOK_EVERY_S = 0.05
+_SCAN_EVERY_S = 0.05
 
 _Print = tuple[int, int]
 """Size and time of change of a file."""
 
 
 class FolderWatch:
-    """Tells the newest picture that has come, or was written anew, since the last one it told.
-
-    A file counts when two looks find it the same, so that one that is still being written is not read.
-    """
+    """Finds the newest picture that was written since the last one. A file counts once its size and time have come to rest."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -48,16 +38,16 @@ class FolderWatch:
         self._known, self._growing = self._list(), {}
 
     def next(self, timeout_s: float) -> Image | None:
-        """The newest new picture; older new ones are passed over. None when none came in time."""
+        """The newest new picture; older new ones are skipped. None when none came in time."""
         until_s = time.monotonic() + timeout_s
         while True:
-            image = self._look()
+            image = self._scan()
             left_s = until_s - time.monotonic()
             if image is not None or left_s <= 0.0:
                 return image
-            time.sleep(min(left_s, _LOOK_EVERY_S))
+            time.sleep(min(left_s, _SCAN_EVERY_S))
 
-    def _look(self) -> Image | None:
+    def _scan(self) -> Image | None:
         there = self._list()
         new = {name: stamp for name, stamp in there.items() if self._known.get(name) != stamp}
         whole = [name for name, stamp in new.items() if self._growing.get(name) == stamp]
@@ -67,7 +57,7 @@ class FolderWatch:
             try:
                 return read_image(self._folder / name)
             except ImageError:
-                continue  # no picture after all, or gone again
+                continue  # not a picture, or gone again
         return None
 
     def _list(self) -> dict[str, _Print]:
@@ -162,7 +152,8 @@ F = TypeVar("F")
 
 
 class Pacer(Generic[F]):
-    """Gives each frame when it is due. Late ones are skipped, as from a camera; what decodes too slowly is played slower."""
+    """Gives each frame when it is due. Late ones are skipped, as from a camera; a video that decodes too slowly is played
+    slower."""
 
     def __init__(self) -> None:
         self._start_s: float | None = None
@@ -189,7 +180,7 @@ class Pacer(Generic[F]):
             if late_s >= LATE_S:
                 if left_s > 0.0:
                     continue
-                # Decoding is slower than the recording: it is played as fast as it goes, instead of never.
+                # Decoding is slower than the recording.
                 self._start_s += late_s
             time.sleep(max(-late_s, 0.0))
             return frame, self._start_s + at_s
@@ -202,10 +193,9 @@ _MAY_LACK_S = 1.0
 class VideoFile:
     """A ``Camera`` over a video file.
 
-    With `paced` the frames come at the speed of the recording and late ones are skipped, as from a camera, and damaged ones are
-    lost; without, every frame is given, and for a damaged one DamagedPicture raised, after which the next may be read. A video that
-    decodes slower than it was recorded is played slower. ``captured_s`` is the presentation time from the first frame on, in the
-    clock of the first read when paced, whenever a frame is handed out.
+    With `paced` the frames come at the speed of the recording; late ones are skipped, as from a camera, and damaged ones are lost.
+    Without, every frame is given, and a damaged one raises DamagedPicture, after which the next may be read. ``captured_s`` is the
+    presentation time from the first frame on, in the clock of the first read when paced.
     """
 
     def __init__(self, path: Path, *, paced: bool = True) -> None:
@@ -239,7 +229,7 @@ class VideoFile:
         except NoPictures as error:
             container.close()
             raise DeviceError(f"{self._path}: {error}") from None
-        stream.thread_type = "SLICE"  # with a thread for each frame nobody could say which one is damaged
+        stream.thread_type = "SLICE"  # threads by frame hide which frame is damaged
         self._container, self._frames = container, decoded(container, stream)
 
     def read(self, timeout_s: float) -> Frame | None:
@@ -287,11 +277,7 @@ class VideoFile:
         return frame, at - self._first_s
 
     def _lack(self) -> str:
-        """How much came of what the file says that it holds; empty where all came, or where it says nothing of it.
-
-        A trimmed file still counts the pictures that are not to be shown, but knows its length; of several streams any may be the
-        longest.
-        """
+        """How much came of what the file says that it holds; empty where all came, or where it says nothing of it."""
         assert self._container is not None
         stream = self._container.streams.video[0]
         if stream.duration is not None and stream.time_base is not None:

@@ -1,8 +1,7 @@
-"""A real camera as a ``Camera``: read in a thread of its own, newest frame first, found again by itself when it was lost.
+"""Real cameras: read in a thread of their own, newest frame first, and opened again when they were lost.
 
-When a picture was taken, on the monotonic clock, from whatever clock the camera stamps its pictures with.
-
-A camera read in a thread of its own, for those who look at it now and then: the newest picture, or the next few.
+``LiveCamera`` makes a ``Camera`` of a driver's ``Sensor``; ``CaptureClock`` tells when a picture was taken, from whatever clock the
+camera stamps its pictures with; ``CameraFeed`` reads a ``Camera`` for callers that look now and then.
 """
 
 from __future__ import annotations
@@ -26,14 +25,14 @@ _log = logging.getLogger(__name__)
 _OPEN_WITHIN_S = 20.0
 _FIRST_FRAME_WITHIN_S = 5.0
 """Exposure and laser take a moment to come up."""
-_LOOK_EVERY_S = 0.1
+_READ_S = 0.1
 _LATE_PERIODS = 1.75
 """A frame that comes later than this after the one before has left one out; less is jitter."""
 _END_WITHIN_S = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class SensorFrame:
     """A picture as it comes from a sensor; ``captured_s`` is monotonic, ``number`` the camera's own count (None: it has none)."""
 
     image: Image
@@ -42,7 +41,7 @@ class Shot:
 
 
 class Sensor(Protocol):
-    """What a driver must be able to do. All but ``name`` is called from one thread."""
+    """What a driver must do. All but ``name`` is called from one thread."""
 
     @property
     def name(self) -> str: ...
@@ -50,14 +49,14 @@ class Sensor(Protocol):
     def start(self) -> None:
         """Find the camera and start it, quickly or not at all; raises DeviceError with what to do."""
 
-    def shoot(self, timeout_s: float) -> Shot | None:
+    def read(self, timeout_s: float) -> SensorFrame | None:
         """The newest picture, after at most about `timeout_s`; None when none came. DeviceError: the camera is gone."""
 
     def stop(self) -> None:
-        """Let go of the camera, whatever state it is in. Never fails."""
+        """Release the camera, whatever state it is in. Never fails."""
 
-    def revive(self) -> float:
-        """Reset a camera that was lost while it is still plugged in; returns for how many seconds to leave it alone then."""
+    def reset(self) -> float:
+        """Reset a camera that was lost while it is still plugged in; returns for how many seconds it must rest then."""
 
 
 class LiveCamera:
@@ -65,15 +64,13 @@ class LiveCamera:
 
     ``read`` raises ``CameraLost`` when no picture came for ``lost_after_s`` (five seconds after the start). Meanwhile the camera is
     reset and opened again and again; once it is back, ``read`` gives frames as before, and their index goes on. A ``DeviceError``
-    that is no ``CameraLost`` is for good.
-
-    A driver that hangs in a call of its library does no harm but that: the age is watched from outside its thread.
+    that is no ``CameraLost`` is for good. The age is watched from outside the driver's thread, which may hang in its library.
     """
 
     def __init__(self, sensor: Sensor, config: CameraConfig) -> None:
         self._sensor, self._config = sensor, config
-        self._session: _Session | None = None
-        self._hung: _Session | None = None
+        self._reader: _Reader | None = None
+        self._hung: _Reader | None = None
 
     @property
     def name(self) -> str:
@@ -86,49 +83,49 @@ class LiveCamera:
     @property
     def reconnects(self) -> int:
         """How often the camera came back since it was opened."""
-        return self._session.reconnects if self._session is not None else 0
+        return self._reader.reconnects if self._reader is not None else 0
 
     def open(self) -> None:
         """Start the camera; raises DeviceError when it is not there or does not start."""
         self.close()
-        if self._hung is not None and self._hung.is_alive:
+        if self._hung is not None and self._hung.thread.is_alive():
             raise DeviceError(f"the driver of {self.name} does not return: plug the camera out and in again")
-        self._session = _Session(self._sensor, self._config)
-        self._session.begin()
-        problem = None if self._session.opened.wait(_OPEN_WITHIN_S) else f"{self.name} does not answer: plug it out and in again"
-        problem = problem or self._session.refused
+        self._reader = _Reader(self._sensor, self._config)
+        self._reader.thread.start()
+        problem = None if self._reader.opened.wait(_OPEN_WITHIN_S) else f"{self.name} does not answer: plug it out and in again"
+        problem = problem or self._reader.refused
         if problem is not None:
             self.close()
             raise DeviceError(problem)
 
     def read(self, timeout_s: float) -> Frame | None:
-        session = self._session
-        if session is None:
+        reader = self._reader
+        if reader is None:
             raise DeviceError(f"{self.name} is not open: open it first")
-        frame = session.frames.take(timeout_s)
-        if frame is None and session.died is not None:
-            raise DeviceError(session.died)
-        if frame is None and (problem := session.problem(time.monotonic())) is not None:
+        frame = reader.frames.take(timeout_s)
+        if frame is None and reader.died is not None:
+            raise DeviceError(reader.died)
+        if frame is None and (problem := reader.problem(time.monotonic())) is not None:
             raise CameraLost(problem)
         return frame
 
     def close(self) -> None:
-        session, self._session = self._session, None
-        if session is not None and not session.end():
-            self._hung = session
+        reader, self._reader = self._reader, None
+        if reader is not None and not reader.end():
+            self._hung = reader
 
 
-class _Session:
-    """From ``open`` to ``close``: the thread and what it found. A thread that hangs is left behind with its session."""
+class _Reader:
+    """The thread that reads a sensor from ``open`` to ``close``; one that hangs is left behind."""
 
     def __init__(self, sensor: Sensor, config: CameraConfig) -> None:
         self._sensor, self._config = sensor, config
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
+        self.thread = threading.Thread(target=self._run, name="camera", daemon=True)
         self._lost_after_s = max(config.lost_after_s, 3.0 / config.frames_per_second)
         self._index, self._lost = -1, 0
         self._before: tuple[int | None, float] | None = None
-        self._trouble: str | None = None
+        self._problem: str | None = None
         self._silent_after_s = float("inf")
         self.frames: Latest[Frame] = Latest()
         self.opened = threading.Event()
@@ -136,27 +133,17 @@ class _Session:
         self.died: str | None = None
         self.reconnects = 0
 
-    def begin(self) -> None:
-        self._thread.start()
-
     def end(self) -> bool:
         """False when the driver does not return."""
         self._stop.set()
-        self._thread.join(_END_WITHIN_S)
-        if self.is_alive:
+        self.thread.join(_END_WITHIN_S)
+        if self.thread.is_alive():
             _log.warning("the driver of %s does not return; going on without it", self._sensor.name)
-        return not self.is_alive
-
-    @property
-    def is_alive(self) -> bool:
-        return self._thread.is_alive()
+        return not self.thread.is_alive()
 
     def problem(self, now_s: float) -> str | None:
         """Why there are no frames, as seen from outside the thread; None while all is well."""
-        if self._trouble is not None:
-            return self._trouble
-        late_s = now_s - self._silent_after_s
-        return self._silence() if late_s > 0.0 else None
+        return self._problem or (self._silence() if now_s > self._silent_after_s else None)
 
     def _silence(self) -> str:
         return f"{self._sensor.name} gives no picture: check its cable; it is opened again by itself"
@@ -181,56 +168,52 @@ class _Session:
                 if not self.opened.is_set():
                     self.refused = str(error)
                     return
-                self._trouble = str(error)
+                self._problem = str(error)
             else:
                 self.opened.set()
                 try:
-                    self._follow()
+                    self._read_until_lost()
                 except DeviceError as error:
-                    self._trouble = str(error)
+                    self._problem = str(error)
                 finally:
                     self._sensor.stop()
                 if not self._stop.is_set():
-                    _log.warning("%s", self._trouble)
-                    pause_s = max(pause_s, self._sensor.revive())
+                    _log.warning("%s", self._problem)
+                    pause_s = max(pause_s, self._sensor.reset())
             self._stop.wait(pause_s)
 
-    def _follow(self) -> None:
-        """Until ``end``, or until the camera is lost."""
+    def _read_until_lost(self) -> None:
         self._before = None
         self._silent_after_s = time.monotonic() + _FIRST_FRAME_WITHIN_S
         while not self._stop.is_set():
-            shot = self._sensor.shoot(_LOOK_EVERY_S)
+            found = self._sensor.read(_READ_S)
             if self._stop.is_set():
                 return
             now_s = time.monotonic()
-            if shot is not None and self._take(shot):
+            if found is not None and self._publish(found):
                 self._silent_after_s = now_s + self._lost_after_s
             elif now_s > self._silent_after_s:
                 raise DeviceError(self._silence())
 
-    def _take(self, shot: Shot) -> bool:
+    def _publish(self, found: SensorFrame) -> bool:
         """Count and hand over a picture; False for one that was there already: a camera that repeats itself gives nothing new."""
-        before, self._before = self._before, (shot.number, shot.captured_s)
-        if before is not None and before == self._before:
-            return False
-        self._lost += self._missing(before, shot) if before is not None else 0
-        if self._trouble is not None:
-            self._trouble = None
+        before, self._before = self._before, (found.number, found.captured_s)
+        if before is not None:
+            if before == self._before:
+                return False
+            # Lost frames by the camera's count, which may also go back, or by its rate: in dim light it may slow down and count on.
+            number, captured_s = before
+            by_count = found.number - number - 1 if found.number is not None and number is not None else 0
+            periods = (found.captured_s - captured_s) * self._config.frames_per_second
+            by_rate = round(periods) - 1 if periods > _LATE_PERIODS else 0
+            self._lost += max(0, by_count, by_rate)
+        if self._problem is not None:
+            self._problem = None
             self.reconnects += 1
             _log.warning("%s is back", self._sensor.name)
         self._index += 1
-        self.frames.put(Frame(self._index, shot.captured_s, shot.image, self._lost))
+        self.frames.put(Frame(self._index, found.captured_s, found.image, self._lost))
         return True
-
-    def _missing(self, before: tuple[int | None, float], shot: Shot) -> int:
-        """Frames that are missing between two: by the camera's count, which may also go back, or by its rate."""
-        number, captured_s = before
-        by_count = shot.number - number - 1 if shot.number is not None and number is not None else 0
-        periods = (shot.captured_s - captured_s) * self._config.frames_per_second
-        # A camera that slows down in dim light counts on as if nothing was missing.
-        by_rate = round(periods) - 1 if periods > _LATE_PERIODS else 0
-        return max(0, by_count, by_rate)
 
 
 _BELIEVABLE_S = 0.5
@@ -238,6 +221,7 @@ _BELIEVABLE_S = 0.5
 _STALLED_S = 10.0
 """But of a clock that has proved to be ours, a picture may have waited so long, while the computer was busy."""
 _REMEMBERED = 300
+"""Pictures whose delay is compared."""
 
 
 class CaptureClock:
@@ -261,7 +245,7 @@ class CaptureClock:
         ----------
         arrived_s : monotonic, when the picture came.
         stamp_s : the camera's stamp, in seconds of any clock; None: it has none.
-        now_on_its_clock_s : what that clock showed at the arrival; None: only the camera knows.
+        now_on_its_clock_s : what that clock showed at the arrival; None: unknown.
         """
         captured_s = arrived_s
         age_s = now_on_its_clock_s - stamp_s if stamp_s is not None and now_on_its_clock_s is not None else -1.0
@@ -269,20 +253,15 @@ class CaptureClock:
             self._is_ours = True
             captured_s = arrived_s - age_s
         elif stamp_s is not None:
-            captured_s = stamp_s + self._offset_s(arrived_s, stamp_s)
+            if self._stamp_s is not None and not 0.0 <= stamp_s - self._stamp_s <= 10.0:
+                self._offsets.clear()  # the camera was started again, or its clock was set
+            self._stamp_s = stamp_s
+            self._offsets.append(arrived_s - stamp_s)
+            captured_s = stamp_s + min(self._offsets)
         self._newest_s = max(self._newest_s, min(captured_s, arrived_s))
         return self._newest_s
 
-    def _offset_s(self, arrived_s: float, stamp_s: float) -> float:
-        """From the camera's clock to ours, as the quickest picture had it."""
-        if self._stamp_s is not None and not 0.0 <= stamp_s - self._stamp_s <= 10.0:
-            self._offsets.clear()  # the camera was started again, or its clock was set
-        self._stamp_s = stamp_s
-        self._offsets.append(arrived_s - stamp_s)
-        return min(self._offsets)
 
-
-_READ_S = 0.1
 _KEPT = 30
 _WAIT_S = 0.02
 
@@ -310,7 +289,7 @@ class CameraFeed:
 
     @lens.setter
     def lens(self, lens: LensConfig | None) -> None:
-        """From the next picture on; those from before are forgotten."""
+        """From the next picture on; those from before are dropped."""
         self._camera.lens = lens
         with self._lock:
             self._frames.clear()
@@ -325,7 +304,7 @@ class CameraFeed:
 
         Parameters
         ----------
-        alive : called again and again while waiting; what it raises ends the wait.
+        alive : called while waiting; what it raises ends the wait.
 
         Raises DeviceError: they do not come in time, or the camera is lost.
         """
@@ -350,14 +329,14 @@ class CameraFeed:
         while not self._stop.is_set():
             try:
                 frame = self._camera.read(_READ_S)
-            except CameraLost as error:  # it looks for itself
+            except CameraLost as error:  # it reconnects by itself
                 self.problem = str(error)
                 self._stop.wait(_READ_S)
                 continue
             except DeviceError as error:
                 self.problem = str(error)
                 return
-            except Exception as error:  # noqa: BLE001 - top of the thread: who looks is told
+            except Exception as error:  # noqa: BLE001 - top of the thread
                 _log.exception("the camera feed ended")
                 self.problem = f"{self.name} is no longer read ({type(error).__name__}: {error})"
                 return

@@ -1,9 +1,7 @@
-"""Intel RealSense colour cameras (L515 and others), live.
+"""Intel RealSense colour cameras (L515 and others), live and as recordings (``.bag``).
 
 The colour sensor is driven by itself, not through a pipeline: ``pipeline.start`` without a camera stops the whole interpreter for
 15 seconds, and after an unplug a pipeline restarts itself for as long.
-
-A RealSense recording (``.bag``) as a camera, played at its own pace or as fast as it is read.
 """
 
 from __future__ import annotations
@@ -24,7 +22,7 @@ from core.config.models import CameraConfig
 from core.devices import DeviceError, EndOfStream
 from core.types import Frame, Image
 from hardware.cameras.files import Pacer
-from hardware.cameras.live import CaptureClock, LiveCamera, Shot
+from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
 
 _log = logging.getLogger(__name__)
 
@@ -131,7 +129,7 @@ class RealSenseSensor:
             self.stop()
             raise
 
-    def shoot(self, timeout_s: float) -> Shot | None:
+    def read(self, timeout_s: float) -> SensorFrame | None:
         try:
             came, frame = self._queue.try_wait_for_frame(int(1000 * timeout_s))
             if not came:
@@ -141,7 +139,7 @@ class RealSenseSensor:
             # The other domain, hardware_clock, is the camera's own.
             on_wall = frame.get_frame_timestamp_domain() in {rs.timestamp_domain.system_time, rs.timestamp_domain.global_time}
             captured_s = self._clock.captured_s(arrived_s, stamp_s, wall_s if on_wall else None)
-            return Shot(colour_image(frame), captured_s, int(frame.get_frame_number()))
+            return SensorFrame(colour_image(frame), captured_s, int(frame.get_frame_number()))
         except RuntimeError as error:
             raise DeviceError(f"{self.name} is lost ({_short(error)}): check its cable") from None
 
@@ -153,7 +151,7 @@ class RealSenseSensor:
                     end()
         self._queue = None
 
-    def revive(self) -> float:
+    def reset(self) -> float:
         """Only a camera that is still there can be reset; one that was unplugged starts afresh anyway."""
         device, self._device = self._device, None
         try:
@@ -172,7 +170,7 @@ class RealSenseSensor:
             return chosen[0]
         serials = ", ".join(sorted(_info(device, rs.camera_info.serial_number) for device in devices))
         if devices and self._own_serial is not None:
-            # Another camera's pictures must not take the place of a lost one's: somebody is driving by them.
+            # Another camera's pictures must not take the place of a lost one's: the operator drives by them.
             raise DeviceError(
                 f"{self.name} {wanted} is not there any more (there are: {serials}): plug it in, or start again with another one"
             )
@@ -294,8 +292,7 @@ class RealSenseRecording:
             self._playback.set_real_time(False)
             pipeline.start(config)
         except RuntimeError as error:
-            reason = " ".join(str(error).split())[:120]
-            raise DeviceError(f"{self._path}: cannot be played as a RealSense recording with colour ({reason})") from None
+            raise DeviceError(f"{self._path}: cannot be played as a RealSense recording with colour ({_short(error)})") from None
         self._pipeline = pipeline
 
     def read(self, timeout_s: float) -> Frame | None:
@@ -328,11 +325,11 @@ class RealSenseRecording:
             try:
                 came, frames = self._pipeline.try_wait_for_frames(_WAIT_MS)
             except RuntimeError as error:
-                raise DeviceError(f"{self._path}: cannot be played on ({' '.join(str(error).split())[:120]})") from None
+                raise DeviceError(f"{self._path}: cannot be played on ({_short(error)})") from None
             frame = frames.get_color_frame() if came else None
             if frame:
                 return frame
-            # Nothing came in time: so the end looks, too.
+            # The end looks like this, too.
             ended = ended + 1 if not came and self._playback.current_status() == rs.playback_status.stopped else 0
             if ended == _END_AFTER:
                 raise EndOfStream(f"{self._path}: end of the recording")

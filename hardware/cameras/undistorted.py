@@ -1,4 +1,4 @@
-"""A camera whose lens is known: every picture is straightened where it comes in, so that nobody behind it knows of a lens."""
+"""A camera whose lens is known: every frame is undistorted where it comes in."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from core.types import Frame
 
 
 class UndistortedCamera:
-    """A ``Camera`` over another one. A picture of another aspect, or none at all of the usual kind, is passed on as it is.
+    """A ``Camera`` over another one. A picture of another aspect or type is passed on as it is.
 
-    ``lens`` may be changed between two reads; None: nothing is known, and nothing is done.
+    ``lens`` may be changed between two reads; None: frames are passed on.
     """
 
     def __init__(self, camera: Camera, lens: LensConfig | None) -> None:
@@ -36,18 +36,13 @@ class UndistortedCamera:
 
     def read(self, timeout_s: float) -> Frame | None:
         frame = self._camera.read(timeout_s)
-        return None if frame is None else self.straightened(frame)
+        if frame is None or self.lens is None or frame.image.ndim != 3 or frame.image.dtype != np.uint8:
+            return frame
+        maps = self._maps(self.lens, (frame.image.shape[1], frame.image.shape[0]))
+        return frame if maps is None else replace(frame, image=lenses.straightened(frame.image, *maps))
 
     def close(self) -> None:
         self._camera.close()
-
-    def straightened(self, frame: Frame) -> Frame:
-        """The frame as it would be without the lens."""
-        image, lens = frame.image, self.lens
-        if lens is None or image.ndim != 3 or image.dtype != np.uint8:
-            return frame
-        maps = self._maps(lens, (image.shape[1], image.shape[0]))
-        return frame if maps is None else replace(frame, image=lenses.straightened(image, *maps))
 
     def _maps(self, lens: LensConfig, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray] | None:
         prepared = self._prepared

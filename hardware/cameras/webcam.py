@@ -18,7 +18,7 @@ import numpy as np
 from core.config.models import CameraConfig
 from core.devices import DeviceError
 from hardware.cameras import sysfs
-from hardware.cameras.live import CaptureClock, LiveCamera, Shot
+from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
 
 _log = logging.getLogger(__name__)
 
@@ -34,10 +34,6 @@ _SET_CONTROL, _EXPOSURE_PRIORITY = 0xC008561C, 0x009A0903
 _QUEUE_FRAMES = 2
 
 
-def _open_v4l2(node: str) -> Any:
-    return cv2.VideoCapture(node, cv2.CAP_V4L2)
-
-
 class WebcamSensor:
     """A V4L2 camera.
 
@@ -47,7 +43,7 @@ class WebcamSensor:
     open_capture : makes OpenCV's capture object of a device node.
     """
 
-    def __init__(self, config: CameraConfig, open_capture: Callable[[str], Any] = _open_v4l2) -> None:
+    def __init__(self, config: CameraConfig, open_capture: Callable[..., Any] = cv2.VideoCapture) -> None:
         self._config, self._open_capture = config, open_capture
         self._capture: Any = None
         self._clock = CaptureClock()
@@ -62,7 +58,7 @@ class WebcamSensor:
     def start(self) -> None:
         node = self._find()
         os.environ.setdefault(_SELECT_TIMEOUT, "1")
-        capture = self._open_capture(str(node))
+        capture = self._open_capture(str(node), cv2.CAP_V4L2)
         try:
             if not capture.isOpened():
                 raise DeviceError(
@@ -76,11 +72,9 @@ class WebcamSensor:
         self._clock = CaptureClock()
         self._is_new = True
 
-    def shoot(self, timeout_s: float) -> Shot | None:
-        """The next picture; V4L2 has its own time limit of a second, and a queue that ``LiveCamera``'s thread keeps empty.
-
-        Before the first one a camera may take longer; one that is gone says so at once.
-        """
+    def read(self, timeout_s: float) -> SensorFrame | None:
+        """The next picture. V4L2 has its own time limit of a second, which the first picture may exceed; a lost camera fails at
+        once."""
         asked_s = time.monotonic()
         if not self._capture.grab():
             if self._is_new and time.monotonic() - asked_s > _AT_ONCE_S:
@@ -96,15 +90,15 @@ class WebcamSensor:
         if image.ndim == 2:
             image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
         captured_s = self._clock.captured_s(arrived_s, stamp_s if stamp_s > 0.0 else None, arrived_s)
-        return Shot(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8), captured_s)
+        return SensorFrame(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8), captured_s)
 
     def stop(self) -> None:
         capture, self._capture = self._capture, None
         if capture is not None:
             capture.release()
 
-    def revive(self) -> float:
-        """Nothing resets a V4L2 device but opening it again."""
+    def reset(self) -> float:
+        """Only opening it again resets a V4L2 device."""
         return 0.0
 
     def _find(self) -> Path:
@@ -125,7 +119,7 @@ class WebcamSensor:
             if not node.exists():
                 paths = ", ".join(device.path for device in devices) or "none"
                 raise DeviceError(f"webcam {wanted} is not there; webcams: {paths}: plug it in, or set camera.device")
-        # Resolved at every start: behind the stable path there may be another number after it was plugged in again.
+        # Resolved at every start: plugged in again, the stable path may lead to another number.
         node = node.resolve()
         self._title = next((device.title for device in devices if device.node.resolve() == node), self._title)
         return node
@@ -159,7 +153,7 @@ class WebcamSensor:
 
 
 def _keep_rate(node: Path) -> None:
-    """Forbid the camera to give fewer frames in dim light; OpenCV knows no such setting. Many cameras have none."""
+    """Forbid fewer frames in dim light, which OpenCV cannot; many cameras have no such setting."""
     with contextlib.suppress(OSError):
         handle = os.open(node, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
         try:

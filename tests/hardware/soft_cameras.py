@@ -201,7 +201,7 @@ class SoftWebcam:
             path.unlink()
         folder.rmdir()
 
-    def open_capture(self, node: str) -> SoftCapture:
+    def open_capture(self, node: str, _: int) -> SoftCapture:
         """In place of cv2.VideoCapture."""
         self.captures.append((node, SoftCapture(self)))
         return self.captures[-1][1]

@@ -17,7 +17,7 @@ from core.config.models import CameraConfig, Config
 from core.control.engine import Engine
 from core.devices import Camera, CameraLost, DeviceError, EndOfStream
 from core.types import Frame, Point, Scene
-from hardware.cameras.live import CaptureClock, LiveCamera, Shot
+from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
 from hardware.cameras.realsense import RealSenseInfo, RealSenseRecording, RealSenseSensor, find_cameras, realsense_camera
 from hardware.cameras.webcam import WebcamSensor
 from hardware.rig import RigKind, open_rig
@@ -108,7 +108,7 @@ class _Script:
     name = "script"
 
     def __init__(self) -> None:
-        self.shots: list[Shot | DeviceError | None] = []
+        self.shots: list[SensorFrame | DeviceError | None] = []
         self.refuses_to_start = 0
         self.calls: list[str] = []
         self.hangs = threading.Event()
@@ -120,7 +120,7 @@ class _Script:
             self.refuses_to_start -= 1
             raise DeviceError("script: not there")
 
-    def shoot(self, timeout_s: float) -> Shot | None:
+    def read(self, timeout_s: float) -> SensorFrame | None:
         self.hangs.wait()
         if not self.shots:
             time.sleep(0.005)
@@ -133,13 +133,13 @@ class _Script:
     def stop(self) -> None:
         self.calls.append("stop")
 
-    def revive(self) -> float:
-        self.calls.append("revive")
+    def reset(self) -> float:
+        self.calls.append("reset")
         return 0.0
 
 
-def _shot(number: int | None, at_s: float) -> Shot:
-    return Shot(np.zeros((2, 2, 3), np.uint8), at_s, number)
+def _shot(number: int | None, at_s: float) -> SensorFrame:
+    return SensorFrame(np.zeros((2, 2, 3), np.uint8), at_s, number)
 
 
 @pytest.fixture
@@ -213,7 +213,7 @@ def test_a_lost_camera_is_reset_and_comes_back_with_its_index_going_on(script: _
     script.shots = [_shot(0, 20.0)]
     frame = _until_back(camera)
     assert (frame.index, frame.lost, camera.reconnects) == (1, 0, 1)
-    assert script.calls[:6] == ["start", "stop", "revive", "start", "start", "start"]
+    assert script.calls[:6] == ["start", "stop", "reset", "start", "start", "start"]
 
 
 def test_a_driver_that_hangs_is_noticed_from_outside(script: _Script, camera: LiveCamera) -> None:
@@ -539,7 +539,7 @@ def test_a_webcam_gives_rgb_with_the_kernels_time(webcam: SoftWebcam) -> None:
     webcam.stamp_ms = lambda taken_s: 1000.0 * (taken_s - 0.02)
     began_s = time.monotonic()
     sensor.start()
-    shot = sensor.shoot(0.1)
+    shot = sensor.read(0.1)
     arrived_s = time.monotonic()
     sensor.stop()
     assert shot is not None
@@ -552,7 +552,7 @@ def test_another_webcam_does_not_take_the_place_of_a_lost_one(webcam: SoftWebcam
     """No camera is named, so that the first one is meant; later on it is that one."""
     sensor = _sensor(webcam)
     sensor.start()
-    assert sensor.shoot(0.1) is not None
+    assert sensor.read(0.1) is not None
     sensor.stop()
     webcam.unplug(0)
     other = webcam.sys / "class" / "video4linux" / "video2"
@@ -578,12 +578,12 @@ def test_the_first_picture_may_take_longer_than_the_time_limit(webcam: SoftWebca
         return False
 
     monkeypatch.setattr(capture, "grab", slow)
-    assert sensor.shoot(0.1) is None
+    assert sensor.read(0.1) is None
     monkeypatch.setattr(capture, "grab", grab)
-    assert sensor.shoot(0.1) is not None
+    assert sensor.read(0.1) is not None
     monkeypatch.setattr(capture, "grab", slow)
     with pytest.raises(DeviceError, match="is lost"):
-        sensor.shoot(0.1)
+        sensor.read(0.1)
     sensor.stop()
 
 
@@ -592,7 +592,7 @@ def test_a_webcam_without_stamps_counts_from_the_arrival(webcam: SoftWebcam) -> 
     webcam.stamp_ms = lambda _: 0.0
     sensor.start()
     before_s = time.monotonic()
-    shot = sensor.shoot(0.1)
+    shot = sensor.read(0.1)
     sensor.stop()
     assert shot is not None
     assert before_s <= shot.captured_s <= time.monotonic()
@@ -602,8 +602,8 @@ def test_a_damaged_picture_is_left_out(webcam: SoftWebcam) -> None:
     sensor = _sensor(webcam)
     webcam.damaged = {0}
     sensor.start()
-    assert sensor.shoot(0.1) is None
-    assert sensor.shoot(0.1) is not None
+    assert sensor.read(0.1) is None
+    assert sensor.read(0.1) is not None
     sensor.stop()
 
 
