@@ -47,7 +47,6 @@ def main(port: str) -> None:
     try:
         robot.zero()
         robot.arm()
-        assert robot._client is not None
         say(bus_pid=robot._client.pid)
         drive(robot)
     except ServoError as error:

@@ -80,7 +80,6 @@ def application(servos: SoftServoBus) -> Iterator[tuple[subprocess.Popen[str], i
     """A driving application and its bus process's id; both are gone afterwards."""
     command = [sys.executable, "-m", "tests.hardware.bus_application", servos.port]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
     bus_pid = None
     try:
         line = process.stdout.readline()

@@ -85,7 +85,6 @@ class SoftRealSense:
 
     def __exit__(self, *_: object) -> None:
         self._stop.set()
-        assert self._thread is not None
         self._thread.join()
 
     def _run(self) -> None:

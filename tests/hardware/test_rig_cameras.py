@@ -63,7 +63,6 @@ def test_frames_come_straightened_and_keep_the_rest() -> None:
     image = np.full((480, 640, 3), 50, np.uint8)
     image[:, 60:64] = 255  # a straight line, as a bent lens shows it
     frame = UndistortedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
-    assert frame is not None
     assert (frame.index, frame.captured_s, frame.lost) == (7, 1.5, 3)
     columns = [int(np.argmax(frame.image[row, :200, 0])) for row in (5, 240, 474)]
     assert columns[0] < columns[1] - 2  # barrel: the corners go outwards
@@ -75,14 +74,12 @@ def test_frames_come_straightened_and_keep_the_rest() -> None:
 )
 def test_what_is_no_such_picture_is_passed_on(image: np.ndarray) -> None:
     frame = UndistortedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
-    assert frame is not None
     assert frame.image is image
 
 
 def test_no_lens_no_work() -> None:
     image = np.zeros((480, 640, 3), np.uint8)
     frame = UndistortedCamera(ScriptedCamera(_frame(image)), None).read(0.1)
-    assert frame is not None
     assert frame.image is image
 
 

@@ -620,7 +620,7 @@ def test_a_camera_without_pictures_is_none(make_wizard: MakeWizard, qtbot: QtBot
             time.sleep(0.01)
             return None
 
-    monkeypatch.setattr(calibration_bench, "_LOOK_WITHIN_S", 0.1)
+    monkeypatch.setattr(calibration_bench, "_FRAMES_WITHIN_S", 0.1)
     wizard = make_wizard(
         "bench 1", opener=lambda config, see: CalibrationBench(config, Blind(), None, lambda frame: make_scene(), lambda: None)
     )

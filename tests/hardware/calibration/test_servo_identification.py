@@ -62,9 +62,7 @@ def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[
     feed = twin.wiring.joints[JOINT_NAMES.index("advance")]
     start = dict(twin.turned_mm)
     finding = servo_identification.identify_servo(bench, ServosConfig(), IDS, feed.id, lambda _: None)
-    assert finding is not None
     assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
-    assert finding.way is not None
     assert finding.way.amplitude_mm == 3.0
     assert finding.way.px_per_mm == pytest.approx(default_appearance().pixels_per_mm, rel=0.1)
     assert twin.turned_mm == pytest.approx(start, abs=0.02)
@@ -83,7 +81,6 @@ def test_a_feed_that_leaves_the_picture_on_its_longest_way_is_a_feed_all_the_sam
             return super().observe(alive)
 
     finding = servo_identification.identify_servo(LosesIt(twin), ServosConfig(), IDS, feed.id, lambda _: None)
-    assert finding is not None
     assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
     assert twin.turned_mm == pytest.approx(start, abs=0.05)
 
@@ -119,7 +116,6 @@ def test_the_steering_is_learnt_to_three_degrees(roll_deg: float) -> None:
         if name == "up" and roll_deg == 0.0:
             assert direction is None
         elif name == "right":
-            assert direction is not None
             assert abs(turn_deg(_true_direction(twin, bench, axis), direction)) <= 3.0
     assert np.hypot(*(np.array(learnt.head_px) - twin.head_px())) < 15.0
 

@@ -437,7 +437,6 @@ def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
     frames = _until_the_end(recording)
     assert [frame.index for frame in frames if frame] == list(range(60))
     for frame in frames:
-        assert frame is not None
         assert np.array_equal(frame.image, picture(frame.index))
         assert frame.captured_s == pytest.approx(frame.index * PERIOD_S, abs=1e-3)
         assert frame.lost == 0
@@ -542,7 +541,6 @@ def test_a_webcam_gives_rgb_with_the_kernels_time(webcam: SoftWebcam) -> None:
     shot = sensor.read(0.1)
     arrived_s = time.monotonic()
     sensor.stop()
-    assert shot is not None
     assert np.array_equal(shot.image, picture(0))
     assert began_s - 0.025 <= shot.captured_s <= arrived_s - 0.015
     assert sensor.name == "Soft Webcam"
@@ -594,7 +592,6 @@ def test_a_webcam_without_stamps_counts_from_the_arrival(webcam: SoftWebcam) -> 
     before_s = time.monotonic()
     shot = sensor.read(0.1)
     sensor.stop()
-    assert shot is not None
     assert before_s <= shot.captured_s <= time.monotonic()
 
 

@@ -6,7 +6,6 @@ import itertools
 import re
 import shutil
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -428,19 +427,6 @@ def test_closed_it_is_released_and_the_port_is_free(soft: SoftPedal, listener: L
     count = len(listener.reports)
     held.start()
     listener.until(lambda: len(listener.reports) > count + 5)
-
-
-def test_a_second_program_is_refused(soft: SoftPedal) -> None:
-    program = (
-        "import sys\nfrom core.config.models import PedalConfig\nfrom hardware.inputs.pedal import open_pedal_port\n"
-        "from core.devices import UserError\n"
-        "try:\n    open_pedal_port(PedalConfig(port=sys.argv[1]))\n"
-        "except UserError as error:\n    sys.exit(f'{type(error).__name__}: {error}')\n"
-    )
-    port = open_pedal_port(PedalConfig(port=soft.port))
-    run = subprocess.run([sys.executable, "-c", program, soft.port], cwd=ROOT, capture_output=True, text=True, check=False)
-    port.close()
-    assert (run.returncode, run.stderr.partition(":")[0]) == (1, "PedalPortTaken")
 
 
 @pytest.mark.real_time

@@ -174,6 +174,18 @@ class Bench:
         self.guard.check_arming()
         self.guard.set_armed(self.now_s)
 
+    @property
+    def cause(self) -> Cause:
+        return self.guard.latched.cause
+
+    @property
+    def reason(self) -> RejectReason:
+        return self.guard.rejection.reason
+
+    def cycles(self, count: int) -> None:
+        for _ in range(count):
+            self.cycle()
+
     def until_disarmed(self, most_s: float) -> float:
         """Seconds until the guard is disarmed."""
         start_s = self.now_s
@@ -198,16 +210,13 @@ def test_it_boots_disarmed_and_the_first_goals_are_the_positions() -> None:
     assert bench.guard.sent is None
     bench.arm()
     bench.cycle()
-    assert bench.guard.sent is not None
     assert bench.guard.sent.goals_mm[4] == 3.0
     assert bench.guard.sent.motion.advance_mm_s == 0.0
 
 
 def test_it_follows_orders_and_tells_what_was_sent(bench: Bench) -> None:
-    for _ in range(50):
-        bench.cycle()
+    bench.cycles(50)
     assert bench.goals[4] == pytest.approx(5.0 * 0.98, abs=0.4)
-    assert bench.guard.sent is not None
     assert bench.guard.sent.motion.advance_mm_s == pytest.approx(5.0)
     assert bench.guard.sent.order == bench.order
 
@@ -215,10 +224,8 @@ def test_it_follows_orders_and_tells_what_was_sent(bench: Bench) -> None:
 def test_what_was_limited_is_told_as_it_was_sent(bench: Bench) -> None:
     """Asked for 20 mm/s from rest, the joint may get faster by 200 mm/s^2."""
     bench.command = Command(advance_mm_s=20.0, bend=1.0)
-    for _ in range(3):
-        bench.cycle()
+    bench.cycles(3)
     assert bench.guard.clamps
-    assert bench.guard.sent is not None
     assert bench.guard.sent.motion.advance_mm_s == pytest.approx(8.0)
     assert 0.0 < bench.guard.sent.motion.bend < 0.3
 
@@ -226,20 +233,15 @@ def test_what_was_limited_is_told_as_it_was_sent(bench: Bench) -> None:
 def test_where_nothing_is_written_nothing_is_told_as_sent(bench: Bench) -> None:
     """Positions that are too old: the servos keep their goals, and the order of long ago was shown as if it still went out."""
     bench.command = Command(advance_mm_s=5.0, bend=0.5)
-    for _ in range(20):
-        bench.cycle()
+    bench.cycles(20)
     bench.alter = lambda state: MissingServo(state.name, state.id, state.time_s, 0, "late") if state.id == 3 else state
-    for _ in range(7):
-        bench.cycle()
-    assert bench.guard.rejection is not None
-    assert bench.guard.rejection.reason is RejectReason.STALE_MEASUREMENT
-    assert bench.guard.sent is not None
+    bench.cycles(7)
+    assert bench.reason is RejectReason.STALE_MEASUREMENT
     assert bench.guard.sent.order is None
     assert bench.guard.sent.motion == Command(bend=pytest.approx(0.5))  # type: ignore[arg-type]
     assert bench.guard.sent.goals_mm == tuple(bench.goals)
     bench.alter = lambda state: state
-    bench.cycle()
-    bench.cycle()
+    bench.cycles(2)
     assert bench.guard.sent.order == bench.order
 
 
@@ -259,8 +261,7 @@ def test_servos_that_are_silent_in_turns_disarm() -> None:
             break
     assert not bench.guard.armed
     assert bench.now_s - begun_s == pytest.approx(SAFETY.bus_disarm_s, abs=2.1 * CYCLE_S)
-    assert bench.guard.latched is not None
-    assert bench.guard.latched.cause is Cause.SERVO_SILENT
+    assert bench.cause is Cause.SERVO_SILENT
     assert bench.guard.latched.detail == "in turns, right, advance: not all in one cycle for 0.5 s"
     bench.alter = lambda state: state
     bench.cycle()
@@ -284,8 +285,7 @@ def test_an_order_from_before_the_arming_does_not_count() -> None:
     bench.guard.set_armed(bench.now_s)
     bench.beating = False
     bench.cycle()
-    assert bench.guard.rejection is not None
-    assert bench.guard.rejection.reason is RejectReason.NO_COMMAND
+    assert bench.reason is RejectReason.NO_COMMAND
 
 
 def test_a_joint_from_where_no_goal_leads_hinders_arming_and_is_named() -> None:
@@ -302,7 +302,6 @@ def test_a_joint_from_where_no_goal_leads_hinders_arming_and_is_named() -> None:
     bench.positions[0], bench.positions[4] = 2.8, -6.0  # one bounded step brings it back
     bench.arm()
     bench.cycle()
-    assert bench.guard.sent is not None
     assert bench.guard.sent.goals_mm[4] == -5.0
 
 
@@ -311,8 +310,7 @@ def test_positions_from_long_ago_and_unknown_ones_hinder_no_arming() -> None:
     bench.positions[4] = -7.0
     bench.cycle()
     bench.alter = lambda state: replace(state, position_mm=None)  # a lost zero, of which the driver tells
-    for _ in range(6):
-        bench.cycle()
+    bench.cycles(6)
     bench.guard.check_arming()
 
 
@@ -323,13 +321,12 @@ def test_why_not_even_a_hold_leaves_is_told_also_while_nobody_may_drive() -> Non
     bench.positions[4] = -7.0  # moved between the check and the first cycle
     bench.cycle()
     assert bench.guard.sent is None
-    assert bench.guard.rejection is not None
-    assert bench.guard.rejection.reason is RejectReason.MEASURED_OUT_OF_ENVELOPE
+    assert bench.reason is RejectReason.MEASURED_OUT_OF_ENVELOPE
     assert bench.guard.rejection.detail == "advance at -7.00 mm (-5 to 400 mm)"
     bench.positions[4] = 0.0
     bench.cycle()
     assert bench.guard.sent is not None
-    assert bench.guard.rejection.reason is RejectReason.NOT_ARMED
+    assert bench.reason is RejectReason.NOT_ARMED
 
 
 def test_in_lock_step_the_guard_looks_before_it_arms() -> None:
@@ -350,27 +347,22 @@ def test_in_lock_step_the_guard_looks_before_it_arms() -> None:
 
 def test_a_dead_application_moves_a_joint_by_one_step_then_it_holds_then_it_is_disarmed(bench: Bench) -> None:
     bench.command = Command(advance_mm_s=20.0)
-    for _ in range(30):
-        bench.cycle()
+    bench.cycles(30)
     last, bench.beating = bench.positions[4], False
-    for _ in range(7):
-        bench.cycle()
-    assert bench.guard.rejection is not None
-    assert bench.guard.rejection.reason is RejectReason.NOT_ARMED
+    bench.cycles(7)
+    assert bench.reason is RejectReason.NOT_ARMED
     held = bench.positions[4]
     assert last < held <= last + SERVOS.joints[4].max_step_mm
     assert 0.34 < bench.until_disarmed(1.0) < 0.40
     assert bench.positions[4] == held
-    assert bench.guard.latched is not None
-    assert bench.guard.latched.cause is Cause.WORKER_DEAD
+    assert bench.cause is Cause.WORKER_DEAD
 
 
 @pytest.mark.parametrize("permitted", [None, Source.OPERATOR])
 def test_nobody_but_the_permitted_one_moves_the_servos(bench: Bench, permitted: Source | None) -> None:
     bench.cycle()
     before, bench.permitted = bench.goals, permitted
-    for _ in range(10):
-        bench.cycle()
+    bench.cycles(10)
     assert bench.goals == before
     assert bench.guard.armed
 
@@ -406,8 +398,7 @@ def test_faults_of_servos(bench: Bench, alter: Callable[[ServoState], ServoReadi
     bench.alter = alter
     bench.cycle()
     assert (bench.guard.armed, bench.guard.stopped) == (False, stops)
-    assert bench.guard.latched is not None
-    assert bench.guard.latched.cause is cause
+    assert bench.cause is cause
     assert bench.guard.fault_counts[cause] == 1
     with pytest.raises(NotReady, match="acknowledge first"):
         bench.guard.check_arming()
@@ -420,18 +411,15 @@ def test_fault_22_six_bad_packets_in_a_second(bench: Bench) -> None:
         assert bench.guard.armed
     bench.errors = 1
     bench.cycle()
-    assert bench.guard.latched is not None
-    assert bench.guard.latched.cause is Cause.BUS_NOISE
+    assert bench.cause is Cause.BUS_NOISE
 
 
 def test_fault_25_a_jam(bench: Bench) -> None:
-    for _ in range(20):
-        bench.cycle()
+    bench.cycles(20)
     bench.frozen = True
     assert 0.2 < bench.until_disarmed(2.0) < 0.6
     assert bench.guard.stopped
-    assert bench.guard.latched is not None
-    assert bench.guard.latched.cause is Cause.TRACKING
+    assert bench.cause is Cause.TRACKING
     assert "advance stands" in bench.guard.latched.detail
 
 
@@ -446,8 +434,7 @@ def test_fault_26_the_port_is_lost(bench: Bench) -> None:
 def test_fault_35_the_process_stood_still(bench: Bench) -> None:
     bench.cycle()
     bench.cycle(pause_s=1.5)
-    assert bench.guard.latched is not None
-    assert bench.guard.latched.cause is Cause.CLOCK
+    assert bench.cause is Cause.CLOCK
 
 
 def test_the_first_cause_stays_until_acknowledged_and_nothing_arms_itself(bench: Bench) -> None:
@@ -455,15 +442,13 @@ def test_the_first_cause_stays_until_acknowledged_and_nothing_arms_itself(bench:
     bench.cycle()
     bench.alter = lambda state: replace(state, error=HardwareError.OVERLOAD)
     bench.cycle()
-    assert bench.guard.latched is not None
-    assert bench.guard.latched.cause is Cause.HOT
+    assert bench.cause is Cause.HOT
     bench.guard.acknowledge()
     assert bench.guard.latched is None
     with pytest.raises(NotReady, match="hardware error"):
         bench.guard.check_arming()
     bench.alter = lambda state: state
-    for _ in range(5):
-        bench.cycle()
+    bench.cycles(5)
     assert not bench.guard.armed
     bench.arm()
     assert bench.guard.armed
@@ -485,7 +470,6 @@ def _hand_over(bench: Bench, *, order_first: bool) -> None:
 def test_the_cycle_between_order_and_permission_goes_on_with_the_order_before(bench: Bench) -> None:
     _hand_over(bench, order_first=True)
     assert bench.guard.rejection is None
-    assert bench.guard.followed is not None
     assert bench.guard.followed.source is Source.PROGRAM
     bench.beat = Heartbeat(bench.now_s, Source.OPERATOR)
     bench.cycle()
@@ -495,8 +479,7 @@ def test_the_cycle_between_order_and_permission_goes_on_with_the_order_before(be
 
 def test_a_permission_without_an_order_of_its_own_holds(bench: Bench) -> None:
     _hand_over(bench, order_first=False)
-    assert bench.guard.rejection is not None
-    assert bench.guard.rejection.reason is RejectReason.WRONG_SOURCE
+    assert bench.reason is RejectReason.WRONG_SOURCE
 
 
 def test_the_order_before_is_good_for_no_longer_than_an_order_is(bench: Bench) -> None:
@@ -519,9 +502,7 @@ def test_a_hold_is_everybodys(bench: Bench) -> None:
     bench.order = BusOrder(None, Source.OPERATOR, bench.now_s)
     bench.beat = Heartbeat(bench.now_s, Source.PROGRAM)
     bench.cycle()
-    assert bench.guard.rejection is not None
-    assert bench.guard.rejection.reason is RejectReason.NO_COMMAND
+    assert bench.reason is RejectReason.NO_COMMAND
     bench.order = BusOrder(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
     bench.cycle()
-    assert bench.guard.rejection is not None
-    assert bench.guard.rejection.reason is RejectReason.WRONG_SOURCE
+    assert bench.reason is RejectReason.WRONG_SOURCE

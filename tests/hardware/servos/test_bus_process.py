@@ -78,7 +78,6 @@ def _drive(robot: ServoRobot, seconds: float = PATIENCE_S, until: Callable[[BusS
         robot.beat(Source.OPERATOR)
         robot.send(FORWARD)
         status = robot.bus_status()
-        assert status is not None
         if until(status) or time.monotonic() > end_s:
             return status
         time.sleep(0.02)
@@ -95,6 +94,21 @@ def _seen(robot: ServoRobot, wanted: Callable[[BusStatus], bool], beat: bool = T
             return status
         time.sleep(0.01)
     raise AssertionError(f"not seen: {status}")
+
+
+def _wait_for(condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition() and time.monotonic() < end_s:
+        time.sleep(0.01)
+
+
+def _signal(robot: ServoRobot, number: signal.Signals) -> None:
+    """To the robot's bus process."""
+    os.kill(robot._client.pid, number)
+
+
+def _torques(servos: SoftServoBus) -> list[int]:
+    return [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints]
 
 
 def _latched(cause: Cause) -> Callable[[BusStatus], bool]:
@@ -126,8 +140,6 @@ def test_it_is_a_robot_that_moves_only_when_armed(servos: SoftServoBus, robot: S
     robot.arm()
     status = _drive(robot, until=lambda status: servos.positions_mm()[4] > 1.0)
     assert status.armed
-    assert status.sent is not None
-    assert status.sent.order is not None
     assert status.sent.order.command == FORWARD
     assert robot.send(FORWARD).advance_mm_s == pytest.approx(5.0, abs=2.5)
     assert as_protocol.status().insertion_mm == pytest.approx(servos.positions_mm()[4], abs=0.5)
@@ -149,8 +161,6 @@ def test_without_a_supervisor_orders_are_signs_of_life_and_with_one_they_are_not
         if status is not None and not status.armed:
             break
         time.sleep(0.02)
-    assert status is not None
-    assert status.latched is not None
     assert status.latched.cause is Cause.WORKER_DEAD
     assert servos.positions_mm()[4] < 4.0
 
@@ -174,7 +184,6 @@ def test_it_counts_and_times_its_cycles(armed: ServoRobot) -> None:
     assert 0.0 < status.times.work_p50_ms <= status.times.work_p99_ms
     assert len(status.servos) == 7
     report = armed.report()
-    assert report is not None
     assert report.port_open
     assert report.misses == (0,) * 7
 
@@ -271,21 +280,18 @@ def test_stop_comes_through_floods_of_orders_and_requests(servos: SoftServoBus, 
 
 def test_stop_while_every_way_in_is_full(servos: SoftServoBus, armed: ServoRobot) -> None:
     """The bus process stands still; requests pile up until no more go in, STOPs too. It wakes up, and stops first."""
-    link = armed._client
-    assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
-    os.kill(link.pid, signal.SIGSTOP)
+    _signal(armed, signal.SIGSTOP)
     try:
         with pytest.raises(BlockingIOError):
             for number in range(100_000):
-                link._process.send({"id": 1_000_000 + number, "do": "zero"})
+                armed._client._process.send({"id": 1_000_000 + number, "do": "zero"})
         for _ in range(70_000):
-            link.stop()
+            armed.stop()
     finally:
-        os.kill(link.pid, signal.SIGCONT)
+        _signal(armed, signal.SIGCONT)
     _drive(armed, until=lambda status: status.phase is BusPhase.STOPPED)
     status = armed.bus_status()
-    assert status is not None
     assert status.fault_counts[Cause.STOP_PRESSED] > 0
     _settle_mm(servos)
 
@@ -298,7 +304,7 @@ def test_stop_switches_the_torque_off_when_that_is_the_policy(servos: SoftServoB
         robot.arm()
         robot.stop()
         _seen(robot, lambda status: status.phase is BusPhase.STOPPED)
-        assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+        assert _torques(servos) == [0] * 7
     finally:
         robot.close()
 
@@ -306,10 +312,9 @@ def test_stop_switches_the_torque_off_when_that_is_the_policy(servos: SoftServoB
 @pytest.mark.slow  # what hangs is waited for, and then for its end
 def test_a_bus_process_that_hangs_keeps_no_torque_on(armed: ServoRobot, servos: SoftServoBus) -> None:
     """Asked and asked again it could not answer, and the port was its own: only opening the rig anew got out of it."""
-    assert armed._client is not None
-    os.kill(armed._client.pid, signal.SIGSTOP)
+    _signal(armed, signal.SIGSTOP)
     armed.torque_off()
-    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert _torques(servos) == [0] * 7
     assert armed.failure is not None, "this process is not the one that drives"
 
 
@@ -327,38 +332,31 @@ def test_a_torque_off_that_is_owed_is_paid_when_the_application_closes(
         robot.stop()
         status = _seen(robot, lambda status: status.phase is BusPhase.CLOSED and status.torque_problem != "")
         assert "cut the servos' power" in status.torque_problem
-        assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints)
+        assert any(_torques(servos))
         if comes_back:
             servos.reappear()
     finally:
         robot.close()
-    assert any(servos.servo(joint.id).table["torque"] for joint in CONFIG.joints) is not comes_back
+    assert any(_torques(servos)) is not comes_back
     assert ("the torque is not proven to be off" in caplog.text) is not comes_back
 
 
 def test_torque_that_went_off_on_a_port_that_cannot_be_opened_is_told_at_once(robot: ServoRobot) -> None:
     """All seven had let go, but one of them was another one than before: told only when somebody had changed it back."""
     link, status = robot._client, _seen(robot, lambda status: bool(status.servos))
-    assert link is not None
     closed = replace(status, phase=BusPhase.CLOSED, servos=(), cycle=status.cycle + 1000, torque_offs=1)
     link.status = lambda: closed  # type: ignore[method-assign]
     report = robot.report()
-    assert report is not None
     assert (report.port_open, report.torque_off) == (False, True)
     closed = replace(closed, cycle=closed.cycle + 1)
     report = robot.report()
-    assert report is not None
     assert (report.port_open, report.torque_off) == (False, False)
 
 
 def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servos: SoftServoBus, armed: ServoRobot) -> None:
     """Nobody can connect seven servos of which one is missing, and six went on pulling."""
-    link = armed._client
-    assert link is not None
-    os.kill(link.pid, signal.SIGKILL)
-    end_s = time.monotonic() + PATIENCE_S
-    while armed.failure is None and time.monotonic() < end_s:
-        time.sleep(0.01)
+    _signal(armed, signal.SIGKILL)
+    _wait_for(lambda: armed.failure is not None)
     servos.faults.mute(3)
     with pytest.raises(NoAnswer, match="servo up"):
         armed.connect()
@@ -367,7 +365,7 @@ def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servo
     assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints if joint.id != 3] == [0] * 6
     servos.faults.clear()
     armed.torque_off()
-    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert _torques(servos) == [0] * 7
     assert armed.failure is not None  # nobody drives with it before it was connected again
     armed.connect()
     assert armed.failure is None
@@ -378,25 +376,19 @@ def test_without_a_bus_process_and_without_a_servo_the_others_still_let_go(servo
 
 def test_a_bus_process_that_tells_nothing_any_more_sends_nothing(servos: SoftServoBus, armed: ServoRobot) -> None:
     """It stands still, then it is gone: its last status would say for ever that the robot is being driven."""
-    link = armed._client
-    assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
     sent = armed.sent_motion()
-    assert sent is not None
     assert sent.source is Source.OPERATOR
-    os.kill(link.pid, signal.SIGSTOP)
+    _signal(armed, signal.SIGSTOP)
     try:
         time.sleep(SAFETY.bus_hold_s + 0.1)
         sent = armed.sent_motion()
-        assert sent is not None
         assert (sent.source, sent.motion.advance_mm_s) == (None, 0.0)
         assert armed.send(FORWARD).advance_mm_s == 0.0
     finally:
-        os.kill(link.pid, signal.SIGKILL)
-        os.kill(link.pid, signal.SIGCONT)
-    end_s = time.monotonic() + PATIENCE_S
-    while armed.failure is None and time.monotonic() < end_s:
-        time.sleep(0.01)
+        _signal(armed, signal.SIGKILL)
+        _signal(armed, signal.SIGCONT)
+    _wait_for(lambda: armed.failure is not None)
     assert armed.sent_motion() is None
 
 
@@ -412,7 +404,6 @@ def test_silence_holds_then_disarms_then_quiet_then_the_servos_own_watchdog(serv
         _drive(robot, until=lambda status: servos.positions_mm()[4] > 1.0)
         at_mm = servos.positions_mm()[4]
         status = _seen(robot, lambda status: status.phase is BusPhase.QUIET, beat=False)
-        assert status.latched is not None
         assert status.latched.cause is Cause.WORKER_DEAD
         assert status.servos == ()
         assert abs(servos.positions_mm()[4] - at_mm) <= CONFIG.joints[4].max_step_mm
@@ -452,18 +443,15 @@ def test_a_heartbeat_without_orders_holds_and_stays_armed(servos: SoftServoBus, 
 def test_an_order_that_is_not_finite_is_rejected_in_the_bus_process_too(
     servos: SoftServoBus, armed: ServoRobot, number: float
 ) -> None:
-    link = armed._client
-    assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 0.5)
     end_s = time.monotonic() + PATIENCE_S
     status = armed.bus_status()
     while status is not None and not status.rejections.get(RejectReason.NON_FINITE) and time.monotonic() < end_s:
         now_s = time.monotonic()
-        link.put_heartbeat(Heartbeat(now_s, Source.OPERATOR))
-        link.put_order(BusOrder(Command(bend=number, advance_mm_s=number), Source.OPERATOR, now_s))
+        armed._client.put_heartbeat(Heartbeat(now_s, Source.OPERATOR))
+        armed._client.put_order(BusOrder(Command(bend=number, advance_mm_s=number), Source.OPERATOR, now_s))
         time.sleep(0.02)
         status = armed.bus_status()
-    assert status is not None
     assert status.rejections[RejectReason.NON_FINITE] > 0
     assert status.armed
 
@@ -475,7 +463,6 @@ def test_whoever_is_not_permitted_is_not_followed(servos: SoftServoBus, armed: S
         time.sleep(0.02)
     assert servos.positions_mm()[4] == 0.0
     status = armed.bus_status()
-    assert status is not None
     assert status.rejections[RejectReason.WRONG_SOURCE] > 0
 
 
@@ -500,7 +487,6 @@ def test_faults_end_the_motion(
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
     inject(servos)
     status = _drive(armed, until=_latched(cause))
-    assert status.latched is not None
     assert status.latched.cause is cause
     assert status.phase is phase
     assert status.fault_counts[cause] == 1
@@ -548,7 +534,6 @@ def test_fault_26_the_port_vanishes_and_comes_back(servos: SoftServoBus, armed: 
     status = _drive(armed, until=lambda status: status.phase is BusPhase.CLOSED)
     assert _latched(Cause.PORT_LOST)(status)
     report = armed.report()
-    assert report is not None
     assert not report.port_open
     with pytest.raises(NotReady, match="port is not open"):
         armed.arm()
@@ -569,14 +554,10 @@ def test_fault_26_the_port_vanishes_and_comes_back(servos: SoftServoBus, armed: 
 
 
 def test_a_killed_bus_process_is_seen_and_said(servos: SoftServoBus, armed: ServoRobot) -> None:
-    link = armed._client
-    assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
     assert armed.failure is None
-    os.kill(link.pid, signal.SIGKILL)
-    end_s = time.monotonic() + PATIENCE_S
-    while armed.failure is None and time.monotonic() < end_s:
-        time.sleep(0.01)
+    _signal(armed, signal.SIGKILL)
+    _wait_for(lambda: armed.failure is not None)
     assert armed.failure == (
         "the servo bus process ended (killed by SIGKILL): the servos stopped by themselves; connect the robot again"
     )
@@ -592,24 +573,20 @@ def test_a_killed_bus_process_is_seen_and_said(servos: SoftServoBus, armed: Serv
 
 
 def test_a_bus_process_that_hangs_reports_nothing_new(servos: SoftServoBus, armed: ServoRobot) -> None:
-    link = armed._client
-    assert link is not None
     _seen(armed, lambda status: len(status.servos) == 7)
     assert armed.report() is not None
-    os.kill(link.pid, signal.SIGSTOP)
+    _signal(armed, signal.SIGSTOP)
     time.sleep(0.05)
     armed.report()
     time.sleep(0.1)
     assert armed.report() is None
     assert armed.failure is None
-    os.kill(link.pid, signal.SIGCONT)
+    _signal(armed, signal.SIGCONT)
 
 
 def test_it_dies_while_somebody_waits_for_an_answer(servos: SoftServoBus, robot: ServoRobot) -> None:
-    link = robot._client
-    assert link is not None
-    os.kill(link.pid, signal.SIGSTOP)
-    killer = threading.Timer(0.1, os.kill, (link.pid, signal.SIGKILL))
+    _signal(robot, signal.SIGSTOP)
+    killer = threading.Timer(0.1, _signal, (robot, signal.SIGKILL))
     killer.start()
     with pytest.raises(BusProcessLost, match="killed by SIGKILL"):
         robot.zero()
@@ -617,20 +594,17 @@ def test_it_dies_while_somebody_waits_for_an_answer(servos: SoftServoBus, robot:
 
 
 def test_a_bus_process_that_hangs_is_ended_by_close(servos: SoftServoBus, robot: ServoRobot) -> None:
-    link = robot._client
-    assert link is not None
-    os.kill(link.pid, signal.SIGSTOP)
+    pid = robot._client.pid
+    _signal(robot, signal.SIGSTOP)
     robot.close()
-    assert not psutil.pid_exists(link.pid)
+    assert not psutil.pid_exists(pid)
 
 
 def test_asked_to_end_it_holds_and_ends_with_zero(servos: SoftServoBus, armed: ServoRobot) -> None:
-    link = armed._client
-    assert link is not None
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
-    os.kill(link.pid, signal.SIGTERM)
-    assert link._process.wait(PATIENCE_S)
-    assert link._process.exit_code() == 0
+    _signal(armed, signal.SIGTERM)
+    assert armed._client._process.wait(PATIENCE_S)
+    assert armed._client._process.exit_code() == 0
     _settle_mm(servos)
 
 
@@ -662,7 +636,6 @@ def test_an_application_that_forgets_to_close_leaves_nothing_behind(servos: Soft
         "print(robot._client.pid, child, flush=True)\nos._exit(0)\n"
     )
     run = subprocess.Popen([sys.executable, "-c", program, servos.port], cwd=ROOT, stdout=subprocess.PIPE, text=True)
-    assert run.stdout is not None
     bus_pid, child = map(int, run.stdout.readline().split())
     try:
         end_s = time.monotonic() + PATIENCE_S
@@ -726,7 +699,7 @@ from core.config.safety import ServosConfig
 from hardware.servos.bus_ipc import BusClient
 
 link = BusClient(ServosConfig(port=sys.argv[1]), SafetyConfig())
-link._process.send({"id": 1, "do": "torque off"})
+armed._client._process.send({"id": 1, "do": "torque off"})
 print(link.pid, flush=True)
 os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -740,7 +713,7 @@ def test_torque_off_is_done_though_the_application_dies_while_its_bus_process_lo
     until_s = time.monotonic() + PATIENCE_S
     while _lives(int(done.stdout)) and time.monotonic() < until_s:
         time.sleep(0.02)
-    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    assert _torques(servos) == [0] * 7
 
 
 def test_the_twins_rig_with_servos() -> None:

@@ -110,7 +110,6 @@ class Motors:
     def stopped_for(self, text: str) -> None:
         """Fault 25, which stops, with these words."""
         assert self.guard.stopped
-        assert self.guard.latched is not None
         assert self.guard.latched.cause is Cause.TRACKING
         assert text in self.guard.latched.detail
 
