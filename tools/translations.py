@@ -1,12 +1,14 @@
 """``make translations``: brings resources/translations/*.ts up to date with the code, and makes the .qm files of them.
 
-Texts are the literals in ``tr("...")`` and ``mark("...")`` in app/, and the lists in app/ui/i18n.py, all in one context. A text
+Texts are the literals in ``tr("...")`` and ``mark("...")`` in app/, those in ``message("...")`` in core/ and hardware/ (without the
+formats of their values), and the lists in app/ui/i18n.py, all in one context. A text
 that is new stands in the .ts as unfinished; one that is gone from the code goes from the .ts. The .qm is made by Qt's lrelease.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -14,39 +16,37 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from app.ui.i18n import texts_of_tables
+from app.ui.i18n import COMPOSED, FIXED, TEMPLATES, texts_of_tables
 
 ROOT = Path(__file__).resolve().parent.parent
 
 FOLDER = ROOT / "resources" / "translations"
 CONTEXT = "LumenPilot"
-MARKS = ("tr", "mark")
+MARKS = {"tr", "mark"}
+_FORMAT = re.compile(r"\{(\w+)[!:][^}]*\}")
 
 
 def texts_of_code(root: Path = ROOT) -> dict[str, str]:
     """Every text to translate, and the file (relative to `root`) that has it first."""
     found: dict[str, str] = {}
-    for path in sorted((root / "app").rglob("*.py")):
-        for text in _texts_of(path):
-            found.setdefault(text, path.relative_to(root).as_posix())
+    for folder, names in (("app", MARKS), ("core", {"message"}), ("hardware", {"message"})):
+        for path in sorted((root / folder).rglob("*.py")):
+            for text in _texts_of(path, names):
+                found.setdefault(_FORMAT.sub(r"{\1}", text) if folder != "app" else text, path.relative_to(root).as_posix())
+    for text in (*FIXED, *TEMPLATES, *COMPOSED):
+        found.setdefault(text, "app/ui/i18n.py")
     for text in texts_of_tables():
         found.setdefault(text, "app/ui/i18n.py")
     return {text: file for text, file in found.items() if any(letter.isalpha() for letter in text)}
 
 
-def _texts_of(path: Path) -> Iterator[str]:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    everything = path.name == "core_texts.py"
-    for node in ast.walk(tree):
-        if everything and isinstance(node, ast.Tuple):
-            arguments = node.elts
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in MARKS:
-            arguments = node.args[:1]
-        else:
-            continue
-        for argument in arguments:
-            if isinstance(argument, ast.Constant) and isinstance(argument.value, str):
-                yield argument.value
+def _texts_of(path: Path, names: set[str]) -> Iterator[str]:
+    """The literals that are the first argument of a call of one of these functions."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names and node.args:
+            text = node.args[0]
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                yield text.value
 
 
 def read_ts(path: Path) -> dict[str, str]:

@@ -1,17 +1,14 @@
 """The language of the windows, by Qt's own translation: English in the code, others from ``resources/translations``.
 
 English is the language of everything that is kept or read by programs: session files, JSON, logs, the command line. A text is
-translated only where it is shown; those that come from ``core``, which knows no window, by the list in ``core_texts``.
-
-Texts of the layers below that windows show: finished ones, and patterns of those with values in them. No Qt here.
-
-Core and hardware speak English, for files, logs and the command line; so do the names of edits. What is listed here is translated
-where it is shown (``language.tr_text``); a text that is not listed is shown as it is. A test looks every entry up in the code.
+translated only where it is shown. Core and hardware speak English; their texts with values are made by ``core.messages.message``
+and translated by template. Those that come from a file or another process are recognised by the templates of the translation.
 """
 
 from __future__ import annotations
 
 import re
+import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -27,6 +24,7 @@ from core.control.faults import Cause
 from core.control.gate import RejectReason
 from core.control.joints import Limit
 from core.control.modes import Hindrance
+from core.messages import Message
 from core.types import Reason
 
 if TYPE_CHECKING:
@@ -240,7 +238,7 @@ FIXED = (
     "the last seconds are still being saved",
 )
 
-# A value called by one letter is a number; any other is a text that may be known itself.
+# Texts that core and hardware compose without ``message``. A value called by one letter is a number, any other may be a known text.
 TEMPLATES = (
     "the library of RealSense cameras cannot be used: {problem}",
     "{path}: end of the video",
@@ -490,6 +488,7 @@ class _InUse:
 
 _IN_USE = _InUse()
 _VALUE = re.compile(r"\{(\w+)\}")
+_NUMBER = r"[-+]?\d[\d.]*"
 _AS_WRITTEN: ContextVar[bool] = ContextVar("texts as written", default=False)
 
 
@@ -505,14 +504,17 @@ def tr(text: str, /, **values: object) -> str:
 
 
 def tr_text(text: str) -> str:
-    """A finished text of a layer below: a known one, or one made by a known pattern; any other stays English."""
+    """A finished text of a layer below in the language of the windows; an unknown one stays English."""
     if _IN_USE.lookup is None or _AS_WRITTEN.get() or not text:
         return text
-    return _finished(text)
+    if isinstance(text, Message) and text.values and (shown := tr(text.template)) != text.template:
+        return shown.format(**{name: tr_text(value) for name, value in text.values.items()})
+    return _recognised(str.__str__(text))
 
 
 @lru_cache(maxsize=1024)
-def _finished(text: str) -> str:
+def _recognised(text: str) -> str:
+    """A text of a file or another process: a known one, or one made by a known template."""
     whole = tr(text)
     if whole != text:
         return whole
@@ -526,18 +528,36 @@ def _finished(text: str) -> str:
 @cache
 def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
     """The more words of its own a template has, the earlier it is tried: a short one would fit the texts of longer ones."""
-    templates = sorted((*TEMPLATES, *COMPOSED), key=lambda template: len(_VALUE.sub("", template)), reverse=True)
+
+    def order(template: str) -> tuple[int, int]:
+        return -len(_VALUE.sub("", template)), sum(len(name) > 1 for name in _VALUE.findall(template))  # numbers fit less
+
+    templates = sorted(templates_below(), key=order)
     return tuple((template, _pattern(template)) for template in templates)
+
+
+def templates_below(language: str = CHINESE) -> set[str]:
+    """The templates of core and hardware that a translation has."""
+    found = {*TEMPLATES, *COMPOSED}
+    path = FOLDER / f"lumenpilot_{LOCALE[language]}.ts"
+    for entry in ET.parse(path).getroot().iter("message") if path.is_file() else ():  # our own file
+        place, source = entry.find("location"), entry.findtext("source") or ""
+        is_below = place is not None and place.get("filename", "").startswith(("../../core/", "../../hardware/"))
+        if is_below and _VALUE.search(source):
+            found.add(source)
+    return found
 
 
 def _pattern(template: str) -> re.Pattern[str]:
     parts = _VALUE.split(template)
-    made = (re.escape(part) if k % 2 == 0 else f"(?P<{part}>{_value(part)})" for k, part in enumerate(parts))
+    made, named = [], set[str]()
+    for k, part in enumerate(parts):
+        if k % 2 == 0:
+            made.append(re.escape(part))
+        else:
+            made.append(f"(?P={part})" if part in named else rf"(?P<{part}>{_NUMBER if len(part) == 1 else '.+?'})")
+            named.add(part)
     return re.compile("".join(made), re.DOTALL)
-
-
-def _value(name: str) -> str:
-    return r"[-+]?\d[\d.]*" if len(name) == 1 else ".+?"
 
 
 @contextmanager
@@ -591,7 +611,7 @@ def use_language(application: QApplication, choice: str = AUTO, folder: Path = F
         application.removeTranslator(old)
         old.deleteLater()
     _IN_USE.code, _IN_USE.lookup, _IN_USE.problem = ENGLISH, None, ""
-    _finished.cache_clear()
+    _recognised.cache_clear()
     code = wanted(choice)
     if code not in LOCALE:
         return ""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ast
-import importlib.util
 import json
+import pickle
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QLocale, Qt, QTranslator
@@ -29,27 +28,18 @@ from core.config.files import Profiles, read_settings
 from core.config.models import Config, QualityConfig
 from core.config.schema import Bounds
 from core.control.alerts import ALERTS
+from core.devices import UserError
+from core.messages import Message, message
 from core.perception.quality import check_kind, hinted
 from core.session.writer import RecordStatus
 from core.types import Advice, Reason, Refusal, Speed
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine
+from tools import translations as translations_tool
 
 ROOT = Path(__file__).resolve().parents[3]
 TS = ROOT / "resources" / "translations" / "lumenpilot_zh_CN.ts"
 HAN = re.compile("[\u4e00-\u9fff]")
-
-
-def _script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("translations", ROOT / "scripts" / "translations.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SCRIPT = _script()
 
 
 @pytest.fixture
@@ -73,15 +63,15 @@ def _placeholders(text: str) -> list[str]:
 
 
 def test_every_text_of_the_windows_is_translated_with_its_placeholders() -> None:
-    translations = SCRIPT.read_ts(TS)
-    texts = SCRIPT.texts_of_code()
+    translations = translations_tool.read_ts(TS)
+    texts = translations_tool.texts_of_code()
     assert set(translations) == set(texts), "run make translations"
     assert not [text for text in texts if not translations[text].strip()]
     assert not [text for text in texts if _placeholders(text) != _placeholders(translations[text])]
 
 
 def test_a_key_that_is_marked_in_english_is_marked_in_chinese() -> None:
-    for text, translated in SCRIPT.read_ts(TS).items():
+    for text, translated in translations_tool.read_ts(TS).items():
         marked = re.search(r"&(\w)", text)
         if marked is not None:
             found = re.search(r"&(\w)", translated)
@@ -90,28 +80,28 @@ def test_a_key_that_is_marked_in_english_is_marked_in_chinese() -> None:
 
 
 def test_the_compiled_file_is_what_lrelease_makes_of_the_texts(tmp_path: Path) -> None:
-    made = SCRIPT.release(TS, tmp_path / "made.qm")
+    made = translations_tool.release(TS, tmp_path / "made.qm")
     assert made.read_bytes() == TS.with_suffix(".qm").read_bytes(), "run make translations"
 
 
 def test_writing_the_texts_again_changes_nothing(tmp_path: Path) -> None:
     copy = tmp_path / TS.name
     copy.write_bytes(TS.read_bytes())
-    SCRIPT.write_ts(copy, SCRIPT.texts_of_code(), SCRIPT.read_ts(copy))
+    translations_tool.write_ts(copy, translations_tool.texts_of_code(), translations_tool.read_ts(copy))
     assert copy.read_bytes() == TS.read_bytes()
 
 
 def test_a_new_text_stands_in_the_file_as_unfinished(tmp_path: Path) -> None:
     path = tmp_path / "lumenpilot_zh_CN.ts"
-    SCRIPT.write_ts(path, {"Robot & <head>": "app/a.py", "Vessel": "app/b.py"}, {"Vessel": "血管", "Gone": "没有"})
-    assert SCRIPT.read_ts(path) == {"Robot & <head>": "", "Vessel": "血管"}
+    translations_tool.write_ts(path, {"Robot & <head>": "app/a.py", "Vessel": "app/b.py"}, {"Vessel": "血管", "Gone": "没有"})
+    assert translations_tool.read_ts(path) == {"Robot & <head>": "", "Vessel": "血管"}
     assert 'type="unfinished"' in path.read_text(encoding="utf-8")
 
 
 def _texts_below() -> set[str]:
     """All literals of the code that makes these texts; the values of an f-string are {}."""
     found = set()
-    own = ROOT / "app" / "core_texts.py"
+    own = ROOT / "app" / "ui" / "i18n.py"
     for path in (
         *ROOT.glob("core/**/*.py"),
         *ROOT.glob("hardware/**/*.py"),
@@ -180,7 +170,7 @@ def test_texts_of_the_layers_below_are_translated_where_they_are_known(chinese: 
     assert tr_text(text) == translated
 
 
-@pytest.mark.parametrize("template", [*i18n.TEMPLATES, *i18n.COMPOSED])
+@pytest.mark.parametrize("template", sorted(i18n.templates_below()))
 def test_a_text_is_taken_by_the_template_that_made_it(template: str) -> None:
     """And not by a shorter one, which would leave half of it in English."""
     text = re.sub(r"\{(\w+)\}", lambda found: "5" if len(found[1]) == 1 else "/dev/ttyUSB0", template)
@@ -219,6 +209,14 @@ def test_tool_tips_fit_a_screen_and_no_line_begins_with_a_full_stop(chinese: Non
 def test_a_finished_text_is_not_translated_twice(chinese: None) -> None:
     once = tr_text("newest frame 412 ms old")
     assert tr_text(once) == once
+
+
+def test_a_message_is_translated_by_its_template_also_from_an_error_and_a_pipe(chinese: None) -> None:
+    made = message("the computer slept for {a:.0f} s", a=12.3)
+    assert (made, made.template, dict(made.values)) == ("the computer slept for 12 s", "the computer slept for {a} s", {"a": "12"})
+    for text in (made, str(UserError(made)), pickle.loads(pickle.dumps(made))):
+        assert isinstance(text, Message)
+        assert tr_text(text) == "计算机休眠了 12 s"
 
 
 def test_what_is_kept_is_english_whatever_the_window_speaks(chinese: None) -> None:
