@@ -53,7 +53,8 @@ from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
 from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
-from app.training.dialog import TrainingDialog, Wish, collect_from_file
+from app.training.dialog import TrainingDialog
+from app.training.model import TrainingRequest, collect_from_file
 from app.ui import theme
 from app.widgets.basics import Card
 from app.widgets.servo_table import ServoTable
@@ -513,13 +514,13 @@ def training(studio: Studio) -> None:
         dialog.steps.setValue(_STEPS)
         dialog.show()
         try:
-            dialog.job.start(Wish(dialog.name.text(), steps=_STEPS, remember=_REMEMBERED))
+            dialog.job.start(TrainingRequest(dialog.name.text(), steps=_STEPS, remember=_REMEMBERED))
 
             def far_enough() -> bool:
                 state = dialog.job.state
                 if not state.is_busy:
                     raise UserError(dialog.line)
-                return state.step >= _SHOWN_STEP and len(state.looks) >= _SHOWN_LOOKS
+                return state.step >= _SHOWN_STEP and len(state.held_out) >= _SHOWN_LOOKS
 
             studio.until(far_enough, "the training", _TRAINING_S)
             studio.wait(0.3)

@@ -14,7 +14,8 @@ from app.annotator.editing import Tool
 from app.annotator.model import AnnotationModel
 from app.annotator.panels import AnnotationBar, AnnotationHeader, AnnotationReadout, QueueList, QueueModel
 from app.player.controls import NoteField
-from app.training.dialog import TrainingDialog, collect_from_store
+from app.training.dialog import TrainingDialog
+from app.training.model import collect_from_store
 from app.ui import theme
 from app.ui.actions import KeyTable, MenuEntry, add_help_menu, add_menu, menu_tables, shown
 from app.ui.i18n import mark, tr, tr_text

@@ -24,7 +24,8 @@ from app.operator.preflight_list import PreflightList
 from app.operator.recording import AfterSession, Declined, RecoveryController, open_file
 from app.operator.rig_session import StopOutcome
 from app.operator.window import OperatorWindow
-from app.training.dialog import TrainingDialog, collect_from_file
+from app.training.dialog import TrainingDialog
+from app.training.model import collect_from_file
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
 from app.ui.i18n import tr

@@ -1,31 +1,12 @@
-"""Training on one's own annotations, watched: what to call it, how it goes, what it changes, and stop.
-
-Loss and Dice of a training, step by step.
-
-The same picture before and after: what a network found of it then, and finds now.
-
-A training on one's own annotations: masks become sets, ``train`` runs as a process at low priority, and its progress is kept.
-
-Where a training's annotations come from: an annotation file and the images beside it, or those of an open annotator window.
-"""
+"""The training dialog: what to train, loss and Dice by step, pictures before and after, and stop."""
 
 from __future__ import annotations
 
-import re
-import shutil
-import threading
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
-from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import platformdirs
 import pyqtgraph as pg
-from PySide6.QtCore import QObject, QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QColor, QFontMetrics, QKeyEvent, QPen, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QComboBox,
@@ -41,248 +22,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.operator.models import InstalledModel, installed_models
+from app.operator.models import installed_models
+from app.training.model import STEPS, Collect, TrainingJob, TrainingPhase, TrainingRequest, TrainingState, name_problem
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.ui.workers import ChildProcess, Worker, command_of
 from app.widgets.basics import Card, takes_enter
-from core.annotation.model import AnnotationError
-from core.annotation.store import AnnotationStore, FoundImage, StoredAnnotation
-from core.perception.model_file import MODELS, own_models
-
-if TYPE_CHECKING:
-    from core.annotation.exchange import OwnFrames
-
-
-STEPS = 400
-_INTERRUPTED = 130
-"""Exit code of ``train`` that was stopped before its first step."""
-_BATCH, _RATE, _CROP, _LOOK_SHARE = 8, 2e-3, 256, 0.7
-"""For a network that can see already: a fifth of the rate with which it was taught, so that it does not forget."""
-REMEMBER = 80
-"""Frames of the twin that are made first, in half a minute, and shown as often as the new ones (docs/method.md)."""
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
-_END_WITHIN_MS = 3000
-
-Collect = Callable[[], tuple[Sequence[StoredAnnotation], Sequence[FoundImage]]]
-"""Reads the annotations and finds their images; called in a thread of its own, may raise UserError."""
-
-
-class TrainingPhase(Enum):
-    """Where a training is."""
-
-    IDLE = "idle"
-    PREPARING = "preparing"
-    RUNNING = "running"
-    STOPPING = "stopping"
-    DONE = "done"
-    FAILED = "failed"
-
-
-@dataclass(frozen=True, slots=True)
-class HeldOutLook:
-    """Dice on the frames that are not trained on, after so many steps, and pictures of some of them."""
-
-    step: int
-    vessel_dice: float
-    robot_dice: float
-    pictures: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class TrainingState:
-    """What the dialog shows. ``curve``: step, loss, and Dice of vessel and robot on what is trained on. ``line``: how it is."""
-
-    phase: TrainingPhase = TrainingPhase.IDLE
-    line: str = ""
-    name: str = ""
-    steps: int = STEPS
-    curve: tuple[tuple[int, float, float, float], ...] = ()
-    looks: tuple[HeldOutLook, ...] = ()
-    left_s: float | None = None
-    frames: OwnFrames | None = None
-
-    @property
-    def step(self) -> int:
-        return self.curve[-1][0] if self.curve else 0
-
-    @property
-    def is_busy(self) -> bool:
-        return self.phase in {TrainingPhase.PREPARING, TrainingPhase.RUNNING, TrainingPhase.STOPPING}
-
-
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """What is asked for: the new model's name, the one to start from, how long, and with how many frames of the twin beside."""
-
-    name: str
-    init: str = "default"
-    steps: int = STEPS
-    remember: int = REMEMBER
-
-
-def name_problem(name: str) -> str:
-    """Why a model cannot be called so; empty when it can."""
-    if not _NAME.fullmatch(name):
-        return tr("a name is letters, digits, - and _, 40 at most")
-    if (MODELS / name).exists() or (own_models() / name).exists():
-        return tr("there is a model {name} already; choose another name", name=name)
-    return ""
-
-
-@dataclass(slots=True)
-class _Told:
-    """What the process said last, beside its progress."""
-
-    records: dict[str, Any] = field(default_factory=dict)
-
-
-class TrainingJob(QObject):
-    """One training at a time. ``changed`` carries the ``TrainingState``; ``installed`` the name of a model that is new.
-
-    Parameters
-    ----------
-    collect : where the annotations come from.
-    folder : where the sets are written; default: in the program's data folder.
-    """
-
-    changed = Signal(object)
-    installed = Signal(str)
-
-    def __init__(self, collect: Collect, parent: QObject | None = None, *, folder: Path | None = None) -> None:
-        super().__init__(parent)
-        self._collect = collect
-        self._folder = folder if folder is not None else Path(platformdirs.user_data_dir("LumenPilot")) / "training"
-        self.state = TrainingState()
-        self._wish = Wish("")
-        self._child: ChildProcess | None = None
-        self._is_closed = threading.Event()
-        self._told = _Told()
-        self._work = Worker("preparing a training", self)
-        self._work.done.connect(self._on_prepared)
-        self._work.failed.connect(self._on_not_prepared)
-
-    def start(self, wish: Wish) -> None:
-        """Write the sets, then train; refused, with one line, where that makes no sense."""
-        if self.state.is_busy:
-            return
-        if problem := name_problem(wish.name):
-            self._show(TrainingState(TrainingPhase.FAILED, tr("Not started: {why}", why=tr_text(problem)), steps=wish.steps))
-            return
-        self._wish, self._told = wish, _Told()
-        self._show(TrainingState(TrainingPhase.PREPARING, tr("Collecting the masks"), wish.name, wish.steps))
-        collect, closed = self._collect, self._is_closed
-        out = self._folder / f"{wish.name}_{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
-
-        def prepare() -> OwnFrames:
-            from core.annotation.exchange import split_own_frames  # statistics, which a window does without until then
-
-            annotations, images = collect()
-            with ExitStack() as undo:
-                undo.callback(shutil.rmtree, out, ignore_errors=True)  # half a set is none
-                frames = split_own_frames(annotations, images, out, lambda: not closed.is_set())
-                if not closed.is_set():
-                    undo.pop_all()
-            return frames
-
-        self._work.submit("prepare", prepare)
-
-    def stop(self) -> None:
-        """End it soon; what was learnt until then becomes the model."""
-        if self._child is not None and self.state.phase is TrainingPhase.RUNNING:
-            line = tr("Stopping; what was learnt is kept, which takes some seconds")
-            self._show(replace(self.state, phase=TrainingPhase.STOPPING, line=line))
-            self._child.ask_to_end()
-
-    def close(self) -> None:
-        """The window goes; a running training ends by itself and keeps what it learnt."""
-        if self._child is not None:
-            self._child.leave()
-            self._child.ask_to_end()
-        self._is_closed.set()
-        self._work.stop(finish=False)
-        self._work.wait(_END_WITHIN_MS)
-
-    def _show(self, state: TrainingState) -> None:
-        self.state = state
-        self.changed.emit(state)
-
-    def _on_not_prepared(self, _key: object, line: str) -> None:
-        self._show(
-            TrainingState(TrainingPhase.FAILED, tr("Not started: {why}", why=tr_text(line)), self._wish.name, self._wish.steps)
-        )
-
-    def _on_prepared(self, _key: object, frames: OwnFrames) -> None:
-        if self._is_closed.is_set():
-            return
-        wish, out = self._wish, own_models() / self._wish.name
-        plan = ["--steps", wish.steps, "--batch", _BATCH, "--rate", _RATE, "--crop", _CROP, "--look-share", _LOOK_SHARE]
-        plan += ["--remember", wish.remember]
-        sets = ["--data", frames.train, "--held-out", frames.held_out, "--init", wish.init, "--out", out]
-        child = ChildProcess(command_of("train", *map(str, (*sets, *plan)), "--progress-json"), self)
-        child.told.connect(self._on_told)
-        child.ended.connect(self._on_ended)
-        self._child = child
-        counted = tr(
-            "{learning} pictures to learn from, {held_out} held out to judge by",
-            learning=frames.train_count,
-            held_out=frames.held_out_count,
-        )
-        if frames.problems:
-            counted += tr("; {count} pictures left out: a mask or the picture itself is missing", count=len(frames.problems))
-        self._show(replace(self.state, phase=TrainingPhase.RUNNING, line=counted, frames=frames))
-        child.start()
-
-    def _on_told(self, record: dict[str, Any]) -> None:
-        state = self.state
-        try:
-            if "loss" in record:
-                point = int(record["step"]), float(record["loss"]), float(record["vessel_dice"]), float(record["robot_dice"])
-                steps = int(record.get("steps", state.steps))  # more than asked for where a second look learns, too
-                state = replace(state, curve=(*state.curve, point), steps=steps, left_s=record.get("left_s"))
-            elif "held_out_step" in record:
-                dices = float(record["vessel_dice"]), float(record["robot_dice"])
-                look = HeldOutLook(int(record["held_out_step"]), *dices, tuple(record.get("pictures", ())))
-                state = replace(state, looks=(*state.looks, look))
-            else:
-                self._told.records.update(record)
-                return
-        except (KeyError, TypeError, ValueError):  # a line of another version; the curve does without it
-            return
-        self._show(state)
-
-    def _on_ended(self, code: int, line: str) -> None:
-        self._child = None
-        if code == 0 and "model" in self._told.records:
-            self._show(replace(self.state, phase=TrainingPhase.DONE, line=self._outcome(), left_s=None))
-            self.installed.emit(self._wish.name)
-        elif code == _INTERRUPTED:  # later it keeps what it has, and ends well
-            line = tr("Stopped before the first step; there is no new model")
-            self._show(replace(self.state, phase=TrainingPhase.FAILED, line=line, left_s=None))
-        else:
-            why = line or (tr("it was ended by signal {number}", number=-code) if code < 0 else tr("exit code {code}", code=code))
-            self._show(replace(self.state, phase=TrainingPhase.FAILED, line=tr("Training failed: {why}", why=why), left_s=None))
-
-    def _outcome(self) -> str:
-        """What came of it, in one line."""
-        done, steps = self._told.records.get("steps_done"), self._told.records.get("steps")
-        early = tr(" after {done} of {steps} steps", done=done, steps=steps) if done != steps else ""
-        looks = self.state.looks
-        if len(looks) < 2:
-            return tr("Model {name} is installed{early}; choose it in the Model menu", name=self._wish.name, early=early)
-        first, last = looks[0], looks[-1]
-        vessel = tr("vessel {before:.2f} → {after:.2f}", before=first.vessel_dice, after=last.vessel_dice)
-        robot = tr("robot {before:.2f} → {after:.2f}", before=first.robot_dice, after=last.robot_dice)
-        worse = last.vessel_dice + last.robot_dice < first.vessel_dice + first.robot_dice
-        verdict = tr("It is WORSE than before on the held-out pictures") if worse else tr("Choose it in the Model menu")
-        return tr(
-            "Model {name} is installed{early}. Dice on held-out pictures: {vessel}, {robot}. {verdict}",
-            name=self._wish.name,
-            early=early,
-            vessel=vessel,
-            robot=robot,
-            verdict=verdict,
-        )
 
 
 class TrainingCurves(QWidget):
@@ -335,8 +79,8 @@ class TrainingCurves(QWidget):
         """Draw all that is known."""
         curve = np.array(state.curve, np.float64).reshape(-1, 4)
         self._loss.setData(curve[:, 0], curve[:, 1])
-        steps = [look.step for look in state.looks]
-        held_out = {"vessel": [look.vessel_dice for look in state.looks], "robot": [look.robot_dice for look in state.looks]}
+        steps = [one.step for one in state.held_out]
+        held_out = {"vessel": [one.vessel_dice for one in state.held_out], "robot": [one.robot_dice for one in state.held_out]}
         for place, name in ((2, "vessel"), (3, "robot")):
             self._lines[name].setData(curve[:, 0], curve[:, place])
             self._dots[name].setData(steps, held_out[name])
@@ -411,12 +155,8 @@ class BeforeAfter(QWidget):
         whole.addLayout(head)
         self._show()
 
-    @property
-    def title(self) -> str:
-        return self._title.text()
-
     def show_pictures(self, before: tuple[str, ...], after: tuple[str, ...]) -> None:
-        """Paths of the same frames then and now; they are read again, for they may have been written anew."""
+        """Paths of the same frames then and now; the files are read again, for they may have been rewritten."""
         self._before, self._after = before, after
         self._place = min(self._place, max(0, len(before) - 1))
         self._show()
@@ -431,24 +171,18 @@ class BeforeAfter(QWidget):
         for picture, paths in ((self._left, self._before), (self._right, self._after)):
             picture.show_file(Path(paths[self._place]) if self._place < len(paths) else None)
         colours = theme.ON_PICTURE
-        vessel, robot = (
-            f'<span style="color:{c}">\N{BLACK SQUARE}</span>&nbsp;{n}'
-            for c, n in ((colours.VESSEL, tr("vessel")), (colours.ROBOT, tr("robot")))
-        )
-        found = tr("colour: found ({vessel}, {robot})", vessel=vessel, robot=robot)
-        which = (
-            tr("Held-out picture {place} of {count}; {found}, line: drawn by hand", place=self._place + 1, count=count, found=found)
-            if count
-            else tr("Held-out pictures")
-        )
-        self._title.setText(which)
+        square = '<span style="color:{}">\N{BLACK SQUARE}</span>&nbsp;{}'.format
+        vessel, robot = square(colours.VESSEL, tr("vessel")), square(colours.ROBOT, tr("robot"))
+        found, place = tr("colour: found ({vessel}, {robot})", vessel=vessel, robot=robot), self._place + 1
+        which = tr("Held-out picture {place} of {count}; {found}, line: drawn by hand", place=place, count=count, found=found)
+        self._title.setText(which if count else tr("Held-out pictures"))
 
 
 _SIZE = QSize(940, 640)
 
 
 class TrainingDialog(QDialog):
-    """Shows a job and hands it the user's wishes. Closing it while it trains only hides it: the training goes on.
+    """Shows a job and starts and stops it. Closing it while it trains only hides it: the training goes on.
 
     Parameters
     ----------
@@ -468,13 +202,24 @@ class TrainingDialog(QDialog):
         self.hide_button = QPushButton(tr("&Close"))
         self.curves, self.pictures = TrainingCurves(), BeforeAfter()
         self._bar, self._line = QProgressBar(), QLabel()
-        self._fill_form()
+        self._line.setWordWrap(True)
+        self._line.setMinimumHeight(38)
+        self._bar.setTextVisible(False)
+        self._bar.setFixedHeight(8)
+        self.start.setObjectName("main_button")
+        for button, slot in ((self.start, self._on_start), (self.stop, self.job.stop), (self.hide_button, self.close)):
+            button.setAutoDefault(False)
+            button.clicked.connect(slot)
         heading = QLabel()
         heading.setObjectName("card_title")
         from_where, room = tr("Masks from {source}", source=source), _SIZE.width() - 48
         heading.setText(QFontMetrics(theme.semi_bold(12)).elidedText(from_where, Qt.TextElideMode.ElideMiddle, room))
         heading.setToolTip(source)
         heading.setAccessibleName(from_where)
+        foot = QHBoxLayout()
+        foot.addWidget(self._bar, 1, Qt.AlignmentFlag.AlignVCenter)
+        foot.addWidget(self.stop)
+        foot.addWidget(self.hide_button)
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 12, 16, 12)
         column.setSpacing(theme.GAP)
@@ -483,18 +228,45 @@ class TrainingDialog(QDialog):
         column.addWidget(Card("", self.curves), 4)
         column.addWidget(Card("", self.pictures), 6)
         column.addWidget(self._line)
-        column.addLayout(self._foot())
+        column.addLayout(foot)
         self.job.changed.connect(self._on_changed)
         self._on_changed(self.job.state)
 
+    def _form(self) -> QHBoxLayout:
+        self.name.setMaxLength(40)
+        self.name.setText(_free_name())
+        for model in installed_models():
+            if not model.problem:
+                self.init.addItem(tr("{name} (own)", name=model.name) if model.is_own else model.name, model.name)
+        self.steps.setRange(10, 20_000)
+        self.steps.setSingleStep(100)
+        self.steps.setValue(STEPS)
+        self.steps.setSuffix(tr(" steps"))
+        own = tr("Letters, digits, - and _; the Model menu lists it under this name")
+        kept = tr("What this model can do is kept as far as possible, and the new look is learnt on top")
+        longer = tr("More steps learn more and take longer: on two processor cores a step takes about a second")
+        row = QHBoxLayout()
+        for word, entry, stretch, name, tip in (
+            (tr("New model"), self.name, 2, tr("Name of the new model"), own),
+            (tr("starts from"), self.init, 3, tr("Model to start from"), kept),
+            (tr("for"), self.steps, 1, tr("Steps of training"), longer),
+        ):
+            label = QLabel(word)
+            label.setBuddy(entry)
+            entry.setAccessibleName(name)
+            entry.setToolTip(tip)
+            row.addWidget(label)
+            row.addWidget(entry, stretch)
+        row.addWidget(self.start)
+        return row
+
     @property
     def line(self) -> str:
-        """What is the matter, as shown."""
+        """The state in words, as shown."""
         return self._line.text()
 
     @property
     def is_busy(self) -> bool:
-        """A training goes on."""
         return self.job.state.is_busy
 
     def end(self) -> None:
@@ -502,58 +274,12 @@ class TrainingDialog(QDialog):
         self.job.close()
         self.close()
 
-    def _fill_form(self) -> None:
-        self.name.setMaxLength(40)
-        self.name.setText(_free_name())
-        self.name.setAccessibleName(tr("Name of the new model"))
-        for model in installed_models():
-            if not model.problem:
-                self.init.addItem(_title(model), model.name)
-        self.init.setAccessibleName(tr("Model to start from"))
-        self.steps.setRange(10, 20_000)
-        self.steps.setSingleStep(100)
-        self.steps.setValue(STEPS)
-        self.steps.setSuffix(tr(" steps"))
-        self.steps.setAccessibleName(tr("Steps of training"))
-        self.name.setToolTip(tr("Letters, digits, - and _; the Model menu lists it under this name"))
-        self.init.setToolTip(tr("What this model can do is kept as far as possible, and the new look is learnt on top"))
-        self.steps.setToolTip(tr("More steps learn more and take longer: on two processor cores a step takes about a second"))
-        self.start.setObjectName("main_button")
-        self._line.setWordWrap(True)
-        self._line.setMinimumHeight(38)
-        self._bar.setTextVisible(False)
-        self._bar.setFixedHeight(8)
-        for button, slot in ((self.start, self._on_start), (self.stop, self.job.stop), (self.hide_button, self.close)):
-            button.setAutoDefault(False)
-            button.clicked.connect(slot)
-
-    def _form(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        for word, entry, stretch in (
-            (tr("New model"), self.name, 2),
-            (tr("starts from"), self.init, 3),
-            (tr("for"), self.steps, 1),
-        ):
-            label = QLabel(word)
-            label.setBuddy(entry)
-            row.addWidget(label)
-            row.addWidget(entry, stretch)
-        row.addWidget(self.start)
-        return row
-
-    def _foot(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.addWidget(self._bar, 1, Qt.AlignmentFlag.AlignVCenter)
-        row.addWidget(self.stop)
-        row.addWidget(self.hide_button)
-        return row
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if not takes_enter(self, event):
             super().keyPressEvent(event)
 
     def _on_start(self) -> None:
-        self.job.start(Wish(self.name.text().strip(), str(self.init.currentData() or "default"), self.steps.value()))
+        self.job.start(TrainingRequest(self.name.text().strip(), str(self.init.currentData() or "default"), self.steps.value()))
 
     def _on_changed(self, state: TrainingState) -> None:
         for entry in (self.name, self.init, self.steps, self.start):
@@ -565,9 +291,9 @@ class TrainingDialog(QDialog):
         self._line.setText(_words(state))
         self.setAccessibleDescription(self._line.text())
         self.curves.show_state(state)
-        if state.looks:
-            after = state.looks[-1].pictures if len(state.looks) > 1 else ()
-            self.pictures.show_pictures(state.looks[0].pictures, after)
+        if state.held_out:
+            after = state.held_out[-1].pictures if len(state.held_out) > 1 else ()
+            self.pictures.show_pictures(state.held_out[0].pictures, after)
         if state.phase is TrainingPhase.DONE and name_problem(self.name.text()):
             self.name.setText(_free_name())
 
@@ -580,7 +306,10 @@ def _words(state: TrainingState) -> str:
         )
     if state.phase is not TrainingPhase.RUNNING or not state.step:
         return tr_text(state.line)
-    left = tr(", {duration} left", duration=_duration(state.left_s)) if state.left_s is not None else ""
+    left = ""
+    if state.left_s is not None:
+        time = f"{state.left_s:.0f} s" if state.left_s < 90 else tr("{minutes:.0f} min", minutes=state.left_s / 60)
+        left = tr(", {duration} left", duration=time)
     _, loss, vessel, robot = state.curve[-1]
     return tr(
         "Step {step} of {steps}{left}. Loss {loss:.3f}, Dice vessel {vessel:.2f}, robot {robot:.2f}. {line}",
@@ -594,34 +323,9 @@ def _words(state: TrainingState) -> str:
     )
 
 
-def _duration(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 90 else tr("{minutes:.0f} min", minutes=seconds / 60)
-
-
-def _title(model: InstalledModel) -> str:
-    return tr("{name} (own)", name=model.name) if model.is_own else model.name
-
-
 def _free_name() -> str:
     """A name that no model has."""
     number = 1
     while name_problem(name := f"own_{number}"):
         number += 1
     return name
-
-
-def collect_from_file(path: Path) -> tuple[Sequence[StoredAnnotation], Sequence[FoundImage]]:
-    """All annotations of a file, and those of their images that lie beside it. Raises AnnotationError."""
-    from app.annotator.sources import read_annotated  # statistics, which a window does without until then
-
-    return read_annotated(path, [path.parent])
-
-
-def collect_from_store(
-    store: AnnotationStore, images: Sequence[FoundImage]
-) -> tuple[Sequence[StoredAnnotation], Sequence[FoundImage]]:
-    """The same of a file that is open; images that are shown twice count once. Raises AnnotationError."""
-    annotations = store.annotations()
-    if not annotations:
-        raise AnnotationError(f"{store.path.name}: nothing is annotated yet")
-    return annotations, list({image.sha256: image for image in images}.values())

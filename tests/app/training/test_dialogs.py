@@ -31,7 +31,8 @@ from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
 from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
-from app.training.dialog import TrainingDialog, TrainingPhase, TrainingState
+from app.training.dialog import TrainingDialog
+from app.training.model import TrainingPhase, TrainingState
 from app.ui import theme
 from app.widgets.messages import Offer, OfferButton, OfferStrip
 from core.config.files import Profiles

@@ -20,7 +20,8 @@ from pytestqt.qtbot import QtBot
 from app.operator.models import figures_line, installed_models
 from app.operator.startup import WindowServices
 from app.operator.window import OperatorWindow
-from app.training.dialog import TrainingDialog, TrainingJob, TrainingPhase, Wish, collect_from_file, name_problem
+from app.training.dialog import TrainingDialog
+from app.training.model import TrainingJob, TrainingPhase, TrainingRequest, collect_from_file, name_problem
 from core.annotation.exchange import FEWEST
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.control.drive_view import DriveView
@@ -62,23 +63,23 @@ def test_it_trains_in_a_process_shows_how_it_goes_and_installs_the_model(small_m
     job = job_on(annotate_masks(tmp_path / "images", 10), tmp_path)
     installed: list[str] = []
     job.installed.connect(installed.append)
-    job.start(Wish("own_1", small_model, 12, remember=2))
+    job.start(TrainingRequest("own_1", small_model, 12, remember=2))
     ended(job, qtbot)
     state = job.state
     assert state.phase is TrainingPhase.DONE, state.line
     assert installed == ["own_1"]
     assert [point[0] for point in state.curve] == [2, 4, 6, 8, 10, 12]
-    assert state.looks[0].step == 0
-    assert state.looks[-1].step == 12
+    assert state.held_out[0].step == 0
+    assert state.held_out[-1].step == 12
     assert state.frames is not None
     assert (state.frames.train_count, state.frames.held_out_count) == (8, 2)
-    before, after = state.looks[0].pictures, state.looks[-1].pictures
+    before, after = state.held_out[0].pictures, state.held_out[-1].pictures
     assert [Path(path).name for path in before] == ["frame_04_before.png", "frame_05_before.png"]
     assert all(Path(path).is_file() for path in (*before, *after))
     info = read_model_info(model_folder("own_1"))  # with its hashes
     assert info.figures["held_out"] is True
-    assert info.figures["robot_dice"] == pytest.approx(state.looks[-1].robot_dice)
-    assert info.figures["before"]["robot_dice"] == pytest.approx(state.looks[0].robot_dice)
+    assert info.figures["robot_dice"] == pytest.approx(state.held_out[-1].robot_dice)
+    assert info.figures["before"]["robot_dice"] == pytest.approx(state.held_out[0].robot_dice)
     assert "on held-out pictures" in state.line
     job.close()
 
@@ -86,7 +87,7 @@ def test_it_trains_in_a_process_shows_how_it_goes_and_installs_the_model(small_m
 @pytest.mark.slow
 def test_a_training_that_is_stopped_keeps_what_it_learnt(small_model: str, qtbot: QtBot, tmp_path: Path) -> None:
     job = job_on(annotate_masks(tmp_path / "images", 8), tmp_path)
-    job.start(Wish("own_1", small_model, 5000, remember=2))
+    job.start(TrainingRequest("own_1", small_model, 5000, remember=2))
     qtbot.waitUntil(lambda: job.state.step >= 2 or not job.state.is_busy, timeout=LONG_MS)
     job.stop()
     assert job.state.phase is TrainingPhase.STOPPING
@@ -100,7 +101,7 @@ def test_a_training_that_is_stopped_keeps_what_it_learnt(small_model: str, qtbot
 @pytest.mark.slow
 def test_a_training_whose_window_has_gone_ends_and_keeps_what_it_learnt(small_model: str, qtbot: QtBot, tmp_path: Path) -> None:
     job = job_on(annotate_masks(tmp_path / "images", 8), tmp_path)
-    job.start(Wish("own_1", small_model, 5000, remember=2))
+    job.start(TrainingRequest("own_1", small_model, 5000, remember=2))
     qtbot.waitUntil(lambda: job.state.step >= 2 or not job.state.is_busy, timeout=LONG_MS)
     child = job._child
     assert child is not None
@@ -119,7 +120,7 @@ def test_masks_that_are_still_being_collected_are_left_when_the_window_goes(qtbo
         return collect_from_file(store)
 
     job = TrainingJob(collect, folder=tmp_path / "training")
-    job.start(Wish("own_1"))
+    job.start(TrainingRequest("own_1"))
     assert begun.wait(5.0)
     threading.Timer(0.2, go_on.set).start()
     job.close()
@@ -134,7 +135,7 @@ def test_a_process_that_cannot_be_started_is_said(qtbot: QtBot, tmp_path: Path, 
 
     monkeypatch.setattr(tempfile, "TemporaryFile", full)
     job = job_on(annotate_masks(tmp_path / "images", FEWEST), tmp_path)
-    job.start(Wish("own_1"))
+    job.start(TrainingRequest("own_1"))
     ended(job, qtbot)
     assert job.state.phase is TrainingPhase.FAILED
     assert "cannot be started (No space left on device)" in job.state.line
@@ -143,7 +144,7 @@ def test_a_process_that_cannot_be_started_is_said(qtbot: QtBot, tmp_path: Path, 
 
 def test_too_few_masks_are_one_clear_line(qtbot: QtBot, tmp_path: Path) -> None:
     job = job_on(annotate_masks(tmp_path / "images", FEWEST - 1), tmp_path)
-    job.start(Wish("own_1"))
+    job.start(TrainingRequest("own_1"))
     ended(job, qtbot)
     assert job.state.line.startswith("Not started: 5 images have both a vessel and a robot mask, and training needs 6")
     assert not list((tmp_path / "training").glob("*"))
@@ -152,9 +153,9 @@ def test_too_few_masks_are_one_clear_line(qtbot: QtBot, tmp_path: Path) -> None:
 
 def test_one_that_is_stopped_before_its_first_step_is_said(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stopped = [sys.executable, "-c", "import sys; sys.stderr.write('interrupted\\n'); sys.exit(130)"]
-    monkeypatch.setattr("app.training.dialog.command_of", lambda *_: stopped)
+    monkeypatch.setattr("app.training.model.command_of", lambda *_: stopped)
     job = job_on(annotate_masks(tmp_path / "images", FEWEST), tmp_path)
-    job.start(Wish("own_1"))
+    job.start(TrainingRequest("own_1"))
     ended(job, qtbot)
     assert job.state.line == "Stopped before the first step; there is no new model"
     job.close()
@@ -166,7 +167,7 @@ def test_one_that_is_stopped_before_its_first_step_is_said(qtbot: QtBot, tmp_pat
 def test_a_name_that_makes_no_sense_is_refused(name: str, why: str, tmp_path: Path) -> None:
     assert why in name_problem(name)
     job = job_on(tmp_path / "nothing.sqlite", tmp_path)
-    job.start(Wish(name))
+    job.start(TrainingRequest(name))
     assert job.state.phase is TrainingPhase.FAILED
     assert why in job.state.line
     job.close()
@@ -174,7 +175,7 @@ def test_a_name_that_makes_no_sense_is_refused(name: str, why: str, tmp_path: Pa
 
 def test_what_fails_in_the_process_is_said(qtbot: QtBot, tmp_path: Path) -> None:
     job = job_on(annotate_masks(tmp_path / "images", FEWEST), tmp_path)
-    job.start(Wish("own_1", "no_such_model"))
+    job.start(TrainingRequest("own_1", "no_such_model"))
     ended(job, qtbot)
     assert job.state.phase is TrainingPhase.FAILED
     assert "no model 'no_such_model'" in job.state.line
