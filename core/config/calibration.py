@@ -1,26 +1,22 @@
-"""What is known of a rig that nobody can look up: lens, scale, steering, where its wires are slack. Part of a rig file."""
+"""The calibration section of a rig file: lens, scale, steering, zero of the joints, insertion port."""
 
 from __future__ import annotations
 
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from core.config.safety import JOINT_NAMES, TENDONS, JointName
+from core.config.section import ConfigSection
 
 SizePx = Annotated[tuple[int, int], Field(description="width and height of the pictures")]
-_ANGLE = Field(ge=-360.0, le=360.0)
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+class LensConfig(ConfigSection):
+    """Radial distortion: a point at radius r of the undistorted picture is seen at r (1 + k1 r^2 + k2 r^4).
 
-
-class LensConfig(_Section):
-    """Radial distortion: a point at radius r of the straightened picture is seen at r (1 + k1 r^2 + k2 r^4).
-
-    Radii count from ``center_px``, in halves of the picture's diagonal, so a lens holds good for every size of the same picture.
+    Radii count from ``center_px``, in halves of the picture's diagonal, so a lens holds for every size of the same picture.
     """
 
     k1: float = Field(ge=-0.5, le=0.5, description="negative: barrel")
@@ -32,18 +28,18 @@ class LensConfig(_Section):
 
     @model_validator(mode="after")
     def _check_folds_nothing(self) -> Self:
-        """Farther out in the straight picture must be farther out in the seen one, or its corners would be mirrored content."""
+        """The radius seen must grow with the radius in the straight picture, or its corners would show mirrored content."""
         squares = [place / 20 for place in range(21)]
         if min(1 + 3 * self.k1 * square + 5 * self.k2 * square * square for square in squares) <= 0.0:
             raise ValueError("k1 and k2 fold the picture's corners inwards; calibrate the lens again")
         return self
 
 
-class ScaleConfig(_Section):
-    """Millimetres per pixel of the straightened picture, in the plane in which the robot moves.
+class ScaleConfig(ConfigSection):
+    """Millimetres per pixel of the undistorted picture, in the plane in which the robot moves.
 
-    ``plane`` maps pixels to millimetres of that plane (3x3, row by row); a camera that looks at it at an angle has another scale at
-    every place. Without it the scale is the same everywhere.
+    ``plane`` maps pixels to millimetres of that plane (3x3, row by row), for a camera that sees it at an angle; None: the scale is
+    the same everywhere.
     """
 
     mm_per_px: float = Field(gt=0.0, le=100.0, description="in the middle of the picture")
@@ -61,7 +57,7 @@ class ScaleConfig(_Section):
         return abs(self.size_px[0] * size_px[1] / (self.size_px[1] * size_px[0]) - 1.0) <= 0.01
 
 
-class TendonConfig(_Section):
+class TendonConfig(ConfigSection):
     """Where the head goes when a tendon is pulled. Angles in the image: 0 to the right, 90 down."""
 
     name: Literal["right", "left", "up", "down"]
@@ -70,7 +66,7 @@ class TendonConfig(_Section):
     px_per_mm: float = Field(ge=0.0, description="way of the head per millimetre of pull, in working pixels")
 
 
-class SteeringConfig(_Section):
+class SteeringConfig(ConfigSection):
     """The steering as the camera saw it."""
 
     heading_deg: float = Field(ge=-360.0, le=360.0, description="direction of the robot's end when it was learnt")
@@ -87,23 +83,23 @@ class SteeringConfig(_Section):
         return self
 
 
-class ZeroConfig(_Section):
-    """Where the joints were zeroed. It holds until the servos are switched off: they forget their turns then."""
+class ZeroConfig(ConfigSection):
+    """Where the joints were zeroed. It holds until the servos lose power: they lose count of their turns then."""
 
     ticks: tuple[int, ...] = Field(min_length=len(JOINT_NAMES), max_length=len(JOINT_NAMES), description="position registers")
     slack_mm: tuple[float, ...] = Field(min_length=4, max_length=4, description="how far each tendon was from taut before")
     pretension_mm: float = Field(ge=0.0, le=5.0)
 
 
-class PortConfig(_Section):
-    """Where the robot is inserted, as shares of the (straightened) picture's width and height."""
+class PortConfig(ConfigSection):
+    """Where the robot is inserted, as shares of the undistorted picture's width and height."""
 
     x_share: float = Field(ge=0.0, le=1.0)
     y_share: float = Field(ge=0.0, le=1.0)
 
 
-class CalibrationConfig(_Section):
-    """All that was calibrated; None: it was not."""
+class CalibrationConfig(ConfigSection):
+    """All that was calibrated; None: not calibrated."""
 
     made_utc: datetime
     assumed: tuple[JointName, ...] | None = Field(

@@ -1,11 +1,7 @@
-"""Settings files: what differs from the defaults, as TOML. Nothing that a user wrote is ever lost.
+"""Settings files and profiles: what differs from the defaults, as TOML in the user's configuration folder. No user data is lost.
 
-Comments and unknown keys stay where they are. Before anything else would be lost (a file that is no TOML, a value that is not
-allowed, a change that somebody else made meanwhile) the old file is kept beside the new one, as ``NAME.bad-<time>``.
-
-Reading settings files of the user: what can be used of them is used, what cannot is told and kept.
-
-The user's own settings and named profiles, as TOML files in the user's configuration folder.
+Reading uses what is valid and reports the rest. Writing keeps comments and unknown keys where they are; before anything else would
+be lost (a file that is no TOML, a value that is not allowed, a change made meanwhile) the old file is kept as ``NAME.bad-<time>``.
 """
 
 from __future__ import annotations
@@ -28,6 +24,7 @@ from tomlkit.toml_document import TOMLDocument
 
 from core.config.models import RESOURCES, Config, ConfigError, load_config, merge
 from core.config.schema import JOINTS, FieldKind, settings_by_key, value_at
+from core.config.section import plain_message
 from core.devices import UserError
 from core.files import write_whole
 
@@ -38,10 +35,9 @@ _MOST_ROUNDS = 500
 
 @dataclass(frozen=True, slots=True)
 class SettingsFile:
-    """What a settings file says.
+    """A settings file as read.
 
-    ``data`` is what can be used, as nested dictionaries; ``text`` the file as it was read, None where there was none; ``problems``
-    are one line each, for people.
+    ``data`` is the valid part, as nested dictionaries; ``text`` the whole file, None where there was none; ``problems`` are lines.
     """
 
     path: Path
@@ -51,15 +47,15 @@ class SettingsFile:
 
     @property
     def config(self) -> Config:
-        """With the defaults where the file says nothing."""
+        """With the defaults for everything else."""
         return load_config(overrides=self.data)
 
 
 def read_settings(path: Path, *, may_move: bool = True) -> SettingsFile:
-    """What can be used of a settings file; a missing one is empty.
+    """The valid part of a settings file; a missing one is empty.
 
-    A file that is no TOML is set aside at once (unless it may not be moved), so that the next change does not overwrite it. Unknown
-    keys and values that are not allowed are left out here and stay in the file.
+    A file that is no TOML is renamed at once (if `may_move`), so that a change does not overwrite it. Unknown keys and values
+    that are not allowed are left out here and stay in the file.
     """
     try:
         text = path.read_bytes().decode("utf-8-sig")
@@ -69,7 +65,7 @@ def read_settings(path: Path, *, may_move: bool = True) -> SettingsFile:
     except OSError as error:
         return SettingsFile(path, {}, None, (f"{path}: cannot be read ({error.strerror}); the defaults are used",))
     except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
-        why = f"is no TOML ({_first_line(error)})"
+        why = f"is no TOML ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
         return SettingsFile(path, {}, None, (_move_aside(path, why) if may_move else f"{path}: {why}; the defaults are used",))
     data, problems = usable_part(data)
     return SettingsFile(path, data, text, tuple(f"{path}: {problem}" for problem in problems))
@@ -83,7 +79,7 @@ def aside_name(path: Path) -> Path:
 
 
 def usable_part(data: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """The part of `data` that is allowed, and a line for each part that is not."""
+    """The valid part of `data`, and a line for each part that is not valid."""
     problems: list[str] = []
     base = load_config().model_dump(mode="json")
     for _ in range(_MOST_ROUNDS):
@@ -95,14 +91,14 @@ def usable_part(data: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
             if first["type"] == "extra_forbidden":
                 problems.append(f"{key}: {UNKNOWN}")
             else:
-                problems.append(f"{key}: {_message(error)}; the default is used")
+                problems.append(f"{key}: {plain_message(first)}; the default is used")
         else:
             return data, problems
     return {}, [*problems, f"{_TOO_MUCH}; the defaults are used"]
 
 
 def _without(data: dict[str, Any], location: tuple[Any, ...]) -> tuple[dict[str, Any], str]:
-    """`data` without what is at `location`, or without the nearest thing around it that the file does say."""
+    """`data` without the value at `location`, or without the innermost table around it that the file has."""
     if not location or location[0] not in data:
         return {}, "file"
     name, inner = str(location[0]), data[location[0]]
@@ -110,15 +106,6 @@ def _without(data: dict[str, Any], location: tuple[Any, ...]) -> tuple[dict[str,
         rest, key = _without(inner, location[1:])
         return {**data, name: rest}, f"{name}.{key}"
     return {key: value for key, value in data.items() if key != name}, name
-
-
-def _message(error: ValidationError) -> str:
-    first: Any = error.errors()[0]
-    return str(first["msg"]).removeprefix("Value error, ")
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 def _move_aside(path: Path, why: str) -> str:
@@ -134,13 +121,12 @@ _HEAD = "# LumenPilot's settings: only what differs from the defaults. Every key
 
 
 def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
-    """Write what differs from the defaults; whenever the process or the power goes, the old or the new file is there.
+    """Write what differs from the defaults, atomically, also when the power goes.
 
     Parameters
     ----------
     path : the file, made if it is missing; a link is followed.
-    config : what the file is to say.
-    seen : the text that the file had when `config` was begun; None: nobody looked.
+    seen : the text that the file had when the change of `config` began; None: not read.
 
     Returns
     -------
@@ -166,12 +152,12 @@ def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
 
 
 def settings_text(old: str, config: Config) -> tuple[str, bool]:
-    """The text of a settings file that says `config`, made from its `old` text.
+    """The text of a settings file for `config`, made from its `old` text.
 
     Returns
     -------
     text : comments, order and unknown keys as in `old`.
-    is_lossless : False when `old` held something at a known place that nobody can read back from `text`.
+    is_lossless : False when a value of a known key in `old` is not in `text`.
     """
     try:
         document = tomlkit.parse(old)
@@ -183,7 +169,7 @@ def settings_text(old: str, config: Config) -> tuple[str, bool]:
         return _fresh(config), True
     _update(document, config)
     text = tomlkit.dumps(document)
-    # Rare forms (a table in three places, dotted keys) can outwit the editor: what it wrote is read back before it counts.
+    # rare forms (a table in three places, dotted keys) can break the edit: it is read back before it counts
     if _says(text, config, {problem for problem in problems if UNKNOWN in problem}):
         return text, is_lossless
     return _fresh(config), False
@@ -196,7 +182,7 @@ def changed_keys(first: Config, second: Config) -> tuple[str, ...]:
 
 
 def _old_text(path: Path, seen: str | None) -> tuple[str, str]:
-    """The file's text, empty where there is none that can be edited, and a line when it had to be set aside."""
+    """The file's text, empty where there is none that can be edited, and a line when it had to be kept aside."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:
@@ -218,7 +204,7 @@ def _kept(path: Path, why: str) -> str:
 
 
 def _says(text: str, config: Config, unknown: set[str]) -> bool:
-    """Whether the text, read back, means `config` and still has its unknown keys."""
+    """Whether the text, read back, gives `config` and still has its unknown keys."""
     try:
         data, problems = usable_part(tomllib.loads(text))
     except ValueError:
@@ -234,7 +220,7 @@ def _fresh(config: Config) -> str:
 
 
 def _update(document: TOMLDocument, config: Config) -> None:
-    """Make the document say `config`: what differs from the default is set, what is a default again goes out of it."""
+    """Set in the document what differs from the default, and remove what is a default again."""
     said = document.unwrap()
     base, new = load_config().model_dump(mode="json"), config.model_dump(mode="json")
     for key, setting in settings_by_key().items():
@@ -250,26 +236,19 @@ def _update(document: TOMLDocument, config: Config) -> None:
     usable, _ = usable_part(said)
     is_said = load_config(overrides=usable).model_dump(mode="json")["servos"]["joints"] == joints
     if joints == value_at(base, JOINTS):
-        if not is_said or not _is_at(usable, JOINTS):
+        if not is_said or "joints" not in usable.get("servos", {}):
             _drop(document, JOINTS.split("."))
     elif not is_said:
         _put_joints(document, joints)
 
 
 def _agrees(said: dict[str, Any], key: str, value: Any, *, is_switch: bool) -> bool:
-    """Whether the file says so already; a whole number may stand for a number, but not for a switch."""
-    if not _is_at(said, key):
-        return False
-    found = value_at(said, key)
-    return bool(found == value) and isinstance(found, bool) is is_switch
-
-
-def _is_at(data: dict[str, Any], key: str) -> bool:
+    """Whether the file has this value already; a whole number may stand for a number, but not for a switch."""
     try:
-        value_at(data, key)
+        found = value_at(said, key)
     except KeyError:
         return False
-    return True
+    return bool(found == value) and isinstance(found, bool) is is_switch
 
 
 def _put(table: Any, parts: list[str], value: Any) -> None:
@@ -299,7 +278,7 @@ def _drop(table: Any, parts: list[str]) -> None:
 
 
 def _put_joints(document: TOMLDocument, joints: list[dict[str, Any]]) -> None:
-    """All seven; those that stand there already are edited, so that unknown keys and comments stay."""
+    """All seven; existing ones are edited, so that unknown keys and comments stay."""
     if not isinstance(document.get("servos"), dict):
         document["servos"] = tomlkit.table(is_super_table=True)
     servos: Any = document["servos"]
@@ -327,7 +306,7 @@ class ProfileError(UserError):
 
 
 def settings_folder() -> Path:
-    """Where the program keeps what the user set; it need not exist."""
+    """The user's configuration folder; it need not exist."""
     return Path(platformdirs.user_config_dir("LumenPilot", appauthor=False))
 
 
@@ -337,15 +316,12 @@ def own_settings_path() -> Path:
 
 
 def settings_of_windows(named: Path | None = None) -> SettingsFile:
-    """The settings that a window begins with and its dialog writes: of a file that was named, else the user's own.
-
-    What is wrong with the user's own is among its problems; a named file is left where it is, whatever is wrong with it.
-    """
+    """The settings that a window starts with and its dialog writes: of a named file, which is never moved, else the user's own."""
     return read_settings(named or own_settings_path(), may_move=named is None)
 
 
 def own_config() -> Config:
-    """The user's own configuration, for a window that has no settings to change; no file is touched."""
+    """The user's own configuration, for a window that cannot change it; no file is touched."""
     return read_settings(own_settings_path(), may_move=False).config
 
 
@@ -380,23 +356,18 @@ class Profiles:
         return (*shipped, *(Profile(path.stem, path) for path in own if _NAME.match(path.stem)))
 
     def load(self, profile: Profile) -> SettingsFile:
-        """Its settings. Raises ProfileError when it is gone; what else is wrong with it is among the file's problems."""
+        """Its settings. Raises ProfileError when the file is gone; other problems are among ``SettingsFile.problems``."""
         if not profile.path.is_file():
             raise ProfileError(f"profile {profile.name}: it is no longer there ({profile.path})")
         return read_settings(profile.path)
 
     def save(self, name: str, config: Config) -> tuple[Profile, str]:
-        """Save under a name, over an older one of that name.
+        """Save under a name, over an older one of that name. Raises ProfileError.
 
         Returns
         -------
         profile : as saved.
         note : empty, or one line about where a damaged older file is kept.
-
-        Raises
-        ------
-        ProfileError
-            No usable name, or the disk does not take it.
         """
         name = check_name(name)
         if any(profile.is_preset and profile.name.casefold() == name.casefold() for profile in self.all()):
@@ -423,12 +394,12 @@ class Profiles:
         return (self._folder / f"{name.strip()}{_ENDING}").is_file()
 
     def matching(self, config: Config) -> Profile | None:
-        """The first profile that says exactly `config`, None when none does."""
+        """The first profile with exactly this configuration; None when there is none."""
         for profile in self.all():
             try:
                 if load_config(profile.path) == config:
                     return profile
-            except ConfigError:  # it says so when it is chosen
+            except ConfigError:  # reported when it is chosen
                 continue
         return None
 

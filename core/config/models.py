@@ -1,17 +1,8 @@
-"""The whole configuration, validated. Unknown keys, wrong types and values out of range are one clear line each.
+"""The whole configuration as validated sections, and how it is loaded.
 
 Layers, later ones win: ``resources/config/default.toml``, then a preset (``resources/config/preset_<name>.toml``), then the user's
-file. Every setting has a unit in its name and an allowed range here, which the settings dialog and the error messages show.
-
-The camera as configuration: which one, and how it takes its pictures. Files and the bench twin have none of this.
-
-The gamepad as configuration.
-
-The foot pedal as configuration. Times that safety depends on may be tightened only.
-
-Settings of the policies that advise and drive, and of the loop from advice to command. Pixels are working pixels.
-
-Recording as configuration: where sessions go, how the video is encoded, how much is kept in memory.
+file. Every setting has a unit in its name and an allowed range here, which the settings window and the error messages show; a wrong
+file is one clear line. Pixels are working pixels. Times that safety depends on may be tightened only.
 """
 
 from __future__ import annotations
@@ -22,16 +13,15 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 import platformdirs
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from core.config.safety import SafetyConfig, ServosConfig
+from core.config.section import ConfigSection
 from core.devices import UserError
 
 
-class CameraConfig(BaseModel):
+class CameraConfig(ConfigSection):
     """A real camera. Where it has no such setting, what is asked for is left out, and ``doctor`` says so."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     serial: str | None = Field(None, min_length=1, description="RealSense: its serial number; empty: the only one there is")
     device: str | None = Field(
@@ -48,10 +38,8 @@ class CameraConfig(BaseModel):
     reconnect_s: float = Field(0.5, ge=0.1, le=30.0, description="pause between two attempts to open a lost camera")
 
 
-class GamepadConfig(BaseModel):
+class GamepadConfig(ConfigSection):
     """Sticks and buttons that drive by hand. Which does what: docs/bench.md."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     enabled: bool = Field(True, description="false = gamepads are left alone")
     device: str | None = Field(None, min_length=1, description="path in /dev/input; empty: the first gamepad that is plugged in")
@@ -61,13 +49,11 @@ class GamepadConfig(BaseModel):
 
 
 _SILENCE_S = 0.06
-"""Longest pause between two reports, sent every 20 ms, that is no interruption yet: the foot need not be lifted after it either."""
+"""Longest pause between two reports (sent every 20 ms) that is no interruption: the foot need not be lifted after it."""
 
 
-class PedalConfig(BaseModel):
+class PedalConfig(ConfigSection):
     """Foot pedal: deadman and STOP over a serial line. Its protocol and wiring: docs/bench.md."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     port: str | None = Field(None, min_length=1, description="stable path in /dev/serial/by-id; empty: no pedal")
     baud: int = Field(115_200, ge=9600, le=1_000_000, description="speed of the line")
@@ -84,11 +70,7 @@ class PedalConfig(BaseModel):
 PolicyName = Literal["pursuit", "table", "push", "random"]
 
 
-class _PolicySection(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class PursuitConfig(_PolicySection):
+class PursuitConfig(ConfigSection):
     """Look-ahead along the route."""
 
     pixels_per_mm: float = Field(3.0, gt=0.1, le=50.0, description="of the view, roughly; a calibrated rig has its own scale")
@@ -129,7 +111,7 @@ class PursuitConfig(_PolicySection):
         return self
 
 
-class DriveConfig(_PolicySection):
+class DriveConfig(ConfigSection):
     """From advice to the tendons' bend and the feed."""
 
     turn_deg: float = Field(94.0, gt=1.0, le=720.0, description="by how much the head turns at a bend of 1")
@@ -140,7 +122,7 @@ class DriveConfig(_PolicySection):
     max_gap_s: float = Field(0.1, gt=0.0, le=0.5, description="a longer pause between two commands counts as so much")
 
 
-class JogConfig(_PolicySection):
+class JogConfig(ConfigSection):
     """Driving by hand: speeds at full deflection of a key or a stick."""
 
     bend_rate_per_s: float = Field(1.2, gt=0.0, le=5.0, description="share of the tendons' full pull per second")
@@ -148,7 +130,7 @@ class JogConfig(_PolicySection):
     delivery_mm_s: float = Field(10.0, gt=0.0, le=20.0, description="of the catheter")
 
 
-class PolicyConfig(_PolicySection):
+class PolicyConfig(ConfigSection):
     """Who advises, and drives when handed over to."""
 
     name: PolicyName = Field("pursuit", description="table = the paper's; push and random are baselines of trial")
@@ -157,13 +139,11 @@ class PolicyConfig(_PolicySection):
 
 
 GOP_FRAMES = 30
-"""Longest run of pictures that need each other; it bounds what a damaged place costs and how long a seek takes."""
+"""Pictures between two key frames; bounds what a damaged place costs and how long a seek takes."""
 
 
-class RecordConfig(BaseModel):
+class RecordConfig(ConfigSection):
     """How sessions are recorded."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     folder: str | None = Field(None, min_length=1, description="where sessions go; empty: LumenPilot in Videos")
     codec: Literal["lossy", "lossless"] = Field("lossy", description="lossless keeps every pixel, at a hundred times the size")
@@ -194,11 +174,7 @@ class ConfigError(UserError):
     """The configuration cannot be used; the message names file, key and allowed range in one line."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False, allow_inf_nan=False)
-
-
-class SegmentationConfig(_Section):
+class SegmentationConfig(ConfigSection):
     """The network and its thresholds (METHOD section 1)."""
 
     model: str = Field("default", min_length=1, description="model folder in resources/models, or a path")
@@ -213,7 +189,7 @@ class SegmentationConfig(_Section):
     robot_threshold: float = Field(0.5, gt=0.0, lt=1.0, description="probability from which on a pixel is robot")
 
 
-class CleaningConfig(_Section):
+class CleaningConfig(ConfigSection):
     """Mask cleaning and thinning (METHOD section 2)."""
 
     min_vessel_area_px: int = Field(400, ge=0, le=100_000, description="smaller pieces of vessel are dropped")
@@ -227,7 +203,7 @@ class CleaningConfig(_Section):
     half_size_thinning: bool = Field(True, description="thin the vessel on every second pixel: faster, same topology")
 
 
-class GapConfig(_Section):
+class GapConfig(ConfigSection):
     """Gap repair of the robot's skeleton (METHOD section 3)."""
 
     rule: Literal["components", "every_pair"] = Field("components", description="every_pair = the paper's Algorithm 1, literally")
@@ -237,7 +213,7 @@ class GapConfig(_Section):
     )
 
 
-class PathConfig(_Section):
+class PathConfig(ConfigSection):
     """Choice of the robot's path among candidates (METHOD section 4)."""
 
     weight_length: float = Field(-0.2, ge=-10.0, le=10.0, description="of a candidate's length; negative prefers the shorter")
@@ -263,7 +239,7 @@ class PathConfig(_Section):
     max_candidates: int = Field(200, ge=1, le=10_000, description="no more paths than these are compared in one frame")
 
 
-class VectorConfig(_Section):
+class VectorConfig(ConfigSection):
     """Line fits (METHOD section 5)."""
 
     robot_length_px: float = Field(40.0, ge=4.0, le=400.0, description="end of the robot's path that its line is fitted to")
@@ -278,7 +254,7 @@ class VectorConfig(_Section):
     )
 
 
-class PoseConfig(_Section):
+class PoseConfig(ConfigSection):
     """Pose state thresholds (METHOD section 6); hysteresis acts in a stream only."""
 
     d_allow_px: float = Field(6.0, gt=0.0, le=200.0, description="distance of head and tail that is still on the centerline")
@@ -297,7 +273,7 @@ class PoseConfig(_Section):
         return {"dwell_s": min(values["dwell_frames"] / 30.0, 5.0), **rest}
 
 
-class QualityConfig(_Section):
+class QualityConfig(ConfigSection):
     """When perception refuses to answer, and with which reason."""
 
     enabled: bool = Field(True, description="false = answer wherever a pose can be computed at all, as the paper does")
@@ -325,7 +301,7 @@ class QualityConfig(_Section):
     several_robots_share: Share = Field(0.5, description="a second robot this large against the first one")
 
 
-class TrackingConfig(_Section):
+class TrackingConfig(ConfigSection):
     """Use of the last frames in a stream."""
 
     enabled: bool = Field(True, description="false = every frame by itself")
@@ -348,7 +324,7 @@ class TrackingConfig(_Section):
     )
 
 
-class PerceptionConfig(_Section):
+class PerceptionConfig(ConfigSection):
     """From the picture to the pose."""
 
     working_size_px: int = Field(640, ge=128, le=4096, description="longer side that all _px settings refer to")
@@ -362,7 +338,7 @@ class PerceptionConfig(_Section):
     tracking: TrackingConfig = TrackingConfig()
 
 
-class AdviceConfig(_Section):
+class AdviceConfig(ConfigSection):
     """Speeds behind the paper's words, and how theta becomes a degree of steering."""
 
     slowest_mm_s: float = Field(1.0, ge=0.0, le=50.0, description="in state C, moving away from the centerline")
@@ -374,7 +350,7 @@ class AdviceConfig(_Section):
     max_steer_deg: float = Field(45.0, gt=0.0, le=180.0, description="more steering is never advised")
 
 
-class TwinConfig(_Section):
+class TwinConfig(ConfigSection):
     """The bench twin: a simulated robot, phantom and camera."""
 
     phantom: str = Field("s_curve", min_length=1, description="a named phantom, or random:<seed>")
@@ -398,7 +374,7 @@ class TwinConfig(_Section):
     lens_distortion: float = Field(0.0, ge=-0.14, le=0.3, description="of its camera's lens; negative: barrel, 0: none")
 
 
-class RigConfig(_Section):
+class RigConfig(ConfigSection):
     """Which camera and robot are used."""
 
     name: str = Field("twin", min_length=1, description="as it stands in sessions and messages")
@@ -413,7 +389,7 @@ class RigConfig(_Section):
     watch_folder: bool = Field(False, description="image_folder: wait for new pictures, instead of playing those that are there")
 
 
-class WindowConfig(_Section):
+class WindowConfig(ConfigSection):
     """How the windows look, and where they keep pictures."""
 
     theme: Literal["dark", "light", "system"] = Field("dark", description="of all windows; system = as the desktop has it")
@@ -423,7 +399,7 @@ class WindowConfig(_Section):
     pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; empty: LumenPilot in Pictures")
 
 
-class Config(_Section):
+class Config(ConfigSection):
     rig: RigConfig = RigConfig()
     camera: CameraConfig = CameraConfig()
     twin: TwinConfig = TwinConfig()
@@ -471,22 +447,12 @@ def merge(base: dict[str, Any], top: dict[str, Any]) -> dict[str, Any]:
 
 
 def choose_model(model: str | None) -> dict[str, Any]:
-    """Overrides for ``load_config`` that choose a model; None leaves it as it is. An empty name is refused like any wrong value."""
+    """Overrides for ``load_config`` that choose a model; None leaves it as it is."""
     return {} if model is None else {"perception": {"segmentation": {"model": model}}}
 
 
-def _allowed(error: dict[str, Any]) -> str:
-    context = error.get("ctx", {})
-    limits = [f"{name} {context[key]}" for key, name in (("ge", ">="), ("gt", ">"), ("le", "<="), ("lt", "<")) if key in context]
-    if error["type"] == "extra_forbidden":
-        return "unknown key"
-    return f"must be {' and '.join(limits)}" if limits else str(error["msg"])
-
-
 def _field_range(location: tuple[Any, ...]) -> str:
-    """The allowed range of a setting as text, read from the model, so that one error line shows both ends."""
-    if not location:  # it is nothing of one setting: nested too deeply, perhaps
-        return ""
+    """The allowed range of a setting as text, so that one error line shows both ends; "" when there is none."""
     model: Any = Config
     for part in location[:-1]:
         fields = getattr(model, "model_fields", {})
@@ -496,11 +462,9 @@ def _field_range(location: tuple[Any, ...]) -> str:
             model = fields[part].annotation
         else:
             return ""
-    info = getattr(model, "model_fields", {}).get(location[-1])
-    if info is None:
-        return ""
+    info = getattr(model, "model_fields", {}).get(location[-1]) if location else None
     bounds = []
-    for item in info.metadata:
+    for item in info.metadata if info is not None else ():
         for name, sign in (("ge", ">="), ("gt", ">"), ("le", "<="), ("lt", "<"), ("multiple_of", "a multiple of")):
             value = getattr(item, name, None)
             if value is not None:
@@ -511,22 +475,17 @@ def _field_range(location: tuple[Any, ...]) -> str:
 def _one_line(path: str, error: ValidationError) -> str:
     first: Any = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"])
+    is_unknown = first["type"] == "extra_forbidden"
     bounds = _field_range(first["loc"])
-    what = f"must be {bounds}" if bounds and first["type"] != "extra_forbidden" else _allowed(first)
+    what = "unknown key" if is_unknown else f"must be {bounds}" if bounds else str(first["msg"])
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    says_no_value = not key or first["type"] == "extra_forbidden" or isinstance(first["input"], dict | BaseModel)
+    says_no_value = not key or is_unknown or isinstance(first["input"], dict | BaseModel)
     got = "" if says_no_value else f", got {first['input']!r}"
     return f"{path}: {key + ': ' if key else ''}{what}{got}{more}"
 
 
 def load_config(path: Path | None = None, preset: str | None = None, overrides: dict[str, Any] | None = None) -> Config:
-    """The configuration from its layers.
-
-    Parameters
-    ----------
-    path : the user's TOML file, or None.
-    preset : name of ``resources/config/preset_<name>.toml``, or None.
-    overrides : nested dictionary that wins over all files.
+    """The configuration from its layers: default, `preset`, the user's file at `path`, `overrides` (nested dictionaries).
 
     Raises
     ------
@@ -552,17 +511,13 @@ def load_config(path: Path | None = None, preset: str | None = None, overrides: 
 
 def _validate(data: dict[str, Any], source: str) -> Config:
     try:
-        # As JSON, strictly: true is no number there, nor is "6", and a list is a tuple all the same.
+        # as JSON, strictly: true is no number there, nor is "6", while a list still makes a tuple
         return Config.model_validate_json(json.dumps(data, default=str, ensure_ascii=False).encode(), strict=True)
     except UnicodeEncodeError as error:
-        raise ConfigError(f"{source}: {_around(error)!r} is no text in UTF-8; rename that file or folder") from None
+        text, at = str(error.object), error.start
+        quoted = text[text.rfind('"', 0, at) + 1 :].partition('"')[0]
+        raise ConfigError(f"{source}: {quoted!r} is no text in UTF-8; rename that file or folder") from None
     except RecursionError:
         raise ConfigError(f"{source}: nested too deeply") from None
     except ValidationError as error:
         raise ConfigError(_one_line(source, error)) from None
-
-
-def _around(error: UnicodeEncodeError) -> str:
-    """The quoted text that the error is in."""
-    text, at = str(error.object), error.start
-    return text[text.rfind('"', 0, at) + 1 :].partition('"')[0]

@@ -1,6 +1,6 @@
 """Rig files: camera, servos and calibration of one bench in one TOML file, in the user's configuration folder.
 
-A file that cannot be used is told in one line and left as it is; a rig that is saved again keeps its older file beside the new one.
+A file that cannot be used is reported in one line and left as it is; saving a rig again keeps the older file beside the new one.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from tempfile import TemporaryFile
 from typing import Any, Literal, Self
 
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.files import settings_folder
-from core.config.models import CameraConfig, Config, PerceptionConfig, RigConfig, TwinConfig
+from core.config.models import CameraConfig, Config, RigConfig, TwinConfig
 from core.config.safety import ServosConfig
+from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
 from core.files import write_whole
 
@@ -38,10 +39,8 @@ class RigFileError(UserError):
     """A rig file cannot be read, found or saved; one line names file, key and what is wrong."""
 
 
-class RigFile(BaseModel):
+class RigFile(ConfigSection):
     """One bench. ``twin`` is there when its camera is the twin's."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     format: int = Field(FORMAT, ge=1)
     name: str = Field(min_length=1, max_length=60)
@@ -93,7 +92,7 @@ def check_rig_name(name: str) -> str:
 
 
 def rig_path(name: str, folder: Path | None = None) -> Path:
-    """The file of a rig of this name: one that is there in other letters, or a new one."""
+    """The file of a rig of this name: an existing one, also in another case, or a new one."""
     folder = folder if folder is not None else rigs_folder()
     path = folder / f"{name.strip()}{_ENDING}"
     if path.exists():
@@ -103,7 +102,7 @@ def rig_path(name: str, folder: Path | None = None) -> Path:
 
 
 def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
-    """All rigs by name; those that cannot be used, too. A folder that cannot be read has none."""
+    """All rigs by name, including those that cannot be used. A folder that cannot be read has none."""
     try:
         paths = [path for path in (folder or rigs_folder()).glob(f"*{_ENDING}") if not path.name.endswith(_OLDER)]
     except OSError:
@@ -115,14 +114,14 @@ def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
         except RigFileError as error:
             found.append(ListedRig(path.stem, path, None, str(error)))
         else:
-            found.append(ListedRig(path.stem, path, rig))  # the name inside is that of another one where the file is a copy
+            found.append(ListedRig(path.stem, path, rig))  # not the name inside: the file may be a copy
     return tuple(found)
 
 
 def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
-    """The rig of this name, whatever its case. Raises RigFileError, with those that there are.
+    """The rig of this name, whatever its case. Raises RigFileError, which lists the known ones.
 
-    The file's name goes before the one inside, which a copy of the file keeps, and the exact one before one in other letters.
+    The file's name goes before the one inside, which a copy of the file keeps, and the exact name before another case.
     """
     listed, wanted = list_rigs(folder), name.strip()
     folded = wanted.casefold()
@@ -141,7 +140,7 @@ def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
 
 
 def has_rig(name: str, folder: Path | None = None) -> bool:
-    """Whether there is a file of this name, in order or not, whatever its case."""
+    """Whether there is a file of this name, valid or not, whatever its case."""
     wanted = name.strip().casefold()
     return any(wanted in {rig.name.casefold(), (rig.rig.name if rig.rig else "").casefold()} for rig in list_rigs(folder))
 
@@ -168,18 +167,14 @@ def read_rig(path: Path) -> RigFile:
     try:
         return RigFile.model_validate(content)
     except ValidationError as error:
-        raise RigFileError(f"{path}: {_first_problem(error)}; the file is kept: mend it, or calibrate anew") from None
+        raise RigFileError(f"{path}: {first_problem(error)}; the file is kept: mend it, or calibrate anew") from None
 
 
 def write_rig(rig: RigFile, path: Path | None = None, *, keeps_older: bool = True) -> Path:
-    """Save a rig atomically; an older file of that name, whatever its case, stays beside it as NAME.older.toml.
+    """Save a rig atomically. Raises RigFileError.
 
-    Without `keeps_older` what lies there stays: the calibration before the present one outlives small changes of this.
-
-    Raises
-    ------
-    RigFileError
-        The disk does not take it.
+    An older file of that name, whatever its case, stays beside it as NAME.older.toml; without `keeps_older` that one is left alone,
+    so that the previous calibration outlives small changes of the present one.
     """
     target = path if path is not None else rig_path(rig.name)
     document = tomlkit.document()
@@ -195,12 +190,12 @@ def write_rig(rig: RigFile, path: Path | None = None, *, keeps_older: bool = Tru
 
 
 def check_can_save(name: str) -> None:
-    """Raise RigFileError when a rig of this name could not be saved: said before minutes of calibration, and not after them."""
+    """Raise RigFileError when a rig of this name could not be saved: before minutes of calibration, not after them."""
     target = rig_path(name)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=target.parent):
-            pass  # permissions alone do not tell of a disk that is mounted to be read only
+            pass  # permissions alone do not show that a disk is mounted read-only
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     except OSError as error:
@@ -208,13 +203,7 @@ def check_can_save(name: str) -> None:
 
 
 def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -> RigFile:
-    """What a configuration says of its bench, as a rig file.
-
-    Raises
-    ------
-    RigFileError
-        A recording is no bench, or the name is none.
-    """
+    """The bench of a configuration as a rig file. Raises RigFileError for a recording, and for a bad name."""
     kind = config.rig.camera
     if kind not in RESERVED or config.rig.source is not None:
         raise RigFileError(f"rig {config.rig.name} plays a recording: it cannot be saved as a rig")
@@ -233,11 +222,11 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
             }
         )
     except ValidationError as error:
-        raise RigFileError(f"rig {name}: {_first_problem(error)}") from None
+        raise RigFileError(f"rig {name}: {first_problem(error)}") from None
 
 
 def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
-    """The configuration with the rig's camera, servos and twin in the place of its own. Its name is the file's."""
+    """The configuration with the rig's camera, servos and twin. Its name is the file's."""
     chosen = RigConfig(name=path.stem, camera=rig.kind, robot=rig.robot, file=str(path))
     update: dict[str, Any] = {"rig": chosen, "camera": rig.camera, "servos": rig.servos}
     if rig.twin is not None:
@@ -246,7 +235,7 @@ def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
 
 
 def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:
-    """The sections of `running` that its rig file keeps: what the settings say there is not in force.
+    """The sections of `running` that come from its rig file and not from the settings.
 
     Settings that name the file themselves (`rig.file`) take its calibration only.
     """
@@ -256,14 +245,10 @@ def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:
 
 
 def read_again(running: Config, settings: Config) -> Config:
-    """The running configuration with camera, servos and twin as its rig file has them now: somebody may have edited it.
+    """The running configuration with camera, servos and twin as the rig file, which may have been edited, has them now.
 
-    A phantom that was picked stays. Settings that name the file themselves keep their own sections, and so does whoever was chosen
-    instead of them: the twin, another camera, a recording.
-
-    Raises
-    ------
-    RigFileError
+    A phantom that was picked stays. Settings that name the file themselves keep their own sections, as do the twin, another camera
+    or a recording that was chosen instead of them. Raises RigFileError.
     """
     if running.rig.file is None or not sections_of_rig(running, settings):
         return running
@@ -277,11 +262,9 @@ def read_again(running: Config, settings: Config) -> Config:
 
 
 def calibration_of(config: Config) -> CalibrationConfig | None:
-    """The calibration of the configured rig; None without a rig file, and for recordings, whose pictures are straight already.
+    """The calibration of the configured rig; None without a rig file, and for recordings, whose pictures are undistorted already.
 
-    Raises
-    ------
-    RigFileError
+    Raises RigFileError.
     """
     if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
         return None
@@ -289,8 +272,7 @@ def calibration_of(config: Config) -> CalibrationConfig | None:
 
 
 def scaled(config: Config, known: CalibrationConfig | None) -> Config:
-    """The configuration with the measured scale in the place of ``policy.pursuit.pixels_per_mm``; unchanged without one for such
-    pictures."""
+    """The configuration with the measured scale as ``policy.pursuit.pixels_per_mm``; unchanged without one for such pictures."""
     camera, twin = config.camera, config.twin
     is_twin = config.rig.camera == "twin"
     size = (twin.image_width_px, twin.image_height_px) if is_twin else (camera.width_px, camera.height_px)
@@ -301,35 +283,19 @@ def scaled(config: Config, known: CalibrationConfig | None) -> Config:
     return config.model_copy(update={"policy": config.policy.model_copy(update={"pursuit": pursuit})})
 
 
-def ported(perception: PerceptionConfig, known: CalibrationConfig | None) -> PerceptionConfig:
-    """Perception that knows the rig's insertion port; unchanged where the rig does not tell it."""
-    if known is None or known.port is None:
-        return perception
-    place = {"port_x_share": known.port.x_share, "port_y_share": known.port.y_share}
-    return perception.model_copy(update={"path": perception.path.model_copy(update=place)})
-
-
 def as_calibrated(config: Config) -> Config:
-    """The configuration with what the rig file knows better: scale and insertion port.
-
-    Raises
-    ------
-    RigFileError
-    """
+    """The configuration with scale and insertion port of its rig file. Raises RigFileError."""
     known = calibration_of(config)
-    return scaled(config, known).model_copy(update={"perception": ported(config.perception, known)})
+    config = scaled(config, known)
+    if known is None or known.port is None:
+        return config
+    place = {"port_x_share": known.port.x_share, "port_y_share": known.port.y_share}
+    path = config.perception.path.model_copy(update=place)
+    return config.model_copy(update={"perception": config.perception.model_copy(update={"path": path})})
 
 
 def set_port(path: Path, port: PortConfig | None) -> None:
-    """Keep the insertion port in a rig file; None: nobody knows it. Raises RigFileError."""
+    """Save the insertion port in a rig file; None: not known. Raises RigFileError."""
     rig = read_rig(path)
     known = rig.calibration or CalibrationConfig(made_utc=datetime.now(UTC).replace(microsecond=0))
     write_rig(rig.model_copy(update={"calibration": known.model_copy(update={"port": port})}), path, keeps_older=False)
-
-
-def _first_problem(error: ValidationError) -> str:
-    first: Any = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    text = str(first["msg"]).removeprefix("Value error, ")
-    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    return f"{key + ': ' if key else ''}{text}{more}"

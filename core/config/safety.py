@@ -1,8 +1,7 @@
-"""Thresholds of the gate and of the supervisor. The safety rules' own numbers are the upper ends: they may be tightened only.
+"""Thresholds of gate and supervisor, and the seven servos as configuration.
 
-Nor may they be tightened below what it takes to repeat a thing: a control or deadman that is held would be let go again and again.
-
-The seven servos as configuration: who they are on the bus, how their turns become millimetres, and what each may do.
+The safety rules' own numbers are the upper ends: they may be tightened only, and not below what it takes to repeat an input, or a
+held control or deadman would be released again and again.
 
 Joint coordinates are millimetres: of tendon pull (positive tightens), of robot advance, of catheter delivery. Zero is where the
 joint was zeroed; there, a tendon has no tension.
@@ -10,18 +9,18 @@ joint was zeroed; there, a tendon has no tension.
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from core.config.section import ConfigSection
 
 _REPEATED_S = 0.05
-"""Half as long again as a held key takes to be repeated (33 ms), and twice as long as a held deadman (25 ms)."""
+"""1.5 times the repeat period of a held key (33 ms), twice that of a held deadman (25 ms)."""
 
 
-class SafetyConfig(BaseModel):
+class SafetyConfig(ConfigSection):
     """When the program holds, disarms or stops. Ages count from the capture of the frame, not from its arrival."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     command_max_age_s: float = Field(0.1, ge=_REPEATED_S, le=0.1, description="an older command is dropped")
     measurement_max_age_s: float = Field(0.1, ge=0.02, le=0.1, description="older positions of the servos are not believed")
@@ -85,11 +84,7 @@ JOINT_NAMES: tuple[JointName, ...] = ("right", "left", "up", "down", "advance", 
 TENDONS = JOINT_NAMES[:4]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class JointConfig(_Section):
+class JointConfig(ConfigSection):
     """One servo and the joint that it drives."""
 
     name: JointName
@@ -116,29 +111,20 @@ class JointConfig(_Section):
 
 
 def _tendon(name: JointName, number: int) -> JointConfig:
-    return JointConfig(
-        name=name, id=number, low_mm=-2.4, high_mm=2.8, max_speed_mm_s=10.0, max_acceleration_mm_s2=200.0, max_step_mm=0.6
-    )
+    limits: Any = {"low_mm": -2.4, "high_mm": 2.8, "max_speed_mm_s": 10.0, "max_step_mm": 0.6}
+    return JointConfig(name=name, id=number, max_acceleration_mm_s2=200.0, **limits)
 
 
-def _feed(name: JointName, number: int, low_mm: float, high_mm: float) -> JointConfig:
-    return JointConfig(
-        name=name,
-        id=number,
-        low_mm=low_mm,
-        high_mm=high_mm,
-        warn_margin_mm=2.0,
-        max_speed_mm_s=20.0,
-        max_acceleration_mm_s2=200.0,
-        max_step_mm=1.0,
-    )
+def _feed(name: JointName, number: int) -> JointConfig:
+    limits: Any = {"low_mm": -5.0, "high_mm": 400.0, "warn_margin_mm": 2.0, "max_speed_mm_s": 20.0, "max_step_mm": 1.0}
+    return JointConfig(name=name, id=number, max_acceleration_mm_s2=200.0, **limits)
 
 
 _MAX_HEARTBEAT_S = _MAX_WATCHDOG_S = 0.5
 _MIN_BUS_HZ = 20.0
 
 
-class ServosConfig(_Section):
+class ServosConfig(ConfigSection):
     """The bus and its seven joints."""
 
     driver: Literal["dynamixel", "direct"] = Field("dynamixel", description="direct: the twin without servos, a lighter load")
@@ -163,9 +149,7 @@ class ServosConfig(_Section):
     joints: tuple[JointConfig, ...] = Field(
         (
             *(_tendon(name, number) for number, name in enumerate(TENDONS, start=1)),
-            _feed("advance", 5, -5.0, 400.0),
-            _feed("delivery_1", 6, -5.0, 400.0),
-            _feed("delivery_2", 7, -5.0, 400.0),
+            *(_feed(name, number) for number, name in enumerate(JOINT_NAMES[4:], start=5)),
         ),
         min_length=7,
         max_length=7,
@@ -185,9 +169,9 @@ class ServosConfig(_Section):
 
     @property
     def too_loose(self) -> str:
-        """What real servos may not be driven with, in one line; "" for nothing. The wizard is more patient, and moves one servo.
+        """The setting that is too loose for driving real servos, in one line; "" for none. The wizard, with one servo, ignores it.
 
-        The safety rules want a hold within 100 ms and an end after 500 ms of silence.
+        The safety rules demand a hold within 100 ms and an end after 500 ms of silence.
         """
         for name, limit in (("heartbeat_timeout_s", _MAX_HEARTBEAT_S), ("watchdog_s", _MAX_WATCHDOG_S)):
             if getattr(self, name) > limit:

@@ -1,4 +1,4 @@
-"""What can be set, read off the configuration's models: sections, and for every setting its unit, range, default and meaning."""
+"""The schema of the configuration, read from its models: sections, and for every setting unit, range and description."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _UNITS = (
 JOINTS = "servos.joints"
 """The one list: always written as a whole."""
 _KEPT_ENDS = ("frames_per_second", "_per_mm", "_per_turn", "_rate_per_s", "_frames", "baud")
-"""Units that are part of what the setting is called."""
+"""Units that stay in the title."""
 _SPELLING = {"px": "px", "mm": "mm", "id": "ID", "cpu": "CPU", "crf": "CRF", "theta": "θ", "d": "d", "usb": "USB"}
 _TITLES = {  # of sections, and of settings whose name says little without its unit
     "camera": "Camera (real)",
@@ -71,7 +71,7 @@ _TITLES = {  # of sections, and of settings whose name says little without its u
     "perception.pose.hysteresis_deg": "Hysteresis, angle",
 }
 _SOURCE = re.compile(r" \(METHOD section \d\)")
-"""Where in the method a section is told: for readers of the code."""
+"""Reference to the method, for readers of the code."""
 
 
 class FieldKind(StrEnum):
@@ -94,7 +94,7 @@ class Effect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """An allowed range; None: open. ``low_open`` and ``high_open`` exclude the end itself; ``step``: only multiples of it."""
+    """An allowed range; None: open. ``low_open`` and ``high_open`` exclude the end itself; ``step``: multiples of it only."""
 
     low: float | None = None
     high: float | None = None
@@ -115,7 +115,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One entry. ``key`` is its dotted path; an entry of a list has its place in it (``servos.joints.0.id``)."""
+    """One setting. ``key`` is its dotted path, with the index in a list (``servos.joints.0.id``)."""
 
     key: str
     title: str
@@ -129,12 +129,12 @@ class Setting:
 
     @property
     def name(self) -> str:
-        """As it stands in the file."""
+        """The key in its section."""
         return self.key.rpartition(".")[2]
 
     @property
     def range_text(self) -> str:
-        """What may be entered; empty where that goes without saying."""
+        """What may be entered; empty for switches and free text."""
         if self.kind is FieldKind.CHOICE:
             return ", ".join(str(choice) for choice in self.choices)
         return self.bounds.text(self.unit)
@@ -142,7 +142,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Settings that belong together, and sections within."""
+    """Settings of one section, and the sections within."""
 
     key: str
     title: str
@@ -175,7 +175,7 @@ def settings_by_key() -> dict[str, Setting]:
 
 
 def effect_of(key: str) -> Effect:
-    """When a change of this setting acts. What perception decides by is read anew for every frame; the network is not."""
+    """When a change of this setting acts. Perception reads its thresholds for every frame, and its network once."""
     top, _, rest = key.partition(".")
     if key == "window.language":
         return Effect.PROGRAM
@@ -203,18 +203,18 @@ def value_at(data: Any, key: str) -> Any:
 
 
 def with_value(data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """A copy of nested dictionaries and lists with one value replaced; what is on the way is copied, the rest is shared."""
-    return _replaced(data, key.split("."), value)  # type: ignore[no-any-return]
+    """A copy of nested dictionaries and lists with one value replaced."""
 
+    def replaced(data: Any, parts: list[str]) -> Any:
+        if not parts:
+            return value
+        if isinstance(data, list):
+            place = int(parts[0])
+            return [replaced(item, parts[1:]) if k == place else item for k, item in enumerate(data)]
+        inner = data.get(parts[0], {}) if isinstance(data, dict) else {}
+        return {**data, parts[0]: replaced(inner, parts[1:])}
 
-def _replaced(data: Any, parts: list[str], value: Any) -> Any:
-    if not parts:
-        return value
-    if isinstance(data, list):
-        place = int(parts[0])
-        return [_replaced(item, parts[1:], value) if k == place else item for k, item in enumerate(data)]
-    inner = data.get(parts[0], {}) if isinstance(data, dict) else {}
-    return {**data, parts[0]: _replaced(inner, parts[1:], value)}
+    return replaced(data, key.split("."))  # type: ignore[no-any-return]
 
 
 def _section(model: type[BaseModel], key: str, title: str | None = None) -> Section:
@@ -228,16 +228,19 @@ def _section(model: type[BaseModel], key: str, title: str | None = None) -> Sect
         elif path == JOINTS:
             (item, *_) = get_args(kind)
             sections.extend(_section(item, f"{path}.{k}", f"Joint {name.replace('_', ' ')}") for k, name in enumerate(JOINT_NAMES))
-        elif _is_simple(info) and (name != "name" or not key.startswith("servos.joints")):  # a joint's name is its place
-            settings.append(_setting(path, info))
+        elif name != "name" or not key.startswith(JOINTS):  # a joint's name is its place
+            settings += _setting(path, info)
     text = _SOURCE.sub("", " ".join((model.__doc__ or "").split())) if model.__doc__ != BaseModel.__doc__ else ""
     shown = title or _TITLES.get(key) or _title(key.rpartition(".")[2])
     return Section(key, shown, text, tuple(settings), tuple(sections))
 
 
-def _setting(key: str, info: FieldInfo) -> Setting:
-    name = key.rpartition(".")[2]
-    kind, is_optional = _bare(info.annotation)
+def _setting(key: str, info: FieldInfo) -> list[Setting]:
+    """The setting of a field; none for a field that is not one value that can be typed or chosen."""
+    name, kind, is_optional = key.rpartition(".")[2], info.annotation, False
+    if get_origin(kind) in (Union, types.UnionType):
+        kinds = [one for one in get_args(kind) if one is not type(None)]
+        kind, is_optional = kinds[0], len(kinds) < len(get_args(kind))
     unit = next((unit for end, unit in _UNITS if name.endswith(end)), "")
     common: dict[str, Any] = {
         "title": _TITLES.get(key) or _title(name),
@@ -246,38 +249,16 @@ def _setting(key: str, info: FieldInfo) -> Setting:
         "effect": effect_of(key),
     }
     if get_origin(kind) is Literal:
-        return Setting(key, kind=FieldKind.CHOICE, choices=get_args(kind), **common)
+        return [Setting(key, kind=FieldKind.CHOICE, choices=get_args(kind), **common)]
     if kind is bool:
-        return Setting(key, kind=FieldKind.SWITCH, **common)
+        return [Setting(key, kind=FieldKind.SWITCH, **common)]
     if kind in (int, float):
-        shape = FieldKind.WHOLE if kind is int else FieldKind.NUMBER
-        return Setting(key, kind=shape, unit=unit, bounds=_bounds(info), **common)
-    return Setting(key, kind=FieldKind.TEXT, **common)
-
-
-def _is_simple(info: FieldInfo) -> bool:
-    """Whether it has one value that can be typed or chosen; nothing else is offered, and what a file says of it is left alone."""
-    kind, _ = _bare(info.annotation)
-    return kind in (bool, int, float, str) or get_origin(kind) is Literal
-
-
-def _bare(annotation: Any) -> tuple[Any, bool]:
-    """The type without ``| None``, and whether that stood there."""
-    if get_origin(annotation) in (Union, types.UnionType):
-        kinds = [kind for kind in get_args(annotation) if kind is not type(None)]
-        return kinds[0], len(kinds) < len(get_args(annotation))
-    return annotation, False
-
-
-def _bounds(info: FieldInfo) -> Bounds:
-    found: dict[str, float] = {}
-    for item in info.metadata:
-        for name in ("ge", "gt", "le", "lt", "multiple_of"):
-            value = getattr(item, name, None)
-            if value is not None:
-                found[name] = value
-    low, high = found.get("gt", found.get("ge")), found.get("lt", found.get("le"))
-    return Bounds(low, high, "gt" in found, "lt" in found, found.get("multiple_of"))
+        limits = ("ge", "gt", "le", "lt", "multiple_of")
+        found = {name: value for item in info.metadata for name in limits if (value := getattr(item, name, None)) is not None}
+        low, high = found.get("gt", found.get("ge")), found.get("lt", found.get("le"))
+        bounds = Bounds(low, high, "gt" in found, "lt" in found, found.get("multiple_of"))
+        return [Setting(key, kind=FieldKind.WHOLE if kind is int else FieldKind.NUMBER, unit=unit, bounds=bounds, **common)]
+    return [Setting(key, kind=FieldKind.TEXT, **common)] if kind is str else []
 
 
 def _title(name: str) -> str:
@@ -293,5 +274,5 @@ def _title(name: str) -> str:
 
 
 def _plain(value: float) -> str:
-    """Without an exponent where that can be: 100000, 0.05, 2147483647."""
+    """Without an exponent where possible: 100000, 0.05, 2147483647."""
     return str(int(value)) if float(value).is_integer() and abs(value) < 1e15 else f"{value:g}"
