@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
@@ -10,11 +11,13 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
     QAbstractSpinBox,
+    QBoxLayout,
     QComboBox,
     QFrame,
     QHBoxLayout,
     QLabel,
     QLayout,
+    QPushButton,
     QSplitter,
     QTabWidget,
     QVBoxLayout,
@@ -31,24 +34,40 @@ _TOP_PX = 4  # margin above the panels of a window
 # ---- layouts
 
 
-def column(*parts: tuple[QWidget, int], spacing: int = theme.GAP) -> QVBoxLayout:
-    """Widgets below each other, each with its stretch."""
-    layout = QVBoxLayout()
-    layout.setContentsMargins(0, 0, 0, 0)
+Part = QWidget | QLayout | tuple[QWidget | QLayout, int]
+"""What stands in a layout, with its stretch."""
+Margins = tuple[int, int, int, int]
+_NO_MARGINS = (0, 0, 0, 0)
+
+
+def column(*parts: Part, spacing: int = theme.GAP, margins: Margins = _NO_MARGINS) -> QVBoxLayout:
+    """Widgets and layouts below each other."""
+    return _fill(QVBoxLayout(), parts, spacing, margins)
+
+
+def line(*parts: Part, spacing: int = theme.GAP, margins: Margins = _NO_MARGINS) -> QHBoxLayout:
+    """Widgets and layouts side by side."""
+    return _fill(QHBoxLayout(), parts, spacing, margins)
+
+
+Box = TypeVar("Box", bound=QBoxLayout)
+
+
+def _fill(layout: Box, parts: Sequence[Part], spacing: int, margins: Margins) -> Box:
+    layout.setContentsMargins(*margins)
     layout.setSpacing(spacing)
-    for widget, stretch in parts:
-        layout.addWidget(widget, stretch)
+    for part in parts:
+        item, stretch = part if isinstance(part, tuple) else (part, 0)
+        if isinstance(item, QWidget):
+            layout.addWidget(item, stretch)
+        else:
+            layout.addLayout(item, stretch)
     return layout
 
 
 def row(*widgets: QWidget) -> QWidget:
     """Widgets side by side, equally wide."""
-    layout = QHBoxLayout()
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.setSpacing(theme.GAP)
-    for widget in widgets:
-        layout.addWidget(widget, 1)
-    return holder(layout)
+    return holder(line(*((widget, 1) for widget in widgets)))
 
 
 def holder(layout: QLayout) -> QWidget:
@@ -71,11 +90,27 @@ def set_window_margins(layout: QLayout) -> None:
     layout.setContentsMargins(theme.GAP, _TOP_PX, theme.GAP, theme.GAP)
 
 
+def card_title(text: str) -> QLabel:
+    label = QLabel(text)
+    label.setObjectName("card_title")
+    return label
+
+
 def card_note(text: str) -> QLabel:
     """The small text at the right of a card's title, for a text that changes."""
     label = QLabel(text)
     label.setObjectName("card_note")
     return label
+
+
+def text_button(text: str, action: Callable[[], object], tool_tip: str = "", name: str = "") -> QPushButton:
+    """A button that takes the focus by Tab only: a click must not take the keys from the robot. `name` is for screen readers."""
+    button = QPushButton(text)
+    button.setToolTip(tool_tip)
+    button.setAccessibleName(name)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    button.clicked.connect(lambda _checked=False: action())
+    return button
 
 
 def page_tabs() -> QTabWidget:
@@ -94,22 +129,13 @@ class Card(QFrame):
     def __init__(self, title: str, content: QWidget | QLayout, note: QWidget | str = "") -> None:
         super().__init__()
         self.setObjectName("card")
-        rows = QVBoxLayout(self)
-        rows.setContentsMargins(12, 7, 12, 9)
-        rows.setSpacing(4)
+        parts: list[Part] = [(content, 1)]
         if title:
-            head = QHBoxLayout()
-            head.setSpacing(8)
-            label = QLabel(title)
-            label.setObjectName("card_title")
-            head.addWidget(label)
+            head = line(card_title(title), spacing=8)
             head.addStretch(1)
             head.addWidget(card_note(note) if isinstance(note, str) else note)
-            rows.addLayout(head)
-        if isinstance(content, QWidget):
-            rows.addWidget(content, 1)
-        else:
-            rows.addLayout(content, 1)
+            parts.insert(0, head)
+        self.setLayout(column(*parts, spacing=4, margins=(12, 7, 12, 9)))
 
 
 class Columns(QSplitter):

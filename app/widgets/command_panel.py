@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QPainter
-from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import SPEED_WORD, side, tip
 from app.ui.workers import Pace
-from app.widgets.basics import ScrollKeys, card_note
+from app.widgets.basics import ScrollKeys, card_note, column
 from app.widgets.painting import LEFT, NONE, RIGHT, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
 from app.widgets.servo_table import TONE_ROLE, Cell, Tone
 from core.control.drive_view import DriveView
@@ -310,11 +310,7 @@ class CommandPanel(QWidget):
         self._heading = card_note(_heading(None))
         self._heading.setFixedHeight(16)
         self.log = ClampTable()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(3)
-        for widget, stretch in ((self._table, 3), (self._heading, 0), (self.log, 2)):
-            column.addWidget(widget, stretch)
+        self.setLayout(column((self._table, 3), self._heading, (self.log, 2), spacing=3))
         self.setAccessibleName(tr("Commands"))
 
     @property
@@ -392,13 +388,13 @@ class ClampTable(QTableWidget):
             (entry.text, plain, text, LEFT),
             (count, plain, faint, RIGHT),
         )
-        for column, (shown, font, colour, align) in enumerate(cells):
+        for place, (shown, font, colour, align) in enumerate(cells):
             item = QTableWidgetItem(shown)
             item.setFont(font)
             item.setForeground(QColor(colour))
             item.setTextAlignment(align)
             item.setToolTip(" ".join(part for part in (entry.clock, what, entry.text, count) if part))
-            self.setItem(row, column, item)
+            self.setItem(row, place, item)
 
 
 def _heading(status: BusStatus | None) -> str:

@@ -10,21 +10,18 @@ from enum import Enum
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt, Slot
 from PySide6.QtGui import QColor, QGuiApplication, QPainter
 from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QLabel,
     QListWidget,
     QListWidgetItem,
     QMenu,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.widgets.basics import QuietCombo, ScrollKeys
+from app.widgets.basics import QuietCombo, ScrollKeys, card_title, column, line
 from app.widgets.painting import RIGHT, draw_box, draw_text, text_width
 
 MOST_ROWS = 2000  # events that are kept
@@ -85,17 +82,8 @@ class EventLog(QWidget):
         for kind in LogKind:
             self._filter.addItem(tr(kind.value.plural), kind)
         self._filter.activated.connect(self._on_filter)
-        label = QLabel(tr("Show"))
-        label.setObjectName("card_title")
-        head = QHBoxLayout()
-        head.setSpacing(6)
-        head.addWidget(label)
-        head.addWidget(self._filter, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(head)
-        column.addWidget(self._view, 1)
+        head = line(card_title(tr("Show")), (self._filter, 1), spacing=6)
+        self.setLayout(column(head, (self._view, 1), spacing=4))
         self.setAccessibleName(tr("Event log"))
 
     @property

@@ -6,12 +6,12 @@ from enum import Enum
 
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QPainter
-from PySide6.QtWidgets import QComboBox, QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.texts import tip
-from app.widgets.basics import QuietCombo
+from app.widgets.basics import QuietCombo, column
 from app.widgets.mode_bar import MouseHeld
 from app.widgets.painting import (
     CENTER,
@@ -154,7 +154,7 @@ class JogPanel(QWidget):
         self._enabled = (True, "")
         grid = QGridLayout()
         grid.setSpacing(4)
-        for motion, row, column, arrow, key, text in (
+        for motion, row, place, arrow, key, text in (
             (Motion.PITCH_DOWN, 0, 0, None, "Q", tr("dip")),
             (Motion.ADVANCE, 0, 1, QPointF(0, -1), "W", tr("advance")),
             (Motion.PITCH_UP, 0, 2, None, "E", tr("lift")),
@@ -171,18 +171,14 @@ class JogPanel(QWidget):
             cap.setToolTip(tr("{motion}: hold to move, release to stop", motion=tr(motion.value)))
             cap.pressed.connect(lambda which=motion: self.pressed.emit(which))
             cap.released.connect(lambda which=motion: self.released.emit(which))
-            grid.addWidget(cap, row, column, 1, 2 if is_wide else 1)
+            grid.addWidget(cap, row, place, 1, 2 if is_wide else 1)
             self._caps[motion] = cap
         wide = tr("bring bend and pitch back to the middle: hold to move, release to stop")
         self._caps[Motion.STRAIGHTEN].setToolTip(wide)
         self._speed = self._speed_choice()
         grid.addWidget(self._speed, 2, 2, 1, 2)
         self._readout = JogReadout()
-        rows = QVBoxLayout(self)
-        rows.setContentsMargins(0, 0, 0, 0)
-        rows.setSpacing(4)
-        rows.addLayout(grid, 1)
-        rows.addWidget(self._readout)
+        self.setLayout(column((grid, 1), self._readout, spacing=4))
         self.setAccessibleName(tr("Keys that move the robot"))
 
     @property

@@ -10,13 +10,14 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPicture, QResizeEvent, QTransform
-from PySide6.QtWidgets import QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr
 from app.ui.texts import target_note
 from app.ui.theme import ON_PICTURE
 from app.ui.workers import Pace
+from app.widgets.basics import column
 from app.widgets.painting import PaintedWidget, set_colours
 from app.widgets.scene_overlay import Layer, Marks, scene_shapes
 from app.widgets.scene_painter import on_screen
@@ -243,9 +244,7 @@ class LiveView(QWidget):
             self._box.addItem(item, ignoreBounds=True)
         self._box.left_clicked.connect(lambda point: self._on_place(point.x() - 0.5, point.y() - 0.5))
         self._box.right_clicked.connect(self.cleared)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._view)
+        self.setLayout(column(self._view))
         self._marks = Marks()
         self._drawn = MarksLabel(self)
         self._box.sigTransformChanged.connect(self._draw_marks)

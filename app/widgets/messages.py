@@ -13,11 +13,11 @@ from math import ceil
 
 from PySide6.QtCore import QRectF, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QColor, QFontMetricsF, QMouseEvent, QPainter, QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.widgets.basics import OnResize, column
+from app.widgets.basics import OnResize, column, line, text_button
 from app.widgets.painting import CENTER, PaintedWidget, draw_box, draw_text, draw_track
 
 _SHOWN_MS = 6000
@@ -97,9 +97,7 @@ class Notice(PaintedWidget):
         self._phase = 0.0
         self._timer = QTimer(self, interval=50)
         self._timer.timeout.connect(self._move_bar)
-        self._button = QPushButton(tr("Start again  (F5)"))
-        self._button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click must not take the keys from the robot
-        self._button.clicked.connect(self.restart)
+        self._button = text_button(tr("Start again  (F5)"), self.restart.emit)
         rows = QVBoxLayout(self)
         rows.setContentsMargins(24, 24, 24, 20)
         rows.addStretch(1)
@@ -231,14 +229,8 @@ class OfferStrip(QFrame):
             f"QProgressBar::chunk {{ background: {_INK.SKY}; border-radius: 3px; }}"
         )
         words = column((self._text, 0), (self._detail, 0), (self._bar, 0), spacing=2)
-        self._row = QHBoxLayout()
-        self._row.setSpacing(6)
-        whole = QHBoxLayout(self)
-        whole.setContentsMargins(14, 8, 8, 8)
-        whole.setSpacing(12)
-        whole.addLayout(words, 1)
-        whole.addWidget(self._more)
-        whole.addLayout(self._row)
+        self._row = line(spacing=6)
+        self.setLayout(line((words, 1), self._more, self._row, spacing=12, margins=(14, 8, 8, 8)))
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setCursor(Qt.CursorShape.ArrowCursor)
         OnResize(parent, self, self._place)
@@ -378,11 +370,7 @@ class QuestionStrip(QWidget):
         self._no.clicked.connect(self.cancel)
         self._timer = QTimer(self, singleShot=True, interval=_OPEN_MS)
         self._timer.timeout.connect(self.cancel)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        for widget, stretch in ((self._question, 1), (self._yes, 0), (self._no, 0)):
-            row.addWidget(widget, stretch)
+        self.setLayout(line((self._question, 1), self._yes, self._no, spacing=6))
         self.setAccessibleName(tr("Question"))
 
     @property

@@ -20,11 +20,12 @@ from PySide6.QtGui import (
     QResizeEvent,
     QTextDocument,
 )
-from PySide6.QtWidgets import QAbstractButton, QApplication, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QSizePolicy
 
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.texts import DEADMAN_KEY, NOT_YET, STOP_KEY, NextStep, OperatorStep, Undriven, next_step, sentence, tip, who_drives
+from app.widgets.basics import holder, line
 from app.widgets.painting import (
     CENTER,
     FieldLook,
@@ -399,17 +400,8 @@ class ModeBar(PaintedWidget):
         self.deadman = DeadmanField()
         self.stop = StopButton()
         self._text = _Line()
-        self._steps = QWidget()
-        steps = QHBoxLayout(self._steps)
-        steps.setContentsMargins(0, 0, 0, 0)
-        steps.setSpacing(6)
-        steps.addWidget(self.main, 3)
-        steps.addWidget(self.second, 2)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(12, 6, 6, 6)
-        row.setSpacing(8)
-        for widget, stretch in ((self._steps, 0), (self.deadman, 0), (self._text, 1), (self.stop, 0)):
-            row.addWidget(widget, stretch)
+        self._steps = holder(line((self.main, 3), (self.second, 2), spacing=6))
+        self.setLayout(line(self._steps, self.deadman, (self._text, 1), self.stop, spacing=8, margins=(12, 6, 6, 6)))
         self.main.asked.connect(self._on_step)
         self.second.asked.connect(self._on_step)
         self.stop.asked.connect(self.stop_asked)

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSpinBox, QWidget
+from PySide6.QtWidgets import QSpinBox, QWidget
 
 from app.ui.actions import MenuEntry
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import tip
-from app.widgets.basics import QuietCombo
+from app.widgets.basics import QuietCombo, card_title, line, text_button
 
 _RANDOM = "random"
 _SEED_MAX = 999_999
@@ -33,21 +33,11 @@ class PhantomPicker(QWidget):
         self._combo.setMaxVisibleItems(16)
         self._combo.setToolTip(tip("phantom") + "\n" + tr("Ctrl+P opens the list; so does Enter when Tab has come here"))
         self._seed = _SeedBox()
-        roll = QPushButton(tr("New"))
-        roll.setToolTip(tr("Another random phantom (key R)"))
-        roll.setAccessibleName(tr("Another random phantom"))
-        roll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        label = QLabel(tr("Phantom"))
-        label.setObjectName("card_title")
-        for widget in (label, self._combo, self._seed, roll):
-            row.addWidget(widget)
+        roll = text_button(tr("New"), self.roll, tr("Another random phantom (key R)"), tr("Another random phantom"))
+        self.setLayout(line(card_title(tr("Phantom")), self._combo, self._seed, roll, spacing=6))
         self.show_name(current)
         self._combo.activated.connect(self._on_choice)
         self._seed.committed.connect(self._on_choice)
-        roll.clicked.connect(self.roll)
 
     @property
     def name(self) -> str:

@@ -8,14 +8,13 @@ from functools import partial
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.ui import theme
 from app.ui.actions import MenuEntry, turn_page
 from app.ui.i18n import tr
 from app.ui.texts import REASON_TEXT
 from app.ui.window_base import WindowFrame
 from app.ui.workers import Pace
 from app.widgets.advice_line import AdviceLine
-from app.widgets.basics import Card, Columns, card_note, page_tabs, row, set_window_margins, side
+from app.widgets.basics import Card, Columns, card_note, column, line, page_tabs, row, set_window_margins, side
 from app.widgets.distance_bars import ClearanceBar, DistanceBars
 from app.widgets.live_view import LiveView
 from app.widgets.mode_bar import ModeBadge
@@ -123,14 +122,10 @@ class ScenePanels(QWidget):
         """A header and two columns below it, ``columns``; returns their place, which a page may cover without the header."""
         stage = QWidget()
         self.columns = Columns(left, side(right, *_RIGHT_WIDTH), _LEFT_SHARE)
-        room = QHBoxLayout(stage)
-        room.setContentsMargins(0, 0, 0, 0)
-        room.addWidget(self.columns)
-        rows = QVBoxLayout(self)
+        stage.setLayout(line(self.columns))
+        rows = column(header, (stage, 1))
         set_window_margins(rows)
-        rows.setSpacing(theme.GAP)
-        rows.addLayout(header)
-        rows.addWidget(stage, 1)
+        self.setLayout(rows)
         return stage
 
 

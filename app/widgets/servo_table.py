@@ -16,7 +16,6 @@ from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, Q
 from PySide6.QtGui import QColor, QHideEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
     QHeaderView,
     QLabel,
     QMenu,
@@ -26,7 +25,6 @@ from PySide6.QtWidgets import (
     QStyleOptionViewItem,
     QTableWidget,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -34,6 +32,7 @@ from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import tip
 from app.ui.workers import Pace
+from app.widgets.basics import column, holder, line, text_button
 from app.widgets.messages import BUTTON_STYLE, QuestionStrip
 from app.widgets.painting import (
     LEFT,
@@ -98,20 +97,22 @@ _TRACK_STEPS = 200.0  # resolution of the bar of a joint's position
 
 
 class Column(Enum):
-    """The columns in order: heading and explanation."""
+    """The columns in order: heading, explanation, least width in px, and share of what is left."""
 
-    JOINT = (mark("Joint"), mark("Joint, and id of its servo on the bus"))
+    JOINT = (mark("Joint"), mark("Joint, and id of its servo on the bus"), 70, 0.10)
     POSITION = (
         mark("Position mm"),
         mark("Where the joint is, and where that is within its envelope; darker ends: there it is slowed down"),
+        78,
+        0.25,
     )
-    GOAL = (mark("Goal mm"), mark("The goal that the servo has taken"))
-    CURRENT = ("mA", mark("Motor current in mA"))
-    TEMPERATURE = ("°C", mark("Temperature of the servo in °C"))
-    VOLTAGE = ("V", mark("Supply voltage at the servo in V"))
-    TORQUE = (mark("Torque"), mark("Whether the motor holds"))
-    ZERO = (mark("Zero"), mark("Whether the joint has been zeroed since the servo was switched on"))
-    ERROR = (mark("Error"), mark("What the servo reports, or that it does not answer"))
+    GOAL = (mark("Goal mm"), mark("The goal that the servo has taken"), 52, 0.07)
+    CURRENT = ("mA", mark("Motor current in mA"), 42, 0.05)
+    TEMPERATURE = ("°C", mark("Temperature of the servo in °C"), 34, 0.05)
+    VOLTAGE = ("V", mark("Supply voltage at the servo in V"), 40, 0.05)
+    TORQUE = (mark("Torque"), mark("Whether the motor holds"), 42, 0.04)
+    ZERO = (mark("Zero"), mark("Whether the joint has been zeroed since the servo was switched on"), 32, 0.04)
+    ERROR = (mark("Error"), mark("What the servo reports, or that it does not answer"), 56, 0.35)
 
 
 _ERROR_WORDS = {
@@ -346,12 +347,6 @@ def bus_line(status: BusStatus | None, silence_s: float | None = None) -> Cell:
 
 _COLUMNS = tuple(Column)
 _LEFT = {Column.JOINT, Column.ERROR}
-_WIDTHS = {
-    Column.JOINT: (70, 0.10), Column.POSITION: (78, 0.25), Column.GOAL: (52, 0.07), Column.CURRENT: (42, 0.05),
-    Column.TEMPERATURE: (34, 0.05), Column.VOLTAGE: (40, 0.05), Column.TORQUE: (42, 0.04), Column.ZERO: (32, 0.04),
-    Column.ERROR: (56, 0.35),
-}  # fmt: skip
-"""Least width in px, and share of what is left."""
 _HEADER, _ROW = 19, (15, 34)  # heights, the row's least and most
 _STYLE = """
 QTableView { background: @PANEL; border: none; }
@@ -372,11 +367,11 @@ class ServoView(QTableWidget):
         super().__init__(len(rows), len(_COLUMNS))
         self._rows: tuple[Row, ...] = ()
         self._items = [[QTableWidgetItem() for _ in _COLUMNS] for _ in rows]
-        for place, column in enumerate(_COLUMNS):
-            heading, meaning = (tr(text) for text in column.value)
-            item = QTableWidgetItem(f"  {heading}" if column is Column.ERROR else heading)
-            item.setToolTip(meaning)
-            item.setTextAlignment(LEFT if column in _LEFT else RIGHT)
+        for place, kind in enumerate(_COLUMNS):
+            heading = tr(kind.value[0])
+            item = QTableWidgetItem(f"  {heading}" if kind is Column.ERROR else heading)
+            item.setToolTip(tr(kind.value[1]))
+            item.setTextAlignment(LEFT if kind in _LEFT else RIGHT)
             self.setHorizontalHeaderItem(place, item)
             for row in range(len(rows)):
                 self.setItem(row, place, self._items[row][place])
@@ -417,8 +412,8 @@ class ServoView(QTableWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        spare = max(0, self.width() - sum(least for least, _ in _WIDTHS.values()))
-        widths = [least + int(share * spare) for least, share in _WIDTHS.values()]
+        spare = max(0, self.width() - sum(kind.value[2] for kind in _COLUMNS))
+        widths = [kind.value[2] + int(kind.value[3] * spare) for kind in _COLUMNS]
         widths[-1] += max(0, self.width() - sum(widths))
         for place, width in enumerate(widths):
             self.setColumnWidth(place, width)
@@ -497,16 +492,16 @@ class TendonBalance(PaintedWidget):
 
 
 def _paint_pair(painter: QPainter, box: QRectF, pair: PairBalance) -> None:
-    line, warns = QRectF(box.left(), box.top(), box.width(), 16), pair.tone >= Tone.WARN
+    text_box, warns = QRectF(box.left(), box.top(), box.width(), 16), pair.tone >= Tone.WARN
     colour = theme.ALLOWED if pair.tone is Tone.PLAIN else theme.of(TONE_ROLE[pair.tone])
     title = f"! {pair.title} {pair.word}:" if warns else f"{pair.title} "
     font = theme.semi_bold(12) if warns else theme.font(12)
-    room = line.width() - text_width(font, pair.forces) - 8
+    room = text_box.width() - text_width(font, pair.forces) - 8
     choices = (f"{title} {pair.sum}", f"{title} {pair.total} mm")
     left = next((text for text in choices if text_width(font, text) <= room), choices[-1])
-    draw_text(painter, line, left, font, colour if warns else theme.TEXT_DIM)
+    draw_text(painter, text_box, left, font, colour if warns else theme.TEXT_DIM)
     if text_width(font, left) <= room:
-        draw_text(painter, line, pair.forces, theme.font(12), theme.TEXT_DIM, RIGHT)
+        draw_text(painter, text_box, pair.forces, theme.font(12), theme.TEXT_DIM, RIGHT)
     track = QRectF(box.left(), box.top() + 20, box.width(), 8)
     middle, half = track.center().x(), track.width() / 2 / _RANGE
     draw_track(painter, track)
@@ -555,24 +550,28 @@ class ServoTable(QWidget):
         self._balance = TendonBalance()
         self._bus = QLabel()
         self._bus.setFixedHeight(16)
-        self._question = QuestionStrip()
-        self._question.closed.connect(self._on_answered)
-        self._restart_button = self._make_button(tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), self._open_restart_menu)
-        self._zero_button = self._make_button(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self._open_zero_menu)
-        self._off_button = self._make_button(tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off)
+        self.question = QuestionStrip()  # where a request is confirmed
+        self.question.closed.connect(self._on_answered)
+        self._restart_button = text_button(tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), self._open_restart_menu)
+        self._zero_button = text_button(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self._open_zero_menu)
+        self._off_button = text_button(tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off)
         self._asked_by: QWidget = self._zero_button
-        self._lay_out()
+        buttons = line(self._restart_button, self._zero_button, self._off_button, spacing=6)
+        buttons.addStretch(1)
+        for button in (self._restart_button, self._zero_button, self._off_button):
+            button.setStyleSheet(BUTTON_STYLE)
+        strip = QWidget()
+        strip.setFixedHeight(24)
+        self._strip = QStackedLayout(strip)
+        self._strip.addWidget(holder(buttons))
+        self._strip.addWidget(self.question)
+        self.setLayout(column((self.table, 1), self._balance, self._bus, strip, spacing=2))
         self.setAccessibleName(tr("Servos"))
         self._show(None, None)
 
     @property
     def bus_text(self) -> str:
         return self._bus.text()
-
-    @property
-    def question(self) -> QuestionStrip:
-        """Where a request is confirmed."""
-        return self._question
 
     def show_status(self, status: BusStatus | None, servos: ServosConfig) -> None:
         """The newest status of the bus, None when there is none; a status that is older than a second is shown as silence."""
@@ -604,44 +603,15 @@ class ServoTable(QWidget):
         menu.addAction(tr("Switch all torque off"), self._ask_torque_off).setEnabled(self._reachable)
         return menu
 
-    @staticmethod
-    def _make_button(text: str, slot: Callable[[], None]) -> QPushButton:
-        button = QPushButton(text)
-        button.setStyleSheet(BUTTON_STYLE)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        button.clicked.connect(lambda _checked=False: slot())
-        return button
-
-    def _lay_out(self) -> None:
-        buttons = QWidget()
-        row = QHBoxLayout(buttons)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        for button in (self._restart_button, self._zero_button, self._off_button):
-            row.addWidget(button)
-        row.addStretch(1)
-        strip = QWidget()
-        strip.setFixedHeight(24)
-        self._strip = QStackedLayout(strip)
-        self._strip.addWidget(buttons)
-        self._strip.addWidget(self._question)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        for widget, stretch in ((self.table, 1), (self._balance, 0), (self._bus, 0), (strip, 0)):
-            column.addWidget(widget, stretch)
-
-    # ---- showing
-
     def _show(self, status: BusStatus | None, silence_s: float | None) -> None:
         believed = status if silence_s is None else None
         self.table.show_rows(servo_rows(believed, self._servos, self._safety))
         self._balance.show_pairs(pair_balances(believed, self._servos))
-        line = bus_line(status, silence_s)
-        if line.text != self._bus.text():
-            self._bus.setText(line.text)
-            self._bus.setToolTip(line.tip)
-            role = "TEXT_DIM" if line.tone is Tone.PLAIN else TONE_ROLE[line.tone]
+        said = bus_line(status, silence_s)
+        if said.text != self._bus.text():
+            self._bus.setText(said.text)
+            self._bus.setToolTip(said.tip)
+            role = "TEXT_DIM" if said.tone is Tone.PLAIN else TONE_ROLE[said.tone]
             theme.set_sheet(self._bus, f"color: @{role}; font-size: 12px;")
         armed, reachable = believed is not None and believed.armed, believed is not None
         if (armed, reachable) != (self._armed, self._reachable) or status is None:
@@ -659,9 +629,7 @@ class ServoTable(QWidget):
         self._off_button.setToolTip(
             tr("Let all motors go, which releases the wires' tension; not while armed") if self._reachable else why
         )
-        self._question.cancel()  # it was asked under other circumstances
-
-    # ---- asking
+        self.question.cancel()  # it was asked under other circumstances
 
     def _open_context_menu(self, at: QPoint) -> None:
         place = self.table.indexAt(at).row()
@@ -702,19 +670,19 @@ class ServoTable(QWidget):
     def _ask(self, button: QWidget, question: str, answer: str, action: Callable[[], None]) -> None:
         self._asked_by = button
         self._strip.setCurrentIndex(1)
-        self._question.ask(question, answer, action)
+        self.question.ask(question, answer, action)
 
     @Slot()
     def _on_answered(self) -> None:
         focus = self.focusWidget()
-        had_focus = focus is not None and self._question.isAncestorOf(focus)
+        had_focus = focus is not None and self.question.isAncestorOf(focus)
         self._strip.setCurrentIndex(0)
         if had_focus:
             self._asked_by.setFocus()
 
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
-        self._question.cancel()
+        self.question.cancel()
 
 
 def _popup_above(menu: QMenu, button: QPushButton) -> None:

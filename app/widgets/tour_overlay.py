@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QKeyEvent, QPainter, QPainterPath, QRegion
-from PySide6.QtWidgets import QAbstractButton, QComboBox, QHBoxLayout, QLabel, QPushButton, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QComboBox, QLabel, QTabWidget, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr
-from app.widgets.basics import card_note
+from app.widgets.basics import card_note, column, line, text_button
 from app.widgets.painting import PaintedWidget, draw_box, set_colours
 
 _CARD_WIDTH = 380
@@ -46,10 +46,7 @@ class TourOverlay(QObject):
         self._stops: tuple[TourStop, ...] = ()
         self.place = -1  # which stop, from 0; -1: none
         self._shade = _Shade(parent)
-        self.card = _TourCard(parent)
-        self.card.forward.clicked.connect(self.forward)
-        self.card.back.clicked.connect(self.back)
-        self.card.skip.clicked.connect(self.end)
+        self.card = _TourCard(parent, self)
         self._timer = QTimer(self, interval=_FOLLOW_EVERY_MS)
         self._timer.timeout.connect(self._follow)
 
@@ -218,27 +215,25 @@ class _Shade(PaintedWidget):
 class _TourCard(PaintedWidget):
     """Title, text, and the buttons."""
 
-    def __init__(self, parent: QWidget) -> None:
+    def __init__(self, parent: QWidget, tour: TourOverlay) -> None:
         super().__init__(parent=parent)
         self._title, self._text, self._count = QLabel(), QLabel(wordWrap=True), card_note("")
         self._title.setFont(theme.bold(18))
         for label in (self._title, self._text, self._count):
             label.setTextFormat(Qt.TextFormat.PlainText)
-        self.back = _button(tr("Back"), tr("The stop before  (Backspace)"))
-        self.skip = _button(tr("Skip"), tr("End the tour  (Esc); Help, Tour shows it again"))
-        self.forward = _button(tr("Next"), tr("The next stop  (Enter)"))
-        row = QHBoxLayout()
-        row.setSpacing(8)
-        row.addWidget(self._count)
-        row.addStretch(1)
-        for button in (self.skip, self.back, self.forward):
-            row.addWidget(button)
-        self._rows = QVBoxLayout(self)
-        self._rows.setContentsMargins(18, 14, 18, 14)
-        self._rows.setSpacing(9)
-        self._rows.addWidget(self._title)
-        self._rows.addWidget(self._text)
-        self._rows.addLayout(row)
+        self.back, self.skip, self.forward = (
+            text_button(text, action, tool_tip, tr("{button}: tour", button=text))
+            for text, action, tool_tip in (
+                (tr("Back"), tour.back, tr("The stop before  (Backspace)")),
+                (tr("Skip"), tour.end, tr("End the tour  (Esc); Help, Tour shows it again")),
+                (tr("Next"), tour.forward, tr("The next stop  (Enter)")),
+            )
+        )
+        for button in (self.back, self.skip, self.forward):
+            button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        buttons = line((self._count, 1), self.skip, self.back, self.forward, spacing=8)
+        self._rows = column(self._title, self._text, buttons, spacing=9, margins=(18, 14, 18, 14))
+        self.setLayout(self._rows)
         self.setFixedWidth(_CARD_WIDTH)
         self.setCursor(Qt.CursorShape.ArrowCursor)
         self.hide()
@@ -268,10 +263,3 @@ class _TourCard(PaintedWidget):
 
     def paint(self, painter: QPainter) -> None:
         draw_box(painter, QRectF(self.rect()).adjusted(1, 1, -1, -1), 11, theme.PANEL, theme.SKY, 1.5)
-
-
-def _button(text: str, tip: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tip)
-    button.setAccessibleName(tr("{button}: tour", button=text))
-    return button

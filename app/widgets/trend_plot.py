@@ -6,12 +6,13 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPen, QResizeEvent
-from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr
 from app.ui.texts import tip
 from app.ui.workers import Pace
+from app.widgets.basics import column
 from core.config.models import PoseConfig
 from core.types import PoseState, Scene
 
@@ -54,9 +55,7 @@ class TrendPlot(QWidget):
         view.ci.layout.setContentsMargins(0, 4, 14, 0)
         view.ci.layout.setVerticalSpacing(6)
         view.ci.layout.setHorizontalSpacing(0)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(view)
+        self.setLayout(column(view))
         self._angle = _Chart(view, 0, _ANGLE_RANGES, is_signed=True, allowed=limits.theta_allow_deg)
         self._distance = _Chart(view, 1, _DISTANCE_RANGES, is_signed=False, allowed=limits.d_allow_px)
         self.curves = (self._angle.add_curve(), self._distance.add_curve(), self._distance.add_curve())  # theta, d_head, d_tail
