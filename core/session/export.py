@@ -10,7 +10,6 @@ import base64
 import csv
 import heapq
 import json
-import os
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -34,42 +33,25 @@ from core.types import Command, Image, Points, PoseState, Tick
 
 Draw = Callable[[Tick], Image]
 Advance = Callable[[], None]
-_MADE_MEANWHILE = "{path}: was made by something else meanwhile; choose another file"
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` that takes its place when all went well. Raises SessionError."""
-    part = path.with_name(f".{secrets.token_hex(8)}.part")  # its own: of two that write the same file the second is refused
+    part = path.with_name(f".{secrets.token_hex(8)}.part")
     try:
         if path.exists():
             raise SessionError(f"{path}: is there already; choose another file")
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
-        _put_in_place(part, path)
+        if path.exists():
+            raise SessionError(f"{path}: was made by something else meanwhile; choose another file")
+        part.replace(path)
     except (av.error.FFmpegError, OSError) as error:
         raise SessionError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
     finally:
         with suppress(OSError):
             part.unlink()
-
-
-def _put_in_place(part: Path, path: Path) -> None:
-    """Give the file its name, unless somebody else has made one of that name meanwhile."""
-    try:
-        os.link(part, path)
-    except FileExistsError:
-        raise SessionError(_MADE_MEANWHILE.format(path=path)) from None
-    except OSError:  # a drive that knows no second name for a file
-        try:
-            path.touch(exist_ok=False)
-        except FileExistsError:
-            raise SessionError(_MADE_MEANWHILE.format(path=path)) from None
-        try:
-            part.replace(path)
-        except OSError:
-            path.unlink()  # the empty one that held the name
-            raise
 
 
 def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None) -> int:

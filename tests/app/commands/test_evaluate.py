@@ -30,7 +30,7 @@ from core.learning.dataset import write_png
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
 from tests.app.program import MAIN, run, run_apart
-from tests.core.evaluation.test_classification import label_pairs
+from tests.core.evaluation.test_metrics import label_pairs
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
 

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.evaluation.accuracy import FrameScore, dice, score_frame, summarise, summarise_looks
+from core.evaluation.accuracy import FrameScore, score_frame, summarise, summarise_looks
 from core.evaluation.confidence import describe_confidence, describe_gates
-from core.evaluation.metrics import kappa
 from core.learning.dataset import DatasetError
 from core.types import Masks, Pose, PoseState, Reason, Refusal, RobotPath, Scene
 from tests.core.drawing import art
@@ -32,17 +31,6 @@ def scene(theta_signed_deg: float = 14.0, head: tuple[float, float] = (103.0, 54
     pose = Pose(abs(theta_signed_deg), theta_signed_deg, 8.0, 4.0, False, PoseState.C, 0.8)
     path = RobotPath(np.array([[0.0, 0.0], head]), 1.0, None, True, 0.0, 4.0)
     return Scene(0, 0.0, (1280, 960), 0.5, masks=Masks(VESSEL, ROBOT, BLANK, BLANK), path=path, pose=pose)
-
-
-def test_dice_by_hand() -> None:
-    other = art("""
-.###
-....
-....
-""")
-    assert dice(ROBOT, other) == pytest.approx(2 * 2 / (2 + 3))
-    assert dice(ROBOT, NOTHING) == 0.0
-    assert dice(NOTHING, NOTHING) == 1.0
 
 
 def test_a_frame_with_a_pose() -> None:
@@ -79,21 +67,6 @@ def test_a_frame_without_robot_or_masks() -> None:
     assert not score.expected
     assert score.vessel_dice == 0.0
     assert score.robot_dice is None
-
-
-@pytest.mark.parametrize(
-    ("true", "found", "value"),
-    [
-        ("ABCD", "ABCD", 1.0),
-        ("AABB", "ABAB", 0.0),  # half agree, half would by chance
-        ("AAAB", "AABB", 0.5),  # 3/4 agree, chance 3/4 * 1/2 + 1/4 * 1/2 = 1/2
-        ("AABB", "BBAA", -1.0),
-        ("AAAA", "AAAA", None),
-        ("", "", None),
-    ],
-)
-def test_kappa_by_hand(true: str, found: str, value: float | None) -> None:
-    assert kappa(true, found) == (None if value is None else pytest.approx(value))
 
 
 def score(**more: object) -> FrameScore:
@@ -211,10 +184,6 @@ def test_answers_where_there_is_no_pose_are_counted() -> None:
     sums = summarise([score_frame("a", scene(), VESSEL, ROBOT, TRUTH), without])
     assert (sums["poseless_frames"], sums["answers_on_poseless_frames"]) == (1, 1)
     assert (sums["empty_frames"], sums["expected"]) == (0, 1)
-
-
-def test_angles_that_do_not_vary_have_no_correlation() -> None:
-    assert summarise([score_frame(name, scene(), VESSEL, ROBOT, TRUTH) for name in "abc"])["theta_pearson"] is None
 
 
 def test_a_truth_without_a_head_says_what_it_lacks() -> None:

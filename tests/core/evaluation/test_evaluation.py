@@ -11,7 +11,6 @@ import pytest
 
 from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, evaluate, read_measurements, write_measurements
 from core.evaluation.paper import (
-    PAPER,
     PAPER_CONFUSION,
     Better,
     FigureFormat,
@@ -22,7 +21,7 @@ from core.evaluation.paper import (
     verdict,
     wanted_images,
 )
-from tests.core.evaluation.test_classification import label_pairs
+from tests.core.evaluation.test_metrics import label_pairs
 
 HEADER = "image,angle_1,angle_2,state,algorithm_angle,algorithm_state"
 ROW = "a.png,10,12,B,14.5,C"
@@ -63,19 +62,6 @@ def test_a_row_as_it_stands(table) -> None:
 )
 def test_ways_to_write_the_same_table(table, text: str) -> None:
     assert read_measurements(table(text)) == [Measurement("a.png", 10.0, 12.0, "B", 14.5, "C")]
-
-
-def test_a_table_as_unicode_text_of_a_spreadsheet(table) -> None:
-    assert len(read_measurements(table(f"{HEADER}\n{ROW}".replace(",", "\t"), "utf-16"))) == 1
-
-
-def test_images_of_one_name_may_be_of_several_sessions(table) -> None:
-    assert len(read_measurements(table(f"{HEADER},group\n{ROW},one\n{ROW},two\n,1,1,B,1,B\n,1,1,B,1,B"))) == 4
-
-
-def test_a_minus_of_a_word_processor_is_one(table) -> None:
-    (row,) = read_measurements(table(f"{HEADER}\na,\N{MINUS SIGN}3,,,,"))
-    assert row.angle_1 == -3.0
 
 
 def test_blank_means_not_measured(table) -> None:
@@ -144,13 +130,6 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         Measurement("b", None, None, "A", None, None),
     ]
     write_measurements(tmp_path / "out.csv", rows)
-    assert read_measurements(tmp_path / "out.csv") == rows
-
-
-def test_groups_are_an_optional_column(table, tmp_path: Path) -> None:
-    rows = [Measurement("a", 1.0, None, "B", 2.0, "B", "session 1"), Measurement("b", 1.0, None, "B", 2.0, "B")]
-    write_measurements(tmp_path / "out.csv", rows)
-    assert (tmp_path / "out.csv").read_text().splitlines()[0].endswith(",group")
     assert read_measurements(tmp_path / "out.csv") == rows
 
 
@@ -324,10 +303,6 @@ def test_images_are_drawn_by_seed_and_none_twice() -> None:
     assert {label: sum(states[image] == label for image in chosen) for label in "ABCD"} == {"A": 0, "B": 14, "C": 28, "D": 6}
 
 
-def test_a_state_that_the_set_lacks_is_not_filled_up_by_others() -> None:
-    assert choose_images({"a": "A", "b": "B", "d1": "D", "d2": "D"}, 0) == ["b", "d1", "d2"]
-
-
 def test_two_manual_measures_have_the_asked_spread_and_stay_angles() -> None:
     truth = np.full(4000, 90.0)
     measured = np.array(measure_twice(truth, 1.5, 0))
@@ -337,8 +312,3 @@ def test_two_manual_measures_have_the_asked_spread_and_stay_angles() -> None:
     edges = np.array(measure_twice([0.0, 180.0] * 200, 5.0, 0))
     assert edges.min() >= 0.0
     assert edges.max() <= 180.0
-
-
-def test_the_papers_limits_are_its_mean_and_deviation() -> None:
-    assert PAPER["angle"]["loa_low_deg"] == pytest.approx(-8.8828)
-    assert PAPER["angle"]["loa_high_deg"] == pytest.approx(13.3828)

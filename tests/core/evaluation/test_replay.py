@@ -81,12 +81,6 @@ def test_the_sums() -> None:
     assert sums["latency_ms"]["before"]["mean"] == pytest.approx((30 * 3 + 10 * 2) / 5)
 
 
-def test_without_frames_nothing_is_made_up() -> None:
-    sums = ReplayTally.of([]).to_json()
-    assert sums["theta_change_deg"] == {"n": 0, "mean": None, "median": None, "p95": None, "max": None}
-    assert sums["confidence"] == {"before": None, "after": None}
-
-
 def test_most_changed_first_and_a_lost_pose_before_any_angle() -> None:
     changes = [
         change(0, posed(0.0), posed(0.0)),

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from core.control.drive_view import DriveView
-from core.control.frame_reports import is_sound
 from core.control.modes import Mode
 from core.session.codec import (
     InvalidRecord,
@@ -40,24 +38,6 @@ def test_pose_vectors_advice_command_and_status_come_back_as_they_were() -> None
     for name in ("pose", "robot_vector", "vessel_vector", "latency_ms", "refusal", "scale_xy", "source_size", "route_problem"):
         assert getattr(row.scene, name) == getattr(tick.scene, name), name
     assert (row.advice, row.sent, row.status) == (tick.advice, tick.sent, tick.status)
-
-
-@pytest.mark.parametrize("novelty", [None, 0.8712])
-def test_the_distance_from_known_pictures_comes_back_and_older_rows_have_none(novelty: float | None) -> None:
-    tick = tick_of(7, 12.25, full=True)
-    tick = replace(tick, scene=replace(tick.scene, novelty=novelty))
-    assert through_json(tick).scene.novelty == novelty
-    record = PLACE | row_of(light_tick(tick), None)
-    del record["novelty"]
-    assert row_from_json(json.dumps(record).encode()).scene.novelty is None
-
-
-def test_a_distance_that_is_no_number_is_named() -> None:
-    tick = tick_of(7, 12.25, full=True)
-    tick = replace(tick, scene=replace(tick.scene, novelty=math.nan))
-    assert not is_sound(tick.scene)
-    row = row_of(light_tick(tick), None)
-    assert (row["novelty"], row["not_finite"]) == (None, ["novelty"])
 
 
 def test_lines_come_back_within_half_a_pixel_and_keep_their_ends() -> None:
@@ -109,10 +89,11 @@ def test_what_is_not_finite_becomes_none_and_is_named() -> None:
         pose=Pose(nan, nan, 1.0, 1.0, False, PoseState.C, 0.5),
         robot_vector=Vector((nan, 0.0), (1.0, 1.0), (2.0, 2.0)),
         latency_ms={"total": float("inf")},
+        novelty=nan,
     )
     tick = replace(tick_of(0, 1.0, full=True), scene=scene, sent=Command(bend=nan))
     record = row_of(tick, None)
-    assert set(record["not_finite"]) == {"pose", "robot_vector", "sent"}
+    assert set(record["not_finite"]) == {"pose", "novelty", "robot_vector", "sent"}
     row = through_json(tick)
     assert row.scene.pose is None
     assert row.scene.robot_vector is None
@@ -256,3 +237,11 @@ def test_a_perceived_line_comes_back_in_source_pixels() -> None:
     )
     with pytest.raises(InvalidRecord):
         scene_from_json(json.dumps(unread_to_json("x", "empty file")).encode())
+
+
+def test_rows_of_older_sessions_lack_what_was_added_later() -> None:
+    record = PLACE | row_of(replace(tick_of(3, 1.0), frame=replace(tick_of(3, 1.0).frame, lost=7)), None)
+    assert row_from_json(json.dumps(record).encode()).camera_lost == 7
+    del record["camera_lost"], record["novelty"]
+    row = row_from_json(json.dumps(record | {"picture_crc": "0af45912"}).encode())
+    assert (row.camera_lost, row.scene.novelty) == (0, None)

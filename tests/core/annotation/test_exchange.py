@@ -1,10 +1,11 @@
-"""Export and import: training sets that training reads, COCO both ways, labelme, and one line for each damaged thing."""
+"""Export and import: training sets, COCO both ways, labelme, and one line for each damaged part."""
 
 from __future__ import annotations
 
 import json
 import math
 import random
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,27 +14,19 @@ import cv2
 import numpy as np
 import pytest
 
-from core.annotation.exchange import export_coco, export_training_set, merged, read_files, run_lengths
-from core.annotation.masks import area_of, area_polygon, fill, polygons_of
+from core.annotation.exchange import FEWEST, export_coco, export_training_set, merged, read_files, split_own_frames
+from core.annotation.masks import fill, polygons_of
 from core.annotation.model import (
-    ROBOT,
-    VESSEL,
     Annotation,
     AnnotationError,
     ImageView,
     MaskPolygon,
     MaskTarget,
-    Touch,
-    line_of,
-    move,
-    put,
-    remove,
-    touched,
-    with_line,
 )
-from core.annotation.store import FoundImage, ImageRecord, ItemKey, StoredAnnotation
-from core.learning.dataset import find_labelled, write_png
+from core.annotation.store import AnnotationStore, FoundImage, ImageRecord, ItemKey, StoredAnnotation, find_images
+from core.learning.dataset import UNMEASURED, find_labelled, find_samples, read_truth, write_png
 from core.types import PoseState
+from tests.app.annotated import annotate_masks, measure
 
 SIZE = (64, 48)
 VESSEL_BOX = MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (50.0, 10.0), (50.0, 30.0), (10.0, 30.0)))
@@ -92,20 +85,6 @@ def test_training_finds_every_image_of_its_set(tmp_path: Path, ending: str) -> N
     assert sample.load()[0].mean() == pytest.approx(90, abs=2)
 
 
-def test_a_training_set_leaves_out_half_done_images_by_name(image: FoundImage, tmp_path: Path) -> None:
-    with pytest.raises(AnnotationError, match="no image has both a vessel and a robot mask"):
-        export_training_set([stored(with_masks(VESSEL_BOX))], [image], tmp_path / "set")
-    with pytest.raises(AnnotationError, match="no image has both"):
-        export_training_set([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [], tmp_path / "set")
-
-
-def test_an_image_without_angle_trains_but_has_no_truth_of_it(image: FoundImage, tmp_path: Path) -> None:
-    unsure = Annotation(cannot_tell=True, masks=(VESSEL_BOX, ROBOT_BOX))
-    export_training_set([stored(unsure)], [image], tmp_path / "set")
-    _, truth = find_labelled(tmp_path / "set")
-    assert (truth["frame"]["theta_deg"], truth["frame"]["state"], truth["frame"]["reason"]) == (None, None, "not measured by hand")
-
-
 def test_truth_is_of_finished_answers_of_one_study(image: FoundImage, tmp_path: Path) -> None:
     """Half-drawn lines of one rater, and another study's angle, went into the mean that training takes for the truth."""
     done = stored(tilted(with_masks(VESSEL_BOX, ROBOT_BOX), 10.0), theta=10.0)
@@ -119,11 +98,6 @@ def test_truth_is_of_finished_answers_of_one_study(image: FoundImage, tmp_path: 
     ):
         export_training_set([done, other], [image], tmp_path / "set2")
     assert not (tmp_path / "set2").exists()
-
-
-def test_masks_of_an_answer_that_is_not_finished_train_without_truth(image: FoundImage, tmp_path: Path) -> None:
-    export_training_set([stored(Annotation(masks=(VESSEL_BOX, ROBOT_BOX)))], [image], tmp_path / "set")
-    assert find_labelled(tmp_path / "set")[1]["frame"]["reason"] == "not measured by hand"
 
 
 def test_coco_goes_out_and_comes_back(image: FoundImage, tmp_path: Path) -> None:
@@ -167,50 +141,6 @@ def shoelace(points: np.ndarray) -> float:
     """The area of a polygon (N, 2)."""
     (x0, y0), (x1, y1) = points.T, np.roll(points, -1, axis=0).T
     return abs(float(np.sum(x0 * y1 - x1 * y0))) / 2.0
-
-
-def test_a_polygon_is_the_area_of_the_pixels_whose_centres_it_encloses() -> None:
-    bar = np.zeros((48, 64), bool)
-    bar[10:14, 20:50] = True
-    corners = np.array([(20.0, 10.0), (50.0, 10.0), (50.0, 14.0), (20.0, 14.0)])
-    assert np.array_equal(area_of(corners, SIZE), bar)
-    assert np.array_equal(area_of(corners + 0.4, SIZE), bar), "no centre is passed"
-    assert np.array_equal(area_of(corners + [-1000.0, 0.0], SIZE), np.zeros_like(bar))
-    assert np.array_equal(area_of(np.array([(-9.0, -9.0), (99.0, -9.0), (99.0, 99.0), (-9.0, 99.0)]), SIZE), np.ones_like(bar))
-    triangle = area_of(np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 4.0)]), (5, 5))
-    assert triangle[:4].astype(int).tolist() == [[1, 1, 1, 0, 0], [1, 1, 0, 0, 0], [1, 0, 0, 0, 0], [0, 0, 0, 0, 0]]
-
-
-def test_masks_of_any_shape_come_back_as_they_were() -> None:
-    rng = np.random.default_rng(4)
-    told = 0
-    for _ in range(60):
-        drawn = np.zeros((48, 64), np.uint8)
-        points = np.cumsum(rng.integers(-9, 10, (6, 2)), axis=0) + (32, 24)
-        cv2.polylines(drawn, [points.astype(np.int32)], False, 1, int(rng.integers(1, 7)))
-        if (polygon := area_polygon(drawn > 0)) is not None:
-            told += 1
-            assert np.array_equal(area_of(polygon, SIZE), drawn > 0)
-            assert shoelace(polygon) == pytest.approx(drawn.sum(), rel=0.12)
-    assert told > 20
-    holed = np.ones((9, 9), bool)
-    holed[4, 4] = False
-    assert area_polygon(holed) is None
-    assert area_polygon(np.zeros((9, 9), bool)) is None
-
-
-def test_masks_of_vessel_and_robot_may_come_from_two_files() -> None:
-    both = merged(with_masks(VESSEL_BOX), Annotation(masks=(ROBOT_BOX,)))
-    assert both.masks == (VESSEL_BOX, ROBOT_BOX)
-    other = MaskPolygon(MaskTarget.VESSEL, ROBOT_BOX.points)
-    assert merged(both, Annotation(masks=(other,))).masks == both.masks, "what was drawn by hand stays"
-
-
-def test_run_lengths_by_hand() -> None:
-    mask = np.array([[0, 1, 1], [0, 1, 0]], bool)  # by columns: 00 11 10
-    assert run_lengths(mask) == [2, 3, 1]
-    assert run_lengths(np.ones((2, 2), bool)) == [0, 4]
-    assert run_lengths(np.zeros((2, 2), bool)) == [4]
 
 
 def labelme(**more: Any) -> dict[str, Any]:
@@ -277,31 +207,6 @@ def test_files_damaged_at_random_never_raise(tmp_path: Path, image: FoundImage) 
             read_files([path], [image])
 
 
-def test_an_import_never_takes_the_place_of_work_by_hand() -> None:
-    new = Annotation(((1.0, 1.0), (2.0, 2.0)), masks=(ROBOT_BOX,))
-    assert merged(with_masks(VESSEL_BOX, ROBOT_BOX), new) == with_masks(VESSEL_BOX, ROBOT_BOX)
-    assert merged(Annotation(note="mine"), new) == Annotation(new.robot, masks=new.masks, note="mine")
-
-
-def test_edits_of_points() -> None:
-    drawn = with_masks(VESSEL_BOX)
-    assert line_of(put(drawn, ROBOT, 1, (30.0, 20.0)), ROBOT) == ((10.0, 20.0), (30.0, 20.0), (50.0, 20.0))
-    assert line_of(move(drawn, VESSEL, 0, (1.0, 2.0)), VESSEL)[0] == (1.0, 2.0)
-    assert len(line_of(remove(drawn, 0, 3), 0)) == 3
-    assert remove(remove(drawn, 0, 3), 0, 0).masks == (), "two points are no outline"
-    assert not put(Annotation(cannot_tell=True), ROBOT, 0, (1.0, 1.0)).cannot_tell
-
-
-def test_with_an_outline_its_holes_go() -> None:
-    """They stayed, were shown as masks, and a robot's mask of nothing was exported."""
-    hole = MaskPolygon(MaskTarget.ROBOT, ((28.0, 19.0), (32.0, 19.0), (32.0, 21.0)), is_hole=True)
-    in_vessel = MaskPolygon(MaskTarget.VESSEL, hole.points, is_hole=True)
-    drawn = with_masks(ROBOT_BOX, hole, VESSEL_BOX, in_vessel, hole, ROBOT_BOX, hole)
-    assert with_line(drawn, 0, ()).masks == (VESSEL_BOX, in_vessel, ROBOT_BOX, hole), "up to the next outline of the same mask"
-    assert with_line(drawn, 1, ()).masks == (ROBOT_BOX, VESSEL_BOX, in_vessel, hole, ROBOT_BOX, hole), "a hole goes alone"
-    assert remove(drawn, 0, 1).masks[1:] == drawn.masks[1:], "an outline with a point less is one still"
-
-
 def test_a_hole_alone_is_no_mask(image: FoundImage, tmp_path: Path) -> None:
     lone = replace(ROBOT_BOX, is_hole=True)
     assert with_masks(VESSEL_BOX, lone).drawn == {MaskTarget.VESSEL}
@@ -310,27 +215,61 @@ def test_a_hole_alone_is_no_mask(image: FoundImage, tmp_path: Path) -> None:
     assert merged(Annotation(masks=(lone,)), Annotation(masks=(ROBOT_BOX,))).masks == (lone, ROBOT_BOX)
 
 
-def test_what_a_place_touches() -> None:
-    drawn = with_masks(VESSEL_BOX)
-    assert touched(drawn, [ROBOT, VESSEL], (49.0, 21.0), 3.0, 2.0) == Touch(ROBOT, 1)
-    assert touched(drawn, [ROBOT, VESSEL], (30.0, 21.0), 3.0, 2.0) == Touch(ROBOT, 1, is_edge=True)
-    assert touched(drawn, [VESSEL], (30.0, 21.0), 3.0, 2.0) is None
-    assert touched(drawn, [0], (10.0, 20.0), 3.0, 2.0) == Touch(0, 4, is_edge=True), "an outline is closed"
-    assert touched(drawn, [], (10.0, 10.0), 3.0, 2.0) is None
+@pytest.mark.parametrize("is_answer", [True, False])
+def test_an_image_without_angle_trains_but_has_no_truth(image: FoundImage, tmp_path: Path, is_answer: bool) -> None:
+    answers = [stored(Annotation(cannot_tell=is_answer, masks=(VESSEL_BOX, ROBOT_BOX)))]
+    answers.append(stored(with_masks(VESSEL_BOX), "bob", "2026-01-02"))  # newer, but half
+    assert export_training_set(answers, [image], tmp_path / "set") == (1, [])
+    row = find_labelled(tmp_path / "set")[1]["frame"]
+    assert (row["theta_deg"], row["state"], row["reason"]) == (None, None, "not measured by hand")
+    with pytest.raises(AnnotationError, match="no image has both a vessel and a robot mask"):
+        export_training_set(answers[1:], [image], tmp_path / "set")
 
 
-def test_the_whole_masks_of_one_rater_count_more_than_newer_half_of_anothers(image: FoundImage, tmp_path: Path) -> None:
-    whole = stored(with_masks(VESSEL_BOX, ROBOT_BOX), changed="2026-01-01")
-    half = stored(with_masks(VESSEL_BOX), "bob", "2026-01-02")
-    assert export_training_set([whole, half], [image], tmp_path / "set") == (1, [])
+def test_an_import_fills_gaps_and_replaces_no_work_by_hand() -> None:
+    both = merged(with_masks(VESSEL_BOX), Annotation(masks=(ROBOT_BOX,)))
+    assert both.masks == (VESSEL_BOX, ROBOT_BOX)
+    new = Annotation(((1.0, 1.0), (2.0, 2.0)), masks=(MaskPolygon(MaskTarget.VESSEL, ROBOT_BOX.points), ROBOT_BOX))
+    assert merged(both, new) == both
+    assert merged(Annotation(note="mine"), new) == Annotation(new.robot, masks=new.masks, note="mine")
 
 
-def test_a_coco_file_is_whole_or_not_there(image: FoundImage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(path: Path, _data: bytes) -> None:
-        raise OSError(28, "No space left on device", str(path))
+def read_store(store_path: Path) -> tuple[Sequence[StoredAnnotation], list[FoundImage]]:
+    with AnnotationStore(store_path) as store:
+        return store.annotations(), find_images(sorted(store_path.parent.glob("*.png")), store)[0]
 
-    monkeypatch.setattr("core.annotation.exchange.write_whole", full)
-    with pytest.raises(AnnotationError, match="No space left on device"):
-        export_coco([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [image], tmp_path / "coco.json")
-    monkeypatch.undo()
-    assert export_coco([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [image], tmp_path / "coco.json") == 1
+
+@pytest.mark.parametrize(("count", "held_out"), [(6, 2), (9, 2), (10, 2), (15, 3), (24, 4)])
+def test_a_fifth_and_two_at_least_stay_out(count: int, held_out: int, tmp_path: Path) -> None:
+    annotations, images = read_store(annotate_masks(tmp_path / "images", count))
+    frames = split_own_frames(annotations, images, tmp_path / "sets")
+    assert (frames.train_count, frames.held_out_count) == (count - held_out, held_out)
+    train, out = ({sample.stem for sample in find_samples([folder])} for folder in (frames.train, frames.held_out))
+    assert len(train) == count - held_out
+    assert not train & out
+    places = sorted(int(stem.removeprefix("frame_")) for stem in out)
+    begin = (count - held_out) // 2
+    assert places == list(range(begin, begin + held_out)), "neighbours in the order of their names"
+
+
+def test_too_few_masks_are_refused_with_what_is_missing(tmp_path: Path) -> None:
+    annotations, images = read_store(annotate_masks(tmp_path / "images", FEWEST + 1, without_robot=(0, 3)))
+    with pytest.raises(AnnotationError, match=r"5 images have both a vessel and a robot mask, and training needs 6: 1 more"):
+        split_own_frames(annotations, images, tmp_path / "sets")
+    with pytest.raises(AnnotationError, match=r"1 image has both"):
+        split_own_frames(annotations, images[1:2], tmp_path / "sets")
+    assert not (tmp_path / "sets").exists()
+
+
+def test_answers_of_several_studies_are_no_obstacle_to_training(tmp_path: Path) -> None:
+    path = annotate_masks(tmp_path / "images", FEWEST)
+    pictures = sorted(path.parent.glob("*.png"))
+    measure(path, pictures, [3.0] * FEWEST, study="first")
+    annotations, images = read_store(path)
+    frames = split_own_frames(annotations, images, tmp_path / "of one")
+    assert {row["state"] for row in read_truth(frames.held_out).values()} == {"C"}
+    measure(path, pictures[:1], [9.0], study="second")
+    annotations, images = read_store(path)
+    frames = split_own_frames(annotations, images, tmp_path / "of two")
+    assert (frames.train_count, frames.held_out_count) == (FEWEST - 2, 2)
+    assert {row["reason"] for row in read_truth(frames.held_out).values()} == {UNMEASURED}

@@ -17,7 +17,7 @@ import pytest
 
 from core.annotation.merge import salvage
 from core.annotation.model import Annotation, AnnotationError, History, ImageView, measure_lines
-from core.annotation.store import TAKES_LINES, AnnotationStore, ImageRecord, ItemKey, find_images
+from core.annotation.store import AnnotationStore, ImageRecord, ItemKey, find_images
 from core.config.models import PerceptionConfig
 from core.devices import UserError
 from core.learning.dataset import write_png
@@ -70,18 +70,6 @@ def test_raters_studies_and_repeats_are_kept_apart(tmp_path: Path) -> None:
         assert store.studies() == [("", "ann"), ("", "bob"), ("pilot", "ann")]
 
 
-def test_answers_that_began_with_the_algorithms_are_known(tmp_path: Path) -> None:
-    other = ItemKey(SHA, "", "bob")
-    with known(tmp_path / "a.sqlite") as store:
-        save(store, History(), DRAWN, other)
-        history = History()
-        entry = history.edit(TAKES_LINES, DRAWN)
-        assert entry is not None
-        store.save(KEY, ImageView.AS_IS, entry, DRAWN, measure_lines(DRAWN, (640, 480), PerceptionConfig()), 1.0)
-        save(store, history, Annotation(DRAWN.robot, DRAWN.vessel, PoseState.C))
-        assert store.taken_over() == {KEY}
-
-
 def test_answers_that_were_given_after_a_look_at_the_algorithms_are_known(tmp_path: Path) -> None:
     """And those are not that were complete before it, nor those of whoever never looked."""
     before, after, never, again = (ItemKey(SHA, "", rater) for rater in ("ann", "bob", "eve", "kim"))
@@ -101,15 +89,6 @@ def test_answers_that_were_given_after_a_look_at_the_algorithms_are_known(tmp_pa
         assert store.given_after_look() == {after, again}, "the first look counts"
     with AnnotationStore(tmp_path / "a.sqlite", read_only=True) as store:
         assert store.given_after_look() == {after, again}
-
-
-def test_a_file_of_a_version_that_knew_no_looks_tells_none(tmp_path: Path) -> None:
-    with known(tmp_path / "a.sqlite") as store:
-        save(store, History(), DRAWN)
-    with closing(sqlite3.connect(tmp_path / "a.sqlite")) as database:
-        database.execute("DROP TABLE looks")
-    with AnnotationStore(tmp_path / "a.sqlite", read_only=True) as store:
-        assert store.given_after_look() == set()
 
 
 def test_a_second_window_is_told_and_the_file_is_free_after_closing(tmp_path: Path) -> None:
@@ -147,16 +126,6 @@ def test_files_that_cannot_be_used_are_named(tmp_path: Path) -> None:
         with pytest.raises(AnnotationError, match=message):
             AnnotationStore(path, read_only=True)
     AnnotationStore(empty).close()  # an empty file is a new one
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_without_write_permission_is_named(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    try:
-        with pytest.raises(AnnotationError, match="cannot be written or read here"):
-            AnnotationStore(tmp_path / "a.sqlite")
-    finally:
-        tmp_path.chmod(0o700)
 
 
 def test_a_full_disk_raises_and_keeps_what_was_saved(tmp_path: Path) -> None:
@@ -386,31 +355,6 @@ def test_an_image_that_is_lost_takes_its_annotation_with_it(sixty: bytes, tmp_pa
         store.add_image(ImageRecord(new.sha256, "new.png", 640, 480), 1, 1)
         assert len(store.annotations()) == kept
         assert not store.history(new).can_undo
-
-
-def test_an_annotation_that_is_lost_can_be_made_anew(sixty: bytes, tmp_path: Path) -> None:
-    page = _pages_with(sixty, b"note 59", b"as is")[-1]
-    (tmp_path / "damaged.sqlite").write_bytes(_without_page(sixty, page))
-    kept, problems = salvage(tmp_path / "damaged.sqlite", tmp_path / "b.sqlite")
-    assert 0 < kept < 60
-    assert any("of annotations after number" in problem for problem in problems)
-    with AnnotationStore(tmp_path / "b.sqlite") as store:
-        assert len(store.images()) == 60
-        lost = ItemKey(f"{59:064x}", "", "ann")
-        history = store.history(lost)
-        assert not history.can_undo
-        save(store, history, Annotation(note="again"), lost)
-        assert store.annotations()[-1].content.note == "again"
-
-
-def test_rows_within_a_table_that_cannot_be_read_are_named(sixty: bytes, tmp_path: Path) -> None:
-    page = _pages_with(sixty, b"note 20", b"as is")[0]
-    (tmp_path / "damaged.sqlite").write_bytes(_without_page(sixty, page))
-    kept, problems = salvage(tmp_path / "damaged.sqlite", tmp_path / "b.sqlite")
-    assert 40 < kept < 60
-    (span,) = [problem for problem in problems if problem.endswith("of annotations cannot be read")]
-    first, last = (int(word) for word in span.split() if word.isdigit())
-    assert last - first + 1 == 60 - kept
 
 
 def test_what_a_crash_has_left_half_done_is_taken_back_before_salvage(sixty: bytes, tmp_path: Path) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
-from core.annotation.masks import fill, paint, polygons_of, simplify
+from core.annotation.masks import area_of, area_polygon, fill, paint, polygons_of, simplify
 from core.annotation.model import MaskPolygon, MaskTarget
 from core.types import Mask
 
@@ -96,3 +97,39 @@ def test_a_stroke_is_as_wide_as_the_brush() -> None:
     found = fill(paint((), MaskTarget.VESSEL, stroke, 4.0, SIZE, erase=False), MaskTarget.VESSEL, SIZE)
     assert found[:, 30].sum() == pytest.approx(9, abs=1)
     assert not found[:, 4].any()
+
+
+def shoelace(points: np.ndarray) -> float:
+    """The area of a polygon (N, 2)."""
+    (x0, y0), (x1, y1) = points.T, np.roll(points, -1, axis=0).T
+    return abs(float(np.sum(x0 * y1 - x1 * y0))) / 2.0
+
+
+def test_a_polygon_is_the_area_of_the_pixels_whose_centres_it_encloses() -> None:
+    bar = np.zeros((48, 64), bool)
+    bar[10:14, 20:50] = True
+    corners = np.array([(20.0, 10.0), (50.0, 10.0), (50.0, 14.0), (20.0, 14.0)])
+    assert np.array_equal(area_of(corners, SIZE), bar)
+    assert np.array_equal(area_of(corners + 0.4, SIZE), bar), "no centre is passed"
+    assert np.array_equal(area_of(corners + [-1000.0, 0.0], SIZE), np.zeros_like(bar))
+    assert np.array_equal(area_of(np.array([(-9.0, -9.0), (99.0, -9.0), (99.0, 99.0), (-9.0, 99.0)]), SIZE), np.ones_like(bar))
+    triangle = area_of(np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 4.0)]), (5, 5))
+    assert triangle[:4].astype(int).tolist() == [[1, 1, 1, 0, 0], [1, 1, 0, 0, 0], [1, 0, 0, 0, 0], [0, 0, 0, 0, 0]]
+
+
+def test_masks_of_any_shape_come_back_as_they_were() -> None:
+    rng = np.random.default_rng(4)
+    told = 0
+    for _ in range(60):
+        drawn = np.zeros((48, 64), np.uint8)
+        points = np.cumsum(rng.integers(-9, 10, (6, 2)), axis=0) + (32, 24)
+        cv2.polylines(drawn, [points.astype(np.int32)], False, 1, int(rng.integers(1, 7)))
+        if (polygon := area_polygon(drawn > 0)) is not None:
+            told += 1
+            assert np.array_equal(area_of(polygon, SIZE), drawn > 0)
+            assert shoelace(polygon) == pytest.approx(drawn.sum(), rel=0.12)
+    assert told > 20
+    holed = np.ones((9, 9), bool)
+    holed[4, 4] = False
+    assert area_polygon(holed) is None
+    assert area_polygon(np.zeros((9, 9), bool)) is None

@@ -13,13 +13,14 @@ from core.annotation.agreement_report import (
     choose_study,
     group_notes,
     manual_measurements,
+    measured_alike,
     rater_notes,
     second_measure_notes,
     undecided,
     write_measures,
 )
 from core.annotation.model import Annotation, AnnotationError, ImageView, measure_lines
-from core.annotation.store import ItemKey, StoredAnnotation
+from core.annotation.store import ImageRecord, ItemKey, StoredAnnotation
 from core.config.models import PerceptionConfig
 from core.evaluation.evaluation import EvaluationError, evaluate, read_measurements, write_measurements
 from core.types import PoseState
@@ -66,14 +67,6 @@ def test_known_errors_come_out() -> None:
     assert (report["images"], report["annotations"]) == (200, 800)
 
 
-def test_kappa_by_hand() -> None:
-    """Two raters, four images, three alike: p = 3/4; B 3 and 2 times, C 1 and 2 times: chance 1/2; kappa = 1/2."""
-    first = [answer(str(k), "ann", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 3 + [PoseState.C])]
-    second = [answer(str(k), "bob", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 2 + [PoseState.C] * 2)]
-    (pair,) = agreement_report(first + second, {})["pairs"]
-    assert (pair["state"]["n"], pair["state"]["equal"], pair["state"]["kappa"]) == (4, 0.75, pytest.approx(0.5))
-
-
 def test_kappa_is_of_states_and_who_cannot_tell_gives_none() -> None:
     """As above, with five images that nobody and two that only Bob could tell: they change no agreement of states."""
     ann = [answer(str(k), "ann", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 3 + [PoseState.C])]
@@ -85,13 +78,6 @@ def test_kappa_is_of_states_and_who_cannot_tell_gives_none() -> None:
     assert pair["state"] == {"n": 4, "equal": 0.75, "kappa": pytest.approx(0.5), "one_cannot_tell": 2, "neither_can_tell": 5}
     (pair,) = agreement_report(dark, {})["pairs"]
     assert pair["state"] == {"n": 0, "equal": None, "kappa": None, "one_cannot_tell": 0, "neither_can_tell": 5}
-
-
-def test_cant_tell_is_an_answer_without_an_angle() -> None:
-    both = [answer("1", "ann", 1, None, None), answer("1", "ann", 2, 4.0, PoseState.B), answer("2", "ann", 1, 3.0, PoseState.B)]
-    ann = agreement_report(both, {})["raters"]["ann"]
-    assert (ann["cannot_tell"], ann["angle"]["n"], ann["state"]["n"], ann["state"]["one_cannot_tell"]) == (1, 0, 0, 1)
-    assert ann["sd_deg"] is None
 
 
 def test_one_rater_alone_has_no_pairs(tmp_path) -> None:
@@ -223,3 +209,42 @@ def test_too_few_groups_for_intervals_are_told() -> None:
         "intervals need 10 groups."
     ]
     assert group_notes(answers, {str(k): str(k) for k in range(12)}) == group_notes(answers, {}) == []
+
+
+IMAGE = ImageRecord("ab" * 32, "frame.png", 640, 480)
+BENT = Annotation(((200.0, 240.0), (270.0, 240.0), (290.0, 220.0)), ((150.0, 200.0), (400.0, 200.0)), PoseState.C)
+"""The robot's last 28 px lead elsewhere than what lies before them."""
+METHODS = PerceptionConfig()
+SHORTER = METHODS.model_copy(update={"vectors": METHODS.vectors.model_copy(update={"robot_length_px": 20.0})})
+
+
+def kept(content: Annotation, config: PerceptionConfig) -> StoredAnnotation:
+    """As the annotator keeps it under this configuration."""
+    pose = measure_lines(content, IMAGE.size, config).pose
+    assert pose is not None
+    key = ItemKey(IMAGE.sha256, "", "ann")
+    values = pose.theta_deg, pose.theta_signed_deg, pose.d_head_px, pose.d_tail_px, pose.crossed
+    return StoredAnnotation(key, ImageView.AS_IS, content, *values, 1.0, "2026-01-01")
+
+
+def test_angles_of_other_lengths_are_measured_anew_and_told() -> None:
+    other, own = kept(BENT, SHORTER), kept(BENT, METHODS)
+    assert other.theta_deg == pytest.approx(45.0)
+    assert own.theta_deg is not None
+    assert own.theta_deg < 40.0
+    (first, second), (note,) = measured_alike([other, own], {IMAGE.sha256: IMAGE}, METHODS)
+    assert first == own == second
+    assert measured_alike([own], {IMAGE.sha256: IMAGE}, METHODS) == ([own], [])
+    assert measured_alike([other], {}, METHODS) == ([other], []), "without its image it stays as it was kept"
+    assert "Of the manual angles 1 were fitted otherwise" in note
+    assert "robot 40 px, vessel twice 20 px" in note
+
+
+def test_lines_that_are_too_short_for_other_lengths_have_no_angle_any_more() -> None:
+    one = kept(replace(BENT, vessel=((285.0, 200.0), (295.0, 200.0))), METHODS)
+    vectors = METHODS.vectors.model_copy(update={"vessel_half_length_px": 60.0})
+    (now,), notes = measured_alike([one], {IMAGE.sha256: IMAGE}, METHODS.model_copy(update={"vectors": vectors}))
+    assert (now.theta_deg, now.theta_signed_deg, now.d_head_px, now.d_tail_px, now.crossed) == (None,) * 5
+    assert now.content.state is PoseState.C, "what the rater said stays"
+    (note,) = notes
+    assert note.endswith("On 1 of them too little was drawn for these lengths: they have a state, and no angle.")

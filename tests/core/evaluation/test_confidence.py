@@ -61,14 +61,6 @@ def test_evidence_of_doubts_by_hand() -> None:
     assert 0.0 < found.robot_doubt <= 0.4
 
 
-def test_a_head_in_the_corner_is_no_trouble() -> None:
-    line = LINE - [20.0, 60.0]
-    path = RobotPath(line[::-1], 1.0, None, False, 0.0, 4.0)
-    found = collect(path, Vector((40.0, 0.0), (20.0, 0.0), (0.0, 0.0)), PIECE, _masks(), CONFIG)
-    assert np.isfinite(found.values()).all()
-    assert (found.lead, found.off_border) == (1.0, 1.0)
-
-
 def _answers(count: int, seed: int = 0) -> tuple[list[tuple[float, ...]], list[bool]]:
     """Answers whose chance to be right falls with what is seen beyond the head; nothing else matters."""
     rng = np.random.default_rng(seed)

@@ -52,15 +52,6 @@ def test_a_failed_trial_has_no_path_ratio() -> None:
     assert (row["reached"], row["outcome"], row["path_ratio"]) == (False, "stuck", None)
 
 
-def test_an_empty_trial_is_a_row_too() -> None:
-    row = _row(outcome="lost", log=TrialLog())
-    assert (row["wall_contact_n"], row["offset_ratio"], row["answered_share"]) == (None, None, None)
-    assert row["state_shares"]["A"] is None
-    summary = summarise([row])
-    assert summary["wall_force_max_n"] is None
-    assert summary["reached_share"] == 0.0
-
-
 def test_sums_pool_all_moments_and_take_times_from_those_that_arrived() -> None:
     failed = _row(1, "stuck")
     failed["time_s"], failed["wall_contact_n"]["max"], failed["interventions"] = 60.0, 0.7, 2
@@ -74,12 +65,6 @@ def test_sums_pool_all_moments_and_take_times_from_those_that_arrived() -> None:
     assert (summary["mean_time_s"], summary["median_time_s"], summary["median_path_ratio"]) == (2.0, 2.0, 1.1)
     assert (summary["theta_error_median_deg"], summary["head_error_median_px"]) == (2.0, 1.0)
     assert summary["mean_interventions"] == 1.0
-
-
-def test_a_reached_target_with_help_is_not_unaided() -> None:
-    helped = _row()
-    helped["interventions"] = 1
-    assert summarise([helped])["unaided_share"] == 0.0
 
 
 def test_sums_of_nothing_are_none() -> None:

@@ -1,4 +1,4 @@
-"""Masks by hand become a set to train on and one that stays out; the latter says whether training helped."""
+"""Measuring a network on held-out frames."""
 
 from __future__ import annotations
 
@@ -10,62 +10,17 @@ import pytest
 import torch
 
 from core.annotation.exchange import FEWEST, split_own_frames
-from core.annotation.model import AnnotationError
 from core.annotation.store import AnnotationStore, FoundImage, StoredAnnotation, find_images
-from core.learning.dataset import UNMEASURED, find_samples, read_truth
+from core.learning.dataset import find_samples
 from core.learning.training import dice, measure_held_out
 from core.perception.inference import padded
 from core.perception.unet import DualUNet, UNetShape
-from tests.app.annotated import annotate_masks, measure
+from tests.app.annotated import annotate_masks
 
 
 def read(store_path: Path) -> tuple[Sequence[StoredAnnotation], list[FoundImage]]:
     with AnnotationStore(store_path) as store:
         return store.annotations(), find_images(sorted(store_path.parent.glob("*.png")), store)[0]
-
-
-@pytest.mark.parametrize(("count", "held_out"), [(6, 2), (9, 2), (10, 2), (15, 3), (24, 4)])
-def test_a_fifth_and_two_at_least_stay_out(count: int, held_out: int, tmp_path: Path) -> None:
-    annotations, images = read(annotate_masks(tmp_path / "images", count))
-    frames = split_own_frames(annotations, images, tmp_path / "sets")
-    assert (frames.train_count, frames.held_out_count) == (count - held_out, held_out)
-    train, out = ({sample.stem for sample in find_samples([folder])} for folder in (frames.train, frames.held_out))
-    assert len(train) == count - held_out
-    assert not train & out
-    places = sorted(int(stem.removeprefix("frame_")) for stem in out)
-    begin = (count - held_out) // 2
-    assert places == list(range(begin, begin + held_out)), "neighbours in the order of their names"
-
-
-def test_too_few_masks_are_refused_with_what_is_missing(tmp_path: Path) -> None:
-    annotations, images = read(annotate_masks(tmp_path / "images", FEWEST + 1, without_robot=(0, 3)))
-    with pytest.raises(AnnotationError, match=r"5 images have both a vessel and a robot mask, and training needs 6: 1 more"):
-        split_own_frames(annotations, images, tmp_path / "sets")
-    with pytest.raises(AnnotationError, match=r"1 image has both"):
-        split_own_frames(annotations, images[1:2], tmp_path / "sets")
-    assert not (tmp_path / "sets").exists()
-
-
-def test_answers_of_several_studies_keep_nobody_from_training(tmp_path: Path) -> None:
-    """Training learns masks; that a picture was also measured in a study was said to stand in its way."""
-    path = annotate_masks(tmp_path / "images", FEWEST)
-    pictures = sorted(path.parent.glob("*.png"))
-    measure(path, pictures, [3.0] * FEWEST, study="first")
-    annotations, images = read(path)
-    frames = split_own_frames(annotations, images, tmp_path / "of one")
-    assert {row["state"] for row in read_truth(frames.held_out).values()} == {"C"}
-    measure(path, pictures[:1], [9.0], study="second")
-    annotations, images = read(path)
-    frames = split_own_frames(annotations, images, tmp_path / "of two")
-    assert (frames.train_count, frames.held_out_count) == (FEWEST - 2, 2)
-    assert {row["reason"] for row in read_truth(frames.held_out).values()} == {UNMEASURED}
-
-
-def test_a_folder_in_use_is_left_alone(tmp_path: Path) -> None:
-    annotations, images = read(annotate_masks(tmp_path / "images", FEWEST))
-    split_own_frames(annotations, images, tmp_path / "sets")
-    with pytest.raises(AnnotationError, match="not empty"):
-        split_own_frames(annotations, images, tmp_path / "sets")
 
 
 def test_dice_by_hand() -> None:

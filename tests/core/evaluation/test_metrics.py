@@ -1,4 +1,4 @@
-"""Statistics of angles against values worked out by hand or printed elsewhere."""
+"""Statistics of angles and states against values worked out by hand or printed elsewhere."""
 
 from typing import Any
 
@@ -9,16 +9,16 @@ from scipy.stats import spearmanr
 from core.evaluation.metrics import (
     angle_metrics,
     are_too_few,
-    bootstrap_rows,
-    correlation,
     icc_absolute,
-    interval_95,
+    kappa,
     members,
     repeat_metrics,
     shares,
+    state_metrics,
     wilson_95,
     within_subject,
 )
+from core.evaluation.paper import PAPER, PAPER_CONFUSION, PAPER_LABELS
 
 MANUAL = np.array([10.0, 20.0, 30.0, 40.0])
 ALGORITHM = np.array([11.0, 19.0, 33.0, 41.0])  # errors 1, -1, 3, 1
@@ -37,10 +37,6 @@ def test_bias_and_spread_by_hand() -> None:
     # deviations -15 -5 5 15 and -15 -7 7 15: 520 / sqrt(500 * 548)
     assert found["pearson"] == pytest.approx(520 / np.sqrt(500 * 548))
     assert found["spearman"] == pytest.approx(1.0)
-
-
-def test_the_median_is_signed_like_the_papers() -> None:
-    assert angle_metrics(np.zeros(3), np.array([-5.0, -1.0, 4.0]))["median_deg"] == -1.0
 
 
 def test_spearman_with_ties() -> None:
@@ -62,21 +58,6 @@ def test_icc_of_shrout_and_fleiss() -> None:
     assert icc_absolute(np.array(ratings, float)) == pytest.approx(0.2898, abs=5e-5)
 
 
-def test_icc_counts_a_bias_that_correlation_does_not_see() -> None:
-    """Second rater 10 higher: mean squares of subjects 200, of raters 150, residual 0."""
-    first = np.array([0.0, 10.0, 20.0])
-    assert correlation(first, first + 10) == pytest.approx(1.0)
-    assert icc_absolute(np.stack([first, first + 10], -1)) == pytest.approx(200 / (200 + 2 * 150 / 3))
-    assert icc_absolute(np.stack([first, first], -1)) == pytest.approx(1.0)
-
-
-def test_two_manual_measures() -> None:
-    """Variances within the images: half the squared differences, 1/2, 1/2 and 8; their mean is 3."""
-    found = repeat_metrics(np.array([10.0, 20.0, 30.0]), np.array([11.0, 21.0, 34.0]))
-    assert found["mean_difference_deg"] == pytest.approx(2.0)
-    assert found["repeatability_sd_deg"] == pytest.approx(np.sqrt(3.0))
-
-
 def test_a_second_measure_that_is_always_larger_is_no_perfect_repeat() -> None:
     found = repeat_metrics(MANUAL, MANUAL + 4.0)
     assert found["repeatability_sd_deg"] == pytest.approx(4.0 / np.sqrt(2.0))
@@ -87,15 +68,6 @@ def test_the_spread_of_one_measure_over_raters_and_repeats_by_hand() -> None:
     found = within_subject([[[1.0, 2.0, 3.0], [5.0, 7.0]], [[4.0, 4.0], [9.0]], [[1.0], [50.0]]])
     assert (found["n"], found["sd_deg"]) == (2, pytest.approx(np.sqrt((2 + 2 + 0) / (2 + 1 + 1))))
     assert within_subject([[[1.0], [2.0]]]) == within_subject([]) == {"n": 0, "sd_deg": None, "ci95": None}
-
-
-def test_of_one_rater_with_two_repeats_both_ways_give_one_figure() -> None:
-    rng = np.random.default_rng(2)
-    first = rng.uniform(0.0, 60.0, 48)
-    second = first + rng.normal(0.5, 2.0, 48)
-    pairs, all_repeats = repeat_metrics(first, second), within_subject([[[a, b]] for a, b in zip(first, second, strict=True)])
-    assert all_repeats["sd_deg"] == pytest.approx(pairs["repeatability_sd_deg"])
-    assert all_repeats["ci95"] == pytest.approx(pairs["ci95"]["repeatability_sd_deg"])
 
 
 @pytest.mark.parametrize(("first", "later"), [(1, 1), (3, 1), (3, 3), (4, 8)])
@@ -183,19 +155,6 @@ def test_wilsons_interval(share: float, n: int, low: float, high: float) -> None
     assert wilson_95(share, n) == pytest.approx([low, high], abs=5e-5)
 
 
-def test_ten_of_ten_are_not_certain() -> None:
-    """The bootstrap draws nothing but hits then, and its interval would be from all to all."""
-    manual = np.linspace(10.0, 100.0, 20)
-    alone = angle_metrics(manual, manual + 1.0)
-    assert (alone["share_0_4"], alone["ci95"]["share_0_4"]) == (1.0, pytest.approx([0.8389, 1.0], abs=5e-5))
-    assert alone["ci95"]["share_over_16"] == pytest.approx([0.0, 0.1611], abs=5e-5)
-    grouped = angle_metrics(manual, manual + 1.0, group=members([k // 2 for k in range(20)]))
-    assert grouped["ci95"]["share_0_4"] == pytest.approx([0.7225, 1.0], abs=5e-5), "of ten groups, not of twenty images"
-    mixed = angle_metrics(manual, manual + np.where(np.arange(20) < 6, 10.0, 1.0), group=members([k // 2 for k in range(20)]))
-    assert mixed["ci95"]["share_0_4"] == pytest.approx([0.4, 1.0], abs=0.1), "whole groups were drawn"
-    assert angle_metrics(manual, manual + 1.0, group=members([k // 4 for k in range(20)]))["ci95"]["share_0_4"] is None
-
-
 def test_intervals_are_seeded_and_hold_the_value() -> None:
     rng = np.random.default_rng(5)
     manual = rng.uniform(0, 60, 200)
@@ -209,18 +168,92 @@ def test_intervals_are_seeded_and_hold_the_value() -> None:
     assert high - low == pytest.approx(2 * 1.96 * found["sd_deg"] / np.sqrt(200), rel=0.1)
 
 
-def test_an_interval_is_the_middle_95_percent() -> None:
-    assert interval_95(np.arange(1001.0)) == [25.0, 975.0]
-    assert interval_95(np.array([1.0] * 8 + [np.nan] * 2)) is None, "undefined in a fifth of the resamples"
+# states: the paper's 44 label pairs, scikit-learn as the second opinion, and what is undefined
 
 
-def test_large_sets_are_drawn_in_blocks() -> None:
-    seen: list[int] = []
+def label_pairs(confusion: object, labels: tuple[str, ...] = PAPER_LABELS) -> tuple[list[str], list[str]]:
+    """Manual and algorithmic labels that give a confusion table."""
+    table = np.array(confusion)
+    pairs = [(labels[i], labels[j]) for i, j in np.ndindex(*table.shape) for _ in range(table[i, j])]
+    return [manual for manual, _ in pairs], [algorithm for _, algorithm in pairs]
 
-    def mean(values: np.ndarray) -> dict[str, np.ndarray]:
-        seen.append(values.size)
-        return {"mean": values.mean(-1)}
 
-    assert bootstrap_rows(mean, (np.arange(5000.0),), seed=0)["mean"] is not None
-    assert max(seen) <= 500_000
-    assert sum(seen) == 2000 * 5000
+def test_frames_of_one_phantom_are_drawn_together() -> None:
+    """Twelve phantoms of thirty frames each, all right or all wrong: as certain as twelve frames, not as 360."""
+    right = [True] * 8 + [False] * 4
+    manual = ["B"] * 360
+    algorithm = ["B" if right[place // 30] else "C" for place in range(360)]
+    group = members([place // 30 for place in range(360)])
+    alone, whole = state_metrics(manual, algorithm), state_metrics(manual, algorithm, group=group)
+    once = state_metrics(manual[::30], algorithm[::30])
+    assert whole["accuracy"] == alone["accuracy"] == pytest.approx(8 / 12)
+    assert whole["ci95"]["accuracy"] == pytest.approx(once["ci95"]["accuracy"], abs=0.09)
+    assert alone["ci95"]["accuracy"][1] - alone["ci95"]["accuracy"][0] < 0.11
+    assert whole["ci95"]["accuracy"][1] - whole["ci95"]["accuracy"][0] > 0.4
+
+
+def test_the_papers_labels_give_the_papers_figures_digit_for_digit() -> None:
+    found = state_metrics(*label_pairs(PAPER_CONFUSION))
+    assert (found["n"], found["labels"]) == (44, ["B", "C", "D"])
+    assert found["confusion"] == [[12, 1, 0], [2, 23, 1], [0, 1, 4]]
+    assert f"{100 * found['accuracy']:.1f}" == "88.6"
+    assert f"{found['kappa']:.3f}" == "0.796"
+    assert f"{found['fowlkes_mallows_pairs']:.3f}" == "0.801"
+    rows = {label: found["per_class"][label] for label in "BCD"} | {average: found[average] for average in ("macro", "weighted")}
+    texts = {name: " ".join(f"{row[score]:.2f}" for score in ("precision", "recall", "f1")) for name, row in rows.items()}
+    assert texts == {
+        "B": "0.86 0.92 0.89",
+        "C": "0.92 0.88 0.90",
+        "D": "0.80 0.80 0.80",
+        "macro": "0.86 0.87 0.86",
+        "weighted": "0.89 0.89 0.89",
+    }
+    papers = PAPER["state"]["per_class"] | {average: PAPER["state"][average] for average in ("macro", "weighted")}
+    assert {name: {score: round(rows[name][score], 2) for score in row} for name, row in papers.items()} == papers
+
+
+def test_the_two_fowlkes_mallows_indices_are_different_things() -> None:
+    found = state_metrics(*label_pairs(PAPER_CONFUSION))
+    per_class = [np.sqrt(12 / 14 * 12 / 13), np.sqrt(23 / 25 * 23 / 26), 4 / 5]
+    assert found["fowlkes_mallows_macro"] == pytest.approx(np.mean(per_class))
+    # pairs: 66 + 1 + 253 + 6 = 326 together in both, 413 manually, 401 by the algorithm
+    assert found["fowlkes_mallows_pairs"] == pytest.approx(326 / np.sqrt(413 * 401))
+
+
+@pytest.mark.parametrize(("true", "found"), [("BBBB", "BBBB"), ("B", "B"), ("", "")])
+def test_kappa_of_a_single_label_is_undefined(true: str, found: str) -> None:
+    assert kappa(true, found) is None
+
+
+def test_a_state_that_one_side_never_gives() -> None:
+    found = state_metrics(list("BBC"), list("BBB"))
+    assert found["per_class"]["C"] == {"precision": None, "recall": 0.0, "f1": 0.0, "fowlkes_mallows": None, "n": 1}
+    assert found["macro"]["precision"] == pytest.approx((2 / 3 + 0) / 2)
+    assert found["weighted"]["precision"] == pytest.approx((2 * 2 / 3 + 1 * 0) / 3)
+    assert found["fowlkes_mallows_macro"] == pytest.approx((np.sqrt(2 / 3) + 0) / 2)
+    assert found["macro"]["recall"] == pytest.approx(1 / 2)
+    found = state_metrics(list("BB"), list("BA"))
+    assert found["per_class"]["A"]["recall"] is None
+    assert found["macro"]["recall"] == pytest.approx(1 / 2), "of B alone"
+    assert found["fowlkes_mallows_macro"] == pytest.approx((np.sqrt(1 / 2) + 0) / 2)
+    assert found["labels"] == ["A", "B"]
+
+
+def test_to_find_a_part_of_a_state_is_better_than_to_find_none_of_it() -> None:
+    none, one = ([[13, 0, 0], [0, 26, 0], [0, 5 - found, found]] for found in (0, 1))
+    worse, better = state_metrics(*label_pairs(none)), state_metrics(*label_pairs(one))
+    assert worse["fowlkes_mallows_macro"] == pytest.approx((1 + np.sqrt(26 / 31) + 0) / 3)
+    assert better["fowlkes_mallows_macro"] == pytest.approx((1 + np.sqrt(26 / 30) + np.sqrt(1 / 5)) / 3)
+    assert better["macro"]["precision"] > worse["macro"]["precision"]
+    low, high = worse["ci95"]["fowlkes_mallows_macro"]
+    assert low < worse["fowlkes_mallows_macro"] < high
+    assert high < 0.75, "no class is as good as left out"
+
+
+@pytest.mark.parametrize(("manual", "algorithm"), [("B", "B"), ("B", "C"), ("BB", "BB"), ("BC", "CB"), ("BBC", "DDA"), ("", "")])
+def test_small_and_odd_sets_give_null_and_no_warning(manual: str, algorithm: str) -> None:
+    found = state_metrics(list(manual), list(algorithm))
+    assert found["n"] == len(manual)
+    assert found["accuracy"] == (np.mean([a == b for a, b in zip(manual, algorithm, strict=True)]) if manual else None)
+    values = [value for value in found["ci95"].values() if value is not None]
+    assert all(np.isfinite(value).all() for value in values)

@@ -86,18 +86,6 @@ def test_two_raters_files_are_one_study(begin) -> None:
     assert answers(ben) == before, "the other file is only read"
 
 
-def test_undo_goes_on_in_what_came_in(begin) -> None:
-    anna, ben = begin("a", "anna", 3.0), begin("b", "ben", 5.0, shift=1)
-    joined(anna, ben)
-    with AnnotationStore(anna) as store:
-        history = store.history(ItemKey(SHAS[2], "angles", "ben"))
-        assert history.current == drawn(7.0)
-        history.undo()
-        assert history.current == drawn(0.0)
-        answer(store, ItemKey(SHAS[2], "angles", "ben"), drawn(9.0))
-        assert store.history(ItemKey(SHAS[2], "angles", "ben")).current == drawn(9.0)
-
-
 def test_the_same_join_twice_changes_nothing(begin) -> None:
     anna, ben, cleo = begin("a", "anna", 3.0), begin("b", "user", 5.0), begin("c", "cleo", 1.0)
     joined(anna, ben, cleo, user="ben")
@@ -136,12 +124,6 @@ def test_three_computers_whose_raters_are_all_called_alike(begin) -> None:
     joined(here, second, user="ben")
     joined(here, third, user="cleo")
     assert {rater for _, rater, _ in answers(here)} == {"user", "ben", "cleo"}
-
-
-def test_one_person_at_two_computers_is_one_if_it_is_said(begin) -> None:
-    here, there = begin("a", "anna", 1.0, "angles"), begin("b", "anna", 2.0, "second")
-    joined(here, there, anna="anna")
-    assert {(study, rater) for study, rater, _ in answers(here)} == {("angles", "anna"), ("second", "anna")}
 
 
 def test_who_somebody_is_holds_for_all_studies(begin) -> None:
@@ -248,16 +230,6 @@ def test_a_file_that_is_open_in_a_window_is_named(begin) -> None:
     with pytest.raises(AnnotationError, match=r"a\.sqlite: cannot be joined with itself"):
         joined(here, here)
     assert dump(here) == once
-
-
-def test_one_bad_file_keeps_all_out(begin, tmp_path: Path) -> None:
-    here, there = begin("a", "anna", 1.0), begin("b", "ben", 2.0)
-    once, text = dump(here), tmp_path / "text.sqlite"
-    text.write_text("no database at all, but long enough to have a header of a hundred bytes" * 3)
-    for bad, words in ((text, "not an annotation file"), (tmp_path / "nowhere.sqlite", "no such annotation file")):
-        with pytest.raises(AnnotationError, match=words):
-            joined(here, there, bad)
-        assert dump(here) == once
 
 
 def test_a_killed_join_leaves_the_file_as_it_was(begin, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,8 +66,3 @@ def test_a_robot_is_traced_from_end_to_end_across_its_gap() -> None:
     assert path[:, 1].max() >= 196
     steps = np.abs(np.diff(path, axis=0))
     assert steps.max() == 1  # pixel by pixel
-
-
-def test_no_robot_no_path() -> None:
-    nothing = np.zeros((64, 64), bool)
-    assert trace_paper(nothing, nothing) == []

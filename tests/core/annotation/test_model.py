@@ -1,24 +1,36 @@
-"""What is measured from drawn lines: the 40-px rule, angle, distances, crossing and state, computed by hand."""
+"""What is measured from drawn lines, edits of points, and undo as a journal that only grows."""
 
 from __future__ import annotations
 
 import math
+import random
 
 import numpy as np
 import pytest
 
 from core.annotation.model import (
+    ROBOT,
+    VESSEL,
     Annotation,
+    History,
     ImageView,
+    JournalEntry,
     MaskPolygon,
     MaskTarget,
     Status,
+    Touch,
     annotation_from_json,
+    line_of,
     measure_lines,
+    move,
+    put,
+    remove,
     status_of,
+    touched,
     turn_annotation,
     turn_image,
     turn_point,
+    with_line,
     working_scale,
 )
 from core.config.models import PerceptionConfig
@@ -179,3 +191,104 @@ def test_status() -> None:
     assert status_of(lines, measured=False) is Status.BEGUN
     assert status_of(Annotation(state=PoseState.A), measured=True) is Status.DONE
     assert status_of(Annotation(cannot_tell=True), measured=False) is Status.CANNOT_TELL
+
+
+VESSEL_BOX = MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (50.0, 10.0), (50.0, 30.0), (10.0, 30.0)))
+ROBOT_BOX = MaskPolygon(MaskTarget.ROBOT, ((20.0, 18.0), (40.0, 18.0), (40.0, 22.0), (20.0, 22.0)))
+
+
+def with_masks(*masks: MaskPolygon) -> Annotation:
+    return Annotation(((10.0, 20.0), (50.0, 20.0)), ((12.0, 24.0), (60.0, 24.0)), PoseState.B, masks=masks)
+
+
+def test_edits_of_points() -> None:
+    drawn = with_masks(VESSEL_BOX)
+    assert line_of(put(drawn, ROBOT, 1, (30.0, 20.0)), ROBOT) == ((10.0, 20.0), (30.0, 20.0), (50.0, 20.0))
+    assert line_of(move(drawn, VESSEL, 0, (1.0, 2.0)), VESSEL)[0] == (1.0, 2.0)
+    assert len(line_of(remove(drawn, 0, 3), 0)) == 3
+    assert remove(remove(drawn, 0, 3), 0, 0).masks == (), "two points are no outline"
+    assert not put(Annotation(cannot_tell=True), ROBOT, 0, (1.0, 1.0)).cannot_tell
+
+
+def test_with_an_outline_its_holes_go() -> None:
+    """They stayed, were shown as masks, and a robot's mask of nothing was exported."""
+    hole = MaskPolygon(MaskTarget.ROBOT, ((28.0, 19.0), (32.0, 19.0), (32.0, 21.0)), is_hole=True)
+    in_vessel = MaskPolygon(MaskTarget.VESSEL, hole.points, is_hole=True)
+    drawn = with_masks(ROBOT_BOX, hole, VESSEL_BOX, in_vessel, hole, ROBOT_BOX, hole)
+    assert with_line(drawn, 0, ()).masks == (VESSEL_BOX, in_vessel, ROBOT_BOX, hole), "up to the next outline of the same mask"
+    assert with_line(drawn, 1, ()).masks == (ROBOT_BOX, VESSEL_BOX, in_vessel, hole, ROBOT_BOX, hole), "a hole goes alone"
+    assert remove(drawn, 0, 1).masks[1:] == drawn.masks[1:], "an outline with a point less is one still"
+
+
+def test_what_a_place_touches() -> None:
+    drawn = with_masks(VESSEL_BOX)
+    assert touched(drawn, [ROBOT, VESSEL], (49.0, 21.0), 3.0, 2.0) == Touch(ROBOT, 1)
+    assert touched(drawn, [ROBOT, VESSEL], (30.0, 21.0), 3.0, 2.0) == Touch(ROBOT, 1, is_edge=True)
+    assert touched(drawn, [VESSEL], (30.0, 21.0), 3.0, 2.0) is None
+    assert touched(drawn, [0], (10.0, 20.0), 3.0, 2.0) == Touch(0, 4, is_edge=True), "an outline is closed"
+    assert touched(drawn, [], (10.0, 10.0), 3.0, 2.0) is None
+
+
+def step(number: int) -> Annotation:
+    return Annotation(((float(number), 0.0),))
+
+
+def test_undo_goes_back_to_the_beginning_and_redo_to_the_end() -> None:
+    history = History()
+    for number in range(1, 200):
+        history.edit(f"edit {number}", step(number))
+    assert history.undo_action == "edit 199"
+    while history.undo() is not None:
+        pass
+    assert history.current == Annotation()
+    assert not history.can_undo
+    while history.redo() is not None:
+        pass
+    assert history.current == step(199)
+
+
+def test_an_edit_after_an_undo_ends_redo_but_the_journal_keeps_what_was_undone() -> None:
+    history = History()
+    entries = [history.edit("one", step(1)), history.edit("two", step(2)), history.undo(), history.edit("three", step(3))]
+    assert not history.can_redo
+    assert [entry.number for entry in entries if entry is not None] == [1, 2, 3, 4]
+    assert entries[1] is not None
+    assert entries[1].content == step(2)
+    history.undo()
+    assert history.current == step(1)
+    history.redo()
+    assert history.current == step(3)
+
+
+def test_what_changes_nothing_is_no_edit() -> None:
+    history = History()
+    assert history.edit("nothing", Annotation()) is None
+    assert history.undo() is None
+    assert history.redo() is None
+
+
+def test_the_journal_brings_everything_back() -> None:
+    """Whatever a rater did: a history that follows its journal stands where the first one stands, and undoes the same."""
+    rng = random.Random(5)
+    for _ in range(60):
+        history, journal = History(), []
+        for number in range(rng.randrange(1, 40)):
+            entry = rng.choice((lambda: history.edit("edit", step(number)), history.undo, history.redo))()  # noqa: B023
+            journal += [entry] if entry is not None else []
+        again = History(journal)
+        assert (again.current, again.can_undo, again.can_redo) == (history.current, history.can_undo, history.can_redo)
+        while history.undo() is not None:
+            again.undo()
+            assert again.current == history.current
+
+
+def test_a_journal_with_holes_and_nonsense_is_followed_as_far_as_it_goes() -> None:
+    history = History()
+    first, _, third = history.edit("one", step(1)), history.edit("two", step(2)), history.edit("three", step(3))
+    assert first is not None
+    assert third is not None
+    nonsense = [JournalEntry(4, "undo", 77), JournalEntry(5, "redo", 9), JournalEntry(6, "edit", 6, "loop", step(6)), first]
+    again = History([first, third, *nonsense])
+    assert again.current == step(3)
+    again.undo()
+    assert again.current == step(1), "the lost edit is stepped over"
