@@ -699,7 +699,7 @@ from core.config.safety import ServosConfig
 from hardware.servos.bus_ipc import BusClient
 
 link = BusClient(ServosConfig(port=sys.argv[1]), SafetyConfig())
-armed._client._process.send({"id": 1, "do": "torque off"})
+link._process.send({"id": 1, "do": "torque off"})
 print(link.pid, flush=True)
 os.kill(os.getpid(), signal.SIGKILL)
 """
