@@ -82,11 +82,11 @@ from hardware.calibration.bench import CalibrationBench
 from hardware.rig import RigKind
 from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
 from hardware.servos.dynamixel_port import LineCounts
-from hardware.servos.lockstep import LockStepServos
 from hardware.servos.registers import HardwareError, ServoState
 from hardware.twin.phantom import PHANTOM_TITLES
 from hardware.twin.process import JointsToTwin
 from hardware.twin.world import TwinWorld
+from tools.lockstep import LockStepServos
 
 NAMES = {
     "operator_window": "advisory",

@@ -15,9 +15,9 @@ from core.control.gate import Source
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.types import Command, Points
 from hardware.calibration.servo_probe import ProbeLimits, StopSwitch, probe_config
-from hardware.servos.lockstep import LockStepServos
 from hardware.twin.process import JointsToTwin, wired
 from hardware.twin.world import TwinWorld
+from tools.lockstep import LockStepServos
 
 _CYCLE_S = 0.02
 _FRAMES = 4

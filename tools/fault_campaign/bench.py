@@ -45,12 +45,12 @@ from core.session.manifest import Event, Manifest, about_rig, event_of_alert, re
 from core.session.reader import SessionReader
 from core.session.writer import RecordStatus, SessionWriter, faults_between
 from core.types import Frame, Image, Point, Scene, Tick
-from hardware.servos.lockstep import LockStepServos
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.process import JointsToTwin, drive_world
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.world import TwinWorld
 from tools.fault_campaign.registry import COUNT, CampaignError, FaultCase, Kit, Result, all_cases, run_case, tidy
+from tools.lockstep import LockStepServos
 
 Probability = NDArray[np.float32]
 _START_MM, _START_NETWORK_MM, _TARGET = 45.0, 70.0, (560.0, 195.0)

@@ -28,7 +28,7 @@ from hardware.preflight import checks as program
 from hardware.preflight import device_checks
 from hardware.preflight import model_checks as model
 from hardware.preflight.checks import Check
-from hardware.preflight.preflight import CHECKS, run_checks
+from hardware.preflight.preflight import CHECKS, Level, driving_checks, level_of, run_checks
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.soft_pedal import SoftPedal
 
@@ -228,11 +228,6 @@ def test_the_second_looks_eight_bits_are_compared_too(monkeypatch: pytest.Monkey
     off = iter((0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     monkeypatch.setattr(model, "_apart", lambda some, others: next(off) + 0.0 * apart(some, others))
     _bad(model.check_self_test(_segmentation("default")), "eight-bit network is off by 1.000", "precision to fp32")
-
-
-def test_an_exact_network_has_nothing_to_be_compared_with(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)
-    _good(model.check_self_test(PerceptionConfig(segmentation=SegmentationConfig(precision="fp32"))), "OpenVINO CPU fp32")
 
 
 def test_the_shipped_model_passes_its_self_test() -> None:
@@ -555,3 +550,42 @@ def test_all_checks_are_made_one_after_the_other_and_named_as_in_the_table(tmp_p
     assert all(check.ok == (check.fix == "") for check in checks)
     assert {check.name for check in checks if not check.ok} == {"model", "self-test"}
     assert checks[0].to_json().keys() == {"name", "ok", "detail", "fix"}
+
+
+# --- before driving ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "detail", "level"),
+    [
+        ("model", "network.onnx: SHA-256 differs", Level.BAD),
+        ("self-test", "gives no pose", Level.BAD),
+        ("camera", "USB 2", Level.BAD),
+        ("adapter latency", "16 ms", Level.BAD),
+        ("packages", "numpy 1 instead of 2", Level.BAD),
+        ("clock", "monotonic, now 1970-01-01 00:00 UTC: the date is wrong, and sessions are named by it", Level.WARNING),
+        ("recordings", "0.1 GB free", Level.WARNING),
+        ("cores and memory", "1 core", Level.WARNING),
+        ("gamepad", "no permission", Level.WARNING),
+    ],
+)
+def test_only_what_driving_needs_stands_against_it(name: str, detail: str, level: Level) -> None:
+    assert level_of(Check(name, False, detail, "mend it")) is level
+    assert level_of(Check(name, True, "as it should be")) is Level.GOOD
+
+
+def test_a_damaged_model_and_a_lost_camera_are_found_without_opening_any_device() -> None:
+    config = Config.model_validate(
+        {
+            "perception": {"segmentation": {"model": "no_such_model"}},
+            "rig": {"camera": "webcam", "robot": "none"},
+            "camera": {"device": "/dev/no_such_camera"},
+            "servos": {"port": "/dev/no_such_port"},
+        }
+    )
+    found = {check.name: check for check in driving_checks(config)}
+    assert {"model", "self-test", "camera", "recordings", "clock"} <= found.keys()
+    assert not {"picture", "servos", "servo port", "foot pedal"} & found.keys(), "the open rig has these in use"
+    for name in ("model", "self-test", "camera"):
+        assert level_of(found[name]) is Level.BAD
+        assert found[name].fix

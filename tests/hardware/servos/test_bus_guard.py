@@ -20,9 +20,9 @@ from hardware.processes import SharedSlot
 from hardware.servos.bus_guard import BusGuard, OneStep
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
 from hardware.servos.dynamixel_port import NotReady
-from hardware.servos.lockstep import LockStepServos
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
 from hardware.servos.tracking import Jam, JamMonitor
+from tools.lockstep import LockStepServos
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 CYCLE_S = 0.02
