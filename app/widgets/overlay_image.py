@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cache
 
 import cv2
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtCore import QPointF, QRect, QRectF
 from PySide6.QtGui import QColor, QFont, QImage, QPainter, QTransform
 from PySide6.QtWidgets import QApplication
 
@@ -16,7 +17,7 @@ from app.ui.i18n import english_texts
 from app.ui.texts import REASON_TEXT, STATE_TITLE, advice_headline, signed_degrees
 from app.ui.theme import ON_PICTURE
 from app.widgets.painting import CENTER, draw_box, draw_text, set_colours, text_width
-from app.widgets.scene_overlay import Marks, SceneShapes, scene_shapes
+from app.widgets.scene_overlay import Marks, scene_shapes
 from app.widgets.state_badge import paint_state
 from core.types import Advice, Image, Mask, Scene
 
@@ -56,17 +57,26 @@ def draw_overlay(
     pixels[:height] = canvas
     pixels[height:] = theme.rgb(ON_PICTURE.PANEL)
 
-    shapes, marks = scene_shapes(scene), Marks(digits=1)
-    marks.set_scene(shapes, scene.pose, scene.to_source(scene.route.target) if scene.route is not None else None)
-    corner = _free_corner(canvas, scene, zoom)
+    marks = Marks(digits=1)
+    marks.set_scene(scene_shapes(scene), scene.pose, scene.to_source(scene.route.target) if scene.route is not None else None)
+    inset = _place_inset(canvas, scene, zoom)
     drawn.setDevicePixelRatio(unit)
     painter = QPainter(drawn)
     room = QRectF(0, 0, width / unit, height / unit)
     painter.setClipRect(room)
     to_canvas = QTransform.fromScale(zoom / unit, zoom / unit)
-    marks.draw(painter, to_canvas, room, _LABEL_PX if corner is None else 0, smooth=True)
-    if corner is not None:
-        _draw_inset(painter, pixels, corner, image, scene, shapes, marks, to_canvas, unit)
+    marks.draw(painter, to_canvas, room, 0 if inset is not None else _LABEL_PX, smooth=True)
+    if inset is not None:  # the surroundings of the head, magnified, with the labels; a frame shows where they are
+        x, y, part = inset.source.left(), inset.source.top(), inset.box
+        _draw_frame(painter, to_canvas.mapRect(inset.source))
+        pixels[part.top() : part.top() + part.height(), part.left() : part.left() + part.width()] = inset.magnified(image)
+        box = QRectF(part.left() / unit, part.top() / unit, part.width() / unit, part.height() / unit)
+        scale = inset.zoom / unit
+        to_inset = QTransform(scale, 0.0, 0.0, scale, box.left() - x * scale, box.top() - y * scale)
+        painter.setClipRect(box)
+        marks.draw(painter, to_inset, box, _LABEL_PX, tags=False, smooth=True)
+        painter.setClipRect(room)
+        _draw_frame(painter, box.adjusted(1, 1, -1, -1))
     if stamp:
         font = theme.semi_bold(_LABEL_PX)
         box = QRectF(12.0, room.height() - 30.0, text_width(font, stamp) + 14.0, 20.0)
@@ -125,9 +135,26 @@ def _tint(canvas: Image, mask: Mask, name: str, opacity: float) -> Image:
     return tinted
 
 
-def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, int, int] | None:
-    """Left, top, width and height of the corner where a magnified head covers least; None when it would cover much."""
-    if scene.pose is None or scene.masks is None or scene.path is None:
+@dataclass(frozen=True, slots=True)
+class _Inset:
+    """Where the magnified head lies in the picture, px, and the part of the source that it shows."""
+
+    box: QRect
+    source: QRectF
+
+    @property
+    def zoom(self) -> float:
+        return self.box.width() / self.source.width()
+
+    def magnified(self, image: Image) -> Image:
+        x, y, zoom, size = self.source.left(), self.source.top(), self.zoom, (self.box.width(), self.box.height())
+        place = np.array([[zoom, 0.0, (0.5 - x) * zoom - 0.5], [0.0, zoom, (0.5 - y) * zoom - 0.5]])
+        return np.asarray(cv2.warpAffine(image, place, size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), np.uint8)
+
+
+def _place_inset(canvas: Image, scene: Scene, zoom: float) -> _Inset | None:
+    """The inset in the corner where it covers least; None when it would cover much, or there is no pose."""
+    if scene.pose is None or scene.masks is None or scene.path is None or not (scene.robot_vector and scene.vessel_vector):
         return None
     height, width = canvas.shape[:2]
     box_width, box_height = round(0.34 * width), round(0.38 * height)
@@ -141,42 +168,15 @@ def _free_corner(canvas: Image, scene: Scene, zoom: float) -> tuple[int, int, in
             columns = slice(round(left * across), round((left + box_width) * across))
             part = busy[rows, columns]
             away = np.abs(head - (left + box_width / 2, top + box_height / 2)) / (box_width, box_height)
-            is_beside = bool(away.max() > 0.6)
-            if part.size and is_beside and float(part.mean()) < best_share:
-                best, best_share = (left, top, box_width, box_height), float(part.mean())
-    return best
-
-
-def _draw_inset(
-    painter: QPainter,
-    pixels: Image,
-    corner: tuple[int, int, int, int],
-    image: Image,
-    scene: Scene,
-    shapes: SceneShapes,
-    marks: Marks,
-    to_canvas: QTransform,
-    unit: float,
-) -> None:
-    """The surroundings of the head, magnified, with the labels; a frame shows where they are."""
-    if shapes.robot_vector is None or shapes.vessel_vector is None:
-        return
-    left, top, width, height = corner
-    span = _INSET_SPAN_PX / scene.scale
-    zoom = width / span
-    middle = (np.array(shapes.robot_vector.center) + np.array(shapes.vessel_vector.center)) / 2
-    x, y = (middle - np.array([span, height / zoom]) / 2).tolist()
-    _draw_frame(painter, to_canvas.mapRect(QRectF(x, y, span, height / zoom)))
-    place = np.array([[zoom, 0.0, (0.5 - x) * zoom - 0.5], [0.0, zoom, (0.5 - y) * zoom - 0.5]])
-    warped = cv2.warpAffine(image, place, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-    pixels[top : top + height, left : left + width] = warped
-    box = QRectF(left / unit, top / unit, width / unit, height / unit)
-    to_inset = QTransform(zoom / unit, 0.0, 0.0, zoom / unit, box.left() - x * zoom / unit, box.top() - y * zoom / unit)
-    painter.save()
-    painter.setClipRect(box)
-    marks.draw(painter, to_inset, box, _LABEL_PX, tags=False, smooth=True)
-    painter.restore()
-    _draw_frame(painter, box.adjusted(1, 1, -1, -1))
+            if part.size and away.max() > 0.6 and float(part.mean()) < best_share:
+                best, best_share = QRect(left, top, box_width, box_height), float(part.mean())
+    if best is None:
+        return None
+    span_x = _INSET_SPAN_PX / scene.scale
+    span_y = span_x * box_height / box_width
+    centers = [scene.to_source(vector.center) for vector in (scene.robot_vector, scene.vessel_vector)]
+    x, y = np.mean(centers, axis=0).tolist()
+    return _Inset(best, QRectF(x - span_x / 2, y - span_y / 2, span_x, span_y))
 
 
 def _draw_frame(painter: QPainter, box: QRectF) -> None:

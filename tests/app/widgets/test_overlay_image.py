@@ -64,15 +64,11 @@ def test_a_refusal_is_named_instead_of_values() -> None:
 def test_head_is_magnified_only_where_it_covers_little(bench: FakeBench) -> None:
     image, scene = bench.scene_at(0, 6.0)
     canvas = np.zeros((960, 1280, 3), np.uint8)
-    corner = overlay_image._free_corner(canvas, scene, 2.0)
-    assert corner is not None
-    left, top, width, height = corner
-    assert scene.path is not None
-    x, y = 2 * scene.path.head[0], 2 * scene.path.head[1]
-    assert not (left <= x <= left + width and top <= y <= top + height), "never over the head itself"
-    assert scene.masks is not None
+    inset = overlay_image._place_inset(canvas, scene, 2.0)
+    assert inset is not None and scene.path is not None and scene.masks is not None
+    assert not inset.box.contains(round(2 * scene.path.head[0]), round(2 * scene.path.head[1])), "never over the head itself"
     full = replace(scene, masks=replace(scene.masks, vessel=np.ones_like(scene.masks.vessel)))
-    assert overlay_image._free_corner(canvas, full, 2.0) is None
+    assert overlay_image._place_inset(canvas, full, 2.0) is None
     assert draw_overlay(image, full).shape == (1064, 1280, 3)
 
 
