@@ -202,7 +202,7 @@ def _measure_row(one: StoredAnnotation, names: Mapping[str, str]) -> dict[str, A
 
 
 def write_measures(path: Path, measures: Sequence[Mapping[str, Any]]) -> None:
-    """The list of measures as CSV, blank where there is none; raises OSError."""
+    """The list of measures as CSV, blank for None; raises OSError."""
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, list(measures[0]), lineterminator="\n")
         table.writeheader()

@@ -462,7 +462,7 @@ _TOLERANCE_PX = 0.4  # by which a proposed line may leave the perceived one
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """The algorithm's answer in the form of an annotation (source pixels), its pose, and why there is none if so."""
+    """The algorithm's answer in the form of an annotation (source pixels), with its pose or the refusal."""
 
     annotation: Annotation
     pose: Pose | None

@@ -32,7 +32,7 @@ class Persons:
 
 
 def whose(there: Sequence[KeptAnnotation], here: Sequence[KeptAnnotation], names: Mapping[str, str], where: str) -> Persons:
-    """Who is who, over all studies: whose answers are in both files is the same person, whatever he is called in each of them.
+    """Who is who, over all studies: a rater whose answers are in both files is one person, whatever the names in the two files.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def whose(there: Sequence[KeptAnnotation], here: Sequence[KeptAnnotation], names
 
 
 def raters_alike(raters: Iterable[str]) -> list[str]:
-    """A line for names that may be one person's, written in two ways."""
+    """A line for each group of names that may be one person's, written in different ways."""
     ways: dict[str, set[str]] = {}
     for rater in raters:
         ways.setdefault(" ".join(rater.casefold().split()), set()).add(rater)
@@ -108,8 +108,8 @@ def join(target: AnnotationStore, files: Sequence[Path], study: str | None, name
     Raises
     ------
     AnnotationError
-        A file is damaged, open in a window, or cannot be read; a study was begun otherwise there; or it is not clear who somebody
-        is. Nothing is changed then.
+        A file is damaged, open in a window, or cannot be read; a study was begun otherwise there; or it is not clear who a
+        rater is. Nothing is changed then.
     """
     paths = [path / DEFAULT_NAME if path.is_dir() else path for path in files]
     for path in paths:
@@ -126,45 +126,43 @@ def join(target: AnnotationStore, files: Sequence[Path], study: str | None, name
         opened = [(source.path, stack.enter_context(source.transaction(writing=False))) for source in sources]
         with target.transaction() as database:
             for path, theirs in opened:
-                _take(database, theirs, _Ask(path, study, names), joined)
+                _join_file(database, theirs, path, study, names, joined)
             if database.execute("PRAGMA foreign_key_check").fetchone() is not None:
                 raise AnnotationError(f"{target.path}: damaged; annotate --salvage writes what is readable into a new file")
     joined.told += raters_alike(rater for _, rater in target.studies())
     return joined
 
 
-@dataclass(frozen=True, slots=True)
-class _Ask:
-    """What is asked of one file: its path for messages, and as in ``join``."""
-
-    where: Path
-    study: str | None
-    names: Mapping[str, str]
-
-
-def _take(database: sqlite3.Connection, theirs: sqlite3.Connection, ask: _Ask, joined: Joined) -> None:
+def _join_file(
+    database: sqlite3.Connection,
+    theirs: sqlite3.Connection,
+    where: Path,
+    study: str | None,
+    names: Mapping[str, str],
+    joined: Joined,
+) -> None:
     if theirs.execute("PRAGMA foreign_key_check").fetchone() is not None:
-        raise AnnotationError(f"{ask.where}: damaged; annotate --salvage writes what is readable into a new file")
+        raise AnnotationError(f"{where}: damaged; annotate --salvage writes what is readable into a new file")
     kept, here = read_kept(theirs), read_kept(database)
-    persons = whose(kept, here, ask.names, str(ask.where))
-    wanted = [one for one in kept if ask.study in (None, one.study)]
-    if ask.study is not None and not wanted:
+    persons = whose(kept, here, names, str(where))
+    wanted = [one for one in kept if study in (None, one.study)]
+    if study is not None and not wanted:
         there = ", ".join(sorted({repr(one.study) if one.study else "'' (outside studies)" for one in kept})) or "nothing"
-        raise AnnotationError(f"{ask.where}: has no answer of study {ask.study!r}; in it is {there}")
+        raise AnnotationError(f"{where}: has no answer of study {study!r}; in it is {there}")
     if left := len(kept) - len(wanted):
-        joined.told.append(f"{ask.where}: {left} answers of other studies stay there; without --study they come along")
+        joined.told.append(f"{where}: {left} answers of other studies stay there; without --study they come along")
     for name in dict.fromkeys(one.study for one in wanted if one.study):
-        _take_study(database, theirs, name, ask.where)
-    _take_images(database, theirs, {one.sha256 for one in wanted}, ask.where)
-    _take_answers(database, theirs, (wanted, here), persons, ask.where, joined)
+        _join_study(database, theirs, name, where)
+    _join_images(database, theirs, {one.sha256 for one in wanted}, where)
+    _join_answers(database, theirs, (wanted, here), persons, where, joined)
     looks = "SELECT l.study, l.rater, l.repeat, l.after, i.sha256 FROM looks l JOIN images i ON i.id = l.image_id"
     for name, rater, *look in theirs.execute(looks).fetchall():
-        if ask.study in (None, name):
+        if study in (None, name):
             database.execute(ADD_LOOK, (name, persons.names.get(rater, rater), *look))
-    joined.persons[ask.where] = dict(persons.names)
+    joined.persons[where] = dict(persons.names)
 
 
-def _take_study(database: sqlite3.Connection, theirs: sqlite3.Connection, name: str, where: Path) -> None:
+def _join_study(database: sqlite3.Connection, theirs: sqlite3.Connection, name: str, where: Path) -> None:
     """Its settings; raises AnnotationError when it was begun otherwise: answers to other questions are no repeats."""
     query = "SELECT settings, made_utc FROM studies WHERE name = ?"
     their, own = theirs.execute(query, (name,)).fetchone(), database.execute(query, (name,)).fetchone()
@@ -173,19 +171,17 @@ def _take_study(database: sqlite3.Connection, theirs: sqlite3.Connection, name: 
     if own is None:
         database.execute("INSERT INTO studies (name, settings, made_utc) VALUES (?, ?, ?)", (name, *their))
         return
-    there, here = _settings(their[0], f"{where}: study {name!r}"), _settings(own[0], f"study {name!r}")
+    sides = []
+    for text, which in ((their[0], f"{where}: study {name!r}"), (own[0], f"study {name!r}")):
+        try:
+            sides.append(settings_from(json.loads(str(text)), which))
+        except ValueError:
+            raise AnnotationError(f"{which}: the settings of the study are damaged") from None
+    there, here = sides
     if (there.views, there.order, there.seed) != (here.views, here.order, here.seed):
         raise AnnotationError(f"{where}: study {name!r} was begun otherwise there: {_said(there)}; here: {_said(here)}")
     if others := len(set(there.images) ^ set(here.images)):
         raise AnnotationError(f"{where}: study {name!r} was begun with other pictures there: {others} are in one of the two only")
-
-
-def _settings(text: object, where: str) -> StudySettings:
-    """The settings as the file has them; raises AnnotationError."""
-    try:
-        return settings_from(json.loads(str(text)), where)
-    except ValueError:
-        raise AnnotationError(f"{where}: the settings of the study are damaged") from None
 
 
 def _said(settings: StudySettings) -> str:
@@ -193,14 +189,14 @@ def _said(settings: StudySettings) -> str:
     return f"shown {settings.repeats} times ({shown}), order {settings.order.value}, seed {settings.seed}"
 
 
-def _take_images(database: sqlite3.Connection, theirs: sqlite3.Connection, wanted: set[str], where: Path) -> None:
+def _join_images(database: sqlite3.Connection, theirs: sqlite3.Connection, wanted: set[str], where: Path) -> None:
     sizes = {sha256: (width, height) for sha256, width, height in database.execute("SELECT sha256, width, height FROM images")}
     for sha256, name, width, height in theirs.execute("SELECT sha256, name, width, height FROM images").fetchall():
         if sha256 not in wanted:
             continue
         if sizes.setdefault(sha256, (width, height)) != (width, height):
             raise AnnotationError(f"{where}: {name}: has another size there than here; one of the two files is damaged")
-        # The size of no file: it is looked at anew before it is taken for the file of that name here.
+        # The size of no file: the file of that name here is read again before it counts as this image.
         database.execute(
             "INSERT INTO images (sha256, name, width, height, file_size, modified_ns) VALUES (?, ?, ?, ?, -1, 0)"
             " ON CONFLICT (sha256) DO NOTHING",
@@ -208,7 +204,7 @@ def _take_images(database: sqlite3.Connection, theirs: sqlite3.Connection, wante
         )
 
 
-def _take_answers(
+def _join_answers(
     database: sqlite3.Connection,
     theirs: sqlite3.Connection,
     there_and_here: tuple[Sequence[KeptAnnotation], Sequence[KeptAnnotation]],

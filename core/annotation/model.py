@@ -72,7 +72,7 @@ class Annotation:
 
     @property
     def drawn(self) -> frozenset[MaskTarget]:
-        """Of what there is a mask: a hole alone is none."""
+        """Targets with a mask; a hole alone does not count."""
         return frozenset(mask.target for mask in self.masks if not mask.is_hole)
 
     def to_json(self) -> str:
@@ -389,7 +389,7 @@ class History:
         return self._add("edit", self._now, action, self.current) if self.current != Annotation() else None
 
     def undo(self) -> JournalEntry | None:
-        """Back to before the last edit; None when there is none."""
+        """Back to before the last edit; None without one."""
         return self._add("undo", self._bases[self._now], self._actions[self._now]) if self.can_undo else None
 
     def redo(self) -> JournalEntry | None:

@@ -232,8 +232,8 @@ class AnnotationStore:
 
     Parameters
     ----------
-    path : the file; it is made when there is none.
-    read_only : look only; then there must be one.
+    path : the file; it is made unless it exists.
+    read_only : the file must exist then.
 
     Raises
     ------

@@ -77,7 +77,7 @@ class FigureFormat(StrEnum):
     RATIO = "ratio"
 
     def write(self, value: float | None, *, unit: bool = True) -> str:
-        """The figure as text, an en dash where there is none."""
+        """The figure as text, an en dash for None."""
         if value is None:
             return "–"
         if self is FigureFormat.PERCENT:

@@ -489,24 +489,8 @@ class RecordedRow:
 def row_from_json(data: bytes) -> RecordedRow:
     """A line of ``frames.jsonl`` as values again; raises InvalidRecord, which names the value."""
     row = read_json(_RowLayout, data)
-    return RecordedRow(
-        row=row.row,
-        index=row.index,
-        captured_s=row.captured_s,
-        video=row.video,
-        pts_ms=row.pts_ms,
-        size=row.size,
-        dropped_frames=row.dropped_frames,
-        dropped_rows=row.dropped_rows,
-        frames_per_second=row.fps or 0.0,
-        scene=_scene(row),
-        advice=row.advice,
-        sent=row.sent,
-        status=row.servo,
-        drive=row.drive,
-        bus=row.bus,
-        camera_lost=row.camera_lost,
-    )
+    values = {field.name: getattr(row, field.name) for field in fields(RecordedRow) if field.name in _RowLayout.model_fields}
+    return RecordedRow(**values | {"frames_per_second": row.fps or 0.0, "scene": _scene(row), "status": row.servo})
 
 
 def _scene(row: _RowLayout) -> Scene:

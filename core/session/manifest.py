@@ -1,6 +1,6 @@
-"""``manifest.json``: what a session is. Written when it begins and when it ends, each time atomically, and read with suspicion.
+"""``manifest.json``, which says what a session is, and the events of ``events.jsonl``.
 
-What happened beside the frames: one line each in ``events.jsonl``. What can be seen in two pictures of driving is found here.
+The manifest is written when the session begins and when it ends, each time atomically.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] 
         model["onnx_sha256"], model["onnx_int8_sha256"] = info.onnx_sha256, info.onnx_int8_sha256
         model["second_look_sha256"] = info.second_look_sha256
     if calibration is None:
-        with contextlib.suppress(RigFileError):  # whoever opens the rig is told
+        with contextlib.suppress(RigFileError):  # reported when the rig is opened
             known = calibration_of(config)
             calibration = known.model_dump(mode="json") if known is not None else None
     return About(kind, rig, config.model_dump(mode="json"), model, calibration)
@@ -231,9 +231,9 @@ class Event:
 
 
 def events_between(before: DriveView | None, after: DriveView) -> Iterator[Event]:
-    """What changed from one picture of driving to the next; the first one has no past and tells its mode only.
+    """What changed from one drive view to the next; the first one gives its mode only.
 
-    An override is the operator taking back while the program drives: driving -> armed with the motion that goes out his, or wanted.
+    An override is the operator taking back control while the program drives: driving -> armed, with the operator permitted.
     """
     now_s = after.time_s
     if before is None:
@@ -241,26 +241,20 @@ def events_between(before: DriveView | None, after: DriveView) -> Iterator[Event
         return
     if after.mode is not before.mode:
         yield Event(now_s, EventKind.MODE, after.mode.value, {"from": before.mode.value})
-        yield from _of_modes(before, after)
-    known, active = set(before.active), set(after.active)
+        if after.mode in ARMED_MODES and before.mode not in ARMED_MODES:
+            yield Event(now_s, EventKind.ARM)
+        if before.mode in ARMED_MODES and after.mode not in ARMED_MODES:
+            yield Event(now_s, EventKind.DISARM, str(after.latched.cause) if after.latched else "")
+        if before.mode in DRIVING_MODES and after.mode is Mode.ARMED and after.permitted is Source.OPERATOR:
+            yield Event(now_s, EventKind.OVERRIDE, "the operator took back")
     for fault in after.active:
-        if fault.cause not in {old.cause for old in known}:
+        if fault.cause not in {old.cause for old in before.active}:
             yield Event(now_s, EventKind.FAULT, str(fault.cause), {"detail": fault.detail})
     for fault in before.active:
-        if fault.cause not in {new.cause for new in active}:
+        if fault.cause not in {new.cause for new in after.active}:
             yield Event(now_s, EventKind.CLEARED, str(fault.cause))
     if before.latched is not None and after.latched is None:
         yield Event(now_s, EventKind.ACKNOWLEDGE, str(before.latched.cause))
-
-
-def _of_modes(before: DriveView, after: DriveView) -> Iterator[Event]:
-    if after.mode in ARMED_MODES and before.mode not in ARMED_MODES:
-        yield Event(after.time_s, EventKind.ARM)
-    if before.mode in ARMED_MODES and after.mode not in ARMED_MODES:
-        yield Event(after.time_s, EventKind.DISARM, str(after.latched.cause) if after.latched else "")
-    is_back = before.mode in DRIVING_MODES and after.mode is Mode.ARMED
-    if is_back and after.permitted is Source.OPERATOR:
-        yield Event(after.time_s, EventKind.OVERRIDE, "the operator took back")
 
 
 def event_of_alert(alert: Alert, time_s: float) -> Event:
@@ -277,7 +271,7 @@ def event_of_target(point: Point | None, time_s: float) -> Event:
 
 
 def frames_lost(events: Iterable[Event]) -> int:
-    """How many frames never came from the camera, by what the recorder has told of it."""
+    """How many frames never came from the camera, by the events of the recorder."""
     counts = (event.data.get("count") for event in events if event.kind is EventKind.LOST)
     return sum(count for count in counts if type(count) is int and count > 0)
 

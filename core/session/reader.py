@@ -108,7 +108,7 @@ class _Pictures:
 
     Parameters
     ----------
-    number_of : file and time in it (ms) -> number of the row, None where there is none.
+    number_of : file and time in it (ms) -> number of the row, or None.
     on_problem : is told of each file and each picture that cannot be read, once.
     """
 
@@ -190,8 +190,8 @@ _PUBLISH_EVERY = 500  # rows
 class Timeline:
     """Columns of all rows that have been read so far, each of shape (N,).
 
-    ``time_s`` is the capture time on the recorded clock. ``state`` and ``mode`` are places in ``PoseState`` and ``Mode``, -1 where
-    there is none. ``theta_deg`` is signed, and NaN where there is none (an array for plots has no None).
+    ``time_s`` is the capture time on the recorded clock. ``state`` and ``mode`` are places in ``PoseState`` and ``Mode``, or -1.
+    ``theta_deg`` is signed, NaN without a pose.
     """
 
     row: NDArray[np.int64]

@@ -60,7 +60,7 @@ class Recovery:
 
 
 def find_cut_sessions(folder: Path) -> tuple[CutSession, ...]:
-    """Sessions in `folder` that were cut, that nobody is writing, and that have not been recovered yet; oldest first."""
+    """Sessions in `folder` that were cut, that no process is writing, and that have not been recovered yet; oldest first."""
     found = []
     try:
         candidates = sorted(path for path in folder.iterdir() if path.name.startswith(PREFIX) and path.is_dir())
@@ -122,23 +122,23 @@ class _Salvage:
 
     def read_rows(self, source: Path, target: Path, on_bytes: OnBytes) -> None:
         """Copy the good lines as they are, and name the others."""
-        last = self._copy_lines(source, target, self._take_row, on_bytes)
+        last = self._copy_lines(source, target, self._add_row, on_bytes)
         if last is not None:  # a session that was cut has no count in its manifest
             with contextlib.suppress(InvalidRecord):
                 self.dropped = max(self.dropped, read_json(_Dropped, last).dropped_rows)
 
     def read_events(self, source: Path, target: Path) -> None:
-        self._copy_lines(source, target, self._take_event, lambda _: None)
+        self._copy_lines(source, target, self._add_event, lambda _: None)
 
-    def _copy_lines(self, source: Path, target: Path, take: Callable[[FileLine], None], on_bytes: OnBytes) -> bytes | None:
-        """Returns the last line that was taken. Raises OSError for what may be read another time."""
+    def _copy_lines(self, source: Path, target: Path, add: Callable[[FileLine], None], on_bytes: OnBytes) -> bytes | None:
+        """Returns the last good line. Raises OSError for what may be read another time."""
         last: bytes | None = None
         with target.open("wb") as output:
             try:
                 for line in lines_of(source):
                     on_bytes(len(line.data or b""))
                     try:
-                        take(line)
+                        add(line)
                     except InvalidRecord as error:
                         self.problems.append(f"{source.name}: line {line.number}: {error}; left out")
                     else:
@@ -152,7 +152,7 @@ class _Salvage:
                 self.problems.append(f"{source.name}: cannot be read further ({error.strerror})")
         return last
 
-    def _take_row(self, line: FileLine) -> None:
+    def _add_row(self, line: FileLine) -> None:
         columns = row_columns(line)
         if not is_sealed(line):  # a sealed row is as it was written
             read_line(row_from_json, line)
@@ -162,7 +162,7 @@ class _Salvage:
         self.captured_s.append(columns.captured_s)
         self.expected.setdefault(columns.video, {})[columns.pts_ms] = columns.row
 
-    def _take_event(self, line: FileLine) -> None:
+    def _add_event(self, line: FileLine) -> None:
         event = read_line(event_from_json, line)
         if was_added_later(event):
             return  # kept, but neither counted nor a sign of how long was recorded

@@ -172,7 +172,7 @@ class NoPictures(ValueError):
 
 
 def open_video(path: Path) -> InputContainer:
-    """A container to read from; raises av.error.FFmpegError or OSError for what is none.
+    """A container to read from; raises av.error.FFmpegError, OSError.
 
     Titles and tags are decoded when it is opened; a flipped bit in one of them must not cost the pictures.
     """
@@ -271,7 +271,7 @@ NumberOf = Callable[[int], int | None]
 
 
 def video_number(path: Path) -> int | None:
-    """The number of a session's video file; None when the name is none of ours."""
+    """The number of a session's video file; None for other names."""
     digits = path.stem.rpartition("_")[2]
     return int(digits) if digits.isascii() and digits.isdigit() else None
 

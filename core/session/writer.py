@@ -31,9 +31,15 @@ from core.types import Frame, Tick
 STOPPED = "recording stopped: "
 """Before a problem that has ended a session."""
 _MB = 1e6
+_DISK_CHECK_S = 1.0
+_MAX_EVENTS = 10_000  # waiting, beyond which events are refused
 _RING_EVENTS = 2000
 _EARLY_EVENTS = 1000  # kept between start and the first frame
 _REPORT_EVERY_S = 1.0  # lost and dropped frames are reported at most so often
+
+
+_log = logging.getLogger(__name__)
+_Order = Callable[[], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +83,7 @@ class RecordStatus:
 
 
 def faults_between(before: RecordStatus, now: RecordStatus) -> list[Fault]:
-    """What the pilot must tell the operator of the recorder, from one look to the next."""
+    """Faults of the recorder that the operator must be told, from one status to the next."""
     faults = []
     if now.problem and now.problems != before.problems:
         faults.append(Fault(Cause.DISK_FULL if now.is_disk_full else Cause.RECORDING_STOPPED, now.problem))
@@ -119,7 +125,7 @@ class Disk:
     full: str
 
 
-def look_at_disk(folder: Path, config: RecordConfig) -> Disk | None:
+def disk_space(folder: Path, config: RecordConfig) -> Disk | None:
     """The disk of a folder that need not exist yet; None when it cannot be read."""
     try:
         there = next(parent for parent in (folder, *folder.parents) if parent.exists())
@@ -256,7 +262,7 @@ class RingSaver:
 
     def _check_room(self) -> None:
         """Raises SessionError where the disk is nearly full: its last room is for closing what is open."""
-        disk = look_at_disk(self._parent, self._config)
+        disk = disk_space(self._parent, self._config)
         if disk is not None and disk.full:
             raise SessionError(f"{disk.full}; make room and save them again")
 
@@ -391,30 +397,28 @@ class Recording:
         """At most once a second: a recorder that is behind must not be kept busy with it."""
         total, now_s = picture.dropped - self.dropped_before, picture.tick.frame.captured_s
         if total > self._dropped_reported and now_s - self._dropped_reported_s >= _REPORT_EVERY_S:
-            event = _dropped_event(now_s, total - self._dropped_reported, total)
+            event = _counted(EventKind.DROPPED, now_s, total - self._dropped_reported, total)
             self._dropped_reported, self._dropped_reported_s = total, now_s
             self.write_event(event)
 
     def _report_lost(self, frame: Frame) -> None:
         """Frames that never came from the camera; at most once a second, too. A camera that was opened again counts from 0."""
         known = self._lost
-        if known is None or frame.lost < known.total:
+        is_reopened = known is None or frame.lost < known.total
+        if known is not None and not is_reopened:
+            self._lost = replace(known, total=frame.lost)
+        if known is None or is_reopened or frame.captured_s - known.reported_s >= _REPORT_EVERY_S:
             for event in self._unreported(frame.captured_s):
                 self.write_event(event)
+        if is_reopened:
             self._lost = _Lost(frame.lost, frame.lost, frame.captured_s)
-            return
-        self._lost = replace(known, total=frame.lost)
-        if frame.captured_s - known.reported_s >= _REPORT_EVERY_S:
-            for event in self._unreported(frame.captured_s):
-                self.write_event(event)
 
     def _unreported(self, time_s: float) -> Iterator[Event]:
         """What the camera has lost and was not reported yet; it counts as reported then."""
         known = self._lost
         if known is not None and known.total > known.reported:
-            count = known.total - known.reported
             self._lost = _Lost(known.total, known.total, time_s)
-            yield Event(time_s, EventKind.LOST, f"{count} frames", {"count": count, "total": known.total})
+            yield _counted(EventKind.LOST, time_s, known.total - known.reported, known.total)
 
     def begin(self) -> None:
         """A session begins with the next frame; nothing happens when one is being recorded."""
@@ -429,7 +433,13 @@ class Recording:
         self.dropped_before = self._files.dropped_before = picture.dropped
         self._dropped_reported, self._dropped_reported_s = 0, -math.inf
         self.began_s = self._clock()
-        self._leave_losses_before(picture.tick.frame)
+        # What was lost before the first frame is not the session's: the ring gets it, which reaches further back.
+        if self._ring is None:
+            self._lost = None  # between two sessions lost frames were not counted
+        elif self._lost is not None:
+            self._lost = replace(self._lost, total=max(picture.tick.frame.lost, self._lost.total))
+            for event in self._unreported(first_s):
+                self._ring.add_event(event)
         self._status.update(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
         drive = picture.drive or self._drive
         if drive is not None:
@@ -443,15 +453,6 @@ class Recording:
         early, self._early = self._early, []
         for event in early:
             self._files.write_event(event)
-
-    def _leave_losses_before(self, first: Frame) -> None:
-        """What was lost before the first frame of a session is not the session's: the ring gets it, which reaches further back."""
-        if self._ring is None:
-            self._lost = None  # between two sessions lost frames were not counted
-        elif self._lost is not None:
-            self._lost = replace(self._lost, total=max(first.lost, self._lost.total))
-            for event in self._unreported(first.captured_s):
-                self._ring.add_event(event)
 
     def end(self, ended: str, dropped: int) -> None:
         """End the session if there is one; `dropped` frames were dropped until now, ever."""
@@ -467,7 +468,7 @@ class Recording:
                     self._ring.add_event(event)
                 files.write_event(event)
             if count > self._dropped_reported:
-                files.write_event(_dropped_event(self._last_s, count - self._dropped_reported, count))
+                files.write_event(_counted(EventKind.DROPPED, self._last_s, count - self._dropped_reported, count))
         problem = files.close(ended, count)
         self._status.update(recording=False, elapsed_s=elapsed_s, dropped=count, bytes=files.counts.bytes)
         if problem:
@@ -504,17 +505,9 @@ class Recording:
             encoder.close()
 
 
-def _dropped_event(time_s: float, count: int, total: int) -> Event:
-    """So many more frames were dropped, so many since the session began."""
-    return Event(time_s, EventKind.DROPPED, f"{count} frames", {"count": count, "total": total})
-
-
-_log = logging.getLogger(__name__)
-
-_LOOK_AT_DISK_S = 1.0
-_MAX_EVENTS = 10_000
-
-_Order = Callable[[], None]
+def _counted(kind: EventKind, time_s: float, count: int, total: int) -> Event:
+    """`count` more frames were dropped or lost, `total` until now."""
+    return Event(time_s, kind, f"{count} frames", {"count": count, "total": total})
 
 
 class SessionWriter:
@@ -535,7 +528,7 @@ class SessionWriter:
         self._parent = folder if folder is not None else sessions_folder(config.folder)
         self._clock = clock
         self._changed = threading.Condition()
-        self._waiting: deque[RecordedTick | Event | _Order] = deque()
+        self._waiting: deque[RecordedTick | _Order] = deque()
         self._pictures_waiting = 0
         self._starts_waiting = 0
         self._dropped = 0
@@ -557,23 +550,21 @@ class SessionWriter:
             self._recording.begin()
 
         with self._changed:
-            if not self._is_closing:
+            if self._enqueue(begin):
                 self._wants_pictures = True
                 self._starts_waiting += 1
-                self._waiting.append(begin)
-                self._changed.notify()
 
     def stop(self, ended: str = "stopped") -> None:
         """End the session after what was put before; `ended` goes into the manifest."""
-        self._order_end(lambda dropped: self._recording.end(ended, dropped))
+        self._enqueue_end(lambda dropped: self._recording.end(ended, dropped))
 
     def save_last(self) -> None:
         """Write what the ring holds as a session, in the background; the status tells when it is there."""
-        self._order(self._recording.save_ring)
+        self._enqueue(self._recording.save_ring)
 
     def set_about(self, about: About) -> None:
         """Another rig was opened: the running session ends and the ring is cleared, since a session never mixes two rigs."""
-        self._order_end(lambda dropped: self._recording.change_rig(about, dropped))
+        self._enqueue_end(lambda dropped: self._recording.change_rig(about, dropped))
 
     def put(self, tick: Tick, drive: DriveView | None = None, bus: Any = None) -> bool:
         """Hand a tick over, with who drives and the newest status of the servo bus (a dataclass) where there are such.
@@ -600,7 +591,7 @@ class SessionWriter:
 
         False when the recorder has ended or is hopelessly behind.
         """
-        return self._queue(lambda: self._recording.write_drive(view))
+        return self._enqueue(lambda: self._recording.write_drive(view), most=_MAX_EVENTS)
 
     def event(self, kind: EventKind, text: str = "", data: dict[str, Any] | None = None, time_s: float | None = None) -> bool:
         """Add an event (a note, a destination, an alert); modes, faults and acknowledgements are found in the drive views."""
@@ -608,15 +599,7 @@ class SessionWriter:
 
     def add_event(self, event: Event) -> bool:
         """False when the recorder has ended or is hopelessly behind."""
-        return self._queue(event)
-
-    def _queue(self, item: Event | _Order) -> bool:
-        with self._changed:
-            if self._is_closing or len(self._waiting) >= _MAX_EVENTS:
-                return False
-            self._waiting.append(item)
-            self._changed.notify()
-        return True
+        return self._enqueue(lambda: self._recording.write_event(event), most=_MAX_EVENTS)
 
     @property
     def is_alive(self) -> bool:
@@ -647,13 +630,16 @@ class SessionWriter:
         is_saved = self._recording.saver.finish(max(0.0, until_s - time.monotonic()))
         return is_saved and not self._thread.is_alive()
 
-    def _order(self, order: _Order) -> None:
+    def _enqueue(self, order: _Order, most: int | None = None) -> bool:
+        """Queue what the thread has to do; False when the recorder is closed, or behind by `most` items."""
         with self._changed:
-            if not self._is_closing:
-                self._waiting.append(order)
-                self._changed.notify()
+            if self._is_closing or (most is not None and len(self._waiting) >= most):
+                return False
+            self._waiting.append(order)
+            self._changed.notify()
+            return True
 
-    def _order_end(self, end: Callable[[int], None]) -> None:
+    def _enqueue_end(self, end: Callable[[int], None]) -> None:
         """Queue an order that ends the session; it gets the number of frames dropped until now."""
 
         def order() -> None:
@@ -664,10 +650,8 @@ class SessionWriter:
                     self._ends_waiting.popleft()
 
         with self._changed:
-            if not self._is_closing:
+            if self._enqueue(order):
                 self._ends_waiting.append(self._dropped)
-                self._waiting.append(order)
-                self._changed.notify()
 
     def _dropped_until_end(self) -> int:
         """Frames dropped until now, ever, or until the end of the session that is being written was asked for."""
@@ -678,7 +662,15 @@ class SessionWriter:
         """The thread."""
         try:
             while (item := self._next()) is not None:
-                self._take(item)
+                try:
+                    if isinstance(item, RecordedTick):
+                        self._recording.write_tick(item)
+                    else:
+                        item()
+                except (VideoError, SessionError) as error:
+                    self._fail(str(error), is_disk_full=_is_disk_full(error))
+                except OSError as error:
+                    self._fail(f"{error.filename or self._parent}: {error.strerror or error}", is_disk_full=_is_disk_full(error))
         except Exception as error:  # noqa: BLE001 - the one top of this thread: everything becomes a visible problem
             _log.error("the recorder stopped", exc_info=error)
             self._fail(f"unexpected {type(error).__name__}: {' '.join(str(error).split())}")
@@ -686,14 +678,14 @@ class SessionWriter:
             self._recording.end("closed", self._dropped_until_end())
             self._recording.drop_encoder()
 
-    def _next(self) -> RecordedTick | Event | _Order | None:
-        """What comes next, looking at the disk meanwhile; None when the recorder is closed and all is done."""
+    def _next(self) -> RecordedTick | _Order | None:
+        """What comes next, checking the disk meanwhile; None when the recorder is closed and all is done."""
         while True:
             self._watch_disk()
             with self._changed:
                 self._wants_pictures = self._recording.wants_pictures or self._starts_waiting > 0
                 if not self._waiting and not self._is_closing:
-                    self._changed.wait(_LOOK_AT_DISK_S)
+                    self._changed.wait(_DISK_CHECK_S)
                 if self._waiting:
                     item = self._waiting.popleft()
                     self._pictures_waiting -= isinstance(item, RecordedTick)
@@ -701,29 +693,15 @@ class SessionWriter:
                 if self._is_closing:
                     return None
 
-    def _take(self, item: RecordedTick | Event | _Order) -> None:
-        try:
-            if isinstance(item, RecordedTick):
-                self._recording.write_tick(item)
-            elif isinstance(item, Event):
-                self._recording.write_event(item)
-            else:
-                item()
-        except (VideoError, SessionError) as error:
-            self._fail(str(error), is_disk_full=_is_disk_full(error))
-        except OSError as error:
-            self._fail(f"{error.filename or self._parent}: {error.strerror or error}", is_disk_full=_is_disk_full(error))
-
     def _fail(self, problem: str, *, is_disk_full: bool = False) -> None:
         self._recording.fail(problem, self._dropped_until_end(), is_disk_full=is_disk_full)
 
     def _watch_disk(self) -> None:
         now_s = time.monotonic()
-        if now_s - self._disk_seen_s < _LOOK_AT_DISK_S:
+        if now_s - self._disk_seen_s < _DISK_CHECK_S:
             return
         self._disk_seen_s = now_s
-        disk = look_at_disk(self._parent, self._config)
-        if disk is not None:
+        if (disk := disk_space(self._parent, self._config)) is not None:
             self._status.update(disk_free=disk.free, warning=disk.warning)
             if disk.full and self._recording.is_on:
                 self._fail(f"{disk.full}; make room and record again", is_disk_full=True)

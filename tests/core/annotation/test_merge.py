@@ -234,15 +234,15 @@ def test_a_file_that_is_open_in_a_window_is_named(begin) -> None:
 
 def test_a_killed_join_leaves_the_file_as_it_was(begin, monkeypatch: pytest.MonkeyPatch) -> None:
     here, there, third = begin("a", "anna", 1.0), begin("b", "ben", 2.0), begin("c", "cleo", 3.0)
-    once, whole = dump(here), merge._take
+    once, whole = dump(here), merge._join_file
 
-    def take(*arguments) -> None:
+    def join_file(*arguments) -> None:
         whole(*arguments)
         arguments[0].execute("PRAGMA cache_spill = 1")
-        if arguments[2].where == third:
+        if arguments[2] == third:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    monkeypatch.setattr(merge, "_take", take)
+    monkeypatch.setattr(merge, "_join_file", join_file)
     child = os.fork()
     if child == 0:
         joined(here, there, third)

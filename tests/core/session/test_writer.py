@@ -681,7 +681,7 @@ def test_a_full_disk_stops_the_recording_visibly_and_keeps_what_was_written(
 def test_with_the_disk_nearly_full_it_warns_and_before_it_is_full_it_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     free = [10_000_000_000]
     monkeypatch.setattr(shutil, "disk_usage", lambda _: (100_000_000_000, 0, free[0]))
-    monkeypatch.setattr(session_writer, "_LOOK_AT_DISK_S", 0.0)
+    monkeypatch.setattr(session_writer, "_DISK_CHECK_S", 0.0)
     config = replace_config(warn_free_mb=500.0, warn_free_share=0.07, stop_free_mb=40.0)
     with writer_in(tmp_path, config) as writer:
         writer.start()
