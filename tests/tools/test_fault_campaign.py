@@ -43,7 +43,7 @@ def test_on_a_slow_disk_the_encoder_too_slow_goes_as_listed_too(monkeypatch: pyt
         monkeypatch.setattr(Recording, name, later)
 
     slow("begin", Recording.begin)
-    slow("take_picture", Recording.take_picture)
+    slow("write_tick", Recording.write_tick)
     assert run_case(CASES[38], live=False).seen.problems == ()
 
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from core.control.alerts import ALERTS, AlertKey
 from core.control.drive_view import DriveView
@@ -19,7 +19,9 @@ from core.control.faults import Cause
 from core.control.modes import DRIVING_MODES, Mode
 from core.devices import UserError
 from core.session.manifest import Event, EventKind
-from tools.fault_campaign.bench import FaultBench
+
+if TYPE_CHECKING:
+    from tools.fault_campaign.bench import FaultBench
 
 _log = logging.getLogger(__name__)
 
@@ -103,6 +105,7 @@ def fault(number: int, name: str, *, injected: str, wanted: str, quick: bool = T
 
 def all_cases() -> tuple[FaultCase, ...]:
     """All faults that are registered, by number."""
+    from tools.fault_campaign import cases  # noqa: F401 - they register themselves
 
     return tuple(_register.cases[number] for number in sorted(_register.cases))
 
