@@ -1,7 +1,4 @@
-"""Arc length on polylines: what several stages of the method need. Points are (N, 2), columns x, y, in pixels.
-
-Many polylines handled at once, one after the other in one array: what is done to each of them takes one call.
-"""
+"""Geometry of polylines and maps. Points are (N, 2), columns x, y, in pixels. The arithmetic is in ``core.perception.kernels``."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from core.perception import compiled
 from core.types import Mask, Point, Points
 
 BEND_SHARE = 0.5
-"""So much of a line's bend is continued beyond its end: noise bends too."""
+"""Share of a line's bend that is continued beyond its end: noise bends too."""
 
 
 def arc_length(points: Points) -> NDArray[np.float64]:
@@ -24,7 +21,7 @@ def arc_length(points: Points) -> NDArray[np.float64]:
 
 
 def point_at(points: Points, along: NDArray[np.float64], position: NDArray[np.float64]) -> Points:
-    """Points at arc-length `position` (M,), given the polyline's ``arc_length`` `along`; clamped to its ends. Shape (M, 2)."""
+    """Points (M, 2) at arc-length `position` (M,), given the ``arc_length`` `along`; clamped to the polyline's ends."""
     return compiled.point_at(points, along, position)
 
 
@@ -41,10 +38,10 @@ def cut(points: Points, start_px: float, end_px: float, along: NDArray[np.float6
     return compiled.cut(points, start_px, end_px, compiled.arc_length(points) if along is None else along)
 
 
-def continued(points: Points, length_px: float, over_px: float) -> Points:
-    """How a polyline would go on from its last point, bending as it did before: a point every px, the last point first.
+def extrapolate(points: Points, length_px: float, over_px: float) -> Points:
+    """A polyline's continuation from its last point, bending as it did before: a point every px, the last point first.
 
-    Its direction and its bend are taken over the last `over_px`, or all of a shorter line, and ``BEND_SHARE`` of the bend goes on.
+    Direction and bend are taken over the last `over_px`, or all of a shorter line; ``BEND_SHARE`` of the bend is continued.
     """
     return compiled.extrapolate(points, length_px, over_px, BEND_SHARE)
 
@@ -60,11 +57,11 @@ def nearest(points: Points, point: Point, along: NDArray[np.float64] | None = No
 
 
 def smooth(points: Points, sigma: float, *, keeps_bends: bool = False) -> Points:
-    """Smoothing along a polyline, `sigma` in points; both ends stay where they are.
+    """Smooth a polyline along itself, `sigma` in points; both ends stay where they are.
 
     Gaussian means draw a bend inwards, by sigma^2 / 2R on a circle of radius R. With `keeps_bends` the weights have no second
     moment, so that parabolas stay as they are, for some more noise at the same sigma. Beyond its ends the line is mirrored through
-    them: it goes on straight there, does not shrink, and the ends themselves are kept.
+    them.
     """
     return compiled.smooth(points, np.array((0, len(points))), sigma, keeps_bends)
 
@@ -88,7 +85,7 @@ def normals(points: Points) -> Points:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
-    """``points`` (N, 2) of all lines one after the other; line ``k`` is ``points[starts[k]:starts[k + 1]]``."""
+    """Polylines in one array, so that each operation takes one call: line ``k`` is ``points[starts[k]:starts[k + 1]]``."""
 
     points: Points
     starts: NDArray[np.int64]
@@ -105,17 +102,14 @@ class Bundle:
         marks = self.starts.tolist()
         return [values[first:last] for first, last in zip(marks[:-1], marks[1:], strict=True)]
 
+    def resample(self, step_px: float) -> Bundle:
+        """``resample`` of each line."""
+        return Bundle(*compiled.resample_lines(self.points, self.starts, step_px))
 
-def resample_bundle(bundle: Bundle, step_px: float) -> Bundle:
-    """``polyline.resample`` of each line."""
-    return Bundle(*compiled.resample_lines(bundle.points, bundle.starts, step_px))
+    def smooth(self, sigma: float, *, keeps_bends: bool = False) -> Bundle:
+        """``smooth`` of each line."""
+        return Bundle(compiled.smooth(self.points, self.starts, sigma, keeps_bends), self.starts)
 
-
-def smooth_bundle(bundle: Bundle, sigma: float, *, keeps_bends: bool = False) -> Bundle:
-    """``polyline.smooth`` of each line."""
-    return Bundle(compiled.smooth(bundle.points, bundle.starts, sigma, keeps_bends), bundle.starts)
-
-
-def bundle_normals(bundle: Bundle) -> Points:
-    """``polyline.normals`` of each line, for all points (N, 2); lines of a single point have none that means anything."""
-    return compiled.normals(bundle.points, bundle.starts)
+    def normals(self) -> Points:
+        """``normals`` of each line, for all points (N, 2); meaningless for lines of a single point."""
+        return compiled.normals(self.points, self.starts)

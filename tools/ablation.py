@@ -22,7 +22,7 @@ import csv
 import json
 import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -39,7 +39,7 @@ from core.config.models import PerceptionConfig, TwinConfig, choose_model, load_
 from core.devices import UserError
 from core.evaluation.accuracy import WRONG_DEG, WRONG_PX, FrameScore, TrueMasks, score_frame
 from core.files import name_as_text
-from core.perception.segmentation import Probability, Recognised, Segmenter, recognise
+from core.perception.segmentation import Probability, Segmentation, Segmenter
 from core.types import Frame, Image, Mask, Point, Scene
 
 if TYPE_CHECKING:
@@ -141,12 +141,12 @@ def _switched(ours: PerceptionConfig, paper: PerceptionConfig, settings: Sequenc
     return PerceptionConfig.model_validate(values)
 
 
-class SameMasks:
+class SameMasks(Segmenter):
     """Runs the network once per frame, whoever asks: all variants work on the very same probabilities."""
 
     def __init__(self, network: Segmenter) -> None:
         self._network = network
-        self._kept: Recognised | None = None
+        self._kept: Segmentation | None = None
 
     @property
     def engine(self) -> str:
@@ -159,12 +159,12 @@ class SameMasks:
             self._network.show(vessel, robot)
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        return self.recognise([image])[0][:2]
+        return self.segment_signed([image])[0][:2]
 
-    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
+    def segment_signed(self, images: Sequence[Image]) -> list[Segmentation]:
         """Of the frame's one image."""
         if self._kept is None:
-            (self._kept,) = recognise(self._network, images)
+            (self._kept,) = self._network.segment_signed(images)
         return [self._kept]
 
 
@@ -846,14 +846,14 @@ def _make_folder(out: Path | None) -> None:
 
 def _open_masks(config: PerceptionConfig, true_masks: bool) -> tuple[SameMasks, Callable[[PerceptionConfig], Pipeline]]:
     """Where all variants get their masks from, and how a pipeline on them is made."""
-    from core.perception.pipeline import Pipeline, open_sights
+    from core.perception.pipeline import Pipeline, open_calibrated
 
     if true_masks:
-        masks, calibration, known = SameMasks(TrueMasks()), None, None
-    else:
-        sight = open_sights(config)[0]
-        masks, calibration, known = SameMasks(sight.segment), sight.calibration, sight.familiarity
-    return masks, lambda settings: Pipeline(masks, settings, calibration, familiarity=known)
+        masks = SameMasks(TrueMasks())
+        return masks, lambda settings: Pipeline(masks, settings)
+    network = open_calibrated(config)[0]
+    masks = SameMasks(network.segment)
+    return masks, lambda settings: Pipeline(replace(network, segment=masks), settings)
 
 
 def _measure_set(

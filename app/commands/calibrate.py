@@ -88,7 +88,7 @@ def _calibrated(
     from core.learning.model_writer import write_calibration
     from core.perception.inference import open_segmenter
     from core.perception.model_file import sha256_of
-    from core.perception.pipeline import open_pipeline, open_sights
+    from core.perception.pipeline import open_calibrated, open_pipeline
     from core.perception.tip_refinement import TipRefinement
 
     folder, samples, pictures = frames.folder, frames.samples, frames.pictures
@@ -113,8 +113,8 @@ def _calibrated(
     left_out.tell(len(pictures) - len(left_out) if scores else 0)
     known, signatures = [picture for picture, _ in signed], np.array([signature for _, signature in signed])
     familiarity = fit_out_of_distribution(known, signatures, config.working_size_px, described | {"knows": list(frames.knows)})
-    again = open_sights(config, recalibrating=True)[1].segment
-    looks = again.looks if isinstance(again, TipRefinement) else 1
+    again = open_calibrated(config, recalibrating=True)[1].segment
+    looks = again.passes if isinstance(again, TipRefinement) else 1
     write_calibration(model, *[calibration for _, (calibration, _, _) in tables], second_looks=looks, familiarity=familiarity)
     return tables
 

@@ -26,7 +26,7 @@ from core.learning.training import HeldOutFrame, HeldOutResult, TrainingProgress
 from core.learning.training_plan import TrainingPlan
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import SECOND_LOOK, ModelError, check_model, load_network, model_folder, second_look_of
-from core.perception.segmentation import Turned
+from core.perception.segmentation import OrientationAverage
 from core.perception.tip_refinement import WINDOW_PX, Planes
 from core.perception.unet import DualUNet, UNetShape, with_prior_planes
 from core.types import Image
@@ -133,7 +133,7 @@ class TipTraining:
         plain = open_segmenter(_segmentation(self._init, plan))
         # Streams are segmented once, single pictures in eight orientations: the refinement has to work after both. Two stand for
         # eight here, where thousands of frames are segmented.
-        ways = (plain, Turned(plain, turns=(0,)))
+        ways = (plain, OrientationAverage(plain, turns=(0,)))
         near = open_second_look(_segmentation(self._init, plan)) if self._has_one else None
         views: dict[Path, PriorViews] = {}  # a sample that is shown more often is segmented once
         for index, sample in enumerate(bar.track(self._samples, description="first look")):

@@ -49,7 +49,7 @@ class FrameScore:
     """How far the true pose is from another state (``room_px``); None where the truth has no distances."""
 
 
-class TrueMasks:
+class TrueMasks(Segmenter):
     """A segmenter that gives the true masks of the current frame: what remains is the error of the geometry."""
 
     engine = "true masks"

@@ -20,7 +20,7 @@ from core.learning.dataset import IMAGE_ENDINGS, DatasetError, read_truth
 from core.perception import quality, segmentation
 from core.perception.out_of_distribution import OutOfDistributionReference, Signature, packed
 from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures
-from core.perception.segmentation import Segmenter, recognise, to_working
+from core.perception.segmentation import Segmenter, to_working
 from core.types import Reason
 
 WRONG_THETA_DEG, WRONG_HEAD_PX = 5.0, 15.0  # an answer is wrong when theta or head is off by more, or when there is no robot
@@ -211,7 +211,7 @@ def signatures_in(
         if quality.check_image(image, config.quality) is not None:
             yield None
             continue
-        vessel, robot, signature = recognise(segment, [image])[0]
+        vessel, robot, signature = segment.segment_signed([image])[0]
         if signature is None:
             raise OutOfDistributionError(
                 "the network's deepest level is not to be had: it cannot tell kinds of pictures; train it again"

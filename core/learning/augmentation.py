@@ -17,7 +17,7 @@ from core.learning.training_plan import TrainingPlan
 from core.perception import compiled
 from core.perception.segmentation import Probability, Segmenter, window_around
 from core.perception.skeleton import end_pixels, thin
-from core.perception.tip_refinement import WINDOW_PX, look_again, places_to_look
+from core.perception.tip_refinement import WINDOW_PX, find_tips, refine_tips
 from core.types import Image, Mask, Point
 
 
@@ -250,7 +250,7 @@ class PriorView:
     @classmethod
     def of(cls, vessel: Probability, robot: Probability) -> PriorView:
         packed = [cv2.imencode(".png", np.rint(seen * 255).astype(np.uint8))[1].tobytes() for seen in (vessel, robot)]
-        return cls(packed[0], packed[1], tuple(places_to_look(robot)))
+        return cls(packed[0], packed[1], tuple(find_tips(robot)))
 
     def probabilities(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """Vessel and robot (h, w), 0..255."""
@@ -277,7 +277,7 @@ class PriorViews:
         probabilities = segment(image)
         first = last = PriorView.of(*probabilities)
         if near is not None:
-            probabilities = look_again(image, probabilities, near)
+            probabilities = refine_tips(image, probabilities, near)
             last = PriorView.of(*probabilities)
         found_vessel, found_robot = (probability >= np.float32(0.5) for probability in probabilities)
         shifted = _wrong(found_vessel, vessel, WALL_PX) & (_end_distances(robot) <= WALL_REACH_PX)

@@ -45,7 +45,7 @@ from core.perception.model_file import (
 from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.quality import ConfidenceCalibration
 from core.perception.segmentation import Probability, Segmenter
-from core.perception.tip_refinement import Planes, look_again
+from core.perception.tip_refinement import Planes, refine_tips
 from core.types import Image
 
 if TYPE_CHECKING:
@@ -392,7 +392,7 @@ _MOST_WINDOWS = 160
 """More of them say no more about the second look's ranges."""
 
 
-class _Listening:
+class _Listening(Segmenter):
     """A second look's network that keeps what it was asked about."""
 
     def __init__(self, near: Segmenter) -> None:
@@ -425,7 +425,7 @@ def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable
     if near is not None:
         first, listening = open_segmenter(config), _Listening(near)
         for done, image in enumerate(images):
-            look_again(image, first(image), listening)
+            refine_tips(image, first(image), listening)
             on_progress(0.2 * done / len(images))
         asked = listening.asked[:: max(1, math.ceil(len(listening.asked) / _MOST_WINDOWS))]
     write_eight_bit(folder, images)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import VectorConfig
-from core.perception.vectors import foot, is_walled_off
+from core.perception.vectors import is_walled_off, project
 from core.perception.vessel_graph import build_graph
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
 
@@ -58,7 +58,7 @@ def feet_of(graph: VesselGraph, head: Point, half_length: float, vessel: Mask | 
             continue
         if vessel is None or is_inside or not is_walled_off(head, place, vessel):
             found.append(near)
-        elif (within := foot(graph.edges[near.edge].points, head, vessel)) is not None:
+        elif (within := project(graph.edges[near.edge].points, head, vessel)) is not None:
             edge = graph.edges[near.edge]
             radius = float(np.interp(within[1], geometry.arc_length(edge.points), edge.radius))
             found.append(EdgeProjection(within[0], near.edge, within[1], max(radius, 0.25 * half_length)))
@@ -132,7 +132,7 @@ def _place(graph: VesselGraph, point: Point, vessel: Mask | None) -> tuple[int, 
         return None
     _, position, place, index = min(nearest, key=lambda found: (found[0], found[1]))
     if vessel is not None and is_walled_off(point, place, vessel):
-        feet = [(found[0], found[1], index) for index, points in lines if (found := foot(points, point, vessel)) is not None]
+        feet = [(found[0], found[1], index) for index, points in lines if (found := project(points, point, vessel)) is not None]
         if feet:
             _, position, index = min(feet)
     return index, position
@@ -398,7 +398,7 @@ def _route_ahead(
     """The part of the route that lies ahead of the head, or None where the route does not pass by."""
     if route is None or len(route.points) < 2:
         return None
-    place = foot(route.points, head, vessel)
+    place = project(route.points, head, vessel)
     if place is None:
         return None
     distance, position, _ = place

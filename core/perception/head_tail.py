@@ -15,12 +15,12 @@ from core.types import Mask, Masks, Point, Points, RobotPath, VesselGraph
 END_PART_PX = 20.0
 """How much of each end is compared for thickness."""
 STILL_HEAD_PX = 15.0
-"""An end this near to the last frame's head is that head, also where it has just reached the image border, if it was seen to come
-there from within the picture, or the robot's other end lies at an end of the vessel."""
+"""An end this near to the last frame's head is that head; also at the image border, if it came there from within the picture, or
+the robot's other end lies at an end of the vessel."""
 ALONG_PX, ALONG_STEP_PX, ALONG_SHARE = 30.0, 10.0, 0.5
-"""A robot lies along an earlier path if so much of the shorter of both is no farther from it than a lumen is wide."""
+"""A robot lies along an earlier path if this share of the shorter of both is no farther from it than a lumen is wide."""
 NEAR_PX = 20
-"""Where the robot meets the border is looked for this far around an end beside it."""
+"""Half side of the area around an end in which the robot may meet the border."""
 OUTSIDE_LEAD_PX = 10.0
 """The end that runs this much farther outside the vessel than the other is the tail."""
 NEARER_BY = 0.6
@@ -28,20 +28,27 @@ NEARER_BY = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surroundings:
-    """What tells tail from head, besides the path itself.
+class PreviousPath:
+    """What a stream knows of the robot from the frames before.
 
-    ``earlier`` is the path from before a gap in a stream, or None. ``came_from_within``: the head of ``previous`` or ``earlier``
-    was seen well within the picture before it was where it is.
-    """
+    ``path`` is the last frame's. After a gap it is None, and ``before_gap`` still tells which end is the head.
+    ``came_from_within``: the head of either was seen well within the picture before it was where it is, so at the image border it
+    is no entry."""
+
+    path: RobotPath | None = None
+    before_gap: RobotPath | None = None
+    came_from_within: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """What tells tail from head, besides the path itself; ``port`` is where the robot is inserted, if known."""
 
     masks: Masks
-    previous: RobotPath | None
     vessel: VesselGraph | None
     port: Point | None
     config: PathConfig
-    earlier: RobotPath | None = None
-    came_from_within: bool = False
+    before: PreviousPath = PreviousPath()
 
 
 def is_entry(place: Points, around: Surroundings) -> bool:
@@ -50,16 +57,16 @@ def is_entry(place: Points, around: Surroundings) -> bool:
 
 
 def was_the_head(points: Points, around: Surroundings) -> bool:
-    """Whether what is taken for the tail of an ordered path was the head before a gap, and well within the picture by then.
+    """Whether the tail of an ordered path was the head before a gap, and well within the picture by then.
 
-    The path lies as it lay then: nothing has turned it about, but the other end reached the image border while nobody saw it.
+    The robot has not turned: its other end has reached the image border during the gap.
     """
-    turned = around.came_from_within and _as_earlier(points, around) < -ALONG_STEP_PX
+    turned = around.before.came_from_within and _as_earlier(points, around) < -ALONG_STEP_PX
     return turned and not _at_port(points[0], around)
 
 
 def may_go_on_outside(place: Points, mask: Mask, config: PathConfig) -> bool:
-    """Whether the robot's mask meets the image border at a place (2,), so that nobody can tell whether the robot ends there."""
+    """Whether the robot's mask meets the image border at a place (2,), so that the robot may not end there."""
     return _is_at_border(place, mask, config) and _meets_border(place, mask)
 
 
@@ -77,9 +84,9 @@ def _at_port(place: Points, around: Surroundings) -> bool:
 def tail_first(points: Points, around: Surroundings) -> Points:
     """The path ordered from tail to head.
 
-    Asked in this order, the first clear answer counts: the one end at border or port (unless it is a head that has just arrived
-    there); the last frame's tail and head, or which way the path from before a gap ran here; the end that lies farther outside the
-    vessel; the one end at an end of the vessel; the thicker end; and at last the end nearer to an end of the vessel.
+    The first clear answer counts: the one end at border or port (unless it is a head that has just arrived there); the last frame's
+    tail and head, or the direction of the path before a gap; the end farther outside the vessel; the one end at an end of the
+    vessel; the thicker end; and at last the end nearer to an end of the vessel.
     """
     for looks_like_tail, margin in (
         (_entry, 0.5),
@@ -97,9 +104,9 @@ def tail_first(points: Points, around: Surroundings) -> Points:
 
 
 def _entry(points: Points, around: Surroundings) -> float:
-    before = around.previous or around.earlier
+    before = around.before.path or around.before.before_gap
     arrived = before is not None and float(np.hypot(*(points[0] - before.points[-1]))) <= STILL_HEAD_PX
-    if arrived and (around.came_from_within or is_at_vessel_end(points[-1], around)):
+    if arrived and (around.before.came_from_within or is_at_vessel_end(points[-1], around)):
         return 0.0
     if not is_entry(points[0], around):
         return 0.0
@@ -119,15 +126,15 @@ def _meets_border(place: Points, mask: Mask) -> bool:
 
 
 def _as_before(points: Points, around: Surroundings) -> float:
-    if around.previous is None:
+    if around.before.path is None:
         return 0.0
-    before = around.previous.points
+    before = around.before.path.points
     return -float(np.hypot(*(points[0] - before[0])) + np.hypot(*(points[-1] - before[-1])))
 
 
 def _as_earlier(points: Points, around: Surroundings) -> float:
-    """How far the path goes on along the one of before a gap."""
-    return goes_along_px(points, around.earlier.points) if around.earlier is not None else 0.0
+    earlier = around.before.before_gap
+    return goes_along_px(points, earlier.points) if earlier is not None else 0.0
 
 
 def goes_along_px(points: Points, before: Points) -> float:
@@ -145,7 +152,7 @@ def goes_along_px(points: Points, before: Points) -> float:
 
 
 def _outside_vessel(points: Points, around: Surroundings) -> float:
-    """How far the path runs outside the vessel before it enters it, in px."""
+    """Length of the path before it enters the vessel, in px."""
     places = np.rint(points).astype(int)
     inside = around.masks.vessel[places[:, 1], places[:, 0]]
     return float(geometry.arc_length(points)[np.argmax(inside)]) if inside.any() else 0.0
@@ -171,7 +178,7 @@ def is_at_vessel_end(place: Points, around: Surroundings) -> bool:
 
 
 def _is_near(distance: float, radius: float) -> bool:
-    """Whether something so far from an end of the vessel, of that radius, lies at it."""
+    """Whether a place at this distance from an end of the vessel with this radius lies at it."""
     return distance <= 2.0 * radius + 5.0
 
 

@@ -58,7 +58,7 @@ class ModelInfo(BaseModel):
     calibration: ConfidenceCalibration | None = None
     calibration_mirrored: ConfidenceCalibration | None = None
     familiarity: OutOfDistributionReference | None = None
-    mirrored_second_looks: int = Field(1, ge=1, le=4)  # second_look.MOST_LOOKS, which cannot be imported from here
+    mirrored_second_looks: int = Field(1, ge=1, le=4)  # tip_refinement.MAX_PASSES, which cannot be imported from here
     figures: dict[str, Any] = {}
 
     @property

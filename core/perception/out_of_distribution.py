@@ -1,9 +1,9 @@
-"""Whether a picture is of a kind that the model knows.
+"""Out-of-distribution detection: whether a picture is of a kind that the model knows.
 
-A network also answers about pictures of a kind that it never saw, and its probabilities do not tell. Its deepest level does: of
-rigs, lights and devices like those of training it holds much the same, of others something else. After K. Lee et al., "A simple
-unified framework for detecting out-of-distribution samples and adversarial attacks", NeurIPS 2018; here with the few directions in
-which known pictures differ most, and all others taken together, so that some hundred pictures are enough to learn from.
+A network also answers about pictures of a kind that it never saw, and its probabilities do not show it. Its deepest level does:
+known rigs, lights and devices give similar values there, others do not. After K. Lee et al., "A simple unified framework for
+detecting out-of-distribution samples and adversarial attacks", NeurIPS 2018; here with the few directions in which known pictures
+differ most, and all others taken together, so that some hundred pictures are enough.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Signature = NDArray[np.float32]
-"""Shape (2 C,): what the deepest level's C channels hold of a picture, on average over all of it, and over what is vessel."""
+"""Shape (2 C,): means of the deepest level's C channels over a picture, and over its vessel."""
 
 _FLOOR = 1e-3
-"""Added to the vessel's sum over the deepest level's cells: without a vessel the second half is next to nothing."""
+"""Added to the vessel's sum over the deepest level's cells: without a vessel the second half is nearly 0."""
 
 
 def signature_of(deepest: NDArray[np.float32], vessel: NDArray[np.float32]) -> Signature:
@@ -35,7 +35,7 @@ def signature_of(deepest: NDArray[np.float32], vessel: NDArray[np.float32]) -> S
     height, width = deepest.shape[1:]
     weight = cv2.resize(vessel, (width, height), interpolation=cv2.INTER_AREA)
     weighted = deepest.reshape(len(deepest), -1) @ weight.reshape(-1) / (weight.sum() + _FLOOR)
-    # What a channel holds is skewed: nothing in most pictures, much in some.
+    # Channels are skewed: 0 in most pictures, large in some.
     return np.asarray(np.log1p(np.concatenate([deepest.mean(axis=(1, 2)), weighted])), np.float32)
 
 
@@ -90,7 +90,7 @@ _DAMAGED = "what the model knows of kinds of pictures is damaged; run calibrate 
 
 
 def packed(*parts: NDArray[np.floating[Any]]) -> str:
-    """Numbers as ``Familiarity.packed`` has them."""
+    """Numbers in the format of ``OutOfDistributionReference.packed``."""
     return base64.b64encode(np.concatenate([np.ravel(part) for part in parts]).astype("<f4").tobytes()).decode("ascii")
 
 

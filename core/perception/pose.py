@@ -48,7 +48,7 @@ def classify(
 ) -> PoseState:
     """The one state of a pose.
 
-    The paper's four descriptions overlap and leave holes; asked in the order A, D, B, C every pose has exactly one state.
+    The paper's four descriptions overlap and leave gaps; tested in the order A, D, B, C every pose has exactly one state.
 
     Parameters
     ----------
@@ -74,9 +74,9 @@ def classify(
 
 
 def room_px(c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseConfig, length_px: float) -> float:
-    """How far head and tail may each lie aside, at least, before the pose has another state; 0 at a threshold.
+    """Least displacement of head and tail across the vessel that gives the pose another state; 0 at a threshold.
 
-    Two distances that differ by less than they can be measured to make a state a toss-up, for a person, too.
+    Where it is less than the distances can be measured to, the state is undecided, for a person, too.
 
     Parameters
     ----------
@@ -96,28 +96,27 @@ def room_px(c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseCo
 
 
 class StateFilter:
-    """Steadies the state of a stream: a hysteresis on every threshold and a dwell time, so that the badge does not chatter.
+    """Filters the state of a stream with a hysteresis on every threshold and a dwell time, so that the badge does not flicker.
 
     A state is left once it has been contradicted for ``dwell_s``, to half a frame, by more than two thirds of the frames since, for
-    the one seen most often in them (of equals the latest): neither an odd frame nor frames that waver between two others keep it.
-    Where frames come so seldom that the next one would be too late, one is enough. A frame without a pose forgets everything: the
-    next pose starts anew, and no stale state is ever shown.
+    the one seen most often in them (of equals the latest). Where the next frame would come too late, one is enough. A frame without
+    a pose resets the filter: no stale state is ever shown.
     """
 
     def __init__(self, config: PoseConfig) -> None:
         self._config = config
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """The next pose starts anew."""
+    def reset(self) -> None:
+        """The next pose is the first of a stream."""
         self._current: PoseState | None = None
         self._last_s = math.inf
         self._votes: list[tuple[float, PoseState]] = []
 
     def update(self, pose: Pose | None, captured_s: float) -> Pose | None:
-        """The same pose with the steadied state; None for None. `captured_s` is the frame's."""
+        """The pose with the filtered state; None for None. `captured_s` is the frame's."""
         if pose is None:
-            self.forget()
+            self.reset()
             return None
         shown = classify(pose.c_head_px, pose.c_tail_px, pose.theta_deg, self._config, self._current)
         half_frame_s = 0.5 * max(0.0, captured_s - self._last_s)
@@ -125,17 +124,14 @@ class StateFilter:
         if self._current is None:
             self._current = shown
         elif self._votes or shown is not self._current:
-            self._vote(captured_s, shown)
+            # Kept are the votes since the first contradiction, for twice the dwell time.
+            self._votes.append((captured_s, shown))
+            oldest_s = captured_s - 2.0 * self._config.dwell_s
+            kept = [vote for vote in self._votes if vote[0] >= oldest_s]
+            first = next((place for place, (_, state) in enumerate(kept) if state is not self._current), len(kept))
+            self._votes = kept[first:]
             self._decide(captured_s + half_frame_s)
         return replace(pose, state=self._current)
-
-    def _vote(self, captured_s: float, shown: PoseState) -> None:
-        """Keep what was seen since the first contradiction, for twice the dwell time."""
-        self._votes.append((captured_s, shown))
-        oldest_s = captured_s - 2.0 * self._config.dwell_s
-        kept = [vote for vote in self._votes if vote[0] >= oldest_s]
-        first = next((place for place, (_, state) in enumerate(kept) if state is not self._current), len(kept))
-        self._votes = kept[first:]
 
     def _decide(self, until_s: float) -> None:
         against = [state for _, state in self._votes if state is not self._current]

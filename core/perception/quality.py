@@ -1,19 +1,12 @@
-"""When perception does not answer, and how sure it is when it does.
+"""The quality gate: when perception refuses to answer, and how confident it is when it answers.
 
-Each check gives a ``Refusal`` that names the measured value and its limit in plain words, or None. The limits are settings. A
-model that was calibrated tells a probability (``evidence``); without calibration the confidence is a product of shares, each 1 when
-nothing speaks against the answer.
+Each check gives a ``Refusal`` that names the measured value and its limit, or None. The limits are settings. A calibrated model's
+confidence is a probability: logistic regression (J. Platt, "Probabilistic outputs for support vector machines", 1999) over
+``ConfidenceFeatures``, fitted once per model on labelled frames that it was not trained on and kept in ``model.json``. Without
+calibration the confidence is a product of shares.
 
-What speaks for and against an answer, as numbers, and how sure it is after calibration.
-
-The numbers are collected while perceiving; how they add up to "right with 90 %" is learnt once per model on labelled frames that
-it was not trained on (``calibrate``), by logistic regression (J. Platt, "Probabilistic outputs for support vector machines", 1999),
-and kept in ``model.json``.
-
-How steady an answer is: what becomes of theta and head when the masks are drawn a little wider or narrower.
-
-A mask's edge is where a probability passes one half, and another number would do about as well. An answer that hangs on it is more
-often wrong than one that does not: no sign that can be read off the masks themselves tells as much (docs/method.md).
+Threshold sensitivity is the strongest feature (docs/method.md): how much theta and head change when the masks' edges are drawn at
+another probability than one half.
 """
 
 from __future__ import annotations
@@ -34,16 +27,16 @@ from core.perception.vessel_graph import MAX_CHAINS
 from core.types import Centerline, Image, Mask, Masks, Point, Points, Reason, Refusal, RobotPath, Vector, VesselGraph
 
 _BEYOND_PX = (4.0, 24.0)
-"""Where a robot that goes on beyond the head that was found would be seen."""
+"""Distances beyond the head at which a robot that continues there would be seen."""
 _AROUND_PX = 60
-"""Half side of the window around the head in which the network's doubt is counted."""
+"""Half side of the window around the head in which the network's uncertainty is summed."""
 
 
 @dataclass(frozen=True, slots=True)
 class ConfidenceFeatures:
-    """Signs of one answer; all are shares or ratios without unit, but ``log_length`` (natural logarithm of px) and the swings.
+    """Features of one answer: shares or ratios without unit, but for ``log_length`` (natural logarithm of px) and the swings.
 
-    The swings are None where nobody looked for them: they take several times as long as all the rest (``steadiness``).
+    The swings (``threshold_sensitivity``) are None where they were not computed: they take several times as long as all the rest.
     """
 
     robot_seen: float
@@ -84,16 +77,16 @@ class ConfidenceFeatures:
         return tuple(field.name for field in fields(cls))
 
     def values(self) -> tuple[float, ...]:
-        """The signs that are known, in the order of their ``names``."""
+        """The features that are known, in the order of their ``names``."""
         return tuple(value for value in (getattr(self, name) for name in self.__slots__) if value is not None)
 
 
-SWINGS = ("theta_swing", "head_swing")
-WITHOUT_SWINGS = tuple(name for name in ConfidenceFeatures.names() if name not in SWINGS)
+SENSITIVITY_FEATURES = ("theta_swing", "head_swing")
+BASIC_FEATURES = tuple(name for name in ConfidenceFeatures.names() if name not in SENSITIVITY_FEATURES)
 
 
 class ConfidenceCalibration(BaseModel):
-    """Weights of a logistic regression over ``Evidence``: confidence = 1 / (1 + exp(-(offset + weights . (x - mean) / scale)))."""
+    """Logistic regression over ``ConfidenceFeatures``: confidence = 1 / (1 + exp(-(offset + weights . (x - mean) / scale)))."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -106,28 +99,28 @@ class ConfidenceCalibration(BaseModel):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.features not in (ConfidenceFeatures.names(), WITHOUT_SWINGS):
+        if self.features not in (ConfidenceFeatures.names(), BASIC_FEATURES):
             raise ValueError("the calibration is of another version; run calibrate again")
         if {len(self.mean), len(self.scale), len(self.weights)} != {len(self.features)} or min(self.scale) <= 0.0:
             raise ValueError("the calibration is damaged; run calibrate again")
         return self
 
     @property
-    def needs_swings(self) -> bool:
-        """Whether it was fitted on evidence with swings, and says nothing of any without."""
-        return SWINGS[0] in self.features
+    def needs_sensitivity(self) -> bool:
+        """Whether it was fitted on features with the threshold sensitivity, and needs it."""
+        return SENSITIVITY_FEATURES[0] in self.features
 
-    def confidence(self, evidence: ConfidenceFeatures) -> float:
+    def confidence(self, features: ConfidenceFeatures) -> float:
         """Probability 0..1 that the answer is right."""
-        signs = np.array([getattr(evidence, name) for name in self.features], np.float64)
-        standard = (signs - np.array(self.mean)) / np.array(self.scale)
-        # What lies far beyond anything seen while fitting must not become certainty.
+        values = np.array([getattr(features, name) for name in self.features], np.float64)
+        standard = (values - np.array(self.mean)) / np.array(self.scale)
+        # Values far beyond those of the fit must not give certainty.
         logit = self.offset + float(np.clip(standard, -4.0, 4.0) @ np.array(self.weights))
         return float(1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0))))
 
 
 def collect(path: RobotPath, robot: Vector, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> ConfidenceFeatures:
-    """All signs of an answer; coordinates in working pixels."""
+    """The features of an answer, without the threshold sensitivity; coordinates in working pixels."""
     along = geometry.arc_length(path.points)
     total = float(along[-1])
     tip = geometry.resample(geometry.cut(path.points, total - config.vectors.robot_length_px, total, along), 1.0)
@@ -160,14 +153,14 @@ def collect(path: RobotPath, robot: Vector, centerline: Centerline, masks: Masks
 
 
 def wall_blur_px(masks: Masks, head: Point) -> float:
-    """How wide, on average, the network's doubt at the vessel's walls is beside the head, px: 4 p(1 - p) summed over them.
+    """Mean blur of the vessel's walls beside the head, px: 4 p(1 - p) summed over them.
 
-    For a wall whose probability is a logistic function of the distance that is the width from 0.1 to 0.9. A lumen is clear but for
-    its rim; what is drawn around a robot where there is none is doubt all over.
+    For a wall whose probability is a logistic function of the distance it is the width from 0.1 to 0.9. A lumen is certain but for
+    its rim; a vessel that is wrongly segmented around a robot is uncertain all over.
     """
     near, inside = _around(masks.vessel_probability, head), np.ascontiguousarray(_around(masks.vessel, head)).view(np.uint8)
     rim = cv2.countNonZero(inside) - cv2.countNonZero(cv2.erode(inside, np.ones((3, 3), np.uint8), borderValue=1))
-    # One wall across the window at least: where the lumen fills all of it, there is nothing to divide by.
+    # One wall across the window at least: where the lumen fills all of it, the rim is empty.
     return 4.0 * float((near * (1 - near)).sum()) / max(rim, 2 * _AROUND_PX)
 
 
@@ -190,15 +183,15 @@ def at(values: NDArray[Any], points: Points) -> NDArray[Any]:
 
 SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
-FARTHEST_RADII, FARTHEST_PX = 2.5, 4.0
-"""A head is no farther from the centerline of its own vessel, also in a junction's opening or where it bulges the wall: of 919
-right answers with true masks none was farther than 1.4 radii. Where it is, the vessel that it lies in was not found."""
+MAX_OFF_RADII, MAX_OFF_PX = 2.5, 4.0
+"""Greatest distance of a head from the centerline of its own vessel, also in a junction's opening or where it bulges the wall: in
+919 right answers with true masks the distance was at most 1.4 radii. Farther off, the head lies in a vessel that was not found."""
 _LEAST_CONTRAST = 4.0
 _KNOWN_AGAIN_SHARE = 0.9
-"""Of the limit. The kind belongs to the rig, not to one frame: a rig at the limit must not stop and go with every other one, and is
-known again only where it was seen well below, however long that takes, or where the stream begins anew."""
+"""Of the limit: hysteresis. The kind of pictures belongs to the rig, and a rig at the limit must not stop and go with every
+frame."""
 MAX_ROBOT_SHARE = 0.3
-"""Of the image. A robot of 60 px across all of it is half of that; thinning a larger one takes long, and finds none."""
+"""Of the image. A robot 60 px wide across all of it is half of that; thinning a larger mask takes long, and finds no robot."""
 
 
 def check_image(image: Image, config: QualityConfig) -> Refusal | None:
@@ -231,21 +224,21 @@ def _level(values: NDArray[np.uint8], share: float) -> float:
 def sharpness(image: Image) -> float:
     """Steepest brightness step against the image's whole contrast, per px: some 0.15 for a sharp edge, 1/width for a blurred one.
 
-    It does not depend on exposure, and it is taken at half size, lightly smoothed, so that noise does not pass for sharpness. An
-    image of one colour has no edge to judge by and passes for sharp.
+    It does not depend on exposure, and it is measured at half size, lightly smoothed, so that noise does not count as sharpness. An
+    image of one colour has no edge and counts as sharp.
     """
     half = cv2.resize(image, (max(1, image.shape[1] // 2), max(1, image.shape[0] // 2)), interpolation=cv2.INTER_AREA)
     grey = cv2.GaussianBlur(cv2.cvtColor(half, cv2.COLOR_RGB2GRAY), (3, 3), 0.75)
     across, down = cv2.spatialGradient(grey, ksize=3)
     squares = (np.multiply(across, across, dtype=np.int32) + np.multiply(down, down, dtype=np.int32)).ravel()
-    steepest = math.sqrt(_of_the_largest(squares, len(squares) - int(0.995 * (len(squares) - 1)))) / 16.0
+    steepest = math.sqrt(_nth_largest(squares, len(squares) - int(0.995 * (len(squares) - 1)))) / 16.0
     samples = np.asarray(grey[::2, ::2], np.uint8)
     contrast = _level(samples, 0.99) - _level(samples, 0.01)
     return steepest / contrast if contrast >= _LEAST_CONTRAST else 1.0
 
 
-def _of_the_largest(values: NDArray[np.int32], rank: int) -> float:
-    """The value that `rank` of all values reach. What every 16th one tells leaves a hundredth of them to be sorted."""
+def _nth_largest(values: NDArray[np.int32], rank: int) -> float:
+    """The value that `rank` of all values reach. A sample of every 16th one leaves a hundredth of them to be sorted."""
     sample = values[::16]
     place = max(0, len(sample) - 1 - rank // 8)  # twice as far down as it has to be on average
     likely = values[values >= np.partition(sample, place)[place]]
@@ -255,8 +248,8 @@ def _of_the_largest(values: NDArray[np.int32], rank: int) -> float:
 
 
 def check_finite(*probabilities: NDArray[np.float32]) -> Refusal | None:
-    """LOW_CONFIDENCE, when the network gave what is no number: no geometry can be trusted with it."""
-    # One such value spoils the product with itself, the quickest thing that looks at each.
+    """LOW_CONFIDENCE, when the network's output is not finite."""
+    # The product with itself is the quickest operation that one such value spoils.
     if all(math.isfinite(float(np.vdot(probability, probability))) for probability in probabilities):
         return None
     return Refusal(Reason.LOW_CONFIDENCE, "the network's output is not finite")
@@ -281,9 +274,9 @@ def check_masks(masks: Masks) -> Refusal | None:
 
 
 def check_kind(novelty: float | None, config: QualityConfig, *, refused_before: bool = False) -> Refusal | None:
-    """UNLIKE_TRAINING, where the picture is of a kind that the model does not know; None also where nobody can tell.
+    """UNLIKE_TRAINING, where the picture is of a kind that the model does not know; None also where that is not known.
 
-    `refused_before`: the last picture of a stream was, and what lies about at the limit stays so.
+    `refused_before`: the last full frame of a stream was refused, which lowers the limit.
     """
     limit = config.max_novelty * (_KNOWN_AGAIN_SHARE if refused_before else 1.0)
     if not config.enabled or novelty is None or novelty <= limit:
@@ -292,14 +285,14 @@ def check_kind(novelty: float | None, config: QualityConfig, *, refused_before: 
 
 
 def hinted(refusal: Refusal, unlike: Refusal | None) -> Refusal:
-    """The refusal of a picture of an unknown kind: that there is no robot may come of that, and who sees one has to be told."""
+    """The refusal, with the hint that a robot may not have been found because the picture is of an unknown kind."""
     if unlike is None or refusal.reason is not Reason.NO_ROBOT:
         return refusal
     return replace(refusal, detail=f"{refusal.detail}; it does not know such pictures: {unlike.detail}")
 
 
 def check_graph(graph: VesselGraph, config: VectorConfig) -> Refusal | None:
-    """NO_VESSEL, when the mask gave no graph that the configured rule could look at: it is a dot, or branches all over."""
+    """NO_VESSEL, when the mask gave no graph that the configured rule could use: it is a dot, or branches all over."""
     if graph.edges or config.vessel_rule == "window":
         return None
     return Refusal(Reason.NO_VESSEL, f"its mask has no centerline, or more than {MAX_CHAINS} branches")
@@ -329,7 +322,7 @@ def check_centerline(centerline: Centerline | None, head: Point, config: Quality
     branches fit the head equally well."""
     if centerline is None:
         return Refusal(Reason.NO_VESSEL, "no centerline beside the robot's head")
-    gap_px, limit_px = math.dist(head, centerline.nearest), FARTHEST_RADII * centerline.radius_px + FARTHEST_PX
+    gap_px, limit_px = math.dist(head, centerline.nearest), MAX_OFF_RADII * centerline.radius_px + MAX_OFF_PX
     if config.enabled and gap_px > limit_px:
         detail = f"its head is {gap_px:.0f} px from the nearest centerline (at most {limit_px:.0f} px)"
         return Refusal(Reason.OUTSIDE_VESSEL, detail)
@@ -340,7 +333,7 @@ def check_centerline(centerline: Centerline | None, head: Point, config: Quality
 
 
 def check_walls(masks: Masks, head: Point, config: QualityConfig) -> Refusal | None:
-    """NO_VESSEL, when the model is in doubt about the vessel's walls beside the head: theta and the distances come from them."""
+    """NO_VESSEL, when the vessel's walls beside the head are uncertain: theta and the distances come from them."""
     if not config.enabled:
         return None
     blur_px = wall_blur_px(masks, head)
@@ -352,7 +345,7 @@ def check_walls(masks: Masks, head: Point, config: QualityConfig) -> Refusal | N
 
 def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None:
     """LOW_CONFIDENCE."""
-    if config.enabled and not confidence >= config.min_confidence:  # nor what is no number
+    if config.enabled and not confidence >= config.min_confidence:  # also NaN
         return Refusal(Reason.LOW_CONFIDENCE, f"{100 * confidence:.0f} % (at least {100 * config.min_confidence:.0f} %)")
     return None
 
@@ -364,7 +357,7 @@ def inside_share(path: RobotPath, vessel: Mask, length_px: float) -> float:
 
 
 def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> float:
-    """How far the answer of a model without calibration can be trusted, 0..1: the product of
+    """The confidence of an answer of a model without calibration, 0..1: the product of
 
     - how clearly the network saw the robot's last 40 px, and the vessel beside them,
     - how much of them lies in the vessel,
@@ -374,7 +367,7 @@ def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: Pe
     """
     total = float(geometry.arc_length(path.points)[-1])
     tip = geometry.resample(geometry.cut(path.points, total - config.vectors.robot_length_px, total), 1.0)
-    in_mask = tip[at(masks.robot, tip)]  # what is bridged there is counted below
+    in_mask = tip[at(masks.robot, tip)]  # bridged parts are counted below
     robot_seen = _clearness(float(at(masks.robot_probability, in_mask).mean())) if len(in_mask) else 0.0
     seen = robot_seen * _clearness(float(at(masks.vessel_probability, centerline.piece).mean()))
     inside = min(1.0, inside_share(path, masks.vessel, config.vectors.robot_length_px) / 0.9)
@@ -388,21 +381,21 @@ def _clearness(probability: float) -> float:
     return float(np.clip((probability - 0.5) / 0.4, 0.0, 1.0))
 
 
-_STEP = 0.7
-"""Of the probabilities' logit: as if the edges were drawn at 0.33 or at 0.67."""
-_WAYS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
+_LOGIT_STEP = 0.7
+"""Shift of the probabilities' logit: as if the edges were drawn at 0.33 or at 0.67."""
+_SHIFTS = ((1, 1), (-1, -1), (1, -1), (-1, 1))
 """Vessel and robot wider and narrower, together and against each other."""
-_MOST_DEG, _MOST_PX = 10.0, 20.0
-"""What an answer that is lost counts for; one that is altogether different is no worse."""
+_MAX_DEG, _MAX_PX = 10.0, 20.0
+"""Counted for a lost answer; one that is altogether different counts no more."""
 
 Answer = tuple[Point, float]
 """Head (x, y) in working px and signed theta in degrees."""
 
 
-def neighbours(masks: Masks) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32]]]:
-    """Probabilities (h, w) of vessel and robot whose edges lie a little farther out or in, all four ways."""
-    for vessel, robot in _WAYS:
-        yield _shifted(masks.vessel_probability, vessel * _STEP), _shifted(masks.robot_probability, robot * _STEP)
+def shifted_probabilities(masks: Masks) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32]]]:
+    """Probabilities (h, w) of vessel and robot whose edges lie a little outside or inside, in all four combinations."""
+    for vessel, robot in _SHIFTS:
+        yield _shifted(masks.vessel_probability, vessel * _LOGIT_STEP), _shifted(masks.robot_probability, robot * _LOGIT_STEP)
 
 
 def _shifted(probability: NDArray[np.float32], step: float) -> NDArray[np.float32]:
@@ -411,14 +404,14 @@ def _shifted(probability: NDArray[np.float32], step: float) -> NDArray[np.float3
     return np.asarray(odds * probability / (1 + (odds - 1) * probability), np.float32)
 
 
-def swings(answer: Answer, others: Sequence[Answer | None]) -> tuple[float, float]:
+def threshold_sensitivity(answer: Answer, others: Sequence[Answer | None]) -> tuple[float, float]:
     """Means of log(1 + degrees) and log(1 + px) by which `others` differ from the answer in theta and head; None: no answer."""
-    turns, ways = [], []
+    turns_deg, steps_px = [], []
     for other in others:
         if other is None:
-            turns.append(_MOST_DEG)
-            ways.append(_MOST_PX)
+            turns_deg.append(_MAX_DEG)
+            steps_px.append(_MAX_PX)
             continue
-        turns.append(min(abs((other[1] - answer[1] + 180.0) % 360.0 - 180.0), _MOST_DEG))
-        ways.append(min(math.dist(answer[0], other[0]), _MOST_PX))
-    return float(np.log1p(turns).mean()), float(np.log1p(ways).mean())
+        turns_deg.append(min(abs((other[1] - answer[1] + 180.0) % 360.0 - 180.0), _MAX_DEG))
+        steps_px.append(min(math.dist(answer[0], other[0]), _MAX_PX))
+    return float(np.log1p(turns_deg).mean()), float(np.log1p(steps_px).mean())

@@ -1,10 +1,6 @@
 """The robot's path from tail to head, found on the pixel graph of its skeleton (METHOD section 4).
 
-Candidates for the robot's path: ways through the pixel graph, and how good each is (METHOD section 4).
-
-The separate pieces of the robot's skeleton: one robot, a broken one, or several (METHOD section 4).
-
-The robot's path to sub-pixel precision: centred in its mask, smooth, and as long as the robot is (METHOD sections 2 and 4).
+Connected components of the skeleton -> path candidates through the graph and their scores -> the path to sub-pixel precision.
 """
 
 from __future__ import annotations
@@ -20,7 +16,7 @@ from numpy.typing import NDArray
 from core import geometry
 from core.config.models import PathConfig, PerceptionConfig
 from core.perception import compiled, skeleton
-from core.perception.head_tail import Surroundings, is_at_vessel_end, is_entry, tail_first, was_the_head
+from core.perception.head_tail import PreviousPath, Surroundings, is_at_vessel_end, is_entry, tail_first, was_the_head
 from core.perception.skeleton import PixelChain, PixelGraph, trace
 from core.types import Mask, Masks, Point, Points, Reason, Refusal, RobotPath, Skeletons, VesselGraph
 
@@ -29,11 +25,12 @@ Steps = tuple[tuple[int, bool], ...]
 HEADING_PX = 10.0
 """Directions at a junction are taken over this length of each chain."""
 STEPS_PER_CANDIDATE = 20
+"""All starts of a frame together walk at most this many chains for each of ``max_candidates``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathCandidate:
-    """A way through the graph that uses no chain twice. ``effective_px`` is its length less what its turns at junctions cost."""
+    """A path through the graph that uses no chain twice. ``effective_px``: its length less the cost of its turns at junctions."""
 
     start: int
     end: int
@@ -42,25 +39,23 @@ class PathCandidate:
     effective_px: float
 
 
-def max_steps(config: PathConfig) -> int:
-    """How many chains may be walked in one frame, by all its starts together."""
-    return STEPS_PER_CANDIDATE * config.max_candidates
-
-
 def explore(graph: PixelGraph, start: int, config: PathConfig, budget: int | None = None) -> list[PathCandidate]:
-    """All ways from an end of the skeleton to its other ends, without using a chain twice; longest (effective) first.
+    """All paths from an end of the skeleton to its other ends, without using a chain twice; longest (effective) first.
 
     A node may be passed twice: a robot that crosses itself does. Straight continuations are tried first, so that the limits drop
-    the unlikely ones: ``max_candidates``, and `budget`, the number of chains walked. Where no other end can be reached (the robot's
-    head lies against its own body) the ways that stop at a junction are given instead.
+    the unlikely paths: ``max_candidates``, and `budget`, the number of chains walked. Where no other end can be reached (the
+    robot's head lies against its own body) the paths that stop at a junction are given instead.
     """
-    leaving = _chains_at(graph)
+    leaving: list[list[tuple[int, bool]]] = [[] for _ in range(len(graph.nodes))]
+    for index, chain in enumerate(graph.chains):
+        leaving[chain.start].append((index, True))
+        leaving[chain.end].append((index, False))
     degrees = graph.degrees()
     headings = {(index, start): _heading(chain, start) for index, chain in enumerate(graph.chains) for start in (True, False)}
     finished: list[tuple[Steps, float]] = []
     stopped: list[tuple[Steps, float]] = []
     pending: list[tuple[int, Steps, float]] = [(start, (), 0.0)]
-    left = max_steps(config) if budget is None else budget
+    left = STEPS_PER_CANDIDATE * config.max_candidates if budget is None else budget
     while pending and left > 0 and len(finished) < config.max_candidates:
         left -= 1
         node, steps, turning = pending.pop()
@@ -79,16 +74,8 @@ def explore(graph: PixelGraph, start: int, config: PathConfig, budget: int | Non
         for turn, index, onward in sorted(options, reverse=True):
             chain = graph.chains[index]
             pending.append((chain.end if onward else chain.start, (*steps, (index, onward)), turning + turn))
-    trails = [_trail(graph, steps, turning, config) for steps, turning in finished or stopped]
-    return sorted(trails, key=lambda trail: -trail.effective_px)
-
-
-def _chains_at(graph: PixelGraph) -> list[list[tuple[int, bool]]]:
-    leaving: list[list[tuple[int, bool]]] = [[] for _ in range(len(graph.nodes))]
-    for index, chain in enumerate(graph.chains):
-        leaving[chain.start].append((index, True))
-        leaving[chain.end].append((index, False))
-    return leaving
+    candidates = [_path_candidate(graph, steps, turning, config) for steps, turning in finished or stopped]
+    return sorted(candidates, key=lambda candidate: -candidate.effective_px)
 
 
 def _heading(chain: PixelChain, from_start: bool) -> NDArray[np.float64]:
@@ -98,11 +85,11 @@ def _heading(chain: PixelChain, from_start: bool) -> NDArray[np.float64]:
     return np.asarray(chord / max(float(np.hypot(chord[0], chord[1])), 1e-9))
 
 
-def _trail(graph: PixelGraph, steps: Steps, turning: float, config: PathConfig) -> PathCandidate:
+def _path_candidate(graph: PixelGraph, steps: Steps, turning: float, config: PathConfig) -> PathCandidate:
     chains = [(graph.chains[index], onward) for index, onward in steps]
     lines = [chain.points if onward else chain.points[::-1] for chain, onward in chains]
     points = np.concatenate([lines[0], *(line[1:] for line in lines[1:])])
-    length = float(geometry.arc_length(points)[-1])
+    length = _length(points)
     (first, onward), (last, last_onward) = chains[0], chains[-1]
     return PathCandidate(
         start=first.start if onward else first.end,
@@ -125,33 +112,25 @@ def score(points: Points, length_share: float, config: PathConfig) -> float:
     """
     # Steps of one pixel only know multiples of 45 degrees; the paper's form takes them as they are.
     line = geometry.resample(points, config.step_px) if config.step_px > 1.0 else points
-    steps = _unit_steps(line)
     return (
         config.weight_length * length_share
-        + config.weight_smoothness * _smoothness(steps, config.cosine)
-        + config.weight_consistency * _consistency(line, steps, config.cosine)
+        + config.weight_smoothness * smoothness(line, config.cosine)
+        + config.weight_consistency * consistency(line, config.cosine)
     )
 
 
 def smoothness(line: Points, cosine: Literal["signed", "absolute"]) -> float:
     """Mean cosine of the change of direction at each inner point: 1 for a straight line."""
-    return _smoothness(_unit_steps(line), cosine)
-
-
-def consistency(line: Points, cosine: Literal["signed", "absolute"]) -> float:
-    """Mean cosine between each step and the vector from start to end: 1 for a straight line, 0 for a closed one."""
-    return _consistency(line, _unit_steps(line), cosine)
-
-
-def _smoothness(steps: Points, cosine: Literal["signed", "absolute"]) -> float:
+    steps = _unit_steps(line)
     if len(steps) < 2:
         return 1.0
     before, after = steps[:-1], steps[1:]
     return _mean_cosine(before[:, 0] * after[:, 0] + before[:, 1] * after[:, 1], cosine)
 
 
-def _consistency(line: Points, steps: Points, cosine: Literal["signed", "absolute"]) -> float:
-    chord = line[-1] - line[0]
+def consistency(line: Points, cosine: Literal["signed", "absolute"]) -> float:
+    """Mean cosine between each step and the vector from start to end: 1 for a straight line, 0 for a closed one."""
+    steps, chord = _unit_steps(line), line[-1] - line[0]
     length = float(np.hypot(chord[0], chord[1]))
     if length == 0.0 or len(steps) == 0:
         return 0.0
@@ -169,110 +148,105 @@ def _mean_cosine(cosines: NDArray[np.float64], cosine: Literal["signed", "absolu
     return float((np.abs(cosines) if cosine == "absolute" else cosines).sum()) / len(cosines)
 
 
-PIECES_HEADING_PX = 12
+END_PIXELS = 12
 """Pixels behind an end that give its direction."""
 FAR_GAP_FACTOR = 3.0
 FAR_TURN_SHARE = 0.6
-"""Pieces that look straight at each other (a turn of this share of the allowed one) belong together across this many thresholds."""
+"""Components that face each other (a turn of this share of the allowed one) belong together across this many gap thresholds."""
 NEAR_TURN_FACTOR = 1.5
-"""Pieces nearer than the gap threshold belong together even if they turn by this much more than was repaired."""
-COMES_IN_PX = 10
-"""A piece of which more lies outside the vessel comes in from there."""
+"""Components nearer than the gap threshold belong together even if they turn by this much more than was repaired."""
+ENTERING_PX = 10
+"""A component of which more lies outside the vessel enters it from there."""
 SURER_BY = 0.05
-"""A line that comes in from nowhere is none of the robot if the robot's mean probability within the vessel exceeds its by this."""
+"""A component that enters from nowhere is no robot if the robot's mean probability within the vessel exceeds its by this."""
 PREVIOUS_PX = 5
-"""A piece this near to the last frame's path lies on it."""
+"""A component this near to the last frame's path lies on it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """A connected piece: its nodes in the pixel graph, and its length within the vessel (or its length, if no piece is within)."""
+    """A connected component: its nodes in the pixel graph, and its length within the vessel (or its length, if none is within)."""
 
     nodes: tuple[int, ...]
     size_px: float
 
 
-def find_pieces(graph: PixelGraph, vessel: Mask) -> list[Component]:
-    """The connected pieces, largest first. A cable that lies outside the vessel is small, however long it is."""
+def find_components(graph: PixelGraph, vessel: Mask) -> list[Component]:
+    """The connected components, largest first. A cable that lies outside the vessel is small, however long it is."""
     group = np.arange(len(graph.nodes))
     for chain in graph.chains:
         group[group == group[chain.end]] = group[chain.start]
     length, inside = np.zeros(len(group)), np.zeros(len(group))
     for chain in graph.chains:
-        chain_px = float(geometry.arc_length(chain.points)[-1])
+        chain_px = _length(chain.points)
         length[group[chain.start]] += chain_px
         inside[group[chain.start]] += chain_px * float(_at(vessel, chain.points).mean())
     size = inside if inside.any() else length
     names = {int(group[chain.start]) for chain in graph.chains}
-    pieces = [Component(tuple(np.flatnonzero(group == name).tolist()), float(size[name])) for name in names]
-    return sorted(pieces, key=lambda piece: -piece.size_px)
+    components = [Component(tuple(np.flatnonzero(group == name).tolist()), float(size[name])) for name in names]
+    return sorted(components, key=lambda component: -component.size_px)
 
 
 def without_reflections(
-    graph: PixelGraph, pieces: list[Component], around: Surroundings, config: PerceptionConfig
+    graph: PixelGraph, components: list[Component], around: Surroundings, config: PerceptionConfig
 ) -> list[Component]:
-    """The pieces (largest first) without long lines that no robot can be: they come in from nowhere, while another piece does.
+    """The components (largest first) without long lines that cannot be robot: they enter from nowhere, while another one enters.
 
-    A robot comes in at the image border, at the port or from outside the vessel; one whose entry is covered begins at an end of the
-    vessel. What lies elsewhere is a part of it beyond something that hides it, or a reflection, a scratch, the board's grain: of
-    these the network is less sure. One that an end of the robot looks at is kept, for ``check_pieces`` to judge, and so are those
-    beside which what comes in is but a bit, and what was the robot in the last frame.
+    A robot enters at the image border, at the port or from outside the vessel; one whose entry is covered begins at an end of the
+    vessel. Other components are parts of it beyond something that hides it, or a reflection, a scratch, the board's grain, of which
+    the network is less sure. One that an end of the robot faces is kept, for ``check_components`` to judge, and so are those beside
+    which the entering one is much smaller, and what was the robot in the last frame.
     """
-    large = [piece for piece in pieces if piece.size_px >= config.path.min_length_px]
+    large = [component for component in components if component.size_px >= config.path.min_length_px]
     if len(large) < 2 or not config.quality.enabled:
-        return pieces
-    coming = [piece for piece in large if _comes_in(graph, piece, around)]
-    robot = next((piece for piece in large if piece in coming or _begins_at_vessel_end(graph, piece, around)), None)
+        return components
+    entering = [component for component in large if _is_entering(graph, component, around)]
+    robot = next((one for one in large if one in entering or any(is_at_vessel_end(e, around) for e in _ends(graph, one))), None)
     if robot is None:
-        return pieces
+        return components
     headings, least = _headings(graph), _sureness(graph, robot, around) - SURER_BY
-    none = [
-        piece
-        for piece in large
-        if piece is not robot
-        and piece not in coming
-        and robot.size_px >= config.path.outlier_share * piece.size_px
-        and not _is_previous(graph, piece, around)
-        and _sureness(graph, piece, around) < least
-        and _facing_gap(graph, headings, robot, piece, config) is None
+    reflections = [
+        component
+        for component in large
+        if component is not robot
+        and component not in entering
+        and robot.size_px >= config.path.outlier_share * component.size_px
+        and not _is_previous(graph, component, around)
+        and _sureness(graph, component, around) < least
+        and _facing_gap(graph, headings, robot, component, config) is None
     ]
-    return [piece for piece in pieces if piece not in none]
+    return [component for component in components if component not in reflections]
 
 
-def _comes_in(graph: PixelGraph, piece: Component, around: Surroundings) -> bool:
-    outside_px = int(np.count_nonzero(~_at(around.masks.vessel, _places(graph, piece))))
-    return outside_px > COMES_IN_PX or any(is_entry(end, around) for end in _ends(graph, piece))
+def _is_entering(graph: PixelGraph, component: Component, around: Surroundings) -> bool:
+    outside_px = int(np.count_nonzero(~_at(around.masks.vessel, _places(graph, component))))
+    return outside_px > ENTERING_PX or any(is_entry(end, around) for end in _ends(graph, component))
 
 
-def _begins_at_vessel_end(graph: PixelGraph, piece: Component, around: Surroundings) -> bool:
-    return any(is_at_vessel_end(end, around) for end in _ends(graph, piece))
-
-
-def _is_previous(graph: PixelGraph, piece: Component, around: Surroundings) -> bool:
-    """Whether most of a piece lies where the robot of the last frame lay."""
-    if around.previous is None:
+def _is_previous(graph: PixelGraph, component: Component, around: Surroundings) -> bool:
+    """Whether most of a component lies where the robot of the last frame lay."""
+    if around.before.path is None:
         return False
     before = np.zeros(around.masks.robot.shape, np.uint8)
-    line = np.rint(around.previous.points).astype(np.int32).reshape(-1, 1, 2)
+    line = np.rint(around.before.path.points).astype(np.int32).reshape(-1, 1, 2)
     cv2.polylines(before, [line], False, 1, 2 * PREVIOUS_PX + 1)
-    return bool(_at(before, _places(graph, piece)).mean() > 0.5)
+    return bool(_at(before, _places(graph, component)).mean() > 0.5)
 
 
-def _sureness(graph: PixelGraph, piece: Component, around: Surroundings) -> float:
-    """The mean probability of robot along a piece, within the vessel if it is there at all: outside, a robot is seen better."""
-    places = _places(graph, piece)
+def _sureness(graph: PixelGraph, component: Component, around: Surroundings) -> float:
+    """Mean robot probability along a component, within the vessel if it is there at all: outside, a robot is seen better."""
+    places = _places(graph, component)
     inside = places[_at(around.masks.vessel, places)]
     return float(_at(around.masks.robot_probability, inside if len(inside) else places).mean())
 
 
-def _ends(graph: PixelGraph, piece: Component) -> list[Points]:
+def _ends(graph: PixelGraph, component: Component) -> list[Points]:
     degrees = graph.degrees()
-    return [graph.nodes[node] for node in piece.nodes if degrees[node] == 1]
+    return [graph.nodes[node] for node in component.nodes if degrees[node] == 1]
 
 
-def _places(graph: PixelGraph, piece: Component) -> Points:
-    """The points (N, 2) of a piece, columns x, y."""
-    return np.vstack([chain.points for chain in graph.chains if chain.start in piece.nodes])
+def _places(graph: PixelGraph, component: Component) -> Points:
+    return np.vstack([chain.points for chain in graph.chains if chain.start in component.nodes])
 
 
 def _at(values: NDArray[Any], places: Points) -> NDArray[Any]:
@@ -281,14 +255,14 @@ def _at(values: NDArray[Any], places: Points) -> NDArray[Any]:
     return np.asarray(values[rows, columns])
 
 
-def check_pieces(graph: PixelGraph, pieces: list[Component], config: PerceptionConfig) -> Refusal | None:
-    """GAP_TOO_LONG when the robot goes on beyond a gap, SEVERAL_ROBOTS when the rest is too large to be outliers.
+def check_components(graph: PixelGraph, components: list[Component], config: PerceptionConfig) -> Refusal | None:
+    """GAP_TOO_LONG when the robot continues beyond a gap, SEVERAL_ROBOTS when the rest is too large to be outliers.
 
-    Either way the largest piece's end would be taken for the head, wrongly. ``several_robots_share = 1`` turns the check off, and
-    so does a disabled quality gate.
+    Either way the end of the largest component would wrongly be taken for the head. ``several_robots_share = 1`` turns the check
+    off, and so does a disabled quality gate.
     """
-    share, first = config.quality.several_robots_share, pieces[0]
-    others = [piece for piece in pieces[1:] if piece.size_px >= config.path.min_length_px]
+    share, first = config.quality.several_robots_share, components[0]
+    others = [component for component in components[1:] if component.size_px >= config.path.min_length_px]
     if share >= 1.0 or not config.quality.enabled or not others:
         return None
     headings = _headings(graph)
@@ -310,7 +284,7 @@ def _headings(graph: PixelGraph) -> dict[int, NDArray[np.float64]]:
     for chain in graph.chains:
         for node, outward in ((chain.start, chain.points[::-1]), (chain.end, chain.points)):
             if degrees[node] == 1:
-                chord = outward[-1] - outward[max(len(outward) - PIECES_HEADING_PX, 0)]
+                chord = outward[-1] - outward[max(len(outward) - END_PIXELS, 0)]
                 headings[node] = chord / max(float(np.hypot(chord[0], chord[1])), 1e-9)
     return headings
 
@@ -318,7 +292,7 @@ def _headings(graph: PixelGraph) -> dict[int, NDArray[np.float64]]:
 def _facing_gap(
     graph: PixelGraph, headings: dict[int, NDArray[np.float64]], first: Component, second: Component, config: PerceptionConfig
 ) -> float | None:
-    """The gap between two pieces if an end of one looks at an end of the other, else None."""
+    """The gap between two components if an end of one faces an end of the other, else None."""
     threshold_px, max_turn_deg = config.gaps.gap_threshold_px, config.gaps.max_turn_deg
     found = []
     for a in first.nodes:
@@ -335,6 +309,7 @@ def _facing_gap(
 
 
 STEP_PX = 2.0
+"""Distance of the refined path's points."""
 TRIM_RADII = 1.2
 """Thinning bends the skeleton's last radius towards a corner of a blunt end."""
 END_HEADING_PX = 16.0
@@ -348,7 +323,7 @@ def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, 
     ----------
     points : pixel path (N, 2), tail -> head.
     masks : the robot's clean mask and probability.
-    radius_px : rough radius of the robot, which limits how far to the sides is looked.
+    radius_px : rough radius of the robot, which limits the search to the sides.
     smoothing_px : standard deviation of the smoothing along the path; 0 leaves the pixels as they are.
     extend : whether both ends are continued along their tangent to the mask's edge.
     """
@@ -356,7 +331,14 @@ def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, 
         return points, radius_px
     step = min(STEP_PX, smoothing_px)
     line = geometry.smooth(geometry.resample(points, step), smoothing_px / step)
-    line, radius_px = _centred(line, masks.robot_probability, radius_px)
+    if len(line) >= 3:
+        # Each point moves across the path to the middle of the robot's probability there.
+        across = geometry.normals(line)
+        reach = int(np.ceil(1.5 * radius_px + 2.0))
+        shift, total = compiled.probability_centres(masks.robot_probability, line, across, reach, radius_px)
+        seen = total[total > 1.0]
+        thickness = geometry.median(seen) if len(seen) else 2.0 * radius_px
+        line, radius_px = line + shift[:, None] * across, 0.5 * thickness
     line = geometry.smooth(line, smoothing_px / step)
     if extend and len(line) > 3:
         line = _to_edge(line, masks, radius_px)
@@ -364,23 +346,12 @@ def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, 
     return line, radius_px
 
 
-def _centred(line: Points, probability: NDArray[np.float32], radius_px: float) -> tuple[Points, float]:
-    """Each point moved across the path to the middle of the robot's probability there, and the median of the half widths."""
-    if len(line) < 3:
-        return line, radius_px
-    across = geometry.normals(line)
-    shift, total = compiled.probability_centres(probability, line, across, int(np.ceil(1.5 * radius_px + 2.0)), radius_px)
-    seen = total[total > 1.0]
-    thickness = geometry.median(seen) if len(seen) else 2.0 * radius_px
-    return line + shift[:, None] * across, 0.5 * thickness
-
-
 def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
-    """The last point replaced by where the path's own direction leaves the mask."""
+    """The line with its last point where its own direction leaves the mask."""
     along = geometry.arc_length(line)
     total = float(along[-1])
     trimmed = geometry.cut(line, 0.0, total - min(TRIM_RADII * radius_px, 0.3 * total), along)
-    onward = geometry.continued(trimmed, 6.0 * radius_px + 10.0, END_HEADING_PX)
+    onward = geometry.extrapolate(trimmed, 6.0 * radius_px + 10.0, END_HEADING_PX)
     reach = edge_distance(onward, masks.robot, masks.robot_probability)
     if reach <= 0.0:
         return line
@@ -388,7 +359,7 @@ def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
 
 
 def edge_distance(places: Points, mask: Mask, probability: NDArray[np.float32]) -> float:
-    """How far a line of points, 1 px apart, runs in a mask: to a fraction of a pixel, where the probability falls through 0.5."""
+    """Length of a line of points, 1 px apart, within a mask: to a fraction of a pixel, where the probability falls through 0.5."""
     height, width = mask.shape
     inside = 0
     for x, y in places.tolist():
@@ -407,9 +378,9 @@ def edge_distance(places: Points, mask: Mask, probability: NDArray[np.float32]) 
 
 
 MAX_CHAINS = 80
-"""A robot with all its false branches has some ten; a graph of more is a mesh, and any way through it is as good as another."""
+"""A robot with all its false branches has some ten; a graph of more is a mesh, and any path through it is as good as another."""
 MAX_ALL_CHAINS = 150
-"""The same for all pieces together, of which a broken robot and some specks have some tens: more are not even looked at."""
+"""The same for all components together, of which a broken robot and some specks have some tens."""
 SAME_END_PX = 10.0
 """Paths whose heads are this near to each other are the same answer."""
 RIVAL_SHARE = 0.8
@@ -420,8 +391,8 @@ CONTINUITY_PX = 30.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Candidate:
-    trail: PathCandidate
+class _Scored:
+    path: PathCandidate
     score: float
     continuity: float
 
@@ -430,17 +401,15 @@ def find(
     skeletons: Skeletons,
     masks: Masks,
     config: PerceptionConfig,
-    previous: RobotPath | None = None,
+    *,
     vessel: VesselGraph | None = None,
     port: Point | None = None,
-    earlier: RobotPath | None = None,
-    *,
-    came_from_within: bool = False,
+    before: PreviousPath = PreviousPath(),  # noqa: B008 (it is frozen)
 ) -> RobotPath | Refusal:
     """The robot's path, tail -> head, or why there is none.
 
     Starts are the ends at the image border or at the insertion port; a robot that enters inside the image starts at any end. From
-    each start the longest branch is kept (shortened by what its turns at junctions cost), and the best scored of these is the
+    each start the longest branch is kept (shortened by the cost of its turns at junctions), and the best scored of these is the
     robot.
 
     Parameters
@@ -448,11 +417,9 @@ def find(
     skeletons : with the robot's gaps repaired.
     masks : the robot's mask and probability give radius, middle and ends; the vessel's mask tells robot from foreign cables.
     config : all of perception's settings.
-    previous : the path of the last frame, which decides between nearly equal candidates.
     vessel : the vessel graph; its ends tell tail from head where the image border does not.
     port : where the robot is inserted, if known.
-    earlier : in a stream, the path from before a gap; it says nothing but which end is the head.
-    came_from_within : the head of one of these was seen well within the picture: at the image border it is no entry.
+    before : of a stream; the last frame's path decides between nearly equal candidates.
 
     Returns
     -------
@@ -466,28 +433,32 @@ def find(
     total_px = sum(_length(chain.points) for chain in traced.chains)
     radius_px = float(np.clip(0.5 * cv2.countNonZero(masks.robot.view(np.uint8)) / max(total_px, 1.0), 0.5, 30.0))
     graph = _without_short_links(traced, 3.0 * radius_px)
-    pieces = find_pieces(graph, masks.vessel)
-    if not pieces:
+    components = find_components(graph, masks.vessel)
+    if not components:
         return Refusal(Reason.TOO_SHORT, f"{total_px:.0f} px long (at least {config.path.min_length_px:.0f} px)")
-    around = Surroundings(masks, previous, vessel, port, config.path, earlier, came_from_within)
-    pieces = without_reflections(graph, pieces, around, config)
-    refusal = check_pieces(graph, pieces, config)
+    around = Surroundings(masks, vessel, port, config.path, before)
+    components = without_reflections(graph, components, around, config)
+    refusal = check_components(graph, components, config)
     if refusal is not None:
         return refusal
-    chosen = [node for piece in pieces if piece.size_px >= config.path.outlier_share * pieces[0].size_px for node in piece.nodes]
+    least_px = config.path.outlier_share * components[0].size_px
+    chosen = [node for component in components if component.size_px >= least_px for node in component.nodes]
     taken = set(chosen)
     chains = sum(chain.start in taken for chain in graph.chains)
     if chains > MAX_CHAINS:
         return Refusal(Reason.AMBIGUOUS_PATH, f"it is a mesh of {chains} branches (at most {MAX_CHAINS})")
-    candidates, rivals = _candidates(graph, chosen, around, previous, config.path)
+    candidates, rivals = _candidates(graph, chosen, around, config.path)
     if not candidates:
-        return _why_no_candidate(graph, config.path)
-    eligible = candidates if previous is None else [*candidates, *rivals]
+        longest = max(_length(chain.points) for chain in graph.chains)
+        if longest < config.path.min_length_px:
+            return Refusal(Reason.TOO_SHORT, f"{longest:.0f} px long (at least {config.path.min_length_px:.0f} px)")
+        return Refusal(Reason.AMBIGUOUS_PATH, "the robot's outline is closed: it shows no end")
+    eligible = candidates if before.path is None else [*candidates, *rivals]
     best = max(eligible, key=lambda candidate: candidate.score + candidate.continuity)
-    must_show_head = config.quality.enabled and previous is None  # in a stream it may have just arrived there: ``check_in_view``
-    if must_show_head and all(is_entry(place, around) for place in best.trail.points[[0, -1]]):
+    must_show_head = config.quality.enabled and before.path is None  # in a stream it may have just arrived: ``check_in_view``
+    if must_show_head and all(is_entry(place, around) for place in best.path.points[[0, -1]]):
         return Refusal(Reason.AMBIGUOUS_PATH, "both of its ends lie at the image border, so its head may be out of view")
-    points = tail_first(best.trail.points, around)
+    points = tail_first(best.path.points, around)
     if config.quality.enabled and was_the_head(points, around):
         return Refusal(Reason.AMBIGUOUS_PATH, "it reaches the image border at its head, which may be out of view")
     line, radius_px = refine(points, masks, radius_px, config.path.smoothing_px, config.cleaning.extend_ends)
@@ -506,7 +477,7 @@ def _length(points: Points) -> float:
 
 
 def _without_short_links(graph: PixelGraph, limit_px: float) -> PixelGraph:
-    """Junctions that are nearer than `limit_px` along a chain made one.
+    """The graph with junctions nearer than `limit_px` along a chain merged.
 
     A robot that crosses itself is thinned to two junctions with a short link, which both strands pass; as one node of four chains
     it lets both strands through.
@@ -531,49 +502,49 @@ def _without_short_links(graph: PixelGraph, limit_px: float) -> PixelGraph:
 
 
 def _candidates(
-    graph: PixelGraph, nodes: list[int], around: Surroundings, previous: RobotPath | None, config: PathConfig
-) -> tuple[list[_Candidate], list[_Candidate]]:
+    graph: PixelGraph, nodes: list[int], around: Surroundings, config: PathConfig
+) -> tuple[list[_Scored], list[_Scored]]:
     """The best branch of each start, scored, and those other branches of the same starts that are nearly as long."""
-    degrees = graph.degrees()
+    degrees, previous = graph.degrees(), around.before.path
     ends = [node for node in nodes if degrees[node] == 1]
     entries = [node for node in ends if is_entry(graph.nodes[node], around)]
     winners, others = [], []
     starts = entries or ends
-    share = max_steps(config) // max(len(starts), 1)
+    budget = STEPS_PER_CANDIDATE * config.max_candidates // max(len(starts), 1)
     for start in starts:
-        valid = [trail for trail in explore(graph, start, config, share) if trail.length_px >= config.min_length_px]
+        valid = [path for path in explore(graph, start, config, budget) if path.length_px >= config.min_length_px]
         if not valid:
             continue
-        worth = [trail.effective_px - config.outside_cost * _outside_end(trail.points, around.masks) for trail in valid]
+        worth = [path.effective_px - config.outside_cost * _outside_end(path.points, around.masks) for path in valid]
         best = int(np.argmax(worth))
         winners.append((worth[best], valid[best]))
-        others += [(w, trail) for w, trail in zip(worth, valid, strict=True) if trail is not valid[best]]
+        others += [(w, path) for w, path in zip(worth, valid, strict=True) if path is not valid[best]]
     most = max((worth for worth, _ in winners), default=0.0)
-    rivals = [trail for worth, trail in others if worth >= RIVAL_SHARE * most]
-    # Where no end is known to be the entry, the tips of side branches are starts too: only the longest ways are the robot.
-    chosen = [trail for worth, trail in winners if entries or worth >= RIVAL_SHARE * most]
-    longest = max((trail.length_px for trail in chosen), default=1.0)
+    rivals = [path for worth, path in others if worth >= RIVAL_SHARE * most]
+    # Where no end is known to be the entry, the tips of side branches are starts too: only the longest paths are the robot.
+    chosen = [path for worth, path in winners if entries or worth >= RIVAL_SHARE * most]
+    longest = max((path.length_px for path in chosen), default=1.0)
 
-    def scored(trail: PathCandidate) -> _Candidate:
-        gap = 0.0 if previous is None else float(np.hypot(*(trail.points[-1] - previous.points[-1])))
+    def scored(path: PathCandidate) -> _Scored:
+        gap = 0.0 if previous is None else float(np.hypot(*(path.points[-1] - previous.points[-1])))
         continuity = 0.0 if previous is None else CONTINUITY_WEIGHT * float(np.exp(-gap / CONTINUITY_PX))
-        return _Candidate(trail, score(trail.points, trail.length_px / longest, config), continuity)
+        return _Scored(path, score(path.points, path.length_px / longest, config), continuity)
 
-    return [scored(trail) for trail in chosen], [scored(trail) for trail in rivals]
+    return [scored(path) for path in chosen], [scored(path) for path in rivals]
 
 
 def _outside_end(points: Points, masks: Masks) -> float:
-    """How long the path's last part outside the vessel is; 0 where all of it is outside."""
-    inside = masks.vessel[np.rint(points[:, 1]).astype(int), np.rint(points[:, 0]).astype(int)]
+    """Length of the path's last part outside the vessel; 0 where all of it is outside."""
+    inside = _at(masks.vessel, points)
     return float(np.argmax(inside[::-1])) if inside.any() else 0.0
 
 
-def _runner_up(best: _Candidate, all_candidates: list[_Candidate]) -> float | None:
+def _runner_up(best: _Scored, all_candidates: list[_Scored]) -> float | None:
     """Score of the best candidate with another pair of ends."""
-    ends = best.trail.points[[0, -1]]
+    ends = best.path.points[[0, -1]]
     different = []
     for other in all_candidates:
-        theirs = other.trail.points[[0, -1]]
+        theirs = other.path.points[[0, -1]]
         same = min(np.abs(ends - theirs).max(), np.abs(ends - theirs[::-1]).max()) <= SAME_END_PX
         if not same:
             different.append(other.score)
@@ -587,10 +558,3 @@ def _bridged(points: Points, skeletons: Skeletons) -> float:
         if all(float(np.hypot(*(points - np.asarray(end)).T).min()) <= 2.0 for end in bridge):
             length += float(np.hypot(bridge[0][0] - bridge[1][0], bridge[0][1] - bridge[1][1]))
     return length
-
-
-def _why_no_candidate(graph: PixelGraph, config: PathConfig) -> Refusal:
-    longest = max(_length(chain.points) for chain in graph.chains)
-    if longest < config.min_length_px:
-        return Refusal(Reason.TOO_SHORT, f"{longest:.0f} px long (at least {config.min_length_px:.0f} px)")
-    return Refusal(Reason.AMBIGUOUS_PATH, "the robot's outline is closed: it shows no end")

@@ -1,14 +1,8 @@
-"""Stage 1: frame -> vessel and robot probabilities at working resolution (METHOD section 1).
-
-From the network's probabilities to clean masks: threshold, small components away, small holes filled (METHOD section 2).
-
-Parts of a picture that are shown to a network instead of all of it.
-"""
+"""Segmentation: frame -> vessel and robot probabilities at working resolution -> clean masks (METHOD sections 1 and 2)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -19,83 +13,49 @@ from core.perception.out_of_distribution import Signature
 from core.types import Image, Mask, Masks, Point, Window
 
 Probability = NDArray[np.float32]
+Segmentation = tuple[Probability, Probability, Signature | None]
+"""Probabilities of vessel and robot, and the picture's signature; None where the network's deepest level cannot be read."""
 
 
-class Segmenter(Protocol):
-    """Gives vessel and robot probabilities, float32 (h, w) each, of an RGB uint8 image (h, w, 3) of any size.
+class Segmenter:
+    """Gives vessel and robot probabilities, float32 (h, w) each, of RGB uint8 images (h, w, 3) of any size.
 
-    The network of the second look takes ``second_look.Planes`` in its place.
+    Only ``__call__`` must be implemented. The other methods have slower defaults. The network of the tip refinement takes
+    ``tip_refinement.Planes`` instead of images.
     """
 
     @property
-    def engine(self) -> str: ...
-    def __call__(self, image: Image) -> tuple[Probability, Probability]: ...
+    def engine(self) -> str:
+        """Where the network runs, in words."""
+        return type(self).__name__
+
+    def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        raise NotImplementedError
+
+    def segment_batch(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
+        """Segment images of one size; a network may take less time for all of them than for one after the other."""
+        return [self(image) for image in images]
+
+    def segment_signed(self, images: Sequence[Image]) -> list[Segmentation]:
+        """Segment images of one size, and give their signatures (``out_of_distribution``) where the network can."""
+        return [(*found, None) for found in self.segment_batch(images)]
+
+    def segment_robots(self, images: Sequence[Image]) -> list[Probability]:
+        """The robot's probability in images of one size. Without the vessel's decoder a network saves a third of its time."""
+        return [robot for _, robot in self.segment_batch(images)]
+
+    def segment_robot_beside(self, vessel: Probability, image: Image) -> Probability:
+        """The robot's probability in an image (h, w, 3) whose vessel (h, w) is known."""
+        return self.segment_robots([image])[0]
 
 
-@runtime_checkable
-class RobotAlone(Protocol):
-    """A network that can leave its vessel's decoder out, which saves a third of its time."""
-
-    def robots(self, images: Sequence[Image]) -> list[Probability]: ...
-
-
-@runtime_checkable
-class RobotBeside(Protocol):
-    """A segmenter that looks for the robot in an image (h, w, 3) whose vessel (h, w) is known."""
-
-    def robot_beside(self, vessel: Probability, image: Image) -> Probability: ...
-
-
-@runtime_checkable
-class Pairing(Protocol):
-    """A segmenter that sees several images of one size in less time than one after the other."""
-
-    def together(self, images: Sequence[Image]) -> list[tuple[Probability, Probability]]: ...
-
-
-Recognised = tuple[Probability, Probability, Signature | None]
-"""Probabilities of vessel and robot, and the picture's signature; None: the network's deepest level is not to be had."""
-Seen = tuple[Probability, Probability] | Recognised
-
-
-@runtime_checkable
-class Recognising(Protocol):
-    """A segmenter that also tells what kind of pictures it sees (``familiarity.py``)."""
-
-    def recognise(self, images: Sequence[Image]) -> list[Recognised]: ...
-
-
-def recognise(segmenter: Segmenter, images: Sequence[Image]) -> list[Recognised]:
-    """What `segmenter` finds in each of the images (of one size), and their signatures where it is able to tell."""
-    if isinstance(segmenter, Recognising):
-        return segmenter.recognise(images)
-    return [(*found, None) for found in see(segmenter, images)]
-
-
-def see(segmenter: Segmenter, images: Sequence[Image]) -> list[tuple[Probability, Probability]]:
-    """What `segmenter` finds in each of the images (of one size), at once where it is able to."""
-    return segmenter.together(images) if isinstance(segmenter, Pairing) else [segmenter(image) for image in images]
-
-
-def robots(segmenter: Segmenter, images: Sequence[Image]) -> list[Probability]:
-    """The robot's probabilities in each of the images (of one size), and of nothing else where `segmenter` is able to."""
-    if isinstance(segmenter, RobotAlone):
-        return segmenter.robots(images)
-    return [robot for _, robot in see(segmenter, images)]
-
-
-def robot_beside(segmenter: Segmenter, vessel: Probability, image: Image) -> Probability:
-    """The robot's probability in an image (h, w, 3) whose vessel's (h, w) is known already."""
-    return segmenter.robot_beside(vessel, image) if isinstance(segmenter, RobotBeside) else robots(segmenter, [image])[0]
-
-
-class Turned:
-    """The mean over a picture and its mirror image, each in some quarter turns (test-time augmentation): surer than any alone.
+class OrientationAverage(Segmenter):
+    """The mean over a picture and its mirror image, each in some quarter turns (test-time augmentation).
 
     Parameters
     ----------
-    segmenter : gives vessel and robot probabilities of an image (h, w, channels).
-    turns : by how many quarters the picture is turned; it is asked twice for each. (0,): the picture and its mirror image.
+    segmenter : takes images (h, w, channels).
+    turns : quarter turns; each asks `segmenter` twice. (0,): the picture and its mirror image.
     """
 
     def __init__(self, segmenter: Segmenter, turns: Sequence[int] = (0, 1, 2, 3)) -> None:
@@ -106,23 +66,25 @@ class Turned:
         return f"{self._segment.engine}, {2 * len(self._turns)} orientations"
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        return self._look(image, see)[:2]
+        return self._average(image, signed=False)[:2]
 
-    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
-        """The signature is that of the picture as it was first shown: one turned upside down is of another kind, a bit."""
-        return [self._look(image, recognise) for image in images]
+    def segment_signed(self, images: Sequence[Image]) -> list[Segmentation]:
+        """The signature is that of the picture in its first orientation: one upside down is of a slightly different kind."""
+        return [self._average(image, signed=True) for image in images]
 
-    def _look(self, image: Image, first: Callable[[Segmenter, Sequence[Image]], Sequence[Seen]]) -> Recognised:
-        """The mean, and what else `first` told of the picture where it was asked first."""
+    def _average(self, image: Image, *, signed: bool) -> Segmentation:
         sums = np.zeros((2, *image.shape[:2]), np.float32)
         signature: Signature | None = None
         for turn in self._turns:
             turned = np.rot90(image, turn)
             pair = [np.ascontiguousarray(turned[:, ::step]) for step in (1, -1)]
-            found: Sequence[Seen] = (first if turn == self._turns[0] else see)(self._segment, pair)
-            if len(found[0]) == 3:
+            if signed and turn == self._turns[0]:
+                found = self._segment.segment_signed(pair)
                 signature = found[0][2]
-            for step, (vessel, robot, *_) in zip((1, -1), found, strict=True):
+                answers = [(vessel, robot) for vessel, robot, _ in found]
+            else:
+                answers = self._segment.segment_batch(pair)
+            for step, (vessel, robot) in zip((1, -1), answers, strict=True):
                 sums += np.rot90(np.stack([vessel, robot])[:, :, ::step], -turn, axes=(1, 2))
         sums /= np.float32(2 * len(self._turns))
         return sums[0], sums[1], signature
@@ -144,12 +106,12 @@ def to_working(image: Image, working_size_px: int) -> tuple[Image, tuple[float, 
 
 
 MAX_OUTLINES = 500
-"""A mask of more pieces and holes is noise: those of real images have some tens before cleaning."""
+"""A mask of more components and holes is noise: those of real images have some tens before cleaning."""
 MAX_EDGE_SHARE = 0.08
-"""Along the rows of a real mask it changes some ten times in 640 px. A share of 0.08 is a stripe pattern of 12 px."""
+"""Changes along the rows of a mask, per pixel: a real mask has some ten in 640 px. 0.08 is a stripe pattern of 12 px."""
 
 
-def clean(vessel_probability: NDArray[np.float32], robot_probability: NDArray[np.float32], config: PerceptionConfig) -> Masks:
+def clean(vessel_probability: Probability, robot_probability: Probability, config: PerceptionConfig) -> Masks:
     """Masks of vessel and robot without specks and pinholes.
 
     Parameters
@@ -157,17 +119,16 @@ def clean(vessel_probability: NDArray[np.float32], robot_probability: NDArray[np
     vessel_probability, robot_probability : shape (h, w), 0..1, at working resolution.
     config : thresholds (``segmentation``) and limits of area (``cleaning``).
     """
-    cleaning, thresholds = config.cleaning, config.segmentation
-    vessel = vessel_probability >= thresholds.vessel_threshold
+    vessel = vessel_probability >= config.segmentation.vessel_threshold
     return Masks(
-        vessel=clean_mask(vessel, cleaning.min_vessel_area_px, cleaning.max_hole_area_px),
+        vessel=clean_mask(vessel, config.cleaning.min_vessel_area_px, config.cleaning.max_hole_area_px),
         robot=clean_robot(robot_probability, config),
         vessel_probability=vessel_probability,
         robot_probability=robot_probability,
     )
 
 
-def clean_robot(robot_probability: NDArray[np.float32], config: PerceptionConfig) -> Mask:
+def clean_robot(robot_probability: Probability, config: PerceptionConfig) -> Mask:
     """The robot's mask alone."""
     robot = robot_probability >= config.segmentation.robot_threshold
     return clean_mask(robot, config.cleaning.min_robot_area_px, config.cleaning.max_hole_area_px)
@@ -176,10 +137,11 @@ def clean_robot(robot_probability: NDArray[np.float32], config: PerceptionConfig
 def clean_mask(mask: Mask, min_area_px: int, max_hole_area_px: int) -> Mask:
     """A copy of `mask` without 8-connected components below `min_area_px`, and with holes up to `max_hole_area_px` filled.
 
-    Larger holes stay: a real loop of the vessel encloses one. Background that reaches the image border is never a hole. Of a mask
-    that is scattered over more than ``MAX_OUTLINES`` pieces and holes nothing is left: cleaning it costs most, and it is noise.
+    Larger holes stay: a real loop of the vessel encloses one. Background that reaches the image border is never a hole. A mask of
+    more than ``MAX_OUTLINES`` components and holes becomes empty: it is noise, and cleaning it would cost most.
     """
-    if _is_noise(mask):
+    rows = mask[::8]  # every eighth row shows whether the mask is worth following its outlines
+    if int(np.count_nonzero(rows[:, 1:] != rows[:, :-1])) > max(MAX_EDGE_SHARE * rows.size, MAX_OUTLINES):
         return np.zeros(mask.shape, np.bool_)
     whole = np.array(mask, np.uint8, order="C")
     x, y, width, height = cv2.boundingRect(whole)
@@ -209,15 +171,8 @@ def clean_mask(mask: Mask, min_area_px: int, max_hole_area_px: int) -> Mask:
     return whole.view(np.bool_)
 
 
-def _is_noise(mask: Mask) -> bool:
-    """Whether a mask begins and ends so often along its rows that nobody needs to follow its outlines; every eighth row tells."""
-    rows = mask[::8]
-    edges = int(np.count_nonzero(rows[:, 1:] != rows[:, :-1]))
-    return edges > max(MAX_EDGE_SHARE * rows.size, MAX_OUTLINES)
-
-
 def _depth(parents: list[int], index: int) -> int:
-    """How many contours lie around this one: an even number around a component's outline, an odd one around a hole's."""
+    """Number of contours around this one: even for a component's outline, odd for a hole's."""
     depth = 0
     while (index := parents[index]) >= 0:
         depth += 1
@@ -231,11 +186,11 @@ def _enclosed_pixels(contour: cv2.typing.MatLike, is_hole: bool) -> float:
 
 
 MARGIN_PX = 16
-"""At a window's inner edges a network lacks context: so much of what it says there counts less, or not at all."""
+"""At a window's inner edges a network lacks context: within this margin its answer counts less, or not at all."""
 
 
 def window_around(place: Point, size: tuple[int, int], side: int) -> Window:
-    """The window (x, y, width, height) of at most `side` px with `place` in its middle, or as near to it as the picture allows."""
+    """The window (x, y, width, height) of at most `side` px centred on `place`, or as near to it as the picture allows."""
     width, height = min(side, size[0]), min(side, size[1])
     x = min(max(round(place[0]) - width // 2, 0), size[0] - width)
     y = min(max(round(place[1]) - height // 2, 0), size[1] - height)
@@ -243,7 +198,7 @@ def window_around(place: Point, size: tuple[int, int], side: int) -> Window:
 
 
 def inner_area(window: Window, size: tuple[int, int]) -> tuple[slice, slice]:
-    """Rows and columns of a picture of `size` (width, height) that a look at a window renews: not the margin at inner edges."""
+    """Rows and columns of a picture of `size` (width, height) that a window renews: without the margin at inner edges."""
     x, y, width, height = window
     left, top = (MARGIN_PX if x > 0 else 0), (MARGIN_PX if y > 0 else 0)
     right = width - (MARGIN_PX if x + width < size[0] else 0)

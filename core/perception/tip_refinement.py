@@ -1,9 +1,9 @@
-"""A second look at the robot's ends: a small network that sees the picture and what the first look took it for, close by.
+"""Tip refinement: a second network segments windows around the robot's ends again.
 
-Most answers that are lost are lost at the robot's tip (docs/method.md), a few hundred of three hundred thousand pixels. The second
-network is wider than the first one on its fine levels, and in training it is shown nothing but windows around ends, and around
-pixels that the first look got wrong. What it says replaces the first look's probabilities there, of robot and vessel; where the
-vessel is known already, as in a stream's windows, the robot's alone, and it is shown the vessel that is known.
+Most wrong answers are wrong at the robot's tip (docs/method.md), a few hundred of three hundred thousand pixels. The second network
+is wider than the first one on its fine levels, and it is trained on windows around ends, and around pixels that the first network
+got wrong. It sees the picture and the first network's probabilities, and replaces both probabilities in the windows. Where the
+vessel is known already, as in a stream's region of interest, it is given that vessel and replaces only the robot's.
 """
 
 from __future__ import annotations
@@ -15,42 +15,32 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.perception.segmentation import (
-    MARGIN_PX,
-    Probability,
-    Recognised,
-    Segmenter,
-    clean_mask,
-    recognise,
-    robots,
-    see,
-    window_around,
-)
+from core.perception.segmentation import MARGIN_PX, Probability, Segmentation, Segmenter, clean_mask, window_around
 from core.perception.skeleton import MAX_KNOTS, end_pixels, thin
 from core.types import Image, Point
 
 WINDOW_PX = 160
 """Four times the piece of the robot that its vector is fitted to."""
 _SEEN_PX = 40.0
-"""An end as near as this to the middle of a window has been looked at."""
-_MAX_LOOKS = 5
+"""An end this near to the middle of a window has been refined."""
+_MAX_WINDOWS = 5
 _ROUNDS = 2
-"""What the second look adds may end farther on: then that end is looked at, too."""
+"""What the refinement adds may end farther on: then that end is refined, too."""
 _FAINT = 0.1
-"""Where nothing is taken for a robot, the likeliest place is looked at, if it is as likely as this."""
+"""Least robot probability of the likeliest place, which is refined where nothing is taken for a robot."""
 _MIN_AREA_PX = 20
 _SHIFTS_PX: tuple[Point, ...] = ((0.0, 0.0), (14.0, 10.0), (-14.0, -10.0))
-"""By how much the windows of the later looks lie beside the ends: what a network says of a pixel depends a bit on where its window
-begins, and where a pixel decides, the mean of several is surer than any of them."""
-MOST_LOOKS = 1 + len(_SHIFTS_PX)
-"""How often a single picture is looked at closely: once at what the first look saw, and then at what that gave."""
+"""Offsets of the windows in later passes: a network's answer depends a bit on where its window begins, and the mean of several
+windows is more accurate than any of them."""
+MAX_PASSES = 1 + len(_SHIFTS_PX)
+"""How often a single picture is refined: once on the first network's answer, and then on what that gave."""
 
 Planes = NDArray[np.uint8]
-"""Shape (h, w, 5): red, green, blue, and the first look's probabilities of vessel and robot as 0..255."""
+"""Shape (h, w, 5): red, green, blue, and the first network's probabilities of vessel and robot as 0..255."""
 
 
-def planes_of(image: Image, vessel: Probability, robot: Probability) -> Planes:
-    """The second network's input of an RGB image (h, w, 3) and the probabilities (h, w) that the first look found in it."""
+def stack_planes(image: Image, vessel: Probability, robot: Probability) -> Planes:
+    """The second network's input of an RGB image (h, w, 3) and the first network's probabilities (h, w)."""
     planes = np.empty((*image.shape[:2], 5), np.uint8)
     planes[:, :, :3] = image
     planes[:, :, 3] = np.rint(vessel * np.float32(255))
@@ -58,10 +48,10 @@ def planes_of(image: Image, vessel: Probability, robot: Probability) -> Planes:
     return planes
 
 
-def places_to_look(robot: Probability) -> list[Point]:
-    """Where a second look is worth it: the ends (x, y) of what the first look took for robot, of the largest pieces first.
+def find_tips(robot: Probability) -> list[Point]:
+    """Places (x, y) worth refining: the ends in the robot's probability, of the largest components first.
 
-    Where it took nothing for one, the likeliest place, if there is any.
+    Where nothing is taken for a robot, the likeliest place, if there is one.
     """
     mask = clean_mask(robot >= np.float32(0.5), _MIN_AREA_PX, 0)
     left, top, across, down = cv2.boundingRect(mask.view(np.uint8))
@@ -77,74 +67,67 @@ def places_to_look(robot: Probability) -> list[Point]:
     ends.sort(key=lambda end: (-int(stats[labels[end[1], end[0]], cv2.CC_STAT_AREA]), end))
     height, width = mask.shape
     places = [(float(x + left), float(y + top)) for x, y in ends]
-    # Where the robot enters the picture there is no more to see of it.
+    # Where the robot enters the picture nothing more of it can be seen.
     return [(x, y) for x, y in places if 8 <= x < width - 8 and 8 <= y < height - 8]
 
 
-class TipRefinement:
-    """A segmenter that looks again, closely, at the ends of what its first look takes for the robot.
+class TipRefinement(Segmenter):
+    """A segmenter that refines the robot's ends in the answer of a first one.
 
     Parameters
     ----------
-    first : the first look, at all of the picture.
-    near : the second network, which is asked about ``Planes``.
-    looks : how often, up to ``MOST_LOOKS``; all but the first one look at what that one saw, through windows that lie a bit beside
-        each other, and the mean of all counts.
+    first : segments the whole picture.
+    near : the second network, which takes ``Planes``.
+    passes : how often, up to ``MAX_PASSES``; all but the first pass refine its answer, in windows a bit beside each other, and the
+        mean of all counts.
     """
 
-    def __init__(self, first: Segmenter, near: Segmenter, *, looks: int = 1) -> None:
-        if not 1 <= looks <= MOST_LOOKS:
-            raise ValueError(f"a picture is looked at closely 1 to {MOST_LOOKS} times, not {looks}")
-        self._first, self._near, self._looks = first, near, looks
-
-    @property
-    def looks(self) -> int:
-        """How often a picture is looked at closely."""
-        return self._looks
+    def __init__(self, first: Segmenter, near: Segmenter, *, passes: int = 1) -> None:
+        if not 1 <= passes <= MAX_PASSES:
+            raise ValueError(f"a picture is looked at closely 1 to {MAX_PASSES} times, not {passes}")
+        self._first, self._near, self.passes = first, near, passes
 
     @property
     def engine(self) -> str:
-        return f"{self._first.engine}, second look{f' {self._looks} times' if self._looks > 1 else ''}"
+        return f"{self._first.engine}, second look{f' {self.passes} times' if self.passes > 1 else ''}"
 
-    def warm_up(self) -> None:
-        """Let the second network be compiled for one window and for several; a picture without a robot would not ask it."""
+    def warm_up(self, *, beside: bool = False) -> None:
+        """Compile the second network; a picture without a robot would not run it. `beside`: for ``segment_robot_beside``."""
         window = np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8)
-        for count in (1, 2):
-            see(self._near, [window] * count)
-
-    def warm_up_beside(self) -> None:
-        """The same for ``robot_beside``."""
-        robots(self._near, [np.zeros((WINDOW_PX, WINDOW_PX, 5), np.uint8)])
+        if beside:
+            self._near.segment_robots([window])
+        else:
+            for count in (1, 2):
+                self._near.segment_batch([window] * count)
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
-        return self._look(image, self._first(image))
+        return self._refine(image, self._first(image))
 
-    def recognise(self, images: Sequence[Image]) -> list[Recognised]:
-        """The signatures are the first look's, which sees the whole pictures."""
-        seen = recognise(self._first, images)
-        return [(*self._look(image, (v, r)), signature) for image, (v, r, signature) in zip(images, seen, strict=True)]
+    def segment_signed(self, images: Sequence[Image]) -> list[Segmentation]:
+        """The signatures are the first network's, which sees the whole pictures."""
+        seen = self._first.segment_signed(images)
+        return [(*self._refine(image, (v, r)), signature) for image, (v, r, signature) in zip(images, seen, strict=True)]
 
-    def robot_beside(self, vessel: Probability, image: Image) -> Probability:
-        """The robot, looked at as often; the close looks are shown the `vessel` that is known."""
-        return self._look(image, (vessel, robots(self._first, [image])[0]), robot_alone=True)[1]
+    def segment_robot_beside(self, vessel: Probability, image: Image) -> Probability:
+        return self._refine(image, (vessel, self._first.segment_robots([image])[0]), robot_alone=True)[1]
 
-    def _look(
+    def _refine(
         self, image: Image, seen: tuple[Probability, Probability], *, robot_alone: bool = False
     ) -> tuple[Probability, Probability]:
-        found = look_again(image, seen, self._near, robot_alone=robot_alone)
-        if self._looks == 1:
+        found = refine_tips(image, seen, self._near, robot_alone=robot_alone)
+        if self.passes == 1:
             return found
         vessel, robot = (probability.copy() for probability in found)
-        for shift in _SHIFTS_PX[: self._looks - 1]:
-            anew = look_again(image, found, self._near, shift, robot_alone=robot_alone)
-            vessel += anew[0]
-            robot += anew[1]
-        vessel /= self._looks
-        robot /= self._looks
+        for shift in _SHIFTS_PX[: self.passes - 1]:
+            again = refine_tips(image, found, self._near, shift, robot_alone=robot_alone)
+            vessel += again[0]
+            robot += again[1]
+        vessel /= self.passes
+        robot /= self.passes
         return vessel, robot
 
 
-def look_again(
+def refine_tips(
     image: Image,
     seen: tuple[Probability, Probability],
     near: Segmenter,
@@ -152,26 +135,25 @@ def look_again(
     *,
     robot_alone: bool = False,
 ) -> tuple[Probability, Probability]:
-    """Probabilities of vessel and robot after a second look at the ends of what the first one has `seen` in the picture.
+    """Probabilities of vessel and robot, refined at the robot's ends in the probabilities `seen`.
 
-    `shift_px`: by how much (x, y) the windows' middles lie beside the ends. `robot_alone`: the vessel stays as it was seen, by whom
-    ever.
+    `shift_px`: offset (x, y) of the windows' middles from the ends. `robot_alone`: the vessel stays as it is.
     """
     vessel, robot = (probability.copy() for probability in seen)
-    looked: list[Point] = []
+    refined: list[Point] = []
     for _ in range(_ROUNDS):
-        before = len(looked)
-        for place in places_to_look(robot):
-            if len(looked) < _MAX_LOOKS and all(math.dist(place, other) > _SEEN_PX for other in looked):
-                looked.append(place)
-        middles = [(x + shift_px[0], y + shift_px[1]) for x, y in looked[before:]]
-        _look_at(middles, image, seen, near, (vessel, robot), robot_alone=robot_alone)
-        if len(looked) == before:
+        before = len(refined)
+        for place in find_tips(robot):
+            if len(refined) < _MAX_WINDOWS and all(math.dist(place, other) > _SEEN_PX for other in refined):
+                refined.append(place)
+        middles = [(x + shift_px[0], y + shift_px[1]) for x, y in refined[before:]]
+        _refine_windows(middles, image, seen, near, (vessel, robot), robot_alone=robot_alone)
+        if len(refined) == before:
             break
     return vessel, robot
 
 
-def _look_at(
+def _refine_windows(
     middles: Sequence[Point],
     image: Image,
     seen: tuple[Probability, Probability],
@@ -180,19 +162,19 @@ def _look_at(
     *,
     robot_alone: bool,
 ) -> None:
-    """Replace both probabilities, or the robot's, in the windows around `middles`; the network is shown what was `seen`."""
+    """Replace both probabilities, or the robot's, in the windows around `middles`; the network is given those of `seen`."""
     height, width = image.shape[:2]
     windows = [window_around(place, (width, height), WINDOW_PX) for place in middles]
     parts = [np.s_[y : y + down, x : x + across] for x, y, across, down in windows]
-    planes = [planes_of(image[part], seen[0][part], seen[1][part]) for part in parts]
-    found = [(robot,) for robot in robots(near, planes)] if robot_alone else see(near, planes)
+    planes = [stack_planes(image[part], seen[0][part], seen[1][part]) for part in parts]
+    found = [(robot,) for robot in near.segment_robots(planes)] if robot_alone else near.segment_batch(planes)
     renewed = probabilities[1:] if robot_alone else probabilities
     for (x, y, across, down), part, near_it in zip(windows, parts, found, strict=True):
         columns = _fade(across, x > 0, x + across < width)
         rows = _fade(down, y > 0, y + down < height)
         weight = rows[:, None] * columns[None, :]
-        for whole, anew in zip(renewed, near_it, strict=True):
-            whole[part] += weight * (anew - whole[part])
+        for whole, new in zip(renewed, near_it, strict=True):
+            whole[part] += weight * (new - whole[part])
 
 
 def _fade(length: int, at_start: bool, at_end: bool) -> NDArray[np.float32]:

@@ -1,7 +1,4 @@
-"""Straight lines through the robot's last 40 px and through the vessel's centerline beside the head (METHOD section 5).
-
-Where the vessel's wall is, roughly, from any place in the lumen; and which places lie in one lumen.
-"""
+"""Vectors: straight lines through the robot's last 40 px and the centerline beside its head (METHOD section 5); lumen geometry."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from core.types import Centerline, Mask, Point, Points, Vector
 
 LineFit = Literal["total_least_squares", "least_squares"]
 MIN_LENGTH_PX = 4.0
-"""A shorter piece says nothing about a direction: its pixels' rounding alone turns it by more than 10 degrees."""
+"""A shorter piece has no direction: the rounding of its pixels alone turns it by more than 10 degrees."""
 
 
 def fit_robot_vector(points: Points, length_px: float, fit: LineFit = "total_least_squares") -> Vector | None:
@@ -29,11 +26,8 @@ def fit_robot_vector(points: Points, length_px: float, fit: LineFit = "total_lea
     length_px : arc length that is used, counted back from the head; a shorter path is used whole.
     fit : how the line is fitted, see ``fit_line``.
 
-    Returns
-    -------
-    Vector with ``end`` = foot of the head on the line, ``start`` = foot of the point `length_px` back, or None when the piece is
-    shorter than ``MIN_LENGTH_PX`` or has no direction (it ends where it began).
-    """
+    Returns ------- Vector with ``end`` = projection of the head on the line, ``start`` = that of the point `length_px` back, or
+    None when the piece is shorter than ``MIN_LENGTH_PX`` or has no direction (it ends where it began)."""
     if len(points) < 2:
         return None
     total = float(geometry.arc_length(points)[-1])
@@ -48,10 +42,9 @@ def fit_vessel_vector(centerline: Centerline, fit: LineFit = "total_least_square
 def fit_line(piece: Points, fit: LineFit = "total_least_squares") -> Vector | None:
     """Least-squares line through a piece of path, directed from its first to its last point.
 
-    By default the distances *across* the line are made least, of points resampled evenly, so that densely traced parts weigh no
-    more than others. With ``fit = "least_squares"`` it is the linear regression that the paper's "linear fitting" means: of the
-    points as they are, with errors in y only (in x for a piece that is steeper than it is wide).
-    """
+    By default it minimises the distances across the line, of points resampled evenly, so that densely traced parts weigh no more
+    than others. ``fit = "least_squares"`` is linear regression, the paper's "linear fitting", of the points as they are, with
+    errors in y only (in x for a piece that is steeper than it is wide)."""
     even = geometry.resample(piece, 1.0) if fit == "total_least_squares" else piece
     if len(even) < 2 or float(geometry.arc_length(piece)[-1]) < MIN_LENGTH_PX:
         return None
@@ -66,32 +59,29 @@ def fit_line(piece: Points, fit: LineFit = "total_least_squares") -> Vector | No
     first, last = float((piece[0] - mean) @ direction), float((piece[-1] - mean) @ direction)
     if abs(last - first) < 1e-6:
         return None
-    start, center, end = (_point(mean + along * direction) for along in (first, 0.5 * (first + last), last))
+    places = (mean + along * direction for along in (first, 0.5 * (first + last), last))
+    start, center, end = ((float(x), float(y)) for x, y in places)
     return Vector(start, center, end)
 
 
-def _point(values: Points) -> Point:
-    return float(values[0]), float(values[1])
-
-
 EROSION_PX = 0.9
+"""Distance to the wall that one step of erosion takes, on average."""
 _STEP_PX = 0.5
 _WALL_STEPS = 2
-"""As thin as the thinnest wall that a mask can show; a line that touches a corner of one pixel is within it for less."""
+"""The thinnest wall that a mask can show; a line that touches a corner of one pixel is within it for less."""
 
 
 class RadiusMap:
     """Distance to the wall in px at sub-pixel places, from a distance map of every second pixel (0.2 ms instead of 0.9 ms).
 
-    One step of erosion lets the thinnest wall show on the coarse grid. It takes 0.5 to 1.3 px, depending on the wall's direction
-    (measured on straight tubes), so ``EROSION_PX`` is given back.
-    """
+    One step of erosion makes the thinnest wall visible on the coarse grid. It takes 0.5 to 1.3 px, depending on the wall's
+    direction (measured on straight tubes), so ``EROSION_PX`` is added."""
 
     def __init__(self, mask: Mask) -> None:
         cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
         half = cv2.erode(mask.view(np.uint8), cross, borderType=cv2.BORDER_REPLICATE)[::2, ::2]
         distance = cv2.distanceTransform(np.ascontiguousarray(half), cv2.DIST_L2, 5)
-        # A mask that fills the image has no wall, and its distance would be the largest number there is.
+        # A mask that fills the image has no wall, and its distance would be the largest possible number.
         self._map = np.minimum(np.asarray(distance, np.float32), np.float32(max(half.shape)))
 
     def at(self, points: Points) -> NDArray[np.float64]:
@@ -99,9 +89,9 @@ class RadiusMap:
 
 
 def is_walled_off(place: Point, other: Point, vessel: Mask) -> bool:
-    """Whether the straight line between two places leaves the vessel's mask (h, w) and comes into it again: they lie in two lumens.
+    """Whether two places lie in two lumens: the straight line between them leaves the vessel's mask (h, w) and enters it again.
 
-    What lies outside at either end does not count: the robot bulges a wall, and a centerline runs on through a gap in the mask.
+    Parts outside at either end do not count: the robot bulges a wall, and a centerline runs on through a gap in the mask.
     """
     steps = max(1, math.ceil(math.dist(place, other) / _STEP_PX))
     width = vessel.shape[1]
@@ -112,14 +102,14 @@ def is_walled_off(place: Point, other: Point, vessel: Mask) -> bool:
     return len(inside) > 0 and int(inside[-1] - inside[0]) + 1 - len(inside) >= _WALL_STEPS
 
 
-def foot(
+def project(
     points: Points, place: Point, vessel: Mask | None, along: NDArray[np.float64] | None = None
 ) -> tuple[float, float, Point] | None:
-    """The place of a centerline that is nearest to a place within its own lumen, as ``polyline.nearest`` tells it.
+    """Project a place on a centerline within its own lumen; the result is that of ``geometry.nearest``.
 
     Where vessels lie side by side, or one bends back beside itself, the nearest place of all may be beyond a wall. Then the other
-    places are asked to which the distance has a minimum, the nearest first. None where a wall lies before all of them; without a
-    mask (None) nobody can tell.
+    local minima of the distance are tried, the nearest first. None where a wall lies before all of them. Without a mask (None)
+    walls are ignored.
     """
     along = geometry.arc_length(points) if along is None else along
     found = geometry.nearest(points, place, along)

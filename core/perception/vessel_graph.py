@@ -129,7 +129,7 @@ def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
     limit = np.array([vessel.shape[1] - 1.0, vessel.shape[0] - 1.0])
     kept = points[: len(points) - min(_hook(points, radius_px, limit), 2 * len(points) // 3)]
     lost_px = math.dist(points[-1].tolist(), kept[-1].tolist())
-    onward = geometry.continued(kept, max(REACH_RADII * radius_px, 1.5 * lost_px) + 1.0, max(radius_px, HEADING_PX))
+    onward = geometry.extrapolate(kept, max(REACH_RADII * radius_px, 1.5 * lost_px) + 1.0, max(radius_px, HEADING_PX))
     # Walls are looked for as far as the mask is known to reach.
     onward = compiled.bend_end(onward, radius_px, lost_px, round(STEP_PX), vessel)
     way_out = _way_out(onward, limit)
@@ -371,19 +371,17 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
     the picture), and then between both walls, to a fraction of a pixel. Where one of these is not to be seen, beside an opening,
     the first result stays.
     """
-    even = geometry.smooth_bundle(
-        geometry.resample_bundle(Bundle.of([line.points for line in lines]), STEP_PX), SMOOTHING_PX / STEP_PX, keeps_bends=True
-    )
+    even = Bundle.of([line.points for line in lines]).resample(STEP_PX).smooth(SMOOTHING_PX / STEP_PX, keeps_bends=True)
     # A line's ends stay in their nodes, and one of two points has no others.
     inner = np.ones(len(even.points), np.bool_)
     inner[even.starts[:-1]] = inner[even.starts[1:] - 1] = False
-    normal = geometry.bundle_normals(even)
+    normal = even.normals()
     reach = radius.at(even.points)
     probe = 0.5 * reach[:, None] * normal
     wider, narrower = np.split(radius.at(np.concatenate([even.points + probe, even.points - probe])), 2)
     shift = by_wall_in_view(even, STEP_PX, normal, reach, 0.5 * (wider - narrower), level.shape)
     centred = _moved(even, normal, np.where(inner, shift, 0.0))
-    normal = geometry.bundle_normals(centred)
+    normal = centred.normals()
     expected, sigma = radius.at(centred.points), WIDTH_PX / STEP_PX
     shift, half_width = compiled.centre_offsets(level, centred.points, centred.starts, normal, expected, sigma)
     centred = _moved(centred, normal, np.where(inner, shift, 0.0))
@@ -393,5 +391,4 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
 
 def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:
     """All points moved across their lines, and these smoothed."""
-    moved = Bundle(lines.points + shift[:, None] * normal, lines.starts)
-    return geometry.smooth_bundle(moved, SMOOTHING_PX / STEP_PX, keeps_bends=True)
+    return Bundle(lines.points + shift[:, None] * normal, lines.starts).smooth(SMOOTHING_PX / STEP_PX, keeps_bends=True)

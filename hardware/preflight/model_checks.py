@@ -77,8 +77,8 @@ def check_self_test(config: PerceptionConfig) -> Check:
 def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
     """How far an eight-bit network is off where its sums are large, in a brighter picture; None: no more than it may."""
     from core.perception.inference import OpenVinoSegmenter, open_second_look, open_segmenter
-    from core.perception.segmentation import see, window_around
-    from core.perception.tip_refinement import WINDOW_PX, planes_of
+    from core.perception.segmentation import window_around
+    from core.perception.tip_refinement import WINDOW_PX, stack_planes
 
     used, used_near = open_segmenter(config), open_second_look(config)
     if not isinstance(used, OpenVinoSegmenter) or not used.is_eight_bit:
@@ -87,15 +87,15 @@ def _eight_bit_off(config: SegmentationConfig, image: Image) -> str | None:
     bright = np.asarray(cv2.convertScaleAbs(image, alpha=_BRIGHTER), np.uint8)
     seen = open_segmenter(exact)(bright)
     # Three are seen as two at once, as single pictures are, and one by itself, as in a stream.
-    found = [(_apart(one, seen), _EIGHT_BIT_OFF) for one in see(used, [bright] * 3)]
+    found = [(_apart(one, seen), _EIGHT_BIT_OFF) for one in used.segment_batch([bright] * 3)]
     near = open_second_look(exact)
     if used_near is not None and near is not None:
         row, column = np.unravel_index(int(np.argmax(seen[1])), seen[1].shape)
         x, y, width, height = window_around((float(column), float(row)), (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
-        planes = planes_of(bright[part], seen[0][part], seen[1][part])
+        planes = stack_planes(bright[part], seen[0][part], seen[1][part])
         exactly = near(planes)
-        found += [(_apart(one, exactly), _EIGHT_BIT_NEAR_OFF) for one in see(used_near, [planes] * 3)]
+        found += [(_apart(one, exactly), _EIGHT_BIT_NEAR_OFF) for one in used_near.segment_batch([planes] * 3)]
     return next((f"{off:.3f} (at most {allowed:g})" for off, allowed in found if off > allowed), None)
 
 

@@ -25,7 +25,7 @@ def test_lines_come_back_as_they_went_in() -> None:
 
 @pytest.mark.parametrize("step_px", [1.0, 2.0, 7.5])
 def test_resampling_is_that_of_each_line(step_px: float) -> None:
-    found = geometry.resample_bundle(ALL, step_px)
+    found = ALL.resample(step_px)
     for line, again in zip(LINES, found.split(found.points), strict=True):
         np.testing.assert_allclose(again, geometry.resample(line, step_px), atol=1e-9)
 
@@ -33,9 +33,9 @@ def test_resampling_is_that_of_each_line(step_px: float) -> None:
 @pytest.mark.parametrize("keeps_bends", [False, True])
 @pytest.mark.parametrize("sigma", [1.0, 4.0])
 def test_smoothing_and_normals_are_those_of_each_line(sigma: float, keeps_bends: bool) -> None:
-    even = geometry.resample_bundle(ALL, 2.0)
-    smooth = geometry.smooth_bundle(even, sigma, keeps_bends=keeps_bends)
-    normals = Bundle(geometry.bundle_normals(smooth), smooth.starts)
+    even = ALL.resample(2.0)
+    smooth = even.smooth(sigma, keeps_bends=keeps_bends)
+    normals = Bundle(smooth.normals(), smooth.starts)
     for line, again, across in zip(
         even.split(even.points), smooth.split(smooth.points), normals.split(normals.points), strict=True
     ):
@@ -47,5 +47,5 @@ def test_smoothing_and_normals_are_those_of_each_line(sigma: float, keeps_bends:
 @pytest.mark.parametrize("lines", [[], [np.array([[3.0, 4.0]])], [np.array([[3.0, 4.0], [3.0, 4.0]])]])
 def test_no_line_and_lines_of_no_length(lines: list[Points]) -> None:
     few = Bundle.of(lines)
-    even = geometry.smooth_bundle(geometry.resample_bundle(few, 2.0), 4.0)
+    even = few.resample(2.0).smooth(4.0)
     assert [line.tolist() for line in even.split(even.points)] == [[[3.0, 4.0]]] * len(lines)

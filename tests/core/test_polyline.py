@@ -83,7 +83,7 @@ def test_a_short_line_goes_on_with_half_the_bend_that_it_has(over_px: float) -> 
     """A circle of 40 px radius, of which 20 px are known."""
     angle = np.linspace(0.0, 0.5, 41)
     line = 40.0 * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
-    onward = geometry.continued(line, 20.0, over_px)
+    onward = geometry.extrapolate(line, 20.0, over_px)
     heading = np.unwrap(np.arctan2(*np.diff(onward, axis=0).T[::-1]))
     assert heading[0] == pytest.approx(0.44, abs=0.01)  # its last half has 0.375
     assert np.diff(heading) == pytest.approx(0.5 / 40.0, rel=0.05)

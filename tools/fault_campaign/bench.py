@@ -41,6 +41,7 @@ from core.devices import CameraLost
 from core.evaluation.accuracy import TrueMasks
 from core.files import write_whole
 from core.perception.pipeline import Pipeline, open_pipeline
+from core.perception.segmentation import Segmenter
 from core.session.manifest import Event, Manifest, about_rig, event_of_alert, read_manifest
 from core.session.reader import SessionReader
 from core.session.writer import RecordStatus, SessionWriter, faults_between
@@ -353,7 +354,7 @@ class FaultBench:
             return read_manifest(status.folder), reader.events
 
 
-class _Hooked:
+class _Hooked(Segmenter):
     """The bench's segmenter as the pipeline wants it."""
 
     def __init__(self, bench: FaultBench) -> None:

@@ -57,6 +57,7 @@ from core.devices import UserError
 from core.perception.model_file import INFO, WEIGHTS, ModelError, load_network, model_folder, read_model_info, sha256_of
 from core.perception.pipeline import open_pipeline
 from core.perception.pose import classify
+from core.perception.segmentation import Segmenter
 from core.session.manifest import EVENTS, FRAMES, MANIFEST, EventKind, read_manifest
 from core.session.reader import SessionReader
 from core.session.recovery import find_cut_sessions, recover
@@ -629,7 +630,7 @@ def wrong_model(kit: Kit) -> Observation:
     pipeline = open_pipeline(plain)
     sight = pipeline._single
 
-    class Swapped:
+    class Swapped(Segmenter):
         engine = "swapped"
 
         def __call__(self, image: Image) -> _Two:

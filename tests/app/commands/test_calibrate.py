@@ -21,9 +21,9 @@ from core.files import read_image
 from core.learning.dataset import DatasetError
 from core.perception.inference import OpenVinoSegmenter
 from core.perception.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, sha256_of
-from core.perception.pipeline import open_sights
-from core.perception.quality import WITHOUT_SWINGS
-from core.perception.tip_refinement import MOST_LOOKS
+from core.perception.pipeline import open_calibrated
+from core.perception.quality import BASIC_FEATURES
+from core.perception.tip_refinement import MAX_PASSES
 from hardware.twin.dataset import SynthPlan, write_set
 
 
@@ -48,7 +48,7 @@ def model(tmp_path: Path) -> Path:
     info = json.loads((tmp_path / "older" / INFO).read_text())
     del info["mirrored_second_looks"], info["familiarity"]
     for part in ("features", "mean", "scale", "weights"):
-        info["calibration_mirrored"][part] = info["calibration_mirrored"][part][: len(WITHOUT_SWINGS)]
+        info["calibration_mirrored"][part] = info["calibration_mirrored"][part][: len(BASIC_FEATURES)]
     (tmp_path / "older" / INFO).write_text(json.dumps(info))
     return tmp_path / "older"
 
@@ -56,8 +56,8 @@ def model(tmp_path: Path) -> Path:
 def _looks(model: Path, **how: bool) -> list[bool]:
     """Whether a picture is looked at closely four times, and its answer's swings looked for: seen once, and in all orientations."""
     config = PerceptionConfig.model_validate({"segmentation": {"model": str(model), "threads": 1}})
-    sights = open_sights(config, **how)
-    often = [getattr(sight.segment, "engine", "").endswith(f"second look {MOST_LOOKS} times") for sight in sights]
+    sights = open_calibrated(config, **how)
+    often = [getattr(sight.segment, "engine", "").endswith(f"second look {MAX_PASSES} times") for sight in sights]
     assert often == [sight.swings for sight in sights]
     return often
 
@@ -77,11 +77,11 @@ def test_a_model_looks_as_often_as_when_its_confidence_was_calibrated(
         shutil.copy(picture, more)
     calibrate(frames, str(model), knows=[more])
     info = read_model_info(model)
-    assert info.mirrored_second_looks == MOST_LOOKS
+    assert info.mirrored_second_looks == MAX_PASSES
     assert info.figures == {}
     assert info.calibration is not None
     assert info.calibration_mirrored is not None
-    assert (info.calibration.needs_swings, info.calibration_mirrored.needs_swings) == (False, True)
+    assert (info.calibration.needs_sensitivity, info.calibration_mirrored.needs_sensitivity) == (False, True)
     assert info.calibration != info.calibration_mirrored
     assert info.calibration.fitted_on["set"] == "set"
     assert info.familiarity is not None

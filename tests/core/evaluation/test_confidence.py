@@ -88,7 +88,7 @@ def test_swings_count_for_a_calibration_that_was_fitted_on_them() -> None:
     rng = np.random.default_rng(3)
     swings = [(*row, float(rng.normal(0.2 if good else 2.0, 0.3)), 0.1) for row, good in zip(evidence, right, strict=True)]
     without, with_ = fit(evidence, right, {}), fit(swings, right, {})
-    assert (without.needs_swings, with_.needs_swings) == (False, True)
+    assert (without.needs_sensitivity, with_.needs_sensitivity) == (False, True)
     steady, unsteady = (replace(GOOD, beyond=0.5, theta_swing=swing, head_swing=0.1) for swing in (0.2, 2.0))
     assert with_.confidence(steady) > 0.9
     assert with_.confidence(unsteady) < 0.1

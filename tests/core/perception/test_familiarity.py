@@ -25,9 +25,9 @@ from core.learning.model_writer import save_model, save_with_second_look, write_
 from core.perception.inference import OpenVinoSegmenter, TorchSegmenter
 from core.perception.model_file import INFO, MODELS, ModelError, read_model_info
 from core.perception.out_of_distribution import OutOfDistributionReference, signature_of
-from core.perception.pipeline import Pipeline, Sight, open_pipeline, open_sights
+from core.perception.pipeline import CalibratedSegmenter, Pipeline, open_calibrated, open_pipeline
 from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures
-from core.perception.segmentation import Recognised, Turned, recognise
+from core.perception.segmentation import OrientationAverage, Segmentation, Segmenter
 from core.perception.tip_refinement import TipRefinement
 from core.perception.unet import DualUNet, UNetShape, with_prior_planes
 from core.types import Frame, Image, Reason, Refusal
@@ -189,13 +189,13 @@ def pictures(count: int) -> list[Image]:
 def test_every_engine_tells_the_same_signature(model: Path) -> None:
     exact, torch_s = OpenVinoSegmenter(model, 1, "fp32"), TorchSegmenter(model, 1)
     eight_bit = OpenVinoSegmenter(model, 1, "int8")
-    for image, told in zip(pictures(3), exact.recognise(pictures(3)), strict=True):
+    for image, told in zip(pictures(3), exact.segment_signed(pictures(3)), strict=True):
         _, _, signature = told
         assert signature is not None and signature.shape == (24,)
         assert signature.max() > 0.01
         for engine in (torch_s, eight_bit):
             # Where the processor computes in bf16, OpenVINO does so in place of fp32.
-            np.testing.assert_allclose(engine.recognise([image])[0][2], signature, atol=0.15 * float(signature.max()))
+            np.testing.assert_allclose(engine.segment_signed([image])[0][2], signature, atol=0.15 * float(signature.max()))
         for one, other in zip(exact(image), told[:2], strict=True):
             np.testing.assert_allclose(one, other, atol=0.02)
 
@@ -203,17 +203,21 @@ def test_every_engine_tells_the_same_signature(model: Path) -> None:
 def test_whoever_looks_again_or_turned_tells_the_first_looks_signature(model: Path) -> None:
     segment = OpenVinoSegmenter(model, 1, "fp32")
     (image,) = pictures(1)
-    wanted = recognise(segment, [image])[0][2]
+    wanted = segment.segment_signed([image])[0][2]
     assert wanted is not None
-    for looking in (Turned(segment), TipRefinement(segment, Blind()), TipRefinement(Turned(segment), Blind())):
-        vessel, robot, signature = recognise(looking, [image])[0]
+    for looking in (
+        OrientationAverage(segment),
+        TipRefinement(segment, Blind()),
+        TipRefinement(OrientationAverage(segment), Blind()),
+    ):
+        vessel, robot, signature = looking.segment_signed([image])[0]
         np.testing.assert_allclose(signature, wanted, atol=0.01)
         for one, other in zip(looking(image), (vessel, robot), strict=True):
             np.testing.assert_allclose(one, other, atol=1e-5)
-    assert recognise(Blind(), [image])[0][2] is None
+    assert Blind().segment_signed([image])[0][2] is None
 
 
-class Blind:
+class Blind(Segmenter):
     """A segmenter that tells no signature."""
 
     engine = "a test's"
@@ -228,7 +232,7 @@ class Kind(Blind):
     def __init__(self, signature: np.ndarray, robot: bool = True, vessel: bool = True) -> None:
         self.signature, self.robot, self.vessel = signature, robot, vessel
 
-    def recognise(self, images: list[Image]) -> list[Recognised]:
+    def segment_signed(self, images: list[Image]) -> list[Segmentation]:
         vessel, robot = (np.zeros(images[0].shape[:2], np.float32) for _ in range(2))
         vessel[180:300, :] = 0.99 if self.vessel else 0.0
         robot[235:244, 0:300] = 0.99 if self.robot else 0.0
@@ -243,7 +247,7 @@ OTHER = known(1)[0] + np.float32(9.0)
 def perceived(
     segment: Kind, config: PerceptionConfig | None = None, familiarity: OutOfDistributionReference | None = FAMILIARITY
 ) -> Reason | None:
-    scene = Pipeline(segment, config or PerceptionConfig(), familiarity=familiarity)(Frame(0, 0.0, IMAGE))
+    scene = Pipeline(CalibratedSegmenter(segment, known=familiarity), config or PerceptionConfig())(Frame(0, 0.0, IMAGE))
     assert (scene.novelty is None) == (familiarity is None or not segment.vessel)
     return None if scene.refusal is None else scene.refusal.reason
 
@@ -252,7 +256,7 @@ def test_a_picture_of_another_kind_is_refused_and_shown_as_it_was_seen() -> None
     assert perceived(Kind(known(1)[0])) is None
     assert perceived(Kind(OTHER)) is Reason.UNLIKE_TRAINING
     assert perceived(Kind(OTHER), familiarity=None) is None, "nobody has told what is known"
-    scene = Pipeline(Kind(OTHER), PerceptionConfig(), familiarity=FAMILIARITY).perceive_single(Frame(0, 0.0, IMAGE))
+    scene = Pipeline(CalibratedSegmenter(Kind(OTHER), known=FAMILIARITY), PerceptionConfig()).perceive_single(Frame(0, 0.0, IMAGE))
     assert scene.pose is None
     assert scene.path is not None and scene.vessel_vector is not None, "who labels it begins with what was seen"
     assert scene.refusal is not None
@@ -261,7 +265,7 @@ def test_a_picture_of_another_kind_is_refused_and_shown_as_it_was_seen() -> None
 
 def test_other_reasons_come_first_and_no_robot_tells_of_the_kind() -> None:
     def refusal(segment: Kind) -> Refusal | None:
-        return Pipeline(segment, PerceptionConfig(), familiarity=FAMILIARITY)(Frame(0, 0.0, IMAGE)).refusal
+        return Pipeline(CalibratedSegmenter(segment, known=FAMILIARITY), PerceptionConfig())(Frame(0, 0.0, IMAGE)).refusal
 
     assert str(refusal(Kind(known(1)[0], robot=False))) == "no robot: highest robot probability 0.00"
     assert "0.00; it does not know such pictures: distance" in str(refusal(Kind(OTHER, robot=False)))
@@ -279,7 +283,7 @@ def test_in_a_stream_a_rig_at_the_limit_does_not_come_and_go() -> None:
     at_limit, below, well_below = (float(shares[np.argmax(novelty > limit)]) for limit in limits)
 
     segment = Kind(OTHER)
-    pipeline = Pipeline(segment, config, familiarity=FAMILIARITY)
+    pipeline = Pipeline(CalibratedSegmenter(segment, known=FAMILIARITY), config)
 
     def refused(share: float, at_s: float) -> bool:
         segment.signature = known(1)[0] + np.float32(share) * step
@@ -289,8 +293,8 @@ def test_in_a_stream_a_rig_at_the_limit_does_not_come_and_go() -> None:
     assert seen == [False, True, True, False, False, True]
     pipeline.reset()
     assert not refused(below, 1.0)
-    single = Sight(segment, familiarity=FAMILIARITY)
-    alone = Pipeline(segment, config, single=single, familiarity=FAMILIARITY)
+    single = CalibratedSegmenter(segment, known=FAMILIARITY)
+    alone = Pipeline(CalibratedSegmenter(segment, known=FAMILIARITY), config, single=single)
     for share, wanted in ((at_limit, True), (below, False)):
         segment.signature = known(1)[0] + np.float32(share) * step
         assert (alone.perceive_single(Frame(0, 0.0, IMAGE)).refusal is not None) == wanted, "single pictures know of no others"
@@ -305,14 +309,14 @@ def test_the_limit_is_a_setting() -> None:
 
 def test_what_a_model_knows_is_kept_in_its_manifest_and_used(model: Path) -> None:
     segment = OpenVinoSegmenter(model, 1)
-    seen = np.array([recognise(segment, [image])[0][2] for image in pictures(LEAST)])
+    seen = np.array([segment.segment_signed([image])[0][2] for image in pictures(LEAST)])
     names = ConfidenceFeatures.names()
     zeros = (0.0,) * len(names)
     calibration = ConfidenceCalibration(features=names, mean=zeros, scale=(1.0,) * len(names), weights=zeros, offset=0.0)
     write_calibration(model, calibration, familiarity=fitted(seen))
     config = PerceptionConfig.model_validate({"segmentation": {"model": str(model), "threads": 1}})
-    assert [sight.familiarity is not None for sight in open_sights(config)] == [True, True]
-    assert [sight.familiarity for sight in open_sights(config, recalibrating=True)] == [None, None], (
+    assert [sight.known is not None for sight in open_calibrated(config)] == [True, True]
+    assert [sight.known for sight in open_calibrated(config, recalibrating=True)] == [None, None], (
         "all of them are to be learnt from"
     )
     smaller = config.model_copy(update={"working_size_px": 320})
@@ -342,7 +346,7 @@ def test_of_another_network_it_is_refused(model: Path, tmp_path: Path) -> None:
 
 def test_it_stays_with_a_new_second_look_and_goes_with_a_new_network(model: Path, tmp_path: Path) -> None:
     base = Path(shutil.copytree(model, tmp_path / "base"))
-    seen = np.array([recognise(OpenVinoSegmenter(base, 1), [image])[0][2] for image in pictures(LEAST)])
+    seen = np.array([OpenVinoSegmenter(base, 1).segment_signed([image])[0][2] for image in pictures(LEAST)])
     names = ConfidenceFeatures.names()
     zeros = (0.0,) * len(names)
     calibration = ConfidenceCalibration(features=names, mean=zeros, scale=(1.0,) * len(names), weights=zeros, offset=0.0)
@@ -369,6 +373,6 @@ def test_the_shipped_model_knows_the_twin_on_every_engine() -> None:
         TorchSegmenter(MODELS / "default", 1),
     )
     for image in images:
-        shipped, *others = (familiarity.novelty(engine.recognise([image])[0][2]) for engine in (eight_bit, exact, torch_s))
+        shipped, *others = (familiarity.novelty(engine.segment_signed([image])[0][2]) for engine in (eight_bit, exact, torch_s))
         assert shipped < 0.85
         assert others == pytest.approx([shipped] * 2, abs=0.08)

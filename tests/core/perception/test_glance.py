@@ -10,9 +10,9 @@ import pytest
 
 from core.config.models import PerceptionConfig, TrackingConfig
 from core.evaluation.confidence import KnownPicture, fit_out_of_distribution
-from core.perception.pipeline import Pipeline, Sight
-from core.perception.roi import RoiSelector, cells_of, has_changed, look
-from core.perception.segmentation import Recognised, window_around
+from core.perception.pipeline import CalibratedSegmenter, Pipeline
+from core.perception.roi import RoiSelector, cells_of, has_changed, segment_roi
+from core.perception.segmentation import Segmentation, Segmenter, window_around
 from core.types import Frame, Image, Reason
 from tests.core.drawing import SIZE, curve
 
@@ -37,7 +37,7 @@ def _drawn(head_x: float) -> Image:
     return image
 
 
-class Colours:
+class Colours(Segmenter):
     """Tells vessel and robot by their colours and can look at any part of a picture; notes what it was shown."""
 
     engine = "colours"
@@ -59,7 +59,7 @@ def network() -> Colours:
 
 @pytest.fixture
 def pipeline(network: Colours) -> Pipeline:
-    return Pipeline(network, CONFIG, glance=Sight(network))
+    return Pipeline(network, CONFIG, roi=CalibratedSegmenter(network))
 
 
 def see(pipeline: Pipeline, time_s: float, image: Image):  # type: ignore[no-untyped-def]
@@ -83,12 +83,12 @@ def test_a_window_is_looked_at_beside_the_vessel_that_is_known() -> None:
             super().__init__()
             self.told: list[np.ndarray] = []
 
-        def robot_beside(self, vessel: np.ndarray, image: Image) -> np.ndarray:
+        def segment_robot_beside(self, vessel: np.ndarray, image: Image) -> np.ndarray:
             self.told.append(vessel)
             return self(image)[1]
 
     network = Beside()
-    pipeline = Pipeline(network, CONFIG, glance=Sight(network))
+    pipeline = Pipeline(network, CONFIG, roi=CalibratedSegmenter(network))
     scenes = [see(pipeline, 0.05 * index, picture(300 + 4 * index)) for index in range(3)]
     assert len(network.told) == 2
     for scene, vessel in zip(scenes[1:], network.told, strict=True):
@@ -219,7 +219,7 @@ def test_single_pictures_neither_use_nor_disturb_the_windows(pipeline: Pipeline,
 
 @pytest.mark.parametrize("tracking", [TrackingConfig(window_px=0), TrackingConfig(enabled=False)])
 def test_windows_can_be_switched_off(network: Colours, tracking: TrackingConfig) -> None:
-    pipeline = Pipeline(network, replace_tracking(tracking), glance=Sight(network))
+    pipeline = Pipeline(network, replace_tracking(tracking), roi=CalibratedSegmenter(network))
     for index in range(3):
         see(pipeline, 0.05 * index, picture(300))
     assert network.shown == [WHOLE] * 3
@@ -242,7 +242,7 @@ def test_a_windows_inner_edges_are_left_out_and_the_pictures_are_not() -> None:
         return np.zeros(image.shape[:2], np.float32), np.ones(image.shape[:2], np.float32)
 
     known = SimpleNamespace(vessel_probability=np.zeros_like(old), robot_probability=old)
-    renewed = look(ones, np.zeros(WHOLE, np.uint8), (0, 100, 256, 256), known)  # type: ignore[arg-type]
+    renewed = segment_roi(ones, np.zeros(WHOLE, np.uint8), (0, 100, 256, 256), known)  # type: ignore[arg-type]
     assert old.max() == 0.25
     seen = np.argwhere(renewed == 1.0)
     assert seen.min(axis=0).tolist() == [116, 0]
@@ -253,7 +253,7 @@ def test_a_stream_that_is_wound_back_is_looked_at_whole() -> None:
     glances = RoiSelector(CONFIG.tracking)
     assert glances.choose(picture(300), 1.0, 1.0) is None
     network = Colours()
-    pipeline = Pipeline(network, CONFIG, glance=Sight(network))
+    pipeline = Pipeline(network, CONFIG, roi=CalibratedSegmenter(network))
     see(pipeline, 5.0, picture(300))
     see(pipeline, 4.0, picture(300))
     assert network.shown == [WHOLE, WHOLE]
@@ -266,7 +266,7 @@ class Kind(Colours):
         super().__init__()
         self.signature = signature
 
-    def recognise(self, images: list[Image]) -> list[Recognised]:
+    def segment_signed(self, images: list[Image]) -> list[Segmentation]:
         return [(*self(image), self.signature) for image in images]
 
 
@@ -274,7 +274,7 @@ def test_a_window_tells_nothing_of_the_kind_and_who_is_refused_for_it_is_looked_
     signatures = np.random.default_rng(0).normal(size=(100, 4)).astype(np.float32)
     network = Kind(signatures[0])
     familiarity = fit_out_of_distribution([KnownPicture(Path(), Path(), index) for index in range(100)], signatures, 640, {})
-    pipeline = Pipeline(network, CONFIG, glance=Sight(network), familiarity=familiarity)
+    pipeline = Pipeline(CalibratedSegmenter(network, known=familiarity), CONFIG, roi=CalibratedSegmenter(network))
     scenes = [see(pipeline, 0.05 * index, picture(300 + 4 * index)) for index in range(3)]
     assert [scene.window is None for scene in scenes] == [True, False, False]
     assert [scene.novelty is None for scene in scenes] == [False, True, True]

@@ -57,7 +57,7 @@ class Stream:
         self.now_s += after_s
         self.head_x = head_x if head_x is not None else self.head_x
         picture = self.image((0, self.head_x)) if image is None else image
-        left = self.lookalikes.without(mask, picture, self.now_s, self.window)
+        left = self.lookalikes.remove(mask, picture, self.now_s, self.window)
         if head_x is not None:
             self.lookalikes.learn(_path(head_x), self.now_s)
         return left
@@ -174,14 +174,14 @@ def test_an_end_that_jumped_teaches_nothing(stream: Stream, is_doubted: bool) ->
     for step in range(30):
         left = stream.see(moved, 236 if step > 15 else None, image=stream.image((0, 336)))
         if step <= 15 and is_doubted:
-            stream.lookalikes.doubt()
+            stream.lookalikes.distrust()
     assert np.array_equal(left, moved) is is_doubted
 
 
 def test_what_is_known_to_be_none_is_so_after_an_end_that_jumped(stream: Stream) -> None:
     stream.advance(100, 160, TEXT)
     stream.see(_stretch((0, 60), TEXT), None)
-    stream.lookalikes.doubt()
+    stream.lookalikes.distrust()
     assert np.array_equal(stream.see(_stretch((0, 161), TEXT), 161), _stretch((0, 161)))
 
 
@@ -224,7 +224,7 @@ def test_another_stream_begins_anew(stream: Stream, how: str) -> None:
     if how == "forget":
         stream.lookalikes.forget()
     else:
-        stream.lookalikes.without(np.zeros((50, 60), np.bool_), np.zeros((50, 60, 3), np.uint8), stream.now_s)
+        stream.lookalikes.remove(np.zeros((50, 60), np.bool_), np.zeros((50, 60, 3), np.uint8), stream.now_s)
     mask = _stretch((0, 160), TEXT)
     assert np.array_equal(stream.see(mask, 160), mask)
 

@@ -5,7 +5,7 @@ import pytest
 
 from core import geometry
 from core.perception import compiled
-from core.perception.vectors import RadiusMap, foot, is_walled_off
+from core.perception.vectors import RadiusMap, is_walled_off, project
 from core.types import Mask, Point, Points
 
 AT = np.array([[60.0, 100.0], [80.0, 100.0], [100.0, 100.0]])
@@ -119,16 +119,16 @@ def test_the_foot_on_a_line_that_bends_back_lies_in_the_strand_that_holds_the_pl
     mask, line = _bent_back()
     place = (100.25, 117.0)
     assert geometry.nearest(line, place)[2] == pytest.approx((100.25, 129.0)), "the other strand is nearer"
-    found = foot(line, place, mask)
+    found = project(line, place, mask)
     assert found is not None
     assert found[0] == pytest.approx(17.0)
     assert found[1] == pytest.approx(100.25)
     assert found[2] == pytest.approx((100.25, 100.0))
-    assert foot(line, place, None) == geometry.nearest(line, place)
+    assert project(line, place, None) == geometry.nearest(line, place)
     open_mask, _ = _bent_back(bridge=(90, 110))
-    assert foot(line, place, open_mask) == geometry.nearest(line, place), "without a wall it is one lumen"
+    assert project(line, place, open_mask) == geometry.nearest(line, place), "without a wall it is one lumen"
 
 
 def test_beyond_a_wall_from_everything_there_is_no_foot() -> None:
     mask, line = _bent_back()
-    assert foot(line[-200:], (100.0, 117.0), mask) is None
+    assert project(line[-200:], (100.0, 117.0), mask) is None

@@ -9,9 +9,9 @@ from core.control.frame_reports import is_sound
 from core.perception import quality
 from core.perception.inference import OpenVinoSegmenter
 from core.perception.model_file import ModelInfo
-from core.perception.pipeline import NoPerception, Pipeline, Sight, open_pipeline
-from core.perception.quality import WITHOUT_SWINGS, ConfidenceFeatures
-from core.perception.segmentation import Turned
+from core.perception.pipeline import CalibratedSegmenter, NoPerception, Pipeline, open_pipeline
+from core.perception.quality import BASIC_FEATURES, ConfidenceFeatures
+from core.perception.segmentation import OrientationAverage, Segmenter
 from core.perception.tracking import TURN_S
 from core.types import Frame, Image, Masks, Points, PoseState, Reason, Scene
 from hardware.twin.world import TwinWorld
@@ -25,7 +25,7 @@ NOTHING = np.zeros((SIZE[1], SIZE[0]), np.float32)
 FRAME_S = 1 / 30
 
 
-class DrawnNetwork:
+class DrawnNetwork(Segmenter):
     """Gives what was drawn last, in the size of the image, and counts how often it is asked."""
 
     info = ModelInfo(name="drawn", shape={"fold": 1}, stride=16, weights_sha256="0" * 64, onnx_sha256="0" * 64)
@@ -118,7 +118,7 @@ def test_a_vessel_without_clear_walls_is_none_and_is_kept_to_be_looked_at(pipeli
 
 def swings(network: DrawnNetwork) -> tuple[float, float]:
     """Of theta and head, as they lie in the evidence."""
-    scene = Pipeline(network, CONFIG, single=Sight(network, swings=True)).perceive_single(frame())
+    scene = Pipeline(network, CONFIG, single=CalibratedSegmenter(network, sensitivity=True)).perceive_single(frame())
     assert reason(scene) is None
     assert list(scene.latency_ms) == [*STAGES[:-1], "steadiness", "total"]
     assert scene.evidence is not None
@@ -145,27 +145,30 @@ def test_an_answer_that_hangs_on_that_number_is_told_by_its_swing(network: Drawn
 def test_without_being_asked_nobody_looks_for_swings(pipeline: Pipeline) -> None:
     scene = pipeline.perceive_single(frame())
     assert scene.evidence is not None
-    assert len(scene.evidence) == len(WITHOUT_SWINGS)
+    assert len(scene.evidence) == len(BASIC_FEATURES)
 
 
 def test_an_answer_that_is_lost_counts_as_the_largest_swing() -> None:
-    same, lost = quality.swings(((10.0, 10.0), 5.0), [((10.0, 10.0), 5.0)]), quality.swings(((10.0, 10.0), 5.0), [None])
+    same, lost = (
+        quality.threshold_sensitivity(((10.0, 10.0), 5.0), [((10.0, 10.0), 5.0)]),
+        quality.threshold_sensitivity(((10.0, 10.0), 5.0), [None]),
+    )
     assert same == (0.0, 0.0)
-    assert lost == quality.swings(((10.0, 10.0), 5.0), [((500.0, 10.0), 120.0)])
-    assert quality.swings(((0.0, 0.0), 179.0), [((3.0, 4.0), -179.0)]) == pytest.approx((np.log(3.0), np.log(6.0)))
+    assert lost == quality.threshold_sensitivity(((10.0, 10.0), 5.0), [((500.0, 10.0), 120.0)])
+    assert quality.threshold_sensitivity(((0.0, 0.0), 179.0), [((3.0, 4.0), -179.0)]) == pytest.approx((np.log(3.0), np.log(6.0)))
 
 
 def test_edges_are_drawn_wider_and_narrower_all_four_ways() -> None:
     shares = np.linspace(0.0, 1.0, 101, dtype=np.float32)[None]
     masks = Masks(shares >= 0.5, shares >= 0.5, shares, shares)
-    edges = [tuple(round(float(shares[p >= 0.5].min()), 2) for p in ways) for ways in quality.neighbours(masks)]
+    edges = [tuple(round(float(shares[p >= 0.5].min()), 2) for p in ways) for ways in quality.shifted_probabilities(masks)]
     assert sorted(edges) == [(0.34, 0.34), (0.34, 0.67), (0.67, 0.34), (0.67, 0.67)]
 
 
 def test_in_a_stream_what_is_known_to_be_no_robot_does_not_shake_an_answer(network: DrawnNetwork) -> None:
     text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
-    pipeline = Pipeline(network, CONFIG, glance=None)
-    pipeline._stream = Sight(network, swings=True)
+    pipeline = Pipeline(network, CONFIG)
+    pipeline._stream = CalibratedSegmenter(network, sensitivity=True)
     for k, x in enumerate(range(270, 416, 5)):
         network.draw(VESSEL[VESSEL[:, 0] <= x], text)
         scene = pipeline(frame(k * FRAME_S))
@@ -512,7 +515,7 @@ def test_without_a_model_every_frame_is_refused_with_what_to_do() -> None:
     assert (scene.source_size, scene.captured_s, scene.latency_ms) == ((800, 600), 1.0, {"total": 0.0})
 
 
-class _LooksLeft:
+class _LooksLeft(Segmenter):
     """A network with a bias: it sees the vessel in the left half of whatever it is shown."""
 
     engine = "biased"
@@ -528,13 +531,13 @@ class _LooksLeft:
 
 
 def test_a_picture_and_its_mirror_image_are_averaged() -> None:
-    vessel, robot = Turned(_LooksLeft(), turns=(0,))(np.zeros((4, 6, 3), np.uint8))
+    vessel, robot = OrientationAverage(_LooksLeft(), turns=(0,))(np.zeros((4, 6, 3), np.uint8))
     assert np.array_equal(vessel, np.full((4, 6), 0.5, np.float32))
     assert vessel.dtype == robot.dtype == np.float32
 
 
 def test_all_eight_orientations_are_asked_about_and_turned_back() -> None:
-    class Copies:
+    class Copies(Segmenter):
         engine = "copies"
 
         def __init__(self) -> None:
@@ -547,7 +550,7 @@ def test_all_eight_orientations_are_asked_about_and_turned_back() -> None:
 
     image = np.random.default_rng(0).integers(0, 256, (4, 6, 3), dtype=np.uint8)
     copies = Copies()
-    turned = Turned(copies)
+    turned = OrientationAverage(copies)
     vessel, robot = turned(image)
     assert len({(shown.shape, shown.tobytes()) for shown in copies.shown}) == 8
     assert vessel == pytest.approx(image[:, :, 0])
@@ -557,7 +560,7 @@ def test_all_eight_orientations_are_asked_about_and_turned_back() -> None:
 
 def test_single_pictures_may_be_looked_at_more_often_than_a_stream() -> None:
     network = _LooksLeft()
-    pipeline = Pipeline(network, CONFIG, None, Sight(Turned(network)))
+    pipeline = Pipeline(network, CONFIG, single=CalibratedSegmenter(OrientationAverage(network)))
     pipeline(frame())
     assert network.calls == 1
     pipeline.perceive_single(frame())

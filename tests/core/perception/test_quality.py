@@ -7,7 +7,7 @@ import pytest
 from core.config.models import PerceptionConfig, QualityConfig
 from core.perception import quality
 from core.perception.quality import wall_blur_px
-from core.perception.tracking import HEAD_AT_BORDER_S, Memory, check_in_view, check_jump, recall, remember
+from core.perception.tracking import HEAD_AT_BORDER_S, TrackedPath, check_in_view, check_jump, recall, track
 from core.types import Centerline, GraphEdge, Masks, Points, Reason, Refusal, RobotPath, VesselGraph
 from tests.core.drawing import depth, probability
 
@@ -233,7 +233,7 @@ def test_low_confidence_is_refused_with_both_numbers() -> None:
 # ---- memory of a stream ----
 
 TRACKING = CONFIG.tracking
-MEMORY = Memory(path(), captured_s=10.0)
+MEMORY = TrackedPath(path(), captured_s=10.0)
 
 
 @pytest.mark.parametrize(("now_s", "kept"), [(10.0, True), (10.03, True), (10.5, True), (10.51, False), (9.9, False)])
@@ -259,35 +259,35 @@ def test_a_head_cannot_jump_farther_than_the_robot_moves() -> None:
 
 def test_a_head_that_has_met_the_border_for_longer_than_a_moment_may_be_out_of_view() -> None:
     inside, outside = (np.array([[20.0, 240.0], [tip, 240.0]]) for tip in (600.0, 639.0))
-    memory: Memory | None = None
+    memory: TrackedPath | None = None
     told = []
     for step, line in enumerate([inside, *[outside] * 5, *[inside] * 3, *[outside] * 5]):
         mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
-        memory = remember(path(line), mask, memory, 0.09 * step, CONFIG)
+        memory = track(path(line), mask, memory, 0.09 * step, CONFIG)
         refusal = check_in_view(memory, CONFIG)
         assert refusal is None or refusal.reason is Reason.AMBIGUOUS_PATH
         told.append(refusal is None)
     assert told == [True, True, True, True, True, False, False, True, True, True, True, True, True, False]
     # A gap in which nothing was found brings it back no more than a frame does; after a long one it has arrived anew.
-    assert check_in_view(remember(path(outside), mask, memory, 9.0, CONFIG), CONFIG) is not None
-    assert remember(path(outside), mask, memory, 12.0, CONFIG).border_s == 12.0
-    assert check_in_view(Memory(path(outside), 9.0, 5.0), PerceptionConfig(quality=QualityConfig(enabled=False))) is None
+    assert check_in_view(track(path(outside), mask, memory, 9.0, CONFIG), CONFIG) is not None
+    assert track(path(outside), mask, memory, 12.0, CONFIG).border_s == 12.0
+    assert check_in_view(TrackedPath(path(outside), 9.0, 5.0), PerceptionConfig(quality=QualityConfig(enabled=False))) is None
 
 
 def test_only_a_head_that_was_seen_well_within_the_picture_came_from_there() -> None:
     within, beside, border = (np.array([[300.0, 240.0], [tip, 240.0]]) for tip in (580.0, 630.0, 639.0))
     mask = probability(depth(border, 4.0)) >= 0.5
-    memory: Memory | None = None
+    memory: TrackedPath | None = None
     told = []
     seen = ((0.0, beside), (0.1, border), (0.2, within), (0.3, beside), (0.4, border), (2.0, border), (4.0, within[::-1]))
     for at_s, line in seen:
-        memory = remember(path(line), mask, memory, at_s, CONFIG)
+        memory = track(path(line), mask, memory, at_s, CONFIG)
         told.append(memory.came_from_within)
     assert told == [False, False, True, True, True, True, True], "also over a gap, where it is the same one"
-    went_on = remember(path(beside), mask, remember(path(within), mask, None, 0.0, CONFIG), 3.0, CONFIG)
+    went_on = track(path(beside), mask, track(path(within), mask, None, 0.0, CONFIG), 3.0, CONFIG)
     assert went_on.came_from_within, "in a gap it has gone on along itself"
-    assert not remember(path(beside[::-1] + [327.0, 0.0]), mask, memory, 6.0, CONFIG).came_from_within, "another one may be none"
-    assert not remember(path(border), mask, memory, 20.0, CONFIG).came_from_within
+    assert not track(path(beside[::-1] + [327.0, 0.0]), mask, memory, 6.0, CONFIG).came_from_within, "another one may be none"
+    assert not track(path(border), mask, memory, 20.0, CONFIG).came_from_within
 
 
 @pytest.mark.parametrize("frame_s", [1 / 30, 0.05, 0.2])
@@ -295,11 +295,11 @@ def test_a_mask_that_flickers_at_the_border_shows_no_head(frame_s: float) -> Non
     """Its end is cut off in single frames: the head is where it was, out of view or at the border, and does not come and go."""
     outside, cut_off = (np.array([[20.0, 240.0], [tip, 240.0]]) for tip in (639.0, 622.0))
     flicker = [cut_off if step % 3 == 2 else outside for step in range(30)]
-    memory: Memory | None = None
+    memory: TrackedPath | None = None
     told = []
     for step, line in enumerate([*flicker, *[cut_off] * 6]):
         mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
-        memory = remember(path(line), mask, memory, frame_s * step, CONFIG)
+        memory = track(path(line), mask, memory, frame_s * step, CONFIG)
         told.append(check_in_view(memory, CONFIG) is None)
     refused = told.index(False)
     assert frame_s * refused == pytest.approx(HEAD_AT_BORDER_S, abs=frame_s)
@@ -309,17 +309,17 @@ def test_a_mask_that_flickers_at_the_border_shows_no_head(frame_s: float) -> Non
 
 def test_a_head_beside_the_border_that_touches_it_in_single_frames_is_in_view() -> None:
     short_of_it, touching = (np.array([[20.0, 240.0], [tip, 240.0]]) for tip in (628.0, 639.0))
-    memory: Memory | None = None
+    memory: TrackedPath | None = None
     for step in range(40):
         line = touching if step % 5 == 4 else short_of_it
         mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
-        memory = remember(path(line), mask, memory, step / 30, CONFIG)
+        memory = track(path(line), mask, memory, step / 30, CONFIG)
         assert check_in_view(memory, CONFIG) is None
 
 
 def test_a_head_beside_the_border_that_does_not_meet_it_is_in_view() -> None:
     line = np.array([[20.0, 6.0], [600.0, 6.0]])  # runs along the border, 2 px of background beside it
     mask = probability(depth(line, 3.6)) >= 0.5
-    assert remember(path(line), mask, Memory(path(line), 0.0), 0.1, CONFIG).border_s is None
-    left_border = Memory(path(line), 0.0, -1.0, -0.1)
-    assert remember(path(line), mask, left_border, 0.1, CONFIG).border_s is None
+    assert track(path(line), mask, TrackedPath(path(line), 0.0), 0.1, CONFIG).border_s is None
+    left_border = TrackedPath(path(line), 0.0, -1.0, -0.1)
+    assert track(path(line), mask, left_border, 0.1, CONFIG).border_s is None

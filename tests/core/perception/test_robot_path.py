@@ -7,6 +7,7 @@ import pytest
 from core import geometry
 from core.config.models import PathConfig, PerceptionConfig, QualityConfig, load_config
 from core.perception import robot_path, segmentation, skeleton
+from core.perception.head_tail import PreviousPath
 from core.perception.robot_path import PathCandidate
 from core.perception.skeleton import PixelGraph
 from core.perception.vectors import fit_robot_vector
@@ -23,8 +24,8 @@ def perceive(
     robot: np.ndarray,
     vessel: np.ndarray | None = None,
     config: PerceptionConfig = CONFIG,
-    previous: RobotPath | None = None,
     port: Point | None = None,
+    before: PreviousPath = PreviousPath(),  # noqa: B008
 ) -> RobotPath | Refusal:
     """The stages before and the path, as the pipeline calls them."""
     found: Masks = segmentation.clean(everywhere() if vessel is None else vessel, robot, config)
@@ -32,7 +33,7 @@ def perceive(
     graph: VesselGraph | None = None
     if vessel is not None:
         graph = build_graph(skeletons.vessel, found.vessel, config.cleaning)
-    return robot_path.find(skeletons, found, config, previous, graph, port)
+    return robot_path.find(skeletons, found, config, vessel=graph, port=port, before=before)
 
 
 def path_of(robot: np.ndarray, **more: object) -> RobotPath:
@@ -82,7 +83,7 @@ def test_a_whole_robot_to_a_fraction_of_a_pixel() -> None:
 def test_head_and_direction_of_any_robot_in_any_direction(radius: float, angle_deg: float) -> None:
     line = turned(angle_deg, curve((120, 240), (240, 225), (330, 250), (400, 300)))
     previous = RobotPath(line, 1.0, None, False, 0.0, radius)  # tells head from tail: neither is at the border
-    path = path_of(probability(depth(line, radius)), previous=previous)
+    path = path_of(probability(depth(line, radius)), before=PreviousPath(previous))
     assert path.head == pytest.approx(tuple(line[-1]), abs=0.8)
     found, true = fit_robot_vector(path.points, 40.0), fit_robot_vector(line, 40.0)
     assert found is not None
@@ -260,7 +261,7 @@ def test_what_was_the_robot_in_the_last_frame_is_no_reflection() -> None:
     line = GLINT
     before = RobotPath(line, 1.0, None, False, 0.0, 3.0)
     assert isinstance(perceive(with_line(line, 0.9), vessel=VESSELS), RobotPath)
-    refusal = perceive(with_line(line, 0.9), vessel=VESSELS, previous=before)
+    refusal = perceive(with_line(line, 0.9), vessel=VESSELS, before=PreviousPath(before))
     assert isinstance(refusal, Refusal)
     assert refusal.reason is Reason.SEVERAL_ROBOTS
 
@@ -294,7 +295,7 @@ def test_a_robot_from_border_to_border_shows_no_head() -> None:
     robot = probability(depth(through, 4.0))
     assert reason_of(robot) is Reason.AMBIGUOUS_PATH
     before = RobotPath(through[20:-40], 1.0, None, True, 0.0, 4.0)
-    assert path_of(robot, previous=before).head[0] > 600  # the last frame knows which end is the head
+    assert path_of(robot, before=PreviousPath(before)).head[0] > 600  # the last frame knows which end is the head
 
 
 def test_the_last_frame_decides_between_nearly_equal_branches() -> None:
@@ -302,7 +303,7 @@ def test_the_last_frame_decides_between_nearly_equal_branches() -> None:
     fork = probability(depth(up, 4.0), depth(down, 4.0))
     for line in (up, down):
         before = RobotPath(line[:-10], 1.0, None, True, 0.0, 4.0)
-        assert path_of(fork, previous=before).head == pytest.approx(tuple(line[-1]), abs=1.0)
+        assert path_of(fork, before=PreviousPath(before)).head == pytest.approx(tuple(line[-1]), abs=1.0)
     assert path_of(fork).runner_up is not None
 
 
@@ -336,7 +337,7 @@ def mesh(pitch_px: int, until_px: int = 640) -> np.ndarray:
 
 
 def test_a_mesh_is_not_searched_for_a_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot_path.trails, "explore", lambda *_: pytest.fail("searched"))
+    monkeypatch.setattr(robot_path, "explore", lambda *_: pytest.fail("searched"))
     refusal = perceive(mesh(60))
     assert isinstance(refusal, Refusal)
     assert refusal.reason is Reason.AMBIGUOUS_PATH
@@ -357,13 +358,13 @@ def test_hundreds_of_pieces_are_not_even_sorted(monkeypatch: pytest.MonkeyPatch)
 
 def test_all_starts_of_a_frame_share_one_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
-    explore = robot_path.trails.explore
+    explore = robot_path.explore
 
     def counted(graph: PixelGraph, start: int, config: PathConfig, budget: int) -> list[PathCandidate]:
         given.append(budget)
         return explore(graph, start, config, budget)
 
-    monkeypatch.setattr(robot_path.trails, "explore", counted)
+    monkeypatch.setattr(robot_path, "explore", counted)
     perceive(mesh(100, until_px=400))
     assert len(given) > 8
     assert sum(given) <= 20 * CONFIG.path.max_candidates
@@ -412,7 +413,7 @@ def test_in_a_stream_a_head_that_reaches_the_border_stays_the_head() -> None:
     path: RobotPath | None = None
     for head_x in (610.0, 620.0, 630.0, 637.0):  # the tail lies in the picture, where an opaque fitting ends
         robot = probability(depth(curve((110, 240), (300, 243), (head_x, 240)), 4.0))
-        path = path_of(robot, vessel=vessel, previous=path)
+        path = path_of(robot, vessel=vessel, before=PreviousPath(path))
         assert path.head[0] == pytest.approx(head_x, abs=2.0)
         assert path.tail[0] == pytest.approx(110.0, abs=2.0)
 
@@ -422,12 +423,12 @@ def test_in_a_stream_a_tail_that_comes_into_view_at_the_border_is_the_tail() -> 
     whole, torn = probability(depth(line, 4.0)), probability(depth(curve((120, 241), (300, 243), (420, 240)), 4.0))
     swapped = path_of(torn)
     before = RobotPath(swapped.points if swapped.head[0] < 200 else swapped.points[::-1], 1.0, None, False, 0.0, 4.0)
-    assert path_of(whole, previous=before).head[0] > 400
+    assert path_of(whole, before=PreviousPath(before)).head[0] > 400
 
 
 def test_in_a_stream_a_wrong_head_beside_the_border_is_mended_when_it_shows_to_be_the_entry() -> None:
     vessel = probability(depth(curve((-20, 240), (300, 240), (660, 240)), 22.0))
     line = curve((9, 240), (150, 243), (300, 240))
     before = RobotPath(line[::-1], 1.0, None, False, 0.0, 4.0)
-    path = path_of(probability(depth(curve((-20, 240), (150, 243), (300, 240)), 4.0)), vessel=vessel, previous=before)
+    path = path_of(probability(depth(curve((-20, 240), (150, 243), (300, 240)), 4.0)), vessel=vessel, before=PreviousPath(before))
     assert path.head[0] == pytest.approx(300.0, abs=2.0)

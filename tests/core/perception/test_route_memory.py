@@ -33,7 +33,7 @@ def memory() -> RouteMemory:
     memory = RouteMemory(CONFIG)
     for at_s in (-CONFIG.memory_s, 0.0):
         found = _route()
-        assert memory.follow(found, (20.0, 100.0), TARGET, _vessel(), at_s) is found
+        assert memory.update(found, (20.0, 100.0), TARGET, _vessel(), at_s) is found
     return memory
 
 
@@ -44,7 +44,7 @@ SHORT_CUT = Route(np.array([(120.0, 100.0), (200.0, 130.0), TARGET]), 150.0, TAR
 
 
 def test_a_short_gap_ahead_does_not_undo_it(memory: RouteMemory) -> None:
-    left = memory.follow(WHY, (120.0, 106.0), TARGET, _vessel((200, 235)), 0.0)
+    left = memory.update(WHY, (120.0, 106.0), TARGET, _vessel((200, 235)), 0.0)
     assert isinstance(left, Route)
     assert left.length_px == pytest.approx(260.0, abs=2.0)
     assert left.points[0] == pytest.approx((120.0, 100.0), abs=1.0)
@@ -53,24 +53,24 @@ def test_a_short_gap_ahead_does_not_undo_it(memory: RouteMemory) -> None:
 
 
 def test_a_long_gap_does(memory: RouteMemory) -> None:
-    assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel((200, 250)), 0.0) == WHY
-    assert isinstance(memory.follow(WHY, (250.0, 100.0), TARGET, _vessel((200, 250)), 0.0), Route), "it lies behind the head now"
+    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel((200, 250)), 0.0) == WHY
+    assert isinstance(memory.update(WHY, (250.0, 100.0), TARGET, _vessel((200, 250)), 0.0), Route), "it lies behind the head now"
 
 
 def test_a_head_that_is_elsewhere_has_no_way(memory: RouteMemory) -> None:
-    assert memory.follow(WHY, (120.0, 135.0), TARGET, _vessel((200, 230)), 0.0) == WHY
+    assert memory.update(WHY, (120.0, 135.0), TARGET, _vessel((200, 230)), 0.0) == WHY
 
 
 def test_another_destination_has_to_be_found_itself(memory: RouteMemory) -> None:
-    assert memory.follow(WHY, (120.0, 100.0), (300.0, 100.0), _vessel(), 0.0) == WHY
-    assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY, "and the old one is forgotten with it"
+    assert memory.update(WHY, (120.0, 100.0), (300.0, 100.0), _vessel(), 0.0) == WHY
+    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY, "and the old one is forgotten with it"
 
 
 def test_what_is_found_anew_and_lasts_replaces_it(memory: RouteMemory) -> None:
     around = Route(np.linspace((120.0, 100.0), (120.0, 190.0), 50), 500.0, TARGET)
-    assert memory.follow(around, (120.0, 100.0), TARGET, _vessel(), 1.0) is not around
-    assert memory.follow(around, (120.0, 100.0), TARGET, _vessel(), 1.5) is around
-    left = memory.follow(WHY, (120.0, 120.0), TARGET, np.ones((200, 400), np.bool_), 1.6)
+    assert memory.update(around, (120.0, 100.0), TARGET, _vessel(), 1.0) is not around
+    assert memory.update(around, (120.0, 100.0), TARGET, _vessel(), 1.5) is around
+    left = memory.update(WHY, (120.0, 120.0), TARGET, np.ones((200, 400), np.bool_), 1.6)
     assert isinstance(left, Route)
     assert left.points[-1] == pytest.approx((120.0, 190.0))
 
@@ -79,31 +79,31 @@ def test_a_way_that_was_found_for_a_moment_only_holds_over_nothing() -> None:
     """One frame in which two vessels seem to touch must not lead the robot for as long as nothing else is found."""
     memory = RouteMemory(CONFIG)
     head, cut = (120.0, 100.0), _vessel((200, 212))
-    assert memory.follow(SHORT_CUT, head, TARGET, _vessel(), 0.0) is SHORT_CUT
-    assert memory.follow(WHY, head, TARGET, cut, 0.03) == WHY
+    assert memory.update(SHORT_CUT, head, TARGET, _vessel(), 0.0) is SHORT_CUT
+    assert memory.update(WHY, head, TARGET, cut, 0.03) == WHY
     found = _route(120.0)
-    assert memory.follow(found, head, TARGET, _vessel(), 0.06) is found, "and stands against nothing"
+    assert memory.update(found, head, TARGET, _vessel(), 0.06) is found, "and stands against nothing"
     for at_s in (0.1, 0.3, 0.5):
-        assert memory.follow(_route(120.0), head, TARGET, _vessel(), at_s)
-        assert memory.follow(WHY, head, TARGET, cut, at_s + 0.01) == WHY
-    memory.follow(_route(120.0), head, TARGET, _vessel(), 0.56)
-    assert isinstance(memory.follow(WHY, head, TARGET, cut, 0.6), Route), "found for half a second, but for moments"
+        assert memory.update(_route(120.0), head, TARGET, _vessel(), at_s)
+        assert memory.update(WHY, head, TARGET, cut, at_s + 0.01) == WHY
+    memory.update(_route(120.0), head, TARGET, _vessel(), 0.56)
+    assert isinstance(memory.update(WHY, head, TARGET, cut, 0.6), Route), "found for half a second, but for moments"
 
 
 def test_finds_long_apart_are_no_lasting(memory: RouteMemory) -> None:
-    memory.forget()
+    memory.reset()
     for at_s in (1.0, 3.0, 5.0):
-        memory.follow(_route(120.0), (120.0, 100.0), TARGET, _vessel(), at_s)
-        assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel(), at_s + 0.1) == WHY
+        memory.update(_route(120.0), (120.0, 100.0), TARGET, _vessel(), at_s)
+        assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel(), at_s + 0.1) == WHY
 
 
 def test_parts_outside_the_picture_are_gaps(memory: RouteMemory) -> None:
-    assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel()[:, :330], 0.0) == WHY
-    assert isinstance(memory.follow(WHY, (120.0, 100.0), TARGET, _vessel()[:, :360], 0.0), Route)
+    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel()[:, :330], 0.0) == WHY
+    assert isinstance(memory.update(WHY, (120.0, 100.0), TARGET, _vessel()[:, :360], 0.0), Route)
 
 
 def test_at_its_end_the_destination_is_reached(memory: RouteMemory) -> None:
-    left = memory.follow(WHY, (390.0, 100.0), TARGET, _vessel(), 0.0)
+    left = memory.update(WHY, (390.0, 100.0), TARGET, _vessel(), 0.0)
     assert isinstance(left, Route)
     assert left.length_px == 0.0
     assert left.points == pytest.approx(np.array([TARGET]))
@@ -112,44 +112,44 @@ def test_at_its_end_the_destination_is_reached(memory: RouteMemory) -> None:
 def test_what_a_frame_found_that_was_not_believed_is_not_kept(memory: RouteMemory) -> None:
     memory.settle(is_believed=True)
     elsewhere = Route(np.linspace((120.0, 190.0), TARGET, 50), 280.0, TARGET)
-    assert memory.follow(elsewhere, (120.0, 190.0), TARGET, _vessel(), 0.1) is elsewhere, "it is shown"
+    assert memory.update(elsewhere, (120.0, 190.0), TARGET, _vessel(), 0.1) is elsewhere, "it is shown"
     memory.settle(is_believed=False)
     memory.settle(is_believed=False)  # a frame in which nobody asked for a way
-    left = memory.follow(WHY, (120.0, 100.0), TARGET, _vessel((200, 235)), 0.2)
+    left = memory.update(WHY, (120.0, 100.0), TARGET, _vessel((200, 235)), 0.2)
     assert isinstance(left, Route)
     assert left.length_px == pytest.approx(260.0, abs=2.0)
 
 
 def test_a_way_that_was_forgotten_does_not_come_back_with_a_frame_that_was_not_believed(memory: RouteMemory) -> None:
     memory.settle(is_believed=True)
-    assert memory.follow(WHY, (120.0, 100.0), (300.0, 100.0), _vessel(), 0.1) == WHY, "another destination"
+    assert memory.update(WHY, (120.0, 100.0), (300.0, 100.0), _vessel(), 0.1) == WHY, "another destination"
     memory.settle(is_believed=False)
-    assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel((200, 212)), 0.2) == WHY
+    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel((200, 212)), 0.2) == WHY
 
 
 def test_forgotten_is_forgotten(memory: RouteMemory) -> None:
-    memory.forget()
-    assert memory.follow(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY
+    memory.reset()
+    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY
 
 
 @pytest.mark.parametrize("other", [DETOUR, SHORT_CUT], ids=["detour", "short cut"])
 def test_another_way_of_a_moment_is_not_taken(memory: RouteMemory, other: Route) -> None:
     head, cut = (120.0, 100.0), _vessel((200, 212))
-    left = memory.follow(other, head, TARGET, cut, 0.1)
+    left = memory.update(other, head, TARGET, cut, 0.1)
     assert isinstance(left, Route)
     assert left.length_px == pytest.approx(260.0, abs=2.0)
-    assert memory.follow(other, head, TARGET, cut, CONFIG.memory_s + 0.1) is other, "what lasts is true: perhaps the way was none"
-    assert memory.follow(other, head, TARGET, cut, CONFIG.memory_s + 0.2) is other
+    assert memory.update(other, head, TARGET, cut, CONFIG.memory_s + 0.1) is other, "what lasts is true: perhaps the way was none"
+    assert memory.update(other, head, TARGET, cut, CONFIG.memory_s + 0.2) is other
 
 
 @pytest.mark.parametrize("other", [DETOUR, SHORT_CUT], ids=["detour", "short cut"])
 def test_nor_is_it_when_the_way_was_not_found_for_long(memory: RouteMemory, other: Route) -> None:
     head, cut = (120.0, 100.0), _vessel((200, 212))
-    assert isinstance(memory.follow(WHY, head, TARGET, cut, 5.0), Route)
-    left = memory.follow(other, head, TARGET, cut, 5.03)
+    assert isinstance(memory.update(WHY, head, TARGET, cut, 5.0), Route)
+    left = memory.update(other, head, TARGET, cut, 5.03)
     assert left is not other
-    assert memory.follow(_route(120.0), head, TARGET, _vessel(), 5.3) is not left
-    assert memory.follow(other, head, TARGET, cut, 5.6) is not other, "it has been seen to be none meanwhile"
+    assert memory.update(_route(120.0), head, TARGET, _vessel(), 5.3) is not left
+    assert memory.update(other, head, TARGET, cut, 5.6) is not other, "it has been seen to be none meanwhile"
 
 
 _ARC = np.linspace(0.0, np.pi, 100)
@@ -164,19 +164,19 @@ def test_round_a_loop_the_way_does_not_change_from_frame_to_frame() -> None:
     memory, head = RouteMemory(CONFIG), (120.0, 100.0)
     vessel = np.ones((200, 400), np.bool_)
     for step in range(18):
-        assert memory.follow(ABOVE, head, TARGET, vessel, step / 30) is ABOVE
+        assert memory.update(ABOVE, head, TARGET, vessel, step / 30) is ABOVE
     for step in range(18, 60):
-        told = memory.follow((ABOVE, BELOW)[step % 2], head, TARGET, vessel, step / 30)
+        told = memory.update((ABOVE, BELOW)[step % 2], head, TARGET, vessel, step / 30)
         assert isinstance(told, Route)
         assert told.points[50][1] == pytest.approx(40.0, abs=1.0), "above"
     for step in range(60, 80):
-        told = memory.follow(BELOW, head, TARGET, vessel, step / 30)
+        told = memory.update(BELOW, head, TARGET, vessel, step / 30)
     assert told is BELOW, "what lasts is true"
 
 
 def test_other_ways_that_contradict_each_other_are_not_taken(memory: RouteMemory) -> None:
     head, cut = (120.0, 100.0), _vessel((200, 212))
     for step in range(40):
-        told = memory.follow((DETOUR, SHORT_CUT)[step % 2], head, TARGET, cut, 0.1 + step / 30)
+        told = memory.update((DETOUR, SHORT_CUT)[step % 2], head, TARGET, cut, 0.1 + step / 30)
         assert isinstance(told, Route)
         assert told.length_px == pytest.approx(260.0, abs=2.0)

@@ -6,6 +6,7 @@ import json
 import math
 import pickle
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,8 @@ from core.learning.model_writer import save_model, save_with_second_look
 from core.learning.training_plan import TrainingPlan
 from core.perception.inference import OpenVinoSegmenter, open_second_look
 from core.perception.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info
-from core.perception.segmentation import MARGIN_PX, window_around
-from core.perception.tip_refinement import MOST_LOOKS, WINDOW_PX, Planes, TipRefinement, places_to_look, planes_of
+from core.perception.segmentation import MARGIN_PX, Segmenter, window_around
+from core.perception.tip_refinement import MAX_PASSES, WINDOW_PX, Planes, TipRefinement, find_tips, stack_planes
 from core.perception.unet import DualUNet, UNetShape, with_prior_planes
 from core.types import Point
 
@@ -35,7 +36,7 @@ def bar(start: int, end: int, row: int = 240) -> np.ndarray:
     return robot
 
 
-class First:
+class First(Segmenter):
     """A first look that always sees the same."""
 
     engine = "drawn"
@@ -48,7 +49,7 @@ class First:
         return self.vessel, self.robot
 
 
-class Near:
+class Near(Segmenter):
     """A second network that knows the truth by heart, from the picture's red plane, and counts its looks."""
 
     engine = "drawn"
@@ -61,6 +62,16 @@ class Near:
         return np.full(planes.shape[:2], 0.75, np.float32), (planes[:, :, 0] > 0).astype(np.float32)
 
 
+class Answering(Segmenter):
+    """A network given by a function."""
+
+    def __init__(self, answer: Callable[[Planes], tuple[np.ndarray, np.ndarray]]) -> None:
+        self.answer = answer
+
+    def __call__(self, image: Planes) -> tuple[np.ndarray, np.ndarray]:
+        return self.answer(image)
+
+
 def picture_of(robot: np.ndarray) -> np.ndarray:
     image = np.zeros((*SIZE, 3), np.uint8)
     image[:, :, 0] = np.where(robot > 0.5, 200, 0)
@@ -69,7 +80,7 @@ def picture_of(robot: np.ndarray) -> np.ndarray:
 
 def test_ends_inside_the_picture_are_looked_at() -> None:
     robot = bar(0, 300)
-    ((x, y),) = places_to_look(robot)
+    ((x, y),) = find_tips(robot)
     assert 285 <= x < 300
     assert abs(y - 240) <= 1
 
@@ -77,21 +88,21 @@ def test_ends_inside_the_picture_are_looked_at() -> None:
 def test_the_largest_piece_comes_first_and_specks_do_not_count() -> None:
     robot = np.maximum(bar(0, 300), bar(400, 440, row=100))
     robot[400:403, 400:403] = 0.9
-    places = places_to_look(robot)
+    places = find_tips(robot)
     assert [round(y / 10) for _, y in places] == [24, 10, 10]
 
 
 def test_where_nothing_is_a_robot_the_likeliest_place_is_looked_at() -> None:
     faint = bar(200, 260) * 0.4
-    ((x, y),) = places_to_look(faint)
+    ((x, y),) = find_tips(faint)
     assert 200 <= x < 260
     assert abs(y - 240) <= 4
-    assert places_to_look(faint * 0.1) == []
+    assert find_tips(faint * 0.1) == []
 
 
 def test_noise_is_not_looked_at_end_by_end() -> None:
     noise = (np.random.default_rng(0).random(SIZE) > 0.5).astype(np.float32)
-    assert len(places_to_look(noise)) <= 200
+    assert len(find_tips(noise)) <= 200
 
 
 @pytest.mark.parametrize(
@@ -130,21 +141,21 @@ def test_the_network_is_shown_the_picture_and_the_first_look() -> None:
 
 def test_where_the_vessel_is_known_the_robot_alone_is_looked_at() -> None:
     class Alone(Near):
-        def robots(self, images: list[Planes]) -> list[np.ndarray]:
+        def segment_robots(self, images: list[Planes]) -> list[np.ndarray]:
             return [self(planes)[1] for planes in images]
 
     near, true, known = Alone(), bar(0, 320), np.full(SIZE, 0.5, np.float32)
     near_both = Near()
     segment = TipRefinement(First(bar(0, 300)), near)
-    found = segment.robot_beside(known, picture_of(true))
+    found = segment.segment_robot_beside(known, picture_of(true))
     assert (found[240, 250:318] > 0.5).all()
     assert not (found[240, 324:] > 0.5).any()
     assert {int(shown[0, 0, 3]) for shown in near.shown} == {128}, "it is shown the vessel that is known"
-    np.testing.assert_array_equal(TipRefinement(First(bar(0, 300)), near_both).robot_beside(known, picture_of(true)), found)
+    np.testing.assert_array_equal(TipRefinement(First(bar(0, 300)), near_both).segment_robot_beside(known, picture_of(true)), found)
     assert (known == 0.5).all(), "which stays what it was"
     once = len(near.shown)
     near.shown.clear()
-    often = TipRefinement(First(bar(0, 300)), near, looks=4).robot_beside(known, picture_of(true))
+    often = TipRefinement(First(bar(0, 300)), near, passes=4).segment_robot_beside(known, picture_of(true))
     assert len(near.shown) == 4 * once, "as often as the confidence was calibrated with"
     assert (often[240, 250:316] > 0.5).all()
 
@@ -340,7 +351,7 @@ def test_a_second_look_that_is_followed_by_another_counts_half() -> None:
         return np.full(planes.shape[:2], 0.5, np.float32), robot
 
     shown: list[Planes] = []
-    vessel, robot = TipRefinement(First(bar(0, 300)), near, looks=2)(picture_of(bar(0, 370)))
+    vessel, robot = TipRefinement(First(bar(0, 300)), Answering(near), passes=2)(picture_of(bar(0, 370)))
     assert [int(planes[:, :, 4].max()) for planes in shown[:2]] == [230, 255], "the second time it is shown what it found itself"
     assert vessel[240, 300] == pytest.approx(0.5, abs=0.01)
     assert robot[240, 315] == pytest.approx(1.0, abs=0.01)
@@ -358,7 +369,7 @@ def test_later_looks_are_through_windows_beside_each_other_and_the_mean_counts()
         return np.full(planes.shape[:2], said, np.float32), (planes[:, :, 0] > 0).astype(np.float32)
 
     shown: list[tuple[int, int]] = []
-    segmenter = TipRefinement(First(bar(0, 300)), near, looks=MOST_LOOKS)
+    segmenter = TipRefinement(First(bar(0, 300)), Answering(near), passes=MAX_PASSES)
     vessel, _ = segmenter(picture)
     begins = np.array(shown) - shown[0]
     assert begins.tolist()[:2] == [[0, 0], [0, 0]]
@@ -367,10 +378,10 @@ def test_later_looks_are_through_windows_beside_each_other_and_the_mean_counts()
     assert segmenter.engine == "drawn, second look 4 times"
 
 
-@pytest.mark.parametrize("looks", [0, MOST_LOOKS + 1])
+@pytest.mark.parametrize("looks", [0, MAX_PASSES + 1])
 def test_more_looks_than_there_are_windows_for_are_refused(looks: int) -> None:
-    with pytest.raises(ValueError, match=f"1 to {MOST_LOOKS} times, not {looks}"):
-        TipRefinement(First(bar(0, 300)), Near(), looks=looks)
+    with pytest.raises(ValueError, match=f"1 to {MAX_PASSES} times, not {looks}"):
+        TipRefinement(First(bar(0, 300)), Near(), passes=looks)
 
 
 @pytest.mark.parametrize("device", ["openvino", "torch"])
@@ -379,7 +390,7 @@ def test_every_engine_can_look_again(model: Path, device: str, precision: str) -
     config = SegmentationConfig.model_validate({"model": str(model), "device": device, "precision": precision, "threads": 1})
     near = open_second_look(config)
     assert near is not None
-    planes = planes_of(np.full((160, 160, 3), 90, np.uint8), np.zeros((160, 160), np.float32), np.ones((160, 160), np.float32))
+    planes = stack_planes(np.full((160, 160, 3), 90, np.uint8), np.zeros((160, 160), np.float32), np.ones((160, 160), np.float32))
     vessel, robot = near(planes)
     assert vessel.shape == robot.shape == (160, 160)
     first = OpenVinoSegmenter(model, 1, "fp32")(planes[:, :, :3])

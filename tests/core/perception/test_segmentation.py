@@ -10,8 +10,8 @@ import pytest
 import torch
 
 from core.learning.model_writer import save_model
-from core.perception.inference import OpenVinoSegmenter, TorchSegmenter, _robot_alone
-from core.perception.segmentation import Pairing, Segmenter, Turned, robot_beside, robots, see
+from core.perception.inference import OpenVinoSegmenter, TorchSegmenter, _without_vessel
+from core.perception.segmentation import OrientationAverage, Segmenter
 from core.perception.unet import DualUNet, UNetShape
 
 TWO_MODELS = """
@@ -62,10 +62,9 @@ def undecided(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("turned", [False, True])
 def test_what_is_seen_together_is_what_is_seen_alone(undecided: Path, precision: str, turned: bool) -> None:
     segment = OpenVinoSegmenter(undecided, 1, precision)
-    assert isinstance(segment, Pairing)
-    looking = Turned(segment) if turned else segment
+    looking = OrientationAverage(segment) if turned else segment
     alone = [np.stack(looking(image)) for image in pictures()]
-    together = [np.stack(found) for found in see(looking, pictures())]
+    together = [np.stack(found) for found in looking.segment_batch(pictures())]
     assert [found.shape for found in together] == [(2, *image.shape[:2]) for image in pictures()]
     for one, other in zip(alone, together, strict=True):
         # In eight bits a value at the middle of a step may be rounded to either side.
@@ -77,7 +76,7 @@ def test_what_is_seen_together_is_what_is_seen_alone(undecided: Path, precision:
 def test_the_robot_alone_is_the_robot_that_is_seen_beside_the_vessel(undecided: Path, engine: str) -> None:
     segment: Segmenter = TorchSegmenter(undecided, 1) if engine == "torch" else OpenVinoSegmenter(undecided, 1, engine)
     both = [segment(image)[1] for image in pictures()]
-    alone = robots(segment, pictures())
+    alone = segment.segment_robots(pictures())
     assert [robot.shape for robot in alone] == [(70, 128)] * 5
     for one, other in zip(both, alone, strict=True):
         assert np.abs(one - other).mean() < 0.0005
@@ -89,7 +88,8 @@ def test_the_robot_alone_is_the_robot_that_is_seen_beside_the_vessel(undecided: 
 def test_the_robot_alone_leaves_the_vessels_decoder_out(undecided: Path) -> None:
     segment = OpenVinoSegmenter(undecided, 1, "fp32")
     counts = [
-        sum(node.get_type_name() == "Convolution" for node in model.get_ordered_ops()) for model in (segment._model, segment._robot)
+        sum(node.get_type_name() == "Convolution" for node in model.get_ordered_ops())
+        for model in (segment._model, segment._robot_model)
     ]
     # ten of the encoder; four and the output of each decoder
     assert counts == [10 + 2 * 5, 10 + 5]
@@ -115,8 +115,8 @@ def test_a_network_of_another_shape_is_asked_for_both() -> None:
         (two, picture),
     ):
         model = openvino.Model([end], [given], "other")
-        assert _robot_alone(model) is model
-    assert _robot_alone(openvino.Model([opset13.sigmoid(two)], [picture], "ours")) is not model
+        assert _without_vessel(model) is model
+    assert _without_vessel(openvino.Model([opset13.sigmoid(two)], [picture], "ours")) is not model
 
 
 @pytest.mark.parametrize(("fold", "planes"), [(1, 3), (4, 3), (2, 5)])
@@ -128,18 +128,18 @@ def test_networks_of_all_shapes_can_leave_the_vessel_out(tmp_path: Path, fold: i
     save_model(network, tmp_path / "any", training={}, figures={}, examples=[image])
     for precision in ("int8", "fp32"):
         segment = OpenVinoSegmenter(tmp_path / "any", 1, precision)
-        (alone,) = robots(segment, [image])
-        assert segment._robot is not segment._model
+        (alone,) = segment.segment_robots([image])
+        assert segment._robot_model is not segment._model
         np.testing.assert_allclose(alone, segment(image)[1], atol=1e-6)
 
 
 def test_several_threads_may_ask_one_network(undecided: Path) -> None:
     """A picture that stands is looked at again in a thread of its own, while a rig that was opened meanwhile has the network."""
     segment = OpenVinoSegmenter(undecided, 1)
-    alone = [segment.recognise([image])[0] for image in pictures()[:3]]
+    alone = [segment.segment_signed([image])[0] for image in pictures()[:3]]
 
     def same(picture: int) -> bool:
-        found = segment.recognise([pictures()[picture]])[0]
+        found = segment.segment_signed([pictures()[picture]])[0]
         return all(np.array_equal(one, other) for one, other in zip(found, alone[picture], strict=True))
 
     with ThreadPoolExecutor(3) as threads:
@@ -149,7 +149,7 @@ def test_several_threads_may_ask_one_network(undecided: Path) -> None:
 def test_who_cannot_see_together_is_asked_one_by_one() -> None:
     asked = []
 
-    class OneByOne:
+    class OneByOne(Segmenter):
         engine = "a test's"
 
         def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -157,9 +157,11 @@ def test_who_cannot_see_together_is_asked_one_by_one() -> None:
             return image[:, :, 0] / np.float32(255), image[:, :, 1] / np.float32(255)
 
     images = pictures()
-    np.testing.assert_array_equal(robot_beside(OneByOne(), images[1][:, :, 2], images[0]), images[0][:, :, 1] / np.float32(255))
+    np.testing.assert_array_equal(
+        OneByOne().segment_robot_beside(images[1][:, :, 2], images[0]), images[0][:, :, 1] / np.float32(255)
+    )
     asked.clear()
-    found = see(Turned(OneByOne()), images)
+    found = OrientationAverage(OneByOne()).segment_batch(images)
     assert len(asked) == 8 * len(images)
     for image, (vessel, robot) in zip(images, found, strict=True):
         np.testing.assert_allclose(vessel, image[:, :, 0] / 255, atol=1e-5)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.config.models import PerceptionConfig, TrackingConfig
-from core.perception.pipeline import Pipeline, Sight
+from core.perception.pipeline import CalibratedSegmenter, Pipeline
 from core.perception.roi import ORIENTATIONS, VesselAverage, cells_of
 from core.types import Frame, Image, Reason, Scene
 from tests.core.perception.test_glance import CONFIG, GREEN, GREY, RED, VESSEL, WHOLE, Colours, picture
@@ -36,7 +36,7 @@ def network() -> Biased:
 
 @pytest.fixture
 def pipeline(network: Biased) -> Pipeline:
-    return Pipeline(network, CONFIG, glance=Sight(network))
+    return Pipeline(network, CONFIG, roi=CalibratedSegmenter(network))
 
 
 def going_on(time_s: float) -> Image:
@@ -101,7 +101,7 @@ def bent(dent_px: float) -> Image:
 
 def test_a_vessel_that_is_bent_in_one_place_is_seen_bent_with_the_next_whole_look() -> None:
     network = Colours()
-    pipeline = Pipeline(network, CONFIG, glance=Sight(network))
+    pipeline = Pipeline(network, CONFIG, roi=CalibratedSegmenter(network))
     straight = whole_looks(pipeline, 5.0, lambda _: bent(0.0))[-1]
     for scene in whole_looks(pipeline, 5.0, lambda _: bent(14.0), start_s=5.0):
         assert middle_of(scene, 430) - middle_of(straight, 430) == pytest.approx(14.0, abs=1.0)
@@ -162,7 +162,7 @@ def test_a_look_that_is_broken_does_not_count(pipeline: Pipeline, network: Biase
 )
 def test_who_looks_at_all_of_every_picture_sees_it_as_it_is(network: Biased, tracking: TrackingConfig) -> None:
     """One orientation after the other would make the head tremble."""
-    pipeline = Pipeline(network, PerceptionConfig(tracking=tracking), glance=Sight(network))
+    pipeline = Pipeline(network, PerceptionConfig(tracking=tracking), roi=CalibratedSegmenter(network))
     for step in range(5):
         pipeline(Frame(step, 0.05 * step, picture(300)))
     assert [np.array_equal(image, picture(300)) for image in network.pictures] == [True] * 5
@@ -178,7 +178,7 @@ def test_pictures_without_an_answer_are_seen_as_they_are(pipeline: Pipeline, net
 
 
 def test_who_looks_in_all_orientations_at_once_need_not_do_so_in_turn(network: Biased) -> None:
-    pipeline = Pipeline(network, CONFIG, glance=Sight(network, all_orientations=True))
+    pipeline = Pipeline(network, CONFIG, roi=CalibratedSegmenter(network, all_orientations=True))
     scenes = whole_looks(pipeline, 4.0)
     shown = [image for image in network.pictures if image.shape == WHOLE]
     assert [np.array_equal(image, going_on(scene.captured_s)) for image, scene in zip(shown, scenes, strict=True)] == [True] * 4
@@ -199,9 +199,9 @@ def test_every_orientation_is_undone() -> None:
     for step in range(ORIENTATIONS):
         assert standing.is_gathering is (step > 0)
         standing.begin(is_turned=True)
-        turned = standing.turned(image)
+        turned = standing.orient(image)
         assert turned.shape == image.shape
-        found = standing.upright(turned[:, :, 0].astype(np.float32))
+        found = standing.orient(turned[:, :, 0].astype(np.float32))
         np.testing.assert_array_equal(found, image[:, :, 0])
         assert found.flags.c_contiguous
         seen.append(turned.tobytes())
@@ -219,7 +219,7 @@ def test_the_mean_is_of_the_newest_look_in_each_orientation() -> None:
         means.append(float(standing.add(found, np.zeros_like(found), STILL, 0.0)[0, 0]))
         assert found[0, 0] == value, "what was given stays as it is"
     assert means == [0.0, 0.5, 0.5, 0.5, 0.75, 0.5]
-    standing.forget()
+    standing.reset()
     standing.begin(is_turned=True)
     assert float(standing.add(found + np.float32(0.25), found, STILL, 0.0)[0, 0]) == 0.25
 
