@@ -78,7 +78,7 @@ def test_the_steepest_steps_are_found_without_sorting_all(size: int) -> None:
     for values in (*kinds, at_the_far_end):
         steps = values.astype(np.float32)
         place = int(0.995 * (size - 1))
-        assert quality._of_the_largest(steps, size - place) == np.sort(steps)[place]
+        assert quality._nth_largest(steps, size - place) == np.sort(steps)[place]
 
 
 @pytest.mark.parametrize("scale_px", [1.0, 2.0, 4.0])
@@ -238,12 +238,12 @@ MEMORY = TrackedPath(path(), captured_s=10.0)
 
 @pytest.mark.parametrize(("now_s", "kept"), [(10.0, True), (10.03, True), (10.5, True), (10.51, False), (9.9, False)])
 def test_the_memory_fades_and_does_not_look_into_the_future(now_s: float, kept: bool) -> None:
-    assert (recall(MEMORY, now_s, TRACKING) is MEMORY.path) is kept
+    assert (recall(MEMORY, now_s, TRACKING).path is MEMORY.path) is kept
 
 
 def test_no_memory_and_tracking_switched_off() -> None:
-    assert recall(None, 10.0, TRACKING) is None
-    assert recall(MEMORY, 10.0, TRACKING.model_copy(update={"enabled": False})) is None
+    assert recall(None, 10.0, TRACKING).path is None
+    assert recall(MEMORY, 10.0, TRACKING.model_copy(update={"enabled": False})).path is None
 
 
 def test_a_head_cannot_jump_farther_than_the_robot_moves() -> None:

@@ -1,168 +1,139 @@
-"""The inference engines as the process sees them; what they compute is tested with the pipeline and the models."""
-
-import subprocess
-import sys
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
-
+import cv2
 import numpy as np
 import pytest
-import torch
 
-from core.learning.model_writer import save_model
-from core.perception.inference import OpenVinoSegmenter, TorchSegmenter, _without_vessel
-from core.perception.segmentation import OrientationAverage, Segmenter
-from core.perception.unet import DualUNet, UNetShape
+from core.config.models import CleaningConfig, PerceptionConfig, SegmentationConfig
+from core.perception.segmentation import clean, clean_mask
+from tests.core.drawing import art, picture
 
-TWO_MODELS = """
-import gc, os, signal
-import numpy as np
-from core.config.models import SegmentationConfig
-from core.perception.inference import open_segmenter
-
-config = SegmentationConfig(device="openvino", threads=1)
-first, second = open_segmenter(config), open_segmenter(config)
-for segment in (first, second):
-    segment(np.zeros((64, 64, 3), np.uint8))
-del segment, first
-gc.collect()
-del second
-gc.collect()
-signal.signal(signal.SIGTERM, lambda *_: print("heard"))
-os.kill(os.getpid(), signal.SIGTERM)
-"""
+CLUTTERED = art("""
+##............
+##..########..
+....########..
+....##.##.##..
+....########..
+.#..########..
+""")
 
 
-def test_a_signal_is_survived_when_models_were_opened_and_dropped() -> None:
-    """OpenVINO's stack for signals is unmapped when a second one gives it back: Ctrl-C after a change of the model killed us."""
-    done = subprocess.run([sys.executable, "-c", TWO_MODELS], capture_output=True, text=True, timeout=120, check=False)
-    assert (done.returncode, done.stdout) == (0, "heard\n"), done.stderr
-
-
-def pictures() -> list[np.ndarray]:
-    """An odd number of one size, which is none of whole strides."""
-    rng = np.random.default_rng(6)
-    return [rng.integers(0, 256, (70, 128, 3)).astype(np.uint8) for _ in range(5)]
-
-
-@pytest.fixture(scope="module")
-def undecided(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small model of random weights whose answers differ from place to place and from picture to picture."""
-    torch.manual_seed(7)
-    network = DualUNet(UNetShape((8, 8, 8, 8, 8), (8, 8, 8, 8), 1, 2))
-    for decoder in (network.vessel, network.robot):
-        torch.nn.init.normal_(decoder.output.weight)
-        torch.nn.init.zeros_(decoder.output.bias)
-    folder = tmp_path_factory.mktemp("models") / "undecided"
-    save_model(network, folder, training={}, figures={}, examples=pictures())
-    return folder
-
-
-@pytest.mark.parametrize("precision", ["int8", "fp32"])
-@pytest.mark.parametrize("turned", [False, True])
-def test_what_is_seen_together_is_what_is_seen_alone(undecided: Path, precision: str, turned: bool) -> None:
-    segment = OpenVinoSegmenter(undecided, 1, precision)
-    looking = OrientationAverage(segment) if turned else segment
-    alone = [np.stack(looking(image)) for image in pictures()]
-    together = [np.stack(found) for found in looking.segment_batch(pictures())]
-    assert [found.shape for found in together] == [(2, *image.shape[:2]) for image in pictures()]
-    for one, other in zip(alone, together, strict=True):
-        # In eight bits a value at the middle of a step may be rounded to either side.
-        assert np.abs(one - other).mean() < 0.0005
-    assert np.abs(alone[0] - alone[1]).mean() > 0.005, "another picture, another answer"
-
-
-@pytest.mark.parametrize("engine", ["int8", "fp32", "torch"])
-def test_the_robot_alone_is_the_robot_that_is_seen_beside_the_vessel(undecided: Path, engine: str) -> None:
-    segment: Segmenter = TorchSegmenter(undecided, 1) if engine == "torch" else OpenVinoSegmenter(undecided, 1, engine)
-    both = [segment(image)[1] for image in pictures()]
-    alone = segment.segment_robots(pictures())
-    assert [robot.shape for robot in alone] == [(70, 128)] * 5
-    for one, other in zip(both, alone, strict=True):
-        assert np.abs(one - other).mean() < 0.0005
-    assert np.abs(alone[0] - alone[1]).mean() > 0.005, "another picture, another answer"
-    again = segment(pictures()[0])
-    assert [plane.shape for plane in again] == [(70, 128)] * 2, "and both can be had as before"
-
-
-def test_the_robot_alone_leaves_the_vessels_decoder_out(undecided: Path) -> None:
-    segment = OpenVinoSegmenter(undecided, 1, "fp32")
-    counts = [
-        sum(node.get_type_name() == "Convolution" for node in model.get_ordered_ops())
-        for model in (segment._model, segment._robot_model)
-    ]
-    # ten of the encoder; four and the output of each decoder
-    assert counts == [10 + 2 * 5, 10 + 5]
-
-
-def test_a_network_of_another_shape_is_asked_for_both() -> None:
-    import openvino
-    from openvino import opset13
-
-    picture = opset13.parameter([1, 3, 16, 16], np.float32, name="picture")
-    kernels = opset13.constant(np.zeros((2, 3, 1, 1), np.float32))
-    logits = opset13.convolution(picture, kernels, [1, 1], [0, 0], [0, 0], [1, 1])
-    joined = opset13.concat([picture, picture], axis=1)
-    flat = opset13.parameter([4], np.float32, name="flat")
-    one = opset13.strided_slice(picture, [0, 0, 0, 0], [1, 1, 16, 16], [1, 1, 1, 1], [0, 0, 0, 0], [0, 0, 0, 0])
-    two = opset13.concat([one, one], axis=1)
-    for end, given in (
-        (opset13.sigmoid(logits), picture),  # no two masks that were joined
-        (opset13.sigmoid(joined), picture),  # something else that was
-        (opset13.sigmoid(opset13.concat([one, one], axis=2)), picture),
-        (opset13.sigmoid(opset13.concat([flat, flat], axis=0)), flat),
-        (opset13.softmax(two, 1), picture),
-        (two, picture),
-    ):
-        model = openvino.Model([end], [given], "other")
-        assert _without_vessel(model) is model
-    assert _without_vessel(openvino.Model([opset13.sigmoid(two)], [picture], "ours")) is not model
-
-
-@pytest.mark.parametrize(("fold", "planes"), [(1, 3), (4, 3), (2, 5)])
-def test_networks_of_all_shapes_can_leave_the_vessel_out(tmp_path: Path, fold: int, planes: int) -> None:
-    torch.manual_seed(8)
-    network = DualUNet(UNetShape((4, 4, 4, 4, 4), (4, 4, 4, 4), 1, fold, inputs=planes))
-    torch.nn.init.normal_(network.robot.output.weight)
-    image = np.random.default_rng(2).integers(0, 256, (64, 128, planes)).astype(np.uint8)
-    save_model(network, tmp_path / "any", training={}, figures={}, examples=[image])
-    for precision in ("int8", "fp32"):
-        segment = OpenVinoSegmenter(tmp_path / "any", 1, precision)
-        (alone,) = segment.segment_robots([image])
-        assert segment._robot_model is not segment._model
-        np.testing.assert_allclose(alone, segment(image)[1], atol=1e-6)
-
-
-def test_several_threads_may_ask_one_network(undecided: Path) -> None:
-    """A picture that stands is looked at again in a thread of its own, while a rig that was opened meanwhile has the network."""
-    segment = OpenVinoSegmenter(undecided, 1)
-    alone = [segment.segment_signed([image])[0] for image in pictures()[:3]]
-
-    def same(picture: int) -> bool:
-        found = segment.segment_signed([pictures()[picture]])[0]
-        return all(np.array_equal(one, other) for one, other in zip(found, alone[picture], strict=True))
-
-    with ThreadPoolExecutor(3) as threads:
-        assert all(threads.map(same, [0, 1, 2] * 40))
-
-
-def test_who_cannot_see_together_is_asked_one_by_one() -> None:
-    asked = []
-
-    class OneByOne(Segmenter):
-        engine = "a test's"
-
-        def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            asked.append(image.shape)
-            return image[:, :, 0] / np.float32(255), image[:, :, 1] / np.float32(255)
-
-    images = pictures()
-    np.testing.assert_array_equal(
-        OneByOne().segment_robot_beside(images[1][:, :, 2], images[0]), images[0][:, :, 1] / np.float32(255)
+def test_specks_go_and_pinholes_are_filled() -> None:
+    assert picture(clean_mask(CLUTTERED, min_area_px=5, max_hole_area_px=1)) == (
+        "..............\n....########..\n....########..\n....########..\n....########..\n....########.."
     )
-    asked.clear()
-    found = OrientationAverage(OneByOne()).segment_batch(images)
-    assert len(asked) == 8 * len(images)
-    for image, (vessel, robot) in zip(images, found, strict=True):
-        np.testing.assert_allclose(vessel, image[:, :, 0] / 255, atol=1e-5)
-        np.testing.assert_allclose(robot, image[:, :, 1] / 255, atol=1e-5)
+
+
+def test_the_limits_are_exact() -> None:
+    assert clean_mask(CLUTTERED, 4, 0)[:2, :2].all()  # the speck has four pixels
+    assert not clean_mask(CLUTTERED, 5, 0)[:2, :2].any()
+    assert not clean_mask(CLUTTERED, 0, 0)[3, 6]
+    assert clean_mask(CLUTTERED, 0, 1)[3, 6]
+
+
+RING = art("""
+.........
+.#######.
+.#.....#.
+.#.###.#.
+.#.....#.
+.#######.
+.........
+""")
+
+
+def test_a_loop_that_encloses_more_than_a_hole_stays_open() -> None:
+    assert not clean_mask(RING, 0, 11)[2, 3]  # the hole has 15 pixels, or 12 without the island in it
+    assert clean_mask(RING, 0, 15)[1:6, 1:8].all()
+
+
+def test_holes_do_not_count_as_area() -> None:
+    assert clean_mask(RING, 20, 0)[1, 1]  # the ring has 20 pixels
+    assert not clean_mask(RING, 21, 0)[1, 1]
+
+
+@pytest.mark.parametrize("thickness", [1, 2, 3])
+def test_what_lies_inside_a_ring_stays_when_the_ring_goes(thickness: int) -> None:
+    mask, disc = np.zeros((140, 140), np.uint8), np.zeros((140, 140), np.uint8)
+    cv2.circle(disc, (70, 70), 18, 1, cv2.FILLED)
+    cv2.circle(mask, (70, 70), 31, 1, thickness)
+    cv2.circle(mask, (70, 70), 23, 1, thickness)
+    cleaned = clean_mask((mask | disc) > 0, min_area_px=1000, max_hole_area_px=20)
+    assert (cleaned == (disc > 0)).all()
+
+
+def test_an_island_in_a_filled_hole_is_no_speck() -> None:
+    assert clean_mask(RING, 5, 15)[1:6, 1:8].all()
+
+
+def test_background_at_the_image_border_is_no_hole() -> None:
+    bay = art("""
+##.##
+##.##
+#####
+""")
+    assert picture(clean_mask(bay, 0, 100)) == picture(bay)
+
+
+def test_diagonal_pixels_belong_together() -> None:
+    stairs = art("""
+#....
+.#...
+..#..
+...#.
+....#
+""")
+    assert clean_mask(stairs, 5, 0).sum() == 5
+    assert clean_mask(stairs, 6, 0).sum() == 0
+
+
+def test_the_input_is_not_written_to() -> None:
+    before = CLUTTERED.copy()
+    clean_mask(CLUTTERED, 100, 100)
+    assert (before == CLUTTERED).all()
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_empty_and_full_images(value: float) -> None:
+    probability = np.full((48, 64), value, np.float32)
+    masks = clean(probability, probability, PerceptionConfig())
+    assert masks.vessel.all() == masks.robot.all() == bool(value)
+    assert masks.vessel.dtype == masks.robot.dtype == np.bool_
+
+
+def test_each_mask_has_its_own_threshold_and_limit() -> None:
+    probability = np.zeros((60, 80), np.float32)
+    probability[10:40, 10:40] = 0.6
+    config = PerceptionConfig(
+        segmentation=SegmentationConfig(vessel_threshold=0.5, robot_threshold=0.7),
+        cleaning=CleaningConfig(min_vessel_area_px=900, min_robot_area_px=900),
+    )
+    masks = clean(probability, probability, config)
+    assert masks.vessel.sum() == 900
+    assert masks.robot.sum() == 0
+    assert masks.vessel_probability is probability
+
+
+def noise(pitch_px: int) -> np.ndarray:
+    """Squares of 2 px, this far apart, all over an image."""
+    mask = np.zeros((480, 640), bool)
+    for row in (0, 1):
+        for column in (0, 1):
+            mask[row::pitch_px, column::pitch_px] = True
+    return mask
+
+
+@pytest.mark.parametrize("pitch_px", [4, 5, 9, 16])
+def test_of_a_mask_scattered_all_over_the_image_nothing_is_left(pitch_px: int) -> None:
+    assert not clean_mask(noise(pitch_px), min_area_px=0, max_hole_area_px=0).any()
+
+
+def test_noise_is_told_before_its_outlines_are_followed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "findContours", lambda *_: pytest.fail("followed"))
+    assert not clean_mask(np.kron(np.indices((240, 320)).sum(axis=0) % 2, np.ones((2, 2))) > 0, 0, 0).any()
+
+
+def test_a_few_hundred_specks_beside_a_vessel_are_only_removed() -> None:
+    mask = noise(32)
+    mask[200:240] = True
+    assert picture(clean_mask(mask, min_area_px=5, max_hole_area_px=0)[190:250, :40]) == picture(
+        np.pad(np.ones((40, 40), bool), ((10, 10), (0, 0)))
+    )

@@ -3,8 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.perception.vectors import fit_line, fit_robot_vector, fit_vessel_vector
-from core.types import Centerline
+from core import geometry
+from core.perception import compiled
+from core.perception.vectors import RadiusMap, fit_line, fit_robot_vector, fit_vessel_vector, is_walled_off, project
+from core.types import Centerline, Mask, Point, Points
 
 
 def test_only_the_last_forty_px_count() -> None:
@@ -89,3 +91,129 @@ def test_the_fit_turns_and_moves_with_the_path(angle: float, shift: tuple[float,
     assert moved is not None
     assert np.asarray(moved.end) == pytest.approx(turn @ plain.end + shift, abs=1e-6)
     assert np.asarray(moved.direction) == pytest.approx(turn @ plain.direction, abs=1e-6)
+
+
+AT = np.array([[60.0, 100.0], [80.0, 100.0], [100.0, 100.0]])
+DOWN = np.tile([0.0, 1.0], (3, 1))
+
+
+def tube(half_width: float) -> np.ndarray:
+    """Probability of a straight tube along row 100."""
+    rows = np.arange(200.0)[:, None] + np.zeros((1, 200))
+    return np.clip(0.5 + 0.25 * (half_width - np.abs(rows - 100.0)), 0.0, 1.0).astype(np.float32)
+
+
+@pytest.mark.parametrize("half_width", [3.0, 7.3, 12.5, 20.8])
+def test_a_wall_is_found_to_a_fraction_of_a_pixel_even_where_it_was_expected_elsewhere(half_width: float) -> None:
+    for off in (-3.0, 0.0, 3.0):
+        found = compiled.wall_distances(tube(half_width), AT, DOWN, np.full(3, half_width + off), 4)[0]
+        np.testing.assert_allclose(found, half_width, atol=0.02)
+
+
+def test_of_a_mask_it_lies_between_the_last_pixel_inside_and_the_first_outside() -> None:
+    mask = (tube(9.0) >= 0.5).astype(np.float32)
+    np.testing.assert_allclose(compiled.wall_distances(mask, AT, DOWN, np.full(3, 9.0), 4)[0], 9.5, atol=0.01)
+
+
+def test_where_there_is_no_wall_there_is_no_distance() -> None:
+    level = tube(9.0)
+    level[:, 75:85] = 1.0  # an opening
+    found = compiled.wall_distances(level, AT, DOWN, np.full(3, 9.0), 4)[0]
+    assert np.isnan(found[:, 1]).all()
+    assert np.isfinite(found[:, [0, 2]]).all()
+
+
+def test_the_walls_of_both_sides_are_told_apart() -> None:
+    right, left = compiled.wall_distances(tube(9.0), AT + [0.0, 2.0], DOWN, np.full(3, 9.0), 4)[0]
+    np.testing.assert_allclose(right, 7.0, atol=0.02)
+    np.testing.assert_allclose(left, 11.0, atol=0.02)
+
+
+def test_a_place_outside_the_lumen_has_none_either() -> None:
+    assert np.isnan(compiled.wall_distances(tube(9.0), AT + [0.0, 20.0], DOWN, np.full(3, 9.0), 4)[0]).all()
+
+
+def test_the_rough_radius_is_right_to_a_pixel_wherever_the_mask_has_a_wall() -> None:
+    radius = RadiusMap(tube(12.0) >= 0.5)
+    assert radius.at(AT) == pytest.approx(12.0, abs=1.0)
+    assert RadiusMap(np.ones((48, 64), bool)).at(np.array([[30.0, 20.0]]))[0] <= 65.0
+
+
+def test_a_soft_wall_is_told_from_a_sharp_one() -> None:
+    rows = np.abs(np.arange(200.0)[:, None] - 100.0) + np.zeros((1, 200))
+    slopes = []
+    for steepness in (0.05, 0.2, 2.0):
+        level = (1.0 / (1.0 + np.exp(-4.0 * steepness * (12.0 - rows)))).astype(np.float32)
+        found, slope = compiled.wall_distances(level, AT, DOWN, np.full(3, 12.0), 4)
+        np.testing.assert_allclose(found, 12.0, atol=0.05)
+        slopes.append(float(slope[0, 0]))
+    assert slopes == sorted(slopes)
+    assert slopes[0] == pytest.approx(0.05, rel=0.2)
+    assert slopes[2] > 4 * slopes[0]
+
+
+# ---- one lumen, or two side by side ----
+
+
+def _bent_back(bridge: tuple[int, int] = (0, 0)) -> tuple[Mask, Points]:
+    """A vessel that bends back beside itself: wide (40 px) on its way out, narrow (10 px) on its way back, 3 px of wall between.
+
+    `bridge`: columns in which there is no wall. The line is the whole centerline, drawn from the wide strand's beginning.
+    """
+    mask = np.zeros((200, 300), np.bool_)
+    mask[80:121, :260] = True
+    mask[124:135, :260] = True
+    mask[80:135, 220:270] = True
+    mask[121:124, bridge[0] : bridge[1]] = True
+    line = np.concatenate(
+        [
+            np.linspace((0.0, 100.0), (240.0, 100.0), 241),
+            np.linspace((240.0, 101.0), (240.0, 128.0), 28),
+            np.linspace((240, 129), (0, 129), 241),
+        ]
+    )
+    return mask, line
+
+
+@pytest.mark.parametrize(
+    ("other", "walled_off"),
+    [((150.0, 100.0), False), ((150.0, 129.0), True), ((190.0, 129.0), True), ((245.0, 129.0), False), ((150.0, 122.0), False)],
+)
+def test_a_wall_between_two_places_parts_them(other: Point, walled_off: bool) -> None:
+    mask, _ = _bent_back()
+    head = (245.0, 100.0) if other[0] > 220 else (150.0, 117.0)
+    assert is_walled_off(head, other, mask) is walled_off
+    assert is_walled_off(other, head, mask) is walled_off
+
+
+def test_a_line_that_touches_the_corner_of_a_pixel_meets_no_wall() -> None:
+    mask = np.ones((20, 20), np.bool_)
+    mask[10, 10] = False
+    assert not is_walled_off((0.0, 9.0), (19.0, 9.4), mask)
+    assert is_walled_off((0.0, 10.0), (19.0, 10.0), mask)
+
+
+def test_what_lies_outside_at_an_end_is_no_wall() -> None:
+    mask, _ = _bent_back()
+    assert not is_walled_off((100.0, 76.0), (100.0, 90.0), mask), "the robot bulges its vessel"
+    assert not is_walled_off((100.0, 150.0), (100.0, 170.0), mask)
+    assert not is_walled_off((-3.0, 100.0), (2.0, 100.0), mask), "nor does what lies beyond the picture matter"
+
+
+def test_the_foot_on_a_line_that_bends_back_lies_in_the_strand_that_holds_the_place() -> None:
+    mask, line = _bent_back()
+    place = (100.25, 117.0)
+    assert geometry.nearest(line, place)[2] == pytest.approx((100.25, 129.0)), "the other strand is nearer"
+    found = project(line, place, mask)
+    assert found is not None
+    assert found[0] == pytest.approx(17.0)
+    assert found[1] == pytest.approx(100.25)
+    assert found[2] == pytest.approx((100.25, 100.0))
+    assert project(line, place, None) == geometry.nearest(line, place)
+    open_mask, _ = _bent_back(bridge=(90, 110))
+    assert project(line, place, open_mask) == geometry.nearest(line, place), "without a wall it is one lumen"
+
+
+def test_beyond_a_wall_from_everything_there_is_no_foot() -> None:
+    mask, line = _bent_back()
+    assert project(line[-200:], (100.0, 117.0), mask) is None

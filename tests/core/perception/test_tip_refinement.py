@@ -284,8 +284,8 @@ def test_what_the_second_look_mends_is_not_wrong(tmp_path: Path) -> None:
     sample = _samples(tmp_path, 1)[0]
     first = sees(bar(0, 210))
     assert PriorViews.at(sample, first).wrong
-    assert PriorViews.at(sample, first, near).wrong == ()
-    looks = PriorViews.at(sample, first, near)
+    assert PriorViews.at(sample, first, Answering(near)).wrong == ()
+    looks = PriorViews.at(sample, first, Answering(near))
     assert looks.first == PriorViews.at(sample, first).last
     ends = [max(x for x, _ in seen.places) for seen in (looks.first, looks.last)]
     assert ends[0] == pytest.approx(209, abs=3) and ends[1] == pytest.approx(249, abs=3)
