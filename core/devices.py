@@ -1,9 +1,4 @@
-"""What a camera and a robot are to the rest of the program. Drivers live in ``hardware`` and pass one contract suite.
-
-The root of all errors that a user can mend.
-
-One-slot hand-over between threads: the newest value wins, the older one is counted as dropped.
-"""
+"""Interfaces of camera and robot, their errors, and a one-slot hand-over between threads. Drivers live in ``hardware``."""
 
 from __future__ import annotations
 
@@ -15,11 +10,11 @@ if TYPE_CHECKING:
 
 
 class UserError(Exception):
-    """Something cannot be done; the message is one line that says what to do. A command ends with it and exit code 2."""
+    """Root of all errors that a user can fix; the message is one line that says what to do. A command ends with exit code 2."""
 
 
 class DeviceError(UserError):
-    """A device cannot do what was asked. The message is one line and says what to do."""
+    """A device cannot do what was asked."""
 
 
 class Camera(Protocol):
@@ -39,7 +34,7 @@ class Camera(Protocol):
 
 
 class CameraLost(DeviceError):
-    """A camera gives no more frames, and looks for itself: ``read`` raises this until it is back, and then gives frames again."""
+    """A camera gives no more frames and reconnects by itself: ``read`` raises this until it is back."""
 
 
 class DamagedPicture(DeviceError):
@@ -70,10 +65,9 @@ T = TypeVar("T")
 
 
 class Latest(Generic[T]):
-    """A slot of depth one.
+    """A slot of depth one between threads: the newest value replaces an older one, which counts as dropped.
 
-    A queue would fall behind without bound when the reader is slower than the writer; measured with a 1 kHz producer and a 30 ms
-    reader, a payload per Qt signal was 20,000 frames late while this slot stayed at 0.
+    A queue would fall behind without bound when the reader is slower than the writer.
     """
 
     def __init__(self) -> None:
@@ -83,12 +77,12 @@ class Latest(Generic[T]):
 
     @property
     def dropped(self) -> int:
-        """How many values were overwritten before anybody took them."""
+        """How many values were replaced before they were taken."""
         with self._condition:
             return self._dropped
 
     def put(self, value: T) -> bool:
-        """Store `value`; True when the slot was empty, so that the writer knows that it must wake the reader."""
+        """Store `value`; True when the slot was empty, so that the writer must wake the reader."""
         with self._condition:
             was_empty = self._value is None
             if not was_empty:
@@ -98,7 +92,7 @@ class Latest(Generic[T]):
             return was_empty
 
     def take(self, timeout_s: float = 0.0) -> T | None:
-        """Take the newest value out, waiting at most `timeout_s`; None when there was none."""
+        """Take the newest value, waiting at most `timeout_s`; None when there was none."""
         with self._condition:
             if self._value is None and timeout_s > 0:
                 self._condition.wait(timeout_s)

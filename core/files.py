@@ -1,11 +1,4 @@
-"""Files that are there as a whole or not at all.
-
-What files and folders are called, for people and for other files.
-
-Reading pictures: any size, grey or colour, 8 or 16 bit, to RGB uint8. Colour order is converted here, once, at the border.
-
-How large a picture may be, known before OpenCV is loaded.
-"""
+"""Files: atomic writes, names as text, and pictures of any size and depth as RGB uint8 (colour order is converted only here)."""
 
 from __future__ import annotations
 
@@ -32,26 +25,26 @@ VIDEO_ENDINGS = (".mp4", ".mkv", ".avi", ".mov", ".webm", ".m4v")
 """Files that are read as videos."""
 
 LEFT_AFTER_S = 60.0
-"""A file aside that nobody has written to for so long was left by a process that was killed."""
-_ASIDE = re.compile(r"\.[0-9a-f]{16}\.part")
+"""An unfinished file that is older was left by a process that was killed."""
+_UNFINISHED = re.compile(r"\.[0-9a-f]{16}\.part")
 
 
 def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path | None = None) -> None:
-    """Write a file aside and rename it: who reads it, even after a crash, finds the old or the new one. A link is followed.
+    """Atomic write: a reader, even after a crash, finds the old file or the new one. A link is followed.
 
-    An old file's permissions are kept, where the file system lets us. With `durable` all that holds also when the power goes; it
-    takes the disk some milliseconds. What was there before is copied to `older`, once the new one has found room.
-    Raises OSError, which names `path`; nothing is left behind then, and the old file is as it was.
+    An old file's permissions are kept where possible. With `durable` it also survives a power cut, which takes some milliseconds.
+    The old file is copied to `older`, once the new one has found room. Raises OSError, which names `path`; the old file is
+    unchanged then, and no other is left behind.
     """
     target = Path(os.path.realpath(path))
-    if target.exists() and not target.is_file():  # a device or a pipe, whose place no file may take
+    if target.exists() and not target.is_file():  # a device or a pipe, which must not be replaced
         target.write_bytes(data)
         return
-    aside = target.with_name(f".{secrets.token_hex(8)}.part")  # as _ASIDE has it; a name of its own length could be too long
+    aside = target.with_name(f".{secrets.token_hex(8)}.part")  # as _UNFINISHED; the target's name plus an ending may be too long
     try:
         with aside.open("wb") as file:
             if target.exists():
-                with contextlib.suppress(PermissionError):  # a disk of somebody else's that we may write on
+                with contextlib.suppress(PermissionError):  # a disk of another user
                     shutil.copymode(target, aside)
             file.write(data)
             if durable:
@@ -70,12 +63,12 @@ def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path |
 
 
 def is_aside(path: Path) -> bool:
-    """Whether a file bears a name that ``write_whole`` gives a file until it is complete."""
-    return _ASIDE.fullmatch(path.name) is not None
+    """Whether a file has the name that ``write_atomic`` uses until the file is complete."""
+    return _UNFINISHED.fullmatch(path.name) is not None
 
 
 def sweep_unfinished(folder: Path) -> None:
-    """Remove what a process that was killed a minute ago or longer left of its files; what cannot be removed stays."""
+    """Remove unfinished files of processes that were killed a minute ago or longer; a file that cannot be removed stays."""
     for path in filter(is_aside, folder.glob(".*.part")):
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFT_AFTER_S:
@@ -92,24 +85,24 @@ def sync_folder(folder: Path) -> None:
 
 
 def name_as_text(name: str | Path) -> str:
-    """A name as files, figures and terminals can hold it: what is no UTF-8 in it, as in old archives, is shown as bytes."""
+    """A file name for files, figures and terminals: bytes that are not UTF-8, as from old archives, are escaped."""
     return os.fsencode(name).decode("utf-8", "backslashreplace")
 
 
 def name_of(path: Path) -> str:
-    """What a file or folder is called, however it was given: "." and ".." have names, too. A link keeps its own."""
+    """The name of a file or folder, also of "." and ".."; a link keeps its own."""
     return os.path.basename(os.path.abspath(path))
 
 
 _AS_SEEN = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
-"""Grey stays grey and 16 bit stay 16 bit; alpha is dropped, and the picture is turned upright as its EXIF orientation says."""
+"""Grey stays grey and 16 bit stay 16 bit; alpha is dropped, and EXIF orientation is applied."""
 _TOO_LARGE = f"is larger than {MAX_PIXELS // 1_000_000} million pixels"
 _FULL_SCALES = (1023, 4095, 65535)
 _PNG, _JPEG = b"\x89PNG", b"\xff\xd8"
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-"""Segments that give the size; the three left out are tables."""
+"""Segments with the size (SOF); the three that are left out are tables."""
 
-# What OpenCV has to say about a damaged file is raised as an ``ImageError``; its own log lines would say it again, less clearly.
+# damaged files are reported as ImageError, not by OpenCV's log
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 
@@ -136,7 +129,7 @@ def read_image(path: Path) -> Image:
     _check_size(path, *(_header_size(data) or (0, 0)))
     try:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), _AS_SEEN)
-        if pixels is None:  # some rare kinds, such as TIFF of floats with alpha, are only read as they are
+        if pixels is None:  # some rare kinds, such as TIFF of floats with alpha, are only read unchanged
             pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
         if "MAX_IMAGE" in error.err:
@@ -157,10 +150,10 @@ def _check_size(path: Path, width: int, height: int) -> None:
 
 
 def _is_cut(data: bytes) -> bool:
-    """Decoders fill the missing part of a cut PNG or JPEG with grey and say nothing; its end mark tells.
+    """Whether a PNG or JPEG has no end mark: decoders silently fill the missing part of a truncated file with grey.
 
-    Behind the end mark anything may follow: phones append a short video. In front of a JPEG's pixels its preview has an end mark of
-    its own; among the pixels the mark cannot occur, because 0xFF is escaped there.
+    Data may follow the end mark (phones append a short video), and a JPEG's preview has an end mark before the pixels; among the
+    pixels it cannot occur, because 0xFF is escaped there.
     """
     if data.startswith(_PNG):
         return b"IEND" not in data
@@ -171,7 +164,7 @@ def _is_cut(data: bytes) -> bool:
 
 
 def _header_size(data: bytes) -> tuple[int, int] | None:
-    """Width and height as the file's header says, known before megabytes are decoded; None for kinds that are not looked into."""
+    """Width and height from the header of PNG, JPEG or BMP, before the picture is decoded; None for other kinds."""
     try:
         if data.startswith(_PNG):
             return struct.unpack_from(">II", data, 16)
@@ -190,7 +183,7 @@ def _header_size(data: bytes) -> tuple[int, int] | None:
 
 
 def _jpeg_segments(data: bytes) -> Iterator[tuple[int, int]]:
-    """Each segment's marker and where its length stands, up to the start of the pixels or to where the file ends or breaks off."""
+    """Each segment's marker and the position of its length, up to the start of the pixels or the end of the file."""
     place = 2
     while place + 4 <= len(data) and data[place] == 0xFF:
         marker = data[place + 1]
@@ -230,7 +223,7 @@ def to_rgb8(pixels: NDArray[np.generic], *, blue_first: bool = False) -> Image:
 
 
 def _from_16_bit(array: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """The smallest usual range (10, 12 or 16 bit) that holds the picture, not its own brightest value: a dark one stays dark."""
+    """Scaled by the smallest usual range (10, 12 or 16 bit) that holds the picture, so that a dark one stays dark."""
     if array.size == 0:
         return array.astype(np.uint8)
     step = max(1, math.isqrt(array.shape[0] * array.shape[1] // 250_000))

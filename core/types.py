@@ -1,8 +1,8 @@
-"""What flows through LumenPilot, from the camera's frame to the command that was sent.
+"""Data types from the camera's frame to the command that was sent.
 
-Everything here is frozen; nobody writes to an array that he was given. Points are ``(x, y)`` in pixels, x to the right, y down,
-pixel centres at integers. Inside the pipeline they are *working* pixels (longer side of the image = 640); ``Scene.to_source`` maps
-them back. "Missing" is ``None`` together with a named reason, never NaN.
+All are frozen, and arrays in them are never written. Points are ``(x, y)`` in pixels, x to the right, y down, pixel centres at
+integers. Inside the pipeline they are *working* pixels (longer side of the image = 640); ``Scene.to_source`` maps them back.
+"Missing" is ``None`` together with a named reason, never NaN.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ Window = tuple[int, int, int, int]
 class Frame:
     """One camera image. ``captured_s`` is ``time.monotonic()`` at capture (or simulated time in lock-step).
 
-    ``index`` counts the frames that the camera gave; ``lost`` those that should have come, by its own count or by its rate, and
-    never did, since it was opened.
+    ``index`` counts the frames that the camera gave; ``lost`` the frames that never came, by its own count or by its rate, since
+    it was opened.
     """
 
     index: int
@@ -84,7 +84,7 @@ class RobotPath:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraphEdge:
-    """A piece of vessel: ``points`` (N, 2) from node ``start`` to node ``end``; how far the nearest wall is, ``radius`` (N,)."""
+    """A piece of vessel: ``points`` (N, 2) from node ``start`` to node ``end``, with the lumen's ``radius`` (N,)."""
 
     start: int
     end: int
@@ -96,7 +96,7 @@ class GraphEdge:
 class VesselGraph:
     """Centerlines of a vessel tree (loops allowed): ``nodes`` (K, 2) are junctions and ends, ``edges`` join them.
 
-    Lengths are pixels in perception and millimetres in the twin's phantoms; the functions that walk it do not care.
+    Lengths are pixels in perception and millimetres in the twin's phantoms.
     """
 
     nodes: Points
@@ -117,7 +117,7 @@ class Centerline:
     """The piece of the vessel's centerline beside the head.
 
     ``piece`` (N, 2) runs along one path of the vessel graph in the robot's direction of travel; ``nearest`` is the centerline point
-    nearest to the head; ``radius_px`` the lumen radius there; ``ambiguity`` 0..1 tells how nearly another branch fitted as well.
+    nearest to the head; ``radius_px`` the lumen radius there; ``ambiguity`` 0..1 how nearly another branch fitted as well.
     """
 
     piece: Points
@@ -128,7 +128,7 @@ class Centerline:
 
 @dataclass(frozen=True, slots=True)
 class Vector:
-    """A fitted, directed line: ``end`` is where it points to, ``center`` the middle of ``start`` and ``end``."""
+    """A fitted line, directed from ``start`` to ``end``; ``center`` is its middle."""
 
     start: Point
     center: Point
@@ -136,7 +136,7 @@ class Vector:
 
     @property
     def direction(self) -> Point:
-        """Unit vector from ``start`` to ``end``; (0, 0) never occurs for a fitted line."""
+        """Unit vector from ``start`` to ``end``."""
         dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
         length = float(np.hypot(dx, dy))
         return dx / length, dy / length
@@ -152,7 +152,7 @@ class PoseState(StrEnum):
 
 
 class Reason(StrEnum):
-    """Why there is no pose. The value is the name kept in files; the text shown to people is in ``REASON_TEXT``."""
+    """Why there is no pose. The value is the name in files."""
 
     UNREADABLE = "unreadable image"
     NO_MODEL = "no model"
@@ -174,7 +174,7 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """No pose, and why. ``detail`` adds the measured value against its threshold, in plain words."""
+    """No pose, and why. ``detail`` adds the measured value and its threshold."""
 
     reason: Reason
     detail: str = ""
@@ -210,7 +210,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """All that perception understood of one frame. Exactly one of ``pose`` and ``refusal`` is set.
+    """The result of perception for one frame. Exactly one of ``pose`` and ``refusal`` is set.
 
     ``scale`` is working pixels per source pixel along the longer side, and ``scale_xy`` in x and y, which differ by the rounding to
     whole pixels (None: both are ``scale``); ``source_size`` is (width, height) of the frame. Stages that were not reached are None.
@@ -267,7 +267,7 @@ class Speed(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What the operator should do next.
+    """Advice to the operator.
 
     ``steer_deg`` is how far to turn the head, positive = to the robot's right as seen on screen; 0 means no steering. ``speed`` is
     the paper's word and ``advance_mm_s`` its number. ``why`` is one plain sentence. No pose -> no advice (None), never a stale one.
@@ -281,7 +281,7 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is asked of the robot.
+    """A command to the robot.
 
     ``bend`` and ``pitch`` are the head's bend in the image plane and out of it, each -1..1 of the tendons' full pull; positive bend
     = to the robot's right as seen on screen. ``advance_mm_s`` feeds the robot (negative retracts), ``delivery_mm_s`` the catheter
@@ -296,7 +296,8 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class RobotStatus:
-    """What the robot reports. ``time_s`` on the clock of the frames; tendon order: right, left, up, down (pull in mm, force in mN).
+    """Measurements of the robot. ``time_s`` on the clock of the frames; tendon order: right, left, up, down (pull in mm, force in
+    mN).
 
     ``wall_contact_n`` is the low-passed sum of wall contact forces, known in the twin only (None on a real rig).
     """
@@ -311,7 +312,7 @@ class RobotStatus:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tick:
-    """One turn of the engine: what the window shows. ``dropped_frames`` counts since start."""
+    """Result of one turn of the engine. ``dropped_frames`` counts since start."""
 
     frame: Frame
     scene: Scene

@@ -29,14 +29,13 @@ from rich.progress import Progress
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = "core/control"
+TEST_FOLDER = "tests/core/control"
 TESTS = {
     "gate": ("test_gate.py",),
-    "gate_checks": ("test_gate.py",),
-    "joint_limits": ("test_gate.py",),
+    "joints": ("test_gate.py", "test_joints.py"),
     "supervisor": ("test_supervisor.py", "test_health.py"),
     "health": ("test_supervisor.py", "test_health.py"),
-    "bus_watch": ("test_bus_watch.py", "test_supervisor.py", "test_health.py"),
-    "deadman": ("test_deadman.py", "test_supervisor.py"),
+    "bus_monitor": ("test_bus_monitor.py", "test_supervisor.py", "test_health.py"),
 }
 """Module -> the tests that should find its mutants."""
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
@@ -63,24 +62,24 @@ EXPLAINED = {
         "if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:",
         "without term 1",
     ): "a goal that no limit touched is the one asked for; it stands there for the type checker",
-    ("joint_limits", "direction = 1.0 if asked_mm > last_mm else -1.0", "Gt -> GtE"): "where both are equal the step is 0",
+    ("joints", "direction = 1.0 if asked_mm > last_mm else -1.0", "Gt -> GtE"): "where both are equal the step is 0",
     (
-        "joint_limits",
+        "joints",
         "to_end_mm = joint.high_mm - last_mm if direction > 0 else last_mm - joint.low_mm",
         "Gt -> GtE",
     ): "a direction is 1 or -1",
     (
-        "joint_limits",
+        "joints",
         "faster_mm_s = max(0.0, speed_mm_s * direction) + joint.max_acceleration_mm_s2 * passed_s",
         "Mult -> Div of speed_mm_s * direction",
     ): "a direction is 1 or -1",
-    ("joint_limits", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
+    ("joints", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
     (
-        "joint_limits",
+        "joints",
         "found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))",
         "Gt -> GtE",
     ): TIE,
-    ("deadman", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
+    ("health", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
 }
 
 COMPARISONS = {
@@ -214,7 +213,7 @@ def run_tests(tree: Path, tests: tuple[str, ...]) -> Fate:
         "-q",
         "-p",
         "no:cacheprovider",
-        *(f"tests/core/{name}" for name in tests),
+        *(f"{TEST_FOLDER}/{name}" for name in tests),
     ]
     try:
         code = subprocess.run(command, cwd=tree, capture_output=True, timeout=TIMEOUT_S, check=False).returncode

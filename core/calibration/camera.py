@@ -1,12 +1,8 @@
-"""The printed board: a chessboard with markers in its white squares (ChArUco), known even where part of it is hidden.
+"""Calibration of the camera: the printed ChArUco board, the lens's distortion, and the scale in the plane in which the robot moves.
 
-The lens: straight lines that are seen bent. Two radial terms, fitted to a flat board, whatever angle it is seen at.
-
-A board that lies flat is seen through an unknown perspective (eight numbers a picture) and the lens (two, the same for all
-pictures). Focal length and pose are not needed to straighten a picture, so they are not asked for: one good picture is enough, and
-the camera need not be moved.
-
-Pixels to millimetres, in the plane in which the robot moves.
+A flat board is seen through an unknown perspective (eight numbers a picture) and the lens (two radial terms, the same for all
+pictures). Focal length and pose are not needed to undistort a picture: one good picture is enough, and the camera need not be
+moved.
 """
 
 from __future__ import annotations
@@ -32,11 +28,11 @@ _MIN_POINTS = 24
 _HUBER_PX = 0.5
 _MAX_K = 0.5
 _SMALL_K2_PX = 7.0
-"""A point's error against the second term's size: 0.2 px for a k2 of 0.03."""
+"""Weight of the second term's size as a residual: 0.2 px for a k2 of 0.03."""
 
 
 class LensError(UserError):
-    """The lens cannot be told from these pictures."""
+    """The lens cannot be fitted to these pictures."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,12 +44,12 @@ class BoardView:
 
 
 def distort(points: Points, lens: LensConfig) -> Points:
-    """Where points (N, 2) of the straightened picture are seen through the lens, in pictures of ``lens.size_px``."""
+    """Where points (N, 2) of the undistorted picture are seen through the lens, in pictures of ``lens.size_px``."""
     return _distort(np.asarray(points, np.float64), lens.k1, lens.k2, np.array(lens.center_px), _half(lens.size_px))
 
 
-def straighten(points: Points, lens: LensConfig) -> Points:
-    """Where seen points (N, 2) are in the straightened picture; the inverse of ``distort`` (Newton steps on the radius)."""
+def undistort(points: Points, lens: LensConfig) -> Points:
+    """Where seen points (N, 2) are in the undistorted picture; the inverse of ``distort`` (Newton steps on the radius)."""
     center, half = np.array(lens.center_px), _half(lens.size_px)
     offset = (np.asarray(points, np.float64) - center) / half
     seen = np.hypot(offset[:, 0], offset[:, 1])
@@ -68,7 +64,7 @@ def straighten(points: Points, lens: LensConfig) -> Points:
 
 
 def scaled_to(lens: LensConfig, size: tuple[int, int]) -> LensConfig | None:
-    """The same lens in pictures of another `size`; None when those show something else (another aspect)."""
+    """The same lens in pictures of another `size`; None when those have another aspect."""
     if size == lens.size_px:
         return lens
     across, down = size[0] / lens.size_px[0], size[1] / lens.size_px[1]
@@ -79,7 +75,7 @@ def scaled_to(lens: LensConfig, size: tuple[int, int]) -> LensConfig | None:
 
 
 def maps(lens: LensConfig) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-    """For ``cv2.remap``: where every pixel of the straightened picture is taken from, in its fast fixed-point form."""
+    """Maps for ``cv2.remap`` of the undistorted picture, in its fast fixed-point form."""
     width, height = lens.size_px
     x, y = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
     seen = distort(np.column_stack([x.ravel(), y.ravel()]), lens).astype(np.float32).reshape(height, width, 2)
@@ -87,13 +83,13 @@ def maps(lens: LensConfig) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
     return np.asarray(places, np.int16), np.asarray(shares, np.uint16)
 
 
-def straightened(image: Image, places: NDArray[np.int16], shares: NDArray[np.uint16]) -> Image:
-    """The picture without the lens's distortion; what was never seen takes the colour of the border beside it."""
+def undistorted(image: Image, places: NDArray[np.int16], shares: NDArray[np.uint16]) -> Image:
+    """The picture without the lens's distortion; places that were not seen take the colour of the border."""
     return np.asarray(cv2.remap(image, places, shares, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.uint8)
 
 
 def fit_lens(views: Sequence[BoardView], size: tuple[int, int]) -> LensConfig:
-    """The lens that makes all boards flat.
+    """The lens that makes all boards flat, by least squares.
 
     Parameters
     ----------
@@ -116,10 +112,10 @@ def fit_lens(views: Sequence[BoardView], size: tuple[int, int]) -> LensConfig:
         for k, view in enumerate(views):
             flat = _project(numbers[2 + 8 * k : 10 + 8 * k], view.board_mm)
             parts.append(_distort(flat, numbers[0], numbers[1], center, half) - view.pixels)
-        # Where the board does not reach, nothing but its smallness is known of the second term.
+        # where the board does not reach, the second term is undetermined: it is kept small
         return np.append(np.concatenate(parts).ravel(), _SMALL_K2_PX * numbers[1])
 
-    from scipy.optimize import least_squares  # half a second that nobody else needs
+    from scipy.optimize import least_squares  # takes half a second
 
     found = least_squares(misses, start, x_scale="jac", loss="soft_l1", f_scale=_HUBER_PX, max_nfev=300)
     k1, k2 = (float(value) for value in found.x[:2])
@@ -135,7 +131,7 @@ def fit_lens(views: Sequence[BoardView], size: tuple[int, int]) -> LensConfig:
 
 
 def plane_of(view: BoardView) -> NDArray[np.float64]:
-    """The perspective (3, 3) from board millimetres to pixels; `view` is straightened already."""
+    """The perspective (3, 3) from board millimetres to pixels; `view` is undistorted already."""
     return np.append(_homography(view), 1.0).reshape(3, 3)
 
 
@@ -165,11 +161,11 @@ def _half(size: tuple[int, int]) -> float:
 _MARKER_SHARE = 0.75
 _MIN_CORNERS = 12
 _DICTIONARY, _MARKERS = cv2.aruco.DICT_4X4_50, 50
-"""All markers that there are; every white square of a board has one of its own."""
+"""The dictionary and its number of markers; every white square of a board has its own."""
 
 
 class BoardError(UserError):
-    """The board is not in the picture, or too little of it; or there can be no such board."""
+    """The board is not in the picture, or too little of it; or no such board can be made."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +187,7 @@ class BoardSpec:
 
 
 def board_bitmap(spec: BoardSpec, pixels_per_square: int = 32) -> NDArray[np.uint8]:
-    """The board as a grey picture without margin, `pixels_per_square` (a multiple of 8) px a square: every module is whole px."""
+    """The board as a grey picture without margin, `pixels_per_square` (a multiple of 8) px a square."""
     size = spec.columns * pixels_per_square, spec.rows * pixels_per_square
     return np.asarray(_board(spec).generateImage(size, marginSize=0, borderBits=1), np.uint8)
 
@@ -236,24 +232,19 @@ def _detector(spec: BoardSpec) -> Any:
 
 _STEP_PX = 0.5
 _CLICK_PX = 0.7
-"""How well a person hits a place, in pixels of the picture."""
+"""Standard error of a click, in pixels of the picture."""
 _MIN_CLICK_PX = 40.0
 
 
 class ScaleError(UserError):
-    """The scale cannot be told from this."""
+    """The scale cannot be measured."""
 
 
 def scale_of_board(views: Sequence[BoardView], size: tuple[int, int]) -> ScaleConfig:
-    """The scale from pictures of a board that lies in the robot's plane; points are straightened.
+    """The scale from undistorted pictures of a board that lies in the robot's plane. Raises ScaleError without a picture.
 
-    With several pictures the one that shows the most of the board gives the plane; how far the others disagree with it is the
-    uncertainty. With one picture it is that of its fit.
-
-    Raises
-    ------
-    ScaleError
-        Without a picture.
+    The picture that shows the most of the board gives the plane; the uncertainty is that of its fit, or the disagreement with the
+    other pictures if that is larger.
     """
     if not views:
         raise ScaleError("no picture of the board was taken")
@@ -278,7 +269,7 @@ def scale_of_clicks(first: Point, second: Point, length_mm: float, size: tuple[i
     Raises
     ------
     ScaleError
-        When the length is none, or the places are too near to each other to tell.
+        The length is not positive, or the places are too near to each other.
     """
     if not (math.isfinite(length_mm) and length_mm > 0.0):
         raise ScaleError("give the length between the two places in millimetres")
@@ -299,7 +290,7 @@ def mm_per_px_at(scale: ScaleConfig, point: Point | None, size: tuple[int, int])
 
 
 def mm_per_working_px(scale: ScaleConfig | None, scene: Scene) -> float | None:
-    """Millimetres per working pixel at the robot's head, where there is one; None without a scale for such pictures."""
+    """Millimetres per working pixel at the robot's head, if it was found; None without a scale for such pictures."""
     if scale is None or not scale.fits(scene.source_size):
         return None
     head = scene.to_source(scene.path.head) if scene.path is not None else None
@@ -307,7 +298,7 @@ def mm_per_working_px(scale: ScaleConfig | None, scene: Scene) -> float | None:
 
 
 def _local(plane: np.ndarray, at: Point) -> float:
-    """Root of the area that a pixel covers."""
+    """Millimetres per pixel at a place: root of the area that a pixel covers."""
     here, right, down = (_mapped(plane, (at[0] + dx, at[1] + dy)) for dx, dy in ((0.0, 0.0), (_STEP_PX, 0.0), (0.0, _STEP_PX)))
     u, v = (right - here) / _STEP_PX, (down - here) / _STEP_PX
     return math.sqrt(abs(float(u[0] * v[1] - u[1] * v[0])))
@@ -319,7 +310,7 @@ def _mapped(plane: np.ndarray, point: Point) -> np.ndarray:
 
 
 def _fit_error(view: BoardView, plane: np.ndarray) -> float:
-    """Standard error of the scale by what the plane leaves over: two ends of a board, each as uncertain as its corners together."""
+    """Standard error of the scale from the residuals of the plane."""
     mapped = np.array([_mapped(plane, (float(x), float(y))) for x, y in view.pixels])
     left_mm = float(np.sqrt(np.mean(np.sum((mapped - view.board_mm) ** 2, axis=1))))
     spread_mm = float(np.sqrt(np.mean(np.sum((view.board_mm - view.board_mm.mean(axis=0)) ** 2, axis=1))))

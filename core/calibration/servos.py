@@ -1,31 +1,9 @@
-"""Which servo does what, and in which direction, from what the camera saw while each was turned a little both ways. Pure.
+"""Calibration of the servos from what the camera sees: which servo does what, steering, taut wires, feed, and the kept zero. Pure.
 
-A wire can only pull: turned one way the servo bends the head, turned the other way it lets the wire go slack and nothing happens. A
-drum feeds both ways. So the direction that does something is the one that tightens, and which way the head goes tells the tendon.
-What acts out of the image plane shortens what is seen of the robot, up or down alike: one camera cannot tell these two apart.
-
-What the camera saw of the robot at rest, and how its head moved between two such looks. Pure.
-
-In which direction each tendon moves the head, as the camera sees it. Pure.
-
-The ways of a pair are taken together: what the wall, the bend or the end of the mask add to both ways alike (all of them push the
-head along its axis) falls out of their difference. A head that is bent starts at right angles to where it points, so the heading
-says the same once more, and the mean of both is kept; how far they disagree is told.
-
-Where a wire becomes taut: the head stays where it is while the wire is slack, and then goes with it. Pure.
-
-Sideways the way of the head grows with the pull; out of the picture's plane what is seen is the shortening, which grows with its
-square. The root makes a line of that, too, and where the line starts the wire is taut: no threshold for the first twitch to pass.
-
-How far the catheter's sheath covers the robot, as far as two pictures of the same robot tell. Pure.
-
-Whether the robot goes as far as the feed's servo was sent: a drum of another size than the configured one. Pure.
-
-Whether the zero that a rig file keeps still fits where its servos stand now. Pure.
-
-A servo in extended position mode counts its turns only while it has power: afterwards its position register has jumped by whole
-turns. A tendon's way is a small part of a turn, so there the jump shows; a feed goes over many turns, and a lost one may not
-show. So a kept zero is never taken over by itself: it says what has happened, and zeroing is the operator's, with slack wires.
+Identification: a wire can only pull. Turned one way the servo bends the head, turned the other way it lets the wire go slack and
+nothing happens, while a drum feeds both ways. So the direction with an effect is the one that tightens, and the direction of the
+head's motion tells the tendon. A tendon that acts out of the image plane shortens the visible robot, up or down alike: one camera
+cannot tell these two apart.
 """
 
 from __future__ import annotations
@@ -44,18 +22,21 @@ from numpy.typing import NDArray
 from core import geometry
 from core.calibration.camera import mm_per_px_at
 from core.config.calibration import ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
-from core.config.safety import JOINT_NAMES, TENDONS, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
+from core.config.safety import JOINT_NAMES, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
 from core.devices import UserError
 from core.perception.vectors import fit_robot_vector
 from core.types import Image, Point, Points
 
 _ANCHOR_PX = 90.0
-"""So far behind the head both paths are laid over each other; within 50 and 200 px it makes no difference."""
+"""Distance behind the head at which both paths are aligned; between 50 and 200 px it makes no difference."""
 _LEAST_ANCHOR_PX = 30.0
 _STEP_PX = 0.5
 _LINE_PX = 40.0
+"""Length of the robot's end that gives its heading."""
 _TANGENT_PX = 8.0
+"""Length of the end that is extended straight on."""
 _LEAST_LOOKS = 3
+"""Paths that must be found."""
 
 
 class HeadNotSeen(UserError):
@@ -66,8 +47,8 @@ class HeadNotSeen(UserError):
 class Look:
     """Some frames of a robot that stands still: its paths (each (N, 2), source px, tail -> head) and their mean picture.
 
-    ``scale`` is working pixels per source pixel: what is measured is told in working pixels, in which the network's noise is always
-    the same, however fine the camera's picture is.
+    ``scale`` is working pixels per source pixel: measurements are in working pixels, in which the network's noise does not depend
+    on the camera's resolution.
 
     Raises
     ------
@@ -87,7 +68,7 @@ class Look:
 
     @cached_property
     def working_paths(self) -> tuple[Points, ...]:
-        """The paths in working px, but for the half pixel that lies between the two."""
+        """The paths in working px (without the half-pixel offset)."""
         return tuple(path * self.scale for path in self.paths)
 
     @cached_property
@@ -98,7 +79,7 @@ class Look:
 
     @cached_property
     def path(self) -> Points:
-        """The path whose head lies nearest to the median, in source px."""
+        """The path whose head is nearest to the median, in source px."""
         return min(self.paths, key=lambda path: float(np.hypot(*(path[-1] - np.array(self.head)))))
 
     @cached_property
@@ -113,10 +94,10 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeadMove:
-    """How the head moved, in working px.
+    """Motion of the head, in working px.
 
-    ``vector`` (2,) is the way of the head at the length of robot that it had; ``lateral_px`` its part to the right of the heading;
-    ``longer_px`` how much more of the robot is seen (fed forward), or less (drawn back, or bent out of the picture).
+    ``vector`` (2,) is its displacement at the same length of robot; ``lateral_px`` the part to the right of the heading;
+    ``longer_px`` how much more of the robot is visible (fed forward), or less (drawn back, or bent out of the image plane).
     """
 
     vector: Points
@@ -131,9 +112,9 @@ class HeadMove:
 def head_move(rest: Look, moved: Look) -> HeadMove:
     """The head's motion between two looks.
 
-    Where the mask ends shifts by some pixels when the tip bends, and would turn the direction of a motion of ten pixels by as many
-    degrees. So the end of the mask is not believed: the robot is as long as it was, and the head is where that length ends,
-    measured along the path from where both paths still lie on each other.
+    The end of the mask shifts by some pixels when the tip bends, which would turn the direction of a motion of ten pixels by as
+    many degrees. So it is not used: the robot keeps its length, and the head is where that length ends, measured along the path
+    from where both paths still coincide.
     """
     before, after = rest.working_paths, moved.working_paths
     pairs = [(one, other) for one in before for other in after]
@@ -180,17 +161,18 @@ F64 = NDArray[np.float64]
 _HALF_WIDTH_PX = 8
 _SHEATH_STEP_PX = 1.0
 _HEAD_PX = 20.0
-"""The head may have moved by a hair; what changes there says nothing of the sheath."""
+"""Length at the head that is left out: it may have moved a little."""
 _BEYOND_PX = 20
+"""Length of bare robot beyond the changed place that is compared."""
 _LEAST_LENGTH = 3
-_LEAST_CHANGE = 3.5
-_NOISE_FACTOR = 3.5
+_LEAST_CHANGE, _NOISE_FACTOR = 3.5, 3.5
+"""A place has changed by more than this, in grey levels and against the median change."""
 _GAP = 6
-"""Of a ringed robot the sheath changes the dark parts much more than the light ones."""
+"""Longest gap in the changed places that is bridged: on a ringed robot the sheath changes mostly the dark parts."""
 
 
 def sheath_growth(path: Points, first: Image, second: Image) -> float:
-    """By how many px along the robot the sheath goes farther in the second picture than in the first; 0: no difference seen.
+    """By how many px the catheter's sheath covers more of the robot in the second picture than in the first; 0: no difference.
 
     Parameters
     ----------
@@ -206,7 +188,8 @@ def sheath_growth(path: Points, first: Image, second: Image) -> float:
     start, end = _longest_run(change > max(_LEAST_CHANGE, _NOISE_FACTOR * float(np.median(change))))
     if end - start < _LEAST_LENGTH:
         return 0.0
-    # Beyond the changed place both pictures show the bare robot: the one that looks like that in the place itself is the shorter.
+    # beyond the changed place both pictures show the bare robot: the picture that looks like that in the place itself has less
+    # sheath
     beyond = np.concatenate([band[end + 2 : min(end + 2 + _BEYOND_PX, usable)] for band in (one, other)])
     if len(beyond) < _BEYOND_PX:
         return 0.0
@@ -241,18 +224,21 @@ def _longest_run(changed: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 _CLEAR_LATERAL_PX, _CLEAR_FEED_PX, _CLEAR_PITCH_PX, _CLEAR_SHEATH_PX = 3.0, 1.5, 1.4, 3.0
+"""Least motions that identify a function."""
 _SHEATH_FROM_MM = 1.4
+"""Least amplitude at which the sheath is looked for."""
 _ONE_SIDED = 2.0
-"""So much more does a wire do when it is tightened than when it is let go."""
+"""A tightened wire moves the head by this factor more than a released one."""
 _STILL_PX = 0.6
+"""Largest motion of a head that stands still."""
 
 
 class NotIdentified(UserError):
-    """The servos' functions are not all clear; the message names what is missing."""
+    """Not all functions of the servos are identified; the message names what is missing."""
 
 
 class Function(StrEnum):
-    """What a servo does, as one camera can tell it."""
+    """What a servo does, as far as one camera can tell."""
 
     RIGHT = "pulls the head to the right"
     LEFT = "pulls the head to the left"
@@ -263,7 +249,7 @@ class Function(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wiggle:
-    """The robot at rest, with the servo turned in its own positive direction, and in its negative one, by so many mm each."""
+    """The robot at rest, and with the servo turned in its positive and in its negative direction, by ``amplitude_mm`` each."""
 
     amplitude_mm: float
     rest: Look
@@ -273,10 +259,7 @@ class Wiggle:
 
 @dataclass(frozen=True, slots=True)
 class FeedWay:
-    """How far the robot went: source px for each mm that was sent, of ``amplitude_mm`` both ways.
-
-    ``scale``: working px in a source px. ``head``: where it was seen, source px.
-    """
+    """Motion of the robot in source px per mm that was sent, of ``amplitude_mm`` both ways. ``scale``: working px per source px."""
 
     px_per_mm: float
     amplitude_mm: float
@@ -286,7 +269,7 @@ class FeedWay:
 
 @dataclass(frozen=True, slots=True)
 class ServoFinding:
-    """What a servo does. ``sign``: the servo's own direction that tightens the wire or feeds forward. ``seen`` for people."""
+    """What a servo does. ``sign``: the direction of the servo that tightens the wire or feeds forward. ``seen``: in plain words."""
 
     function: Function
     sign: Literal[-1, 1]
@@ -296,7 +279,7 @@ class ServoFinding:
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """Who a servo is. ``assumed``: one camera cannot tell, so the order of the ids decides."""
+    """The joint of a servo. ``assumed``: one camera cannot tell, so the order of the ids decides."""
 
     name: JointName
     id: int
@@ -306,7 +289,7 @@ class Assignment:
 
 
 def classify(wiggle: Wiggle) -> ServoFinding | None:
-    """What the servo does; None when nothing clear was seen: turn it farther."""
+    """What the servo does; None when the motion was not clear: turn it further."""
     plus, minus = head_move(wiggle.rest, wiggle.plus), head_move(wiggle.rest, wiggle.minus)
     sides = abs(plus.lateral_px), abs(minus.lateral_px)
     if max(sides) >= _CLEAR_LATERAL_PX:
@@ -326,7 +309,7 @@ def classify(wiggle: Wiggle) -> ServoFinding | None:
         sign = 1 if shorter[0] > shorter[1] else -1
         return ServoFinding(Function.PITCH, sign, f"{max(shorter):.1f} px less of the robot seen")
     if max(abs(value) for value in (*longer, *sides)) > _STILL_PX or wiggle.amplitude_mm < _SHEATH_FROM_MM:
-        return None  # a wire out of the picture's plane may just begin to show
+        return None  # a wire that acts out of the image plane may just begin to show
     grown_px = wiggle.rest.scale * sheath_growth(wiggle.rest.path, wiggle.minus.image, wiggle.plus.image)
     if abs(grown_px) >= _CLEAR_SHEATH_PX:
         return ServoFinding(Function.DELIVERY, 1 if grown_px > 0 else -1, f"sheath {abs(grown_px):.0f} px farther")
@@ -368,16 +351,16 @@ _FREE_PX = 4.0
 """A head that moves less lies against a wall."""
 _MOST_DISAGREEMENT_DEG = 15.0
 _IN_PLANE_SHARE = 0.25
-"""A pair that moves the head by a smaller share of the other one's way acts out of the picture's plane."""
+"""A pair that moves the head by a smaller share of the other pair's motion acts out of the image plane."""
 
 
 class SteeringNotSeen(UserError):
-    """The head did not move enough to tell a direction."""
+    """The head did not move enough to measure a direction."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pull:
-    """A tendon's pull (mm beyond the other's) and what the head did."""
+    """A tendon's pull (mm beyond the other's) and the head's motion."""
 
     pull_mm: float
     move: HeadMove
@@ -391,12 +374,11 @@ class _Pair:
 
 
 def learn(pulls: Mapping[str, Pull], heading: Points) -> SteeringConfig:
-    """The steering from a pull of each of the four tendons, each from rest.
+    """The steering from a pull of each of the four tendons, each from rest. Raises SteeringNotSeen.
 
-    Raises
-    ------
-    SteeringNotSeen
-        The head lies against a wall, or hardly moves, in both directions.
+    Pairs are evaluated together: what the wall, the bend or the end of the mask add to both motions alike falls out of their
+    difference. A bent head starts at right angles to its heading, so the direction is the mean of the measured one and of the
+    normal of the heading; how far they disagree is part of the result.
     """
     heading_deg = angle_deg(heading)
     bend, pitch = (_pair(pulls[one], pulls[other], heading_deg) for one, other in (("right", "left"), ("up", "down")))
@@ -415,7 +397,8 @@ def learn(pulls: Mapping[str, Pull], heading: Points) -> SteeringConfig:
             pull = pulls[name]
             direction = turn_deg(0.0, pair.direction_deg + 180.0 * k) if in_plane and pair is not None else None
             moved = pull.move.size_px if in_plane else abs(pull.move.lateral_px)
-            tendons.append(_tendon(name, direction, moved, pull.pull_mm))
+            learnt = {"name": name, "direction_deg": direction, "moved_px": moved, "px_per_mm": moved / pull.pull_mm}
+            tendons.append(TendonConfig.model_validate(learnt))
     return SteeringConfig(
         heading_deg=heading_deg,
         roll_deg=math.degrees(math.atan2(gains[1], gains[0])),
@@ -425,7 +408,7 @@ def learn(pulls: Mapping[str, Pull], heading: Points) -> SteeringConfig:
 
 
 def _pair(one: Pull, other: Pull, heading_deg: float) -> _Pair | None:
-    """Way per millimetre to the right of the heading and its direction; None when neither tendon moves the head sideways."""
+    """Sideways motion per millimetre and its direction; None when neither tendon moves the head sideways."""
     if max(abs(one.move.lateral_px), abs(other.move.lateral_px)) < _FREE_PX:
         return None
     way = one.move.vector - other.move.vector
@@ -433,44 +416,35 @@ def _pair(one: Pull, other: Pull, heading_deg: float) -> _Pair | None:
     measured = angle_deg(way)
     normal = turn_deg(0.0, heading_deg + math.copysign(90.0, gain))
     apart = turn_deg(measured, normal)
-    # Where only one side is free the difference is that side's way, bent as it is: the heading is the better witness then.
+    # where only one side is free the difference is that side's curved motion: the heading is more reliable then
     is_free = min(abs(one.move.lateral_px), abs(other.move.lateral_px)) >= _FREE_PX
     believed = measured if abs(apart) > _MOST_DISAGREEMENT_DEG else measured + (0.5 if is_free else 1.0) * apart
     return _Pair(gain, turn_deg(0.0, believed), abs(apart))
 
 
-def _tendon(name: str, direction_deg: float | None, moved_px: float, pull_mm: float) -> TendonConfig:
-    assert name in TENDONS
-    return TendonConfig.model_validate(
-        {
-            "name": name,
-            "direction_deg": direction_deg,
-            "moved_px": moved_px,
-            "px_per_mm": moved_px / pull_mm,
-        }
-    )
-
-
 _LEAST_SIDEWAYS_PX, _LEAST_SHORTENING_PX = 1.2, 0.25
+"""From here on the head follows the wire."""
 _ENOUGH_SIDEWAYS_PX, _ENOUGH_SHORTENING_PX = 5.0, 1.4
+"""Enough motion to find where it began."""
 _LEAST_POINTS = 2
 _STARTS = 401
+"""Candidates of the fit."""
 
 
 class NeverTaut(UserError):
-    """The head did not follow the wire, or the wire was never slack: nobody can tell where it becomes taut."""
+    """The head did not follow the wire, or the wire was never slack: where it becomes taut cannot be found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TautReading:
-    """The servo at ``position_mm`` (positive tightens), and what the head has done since the wire was slack."""
+    """The servo at ``position_mm`` (positive tightens), and the head's motion since the wire was slack."""
 
     position_mm: float
     move: HeadMove
 
 
 def is_enough(step: TautReading) -> bool:
-    """Whether the head has gone so far that the start can be told; pulling on would only strain the wire."""
+    """Whether the head has moved enough to find the start; further pulling would only strain the wire."""
     return abs(step.move.lateral_px) >= _ENOUGH_SIDEWAYS_PX or -step.move.longer_px >= _ENOUGH_SHORTENING_PX
 
 
@@ -480,11 +454,10 @@ def is_begun(step: TautReading) -> bool:
 
 
 def taut_at_mm(steps: Sequence[TautReading]) -> float:
-    """The position at which the wire becomes taut.
+    """The position at which the wire becomes taut, from `steps` from slack to pulled.
 
-    Parameters
-    ----------
-    steps : from slack to pulled, in that order.
+    The head stays while the wire is slack, and then follows it: sideways in proportion to the pull; out of the image plane by a
+    shortening that grows with its square, whose root is linear, too. So the start of the line is fitted, without a threshold.
 
     Raises
     ------
@@ -494,7 +467,7 @@ def taut_at_mm(steps: Sequence[TautReading]) -> float:
     sideways = max(abs(step.move.lateral_px) for step in steps) >= _ENOUGH_SIDEWAYS_PX
     least = _LEAST_SIDEWAYS_PX if sideways else math.sqrt(_LEAST_SHORTENING_PX)
     ways = [abs(step.move.lateral_px) if sideways else math.sqrt(max(0.0, -step.move.longer_px)) for step in steps]
-    # From the first step on after which the head always follows: one bad look before does not count.
+    # from the first step on after which the head always follows: one bad look before does not count
     first = len(ways)
     while first > 0 and ways[first - 1] >= least:
         first -= 1
@@ -505,18 +478,14 @@ def taut_at_mm(steps: Sequence[TautReading]) -> float:
     at = np.array([step.position_mm for step in steps])
     if np.polyfit(at[first:], np.array(ways[first:]), 1)[0] <= 0.0:
         raise NeverTaut("the head does not follow the wire's pull: pull it by hand, or zero it by eye")
-    # A root makes much of the little that noise does while the wire is slack; and the last step before may show some of its way.
+    # a root amplifies the noise while the wire is slack, and the last step before may show some motion
     slack = first - 1
     told = np.array([0.0] * slack + ways[first:])
     return _start_of_line(np.concatenate([at[:slack], at[first:]]), told, float(at[first]))
 
 
 def _start_of_line(at: NDArray[np.float64], ways: NDArray[np.float64], latest: float) -> float:
-    """Where the line starts that is 0 up to there and then rises, by least squares over all steps; `latest` at the latest.
-
-    The steps before tell as much as those after: seen in pixels the head goes by half a pixel at a time, and a line through the few
-    steps after the first of these would start anywhere.
-    """
+    """The start of a line that is 0 before and then rises, by least squares over all steps; `latest` at the latest."""
     starts = np.linspace(min(at[0], latest), latest, _STARTS)
     beyond = np.maximum(0.0, at[None, :] - starts[:, None])
     slopes = beyond @ ways / np.maximum((beyond**2).sum(axis=1), 1e-12)
@@ -525,7 +494,7 @@ def _start_of_line(at: NDArray[np.float64], ways: NDArray[np.float64], latest: f
 
 
 _NOISE_PX = 1.0
-"""Of a way as two looks give it, in working pixels."""
+"""Noise of a motion between two looks, in working pixels."""
 _LEAST_SHARE = 0.2
 
 
@@ -536,10 +505,9 @@ def feed_disagreement(
     scale: ScaleConfig,
     size: tuple[int, int],
 ) -> str:
-    """What a person must know of the feed's way; "" where camera and configuration agree as far as can be told.
+    """A warning when the feed per turn that was seen differs from the configured one; "" where they agree.
 
-    While nobody knew who is who all servos were turned as if their drums were as large as the largest configured one, so what
-    was seen tells the way at one turn of the horn.
+    Before identification all servos are turned as if their drums were as large as the largest configured one.
 
     Parameters
     ----------
@@ -569,7 +537,7 @@ _OVER = "the zero of the rig file does not hold any more"
 
 @dataclass(frozen=True, slots=True)
 class KeptZero:
-    """One joint. ``at_mm``: where it stands from the kept zero, after ``lost_turns`` of the servo are taken off."""
+    """One joint. ``at_mm``: its position from the kept zero, without ``lost_turns`` of the servo."""
 
     name: JointName
     lost_turns: int
@@ -578,11 +546,11 @@ class KeptZero:
 
 
 def kept_zero(joint: JointConfig, zero_ticks: int, ticks: int) -> KeptZero:
-    """How a joint stands against its kept zero; turns count as lost only where they take it out of its envelope.
+    """A joint's position from its kept zero, by the position registers then and now.
 
-    Parameters
-    ----------
-    zero_ticks, ticks : position registers, at the kept zero and now.
+    A servo in extended position mode counts its turns only while it has power: afterwards its register has jumped by whole turns.
+    The travel of a tendon is a small part of a turn, so there the jump shows (turns count as lost only where they take the joint
+    out of its envelope); a feed goes over many turns, and a lost one may not show.
     """
     away = ticks - zero_ticks
     if _is_inside(joint, away):
@@ -595,11 +563,9 @@ def kept_zero(joint: JointConfig, zero_ticks: int, ticks: int) -> KeptZero:
 
 
 def zero_advice(servos: ServosConfig, zero: ZeroConfig, ticks: Sequence[int]) -> str:
-    """One sentence for somebody who wants to arm joints that are not zeroed.
+    """What happened to the zero of the rig file, for an operator who arms joints that are not zeroed: it is never used by itself.
 
-    Parameters
-    ----------
-    ticks : position registers now, in the order of the joints.
+    `ticks` are the position registers now, in the order of the joints.
     """
     found = [kept_zero(joint, *both) for joint, *both in zip(servos.joints, zero.ticks, ticks, strict=True)]
     if lost := [f"{one.name} by {one.lost_turns:+d}" for one in found if one.lost_turns]:

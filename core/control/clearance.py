@@ -1,14 +1,12 @@
-"""Room between the robot's head and the wall of the vessel, from the picture, and warnings that do not flicker.
+"""Clearance between the robot's head and the vessel's wall, with warnings that do not flicker, and the prediction of the head's
+path.
 
 The lumen is taken as round about the centerline: its radius beside the head, less the distance of the head's centre from the
-centerline, less the robot's own radius. The head is a round end, so its centre lies one radius behind the tip: taken at the tip,
-the room of a head that points at the wall comes out up to a radius too small.
+centerline, less the robot's own radius. The head is a round end, so its centre lies one radius behind the tip.
 
-In the twin a robot lies against the wall much of the time, with 0.5 px of true room. Against the truth (36 frames of 5 phantoms,
-whole perception) the room is 0.4 px too small in the median and 2.8 px too small in one of ten, mostly where the head was found too
-far ahead. So touching is told from a breach, which begins where the picture's own error ends.
-
-Where the head goes next if the advice is followed: the ghost that the live view shows. A picture, no command is made from it.
+Against the twin's truth (36 frames of 5 phantoms, whole perception) the room is 0.4 px too small in the median and 2.8 px too
+small in one of ten, mostly where the head was found too far ahead. So a head that touches the wall, as it often does, is told
+from a breach, which begins where the picture's own error ends.
 """
 
 from __future__ import annotations
@@ -21,22 +19,23 @@ import numpy as np
 
 from core import geometry
 from core.perception.vectors import fit_robot_vector
-from core.types import Advice, Point, Points, Scene
+from core.types import Advice, Points, Scene
 
 BREACH_PX = 3.0
-"""So far the head must reach into the wall to be more than an error of the picture."""
+"""Depth in the wall that is more than an error of the picture."""
 _BREACH_BAND_PX = 1.5
+"""Hysteresis of a breach."""
 _BREACH_DWELL_S = 0.2
+"""A breach is reported when it has lasted so long."""
 _LEAST_FREE_PX = 1.0
-"""A robot as thick as the lumen has no room at all; below this the share would leap with every pixel."""
+"""Least room of which a share is taken: a robot as thick as the lumen has none."""
 
 
 @dataclass(frozen=True, slots=True)
 class Clearance:
     """``room_px`` from the surface of the head to the wall, in working px; negative: the head seems to reach into the wall.
 
-    ``share`` is what is left of the room that there is at this place: 1 on the centerline, 0 at the wall. ``room_mm`` is None when
-    the scale is not known.
+    ``share`` of the room at this place: 1 on the centerline, 0 at the wall. ``room_mm`` is None when the scale is not known.
     """
 
     room_px: float
@@ -50,58 +49,39 @@ class Clearance:
 
 
 def clearance_of(scene: Scene, pixels_per_mm: float | None = None) -> Clearance | None:
-    """The head's room in a scene.
-
-    Parameters
-    ----------
-    pixels_per_mm : working px per mm in the plane of the vessel; None: no millimetres.
-
-    Returns
-    -------
-    Clearance
-        None without a pose: where the head is, or in which vessel, is then not known.
-    """
+    """The head's room in a scene; None without a pose. `pixels_per_mm`: working px per mm in the vessel's plane, if known."""
     if scene.pose is None or scene.path is None or scene.centerline is None:
         return None
     robot_px = scene.path.radius_px
-    offset_px, _, _ = geometry.nearest(scene.centerline.piece, _head_centre(scene.path.points, robot_px))
+    path = scene.path.points
+    total_px = float(geometry.arc_length(path)[-1])
+    x, y = geometry.cut(path, total_px - robot_px, total_px)[0].tolist()
+    offset_px, _, _ = geometry.nearest(scene.centerline.piece, (x, y))
     free_px = scene.centerline.radius_px - robot_px
     room_px = free_px - offset_px
     return Clearance(room_px, room_px / max(free_px, _LEAST_FREE_PX), room_px / pixels_per_mm if pixels_per_mm else None)
 
 
-def _head_centre(path: Points, radius_px: float) -> Point:
-    total_px = float(geometry.arc_length(path)[-1])
-    x, y = geometry.cut(path, total_px - radius_px, total_px)[0].tolist()
-    return x, y
-
-
 class BreachWatch:
-    """Says that there is a breach once it has lasted for 0.2 s, and until the head is clearly out of the wall again."""
+    """Reports a breach that has lasted for 0.2 s, until the head is clearly out of the wall again."""
 
     def __init__(self) -> None:
         self._since_s: float | None = None
-        self._told = False
+        self._is_reported = False
 
     def update(self, clearance: Clearance | None, time_s: float) -> bool:
-        """With every scene, at its capture; None (not known) starts anew."""
-        if clearance is None or clearance.room_px > -BREACH_PX + (_BREACH_BAND_PX if self._told else 0.0):
-            self._since_s, self._told = None, False
+        """Update with every scene, at its capture; None (not known) resets."""
+        if clearance is None or clearance.room_px > -BREACH_PX + (_BREACH_BAND_PX if self._is_reported else 0.0):
+            self._since_s, self._is_reported = None, False
             return False
         if self._since_s is None or time_s < self._since_s:
             self._since_s = time_s
-        self._told = self._told or time_s - self._since_s >= _BREACH_DWELL_S
-        return self._told
+        self._is_reported = self._is_reported or time_s - self._since_s >= _BREACH_DWELL_S
+        return self._is_reported
 
 
 class Ladder:
-    """Which of some rising limits a value exceeds: it climbs at once, and comes down only when the value is `band` below the limit.
-
-    Parameters
-    ----------
-    limits : rising.
-    band : what keeps a value that swings about a limit from making a warning flicker.
-    """
+    """The number of rising `limits` that a value exceeds, with hysteresis: up at once, down only `band` below the limit."""
 
     def __init__(self, limits: Sequence[float], band: float) -> None:
         self._limits = tuple(limits)
@@ -109,7 +89,7 @@ class Ladder:
         self._level = 0
 
     def update(self, value: float | None) -> int:
-        """The number of limits exceeded; None (not known) starts anew at 0."""
+        """The number of limits exceeded; None (not known) resets to 0."""
         if value is None:
             self._level = 0
             return 0
@@ -120,28 +100,25 @@ class Ladder:
 
 
 _END_PX = 16.0
-"""End of the robot whose direction is the head's; the 40 px of the pose lag behind in a bend."""
+"""Length of the robot's end that gives the head's direction; the 40 px of the pose lag behind in a bend."""
 _SHORTEST_PX = 16.0
-"""So long is the ghost at least: which way a slow move goes must be seen, too."""
+"""Least length of a prediction, so that the direction of a slow move is seen, too."""
 _STRAIGHT_DEG = 0.5
+"""A turn below this is none."""
 _STEP_PX = 2.0
+"""Spacing of the points of a prediction."""
 
 
 def predict(scene: Scene, advice: Advice, horizon_s: float, pixels_per_mm: float) -> Points | None:
-    """The head's way during the next move.
+    """The head's path if the advice is followed for `horizon_s`. For display only: no command is made from it.
 
-    Parameters
-    ----------
-    scene : with a pose.
-    advice : forwards the head follows an arc that has turned by ``steer_deg`` at its end; backwards it comes back along the robot.
-    horizon_s : for so long the advice is followed.
-    pixels_per_mm : working px per mm.
+    Forwards the head follows an arc that has turned by ``steer_deg`` at its end; backwards it comes back along the robot.
 
     Returns
     -------
     Points
-        (N, 2) in working px, N >= 2, from the head onwards; at least 16 px long where the robot lets it. None without a pose, and
-        when the advice is to stay as it is.
+        (N, 2) in working px, N >= 2, from the head onwards; 16 px long at least. None without a pose, and when the advice is to
+        stay.
     """
     if scene.pose is None or scene.path is None:
         return None
@@ -163,7 +140,7 @@ def _arc(start: tuple[float, float], direction: tuple[float, float], turn_deg: f
     """An arc of that length which leaves `start` in `direction` and has turned at its end (positive: to the right on screen)."""
     along = np.linspace(0.0, length_px, max(3, math.ceil(length_px / _STEP_PX) + 1))
     heading, turn = math.atan2(direction[1], direction[0]), math.radians(turn_deg)
-    # a chord of an arc: its length is sinc(half the turn) of the arc's, its direction lies half the turn further
+    # the chord of an arc: its length is sinc(half the turn) of the arc's, its direction is half the turn further
     half = turn * along / length_px / 2.0
     chord = along * np.sinc(half / math.pi)
     return np.column_stack([start[0] + chord * np.cos(heading + half), start[1] + chord * np.sin(heading + half)])

@@ -1,4 +1,4 @@
-"""The loop: newest frame -> perceive -> advise. One thread turns it; the pilot beside it drives."""
+"""The engine: newest frame -> perceive -> advise, in one thread; the pilot beside it drives."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class Perceive(Protocol):
 
 
 class Engine:
-    """Owns an open camera and turns perception once per ``step``.
+    """Owns an open camera and runs perception once per ``step``.
 
     Parameters
     ----------
     camera : open; closed through `on_close`.
     perceive : the perception pipeline.
-    policy : scene -> advice where there is nobody to drive, None when there is none.
+    policy : scene -> advice, for rigs without a pilot.
     on_close : closes the rig.
     pilot : advises and drives the rig's robot; None when there is no robot. Its turns begin now.
-    robot : whose status goes into the ticks.
-    turns_pilot : False: the caller turns the pilot himself, in lock-step.
+    robot : its status goes into the ticks.
+    turns_pilot : False: the caller ticks the pilot, in lock-step.
     """
 
     def __init__(
@@ -63,8 +63,8 @@ class Engine:
     def step(self, timeout_s: float) -> Tick | None:
         """One turn; None when no new frame came in time.
 
-        A camera that is lost and looks for itself does not end the turns, and one that is lost for good only where there is nobody
-        to drive: who has a robot in a vessel must be able to bring it back by hand. ``problem`` then says what is the matter.
+        A lost camera that reconnects by itself does not end the turns, and one that is lost for good only where there is no
+        pilot: an operator with a robot in a vessel must be able to bring it back by hand. ``problem`` then says what is wrong.
 
         Raises
         ------
@@ -91,7 +91,7 @@ class Engine:
         scene = self._perceive(frame, target)
         status = self._status()
         with self._lock:
-            # what was understood with another destination in mind says nothing about the way to this one
+            # a scene that was perceived with another destination has no route to this one
             has_target = target is not None and target == self._target
         if self.pilot is None:
             advice, sent = self._policy(scene), None
@@ -119,7 +119,7 @@ class Engine:
         return frame
 
     def _status(self) -> RobotStatus | None:
-        """None also when the robot was lost: pictures go on, and the pilot says what happened."""
+        """None also when the robot was lost: pictures go on, and the pilot reports it."""
         if self._robot is None:
             return None
         try:
@@ -145,7 +145,7 @@ class Engine:
             self._on_close()
 
     def _refuse(self, frame: Frame) -> None:
-        """A picture that is none is not looked at, shown or recorded; that it came, and what is wrong with it, is told."""
+        """A frame of a wrong format is reported, and not perceived, shown or recorded."""
         shape = "x".join(map(str, frame.image.shape))
         self.problem = f"the camera's picture is {frame.image.dtype} {shape}, not 8-bit RGB: set its colour format"
         if self.pilot is not None:
@@ -153,7 +153,7 @@ class Engine:
             self.pilot.update_scene(frame, scene, None, has_target=False)
 
     def _is_late(self, frame: Frame) -> bool:
-        """Overtaken by a newer one, by number and by time: a camera that was opened again counts anew, but at a later time."""
+        """Older than the last one by index and time: a camera that was opened again restarts its index, but at a later time."""
         if self._last_index is None or frame.index >= self._last_index or frame.captured_s >= self._times[-1]:
             return False
         self._dropped += 1

@@ -1,26 +1,20 @@
-"""The one gate: nothing goes to the servos but what this pure function returns.
+"""The gate: nothing goes to the servos but what the pure function ``gate_step`` returns.
 
-Two kinds of excess are told apart by whether an honest source can produce them (``joints.joint_goals`` is the honest source: it
-starts from the goals that were sent last, and keeps within speed and envelope).
-
-*Rejected*, because no honest source asks for it, and a clamp would hide the fault and still move the robot: numbers that are not
+*Rejected* is what no honest source asks for (``joints.joint_goals`` is the honest one: it starts from the goals that were sent
+last, and keeps within speed and envelope), since a clamp would hide the fault and still move the robot: numbers that are not
 finite, wrong counts, times from the future, anything stale, goals more than one position unit beyond the envelope, and goals
-farther from the last one than the joint can travel at full speed while a command is valid (``command_max_age_s``). The answer to
-every rejection is a hold of all seven joints.
+further from the last one than the joint can travel at full speed while a command is valid (``command_max_age_s``). Every
+rejection holds all seven joints.
 
-*Limited*, and put on record, because timing, lag and inertia of an honest run do produce it: a step longer than this tick allows at
-the joint's speed and acceleration or inside the warn margin, a rounding error at the envelope's end, and a goal farther than
+*Limited*, and recorded, is what timing, lag and inertia of an honest run produce: a step longer than this tick allows at the
+joint's speed and acceleration or inside the warn margin, a rounding error at the envelope's end, and a goal further than
 ``max_step_mm`` from the measured position, which happens whenever a servo lags. Joints that move the same catheter share the
-tightest limit of one of them.
+tightest limit of one of them. The acceleration bounds how a joint gets faster, never how it slows down or stops; when the servo
+falls behind, the goal goes back towards it at up to full speed.
 
-No limit ever keeps a joint moving: the acceleration bounds how a joint gets faster, never how it slows down or stops; and when the
-servo falls behind, the goal goes back towards it at up to full speed.
-
-A hold is the measured position, taken once when the hold begins and then kept while the joint stays within ``max_step_mm`` of it:
-writing the measured position again and again would let a loaded tendon creep, as every servo rests a little short of its goal.
-Without believable positions nothing is sent; the servos then keep their last goal, which was within one step of them.
-
-What the gate rejects: malformed, not permitted, stale, out of envelope, over rate. Each check names its rejection, or None.
+A hold is the measured position, taken once when the hold begins and kept while the joint stays within ``max_step_mm`` of it:
+writing each measured position would let a loaded tendon creep, as every servo rests a little short of its goal. Without valid
+positions nothing is sent; the servos then keep their last goal, which was within one step of them.
 """
 
 from __future__ import annotations
@@ -37,14 +31,14 @@ _COUNT = len(JOINT_NAMES)
 
 
 class Source(StrEnum):
-    """Who asks for a motion."""
+    """The source of a motion."""
 
     OPERATOR = "operator"
     PROGRAM = "program"
 
 
 class RejectReason(StrEnum):
-    """Why the gate let nothing through."""
+    """Why the gate rejected a request."""
 
     NON_FINITE = "number not finite"
     WRONG_COUNT = "wrong number of joints"
@@ -67,7 +61,7 @@ class RejectReason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class GoalRequest:
-    """Goals (mm) that somebody asks for. ``captured_s`` is when the frame behind them was taken; an operator needs none."""
+    """Requested goals (mm). ``captured_s`` is the capture of the frame behind them; the operator's need none."""
 
     goals_mm: Sequence[float]
     source: Source
@@ -77,7 +71,7 @@ class GoalRequest:
 
 @dataclass(frozen=True, slots=True)
 class JointMeasurement:
-    """Where the seven joints are (mm), and when that was read."""
+    """Positions of the seven joints (mm), and when they were read."""
 
     positions_mm: Sequence[float]
     measured_s: float
@@ -85,7 +79,7 @@ class JointMeasurement:
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """Nothing of the request was obeyed. ``detail`` adds the joint or the measured value against its threshold."""
+    """No part of the request is followed. ``detail`` adds the joint, or the measured value and its threshold."""
 
     reason: RejectReason
     detail: str = ""
@@ -158,7 +152,7 @@ def _age(age_s: float, limit_s: float) -> str:
 def measurement_problem(
     measurement: JointMeasurement | None, now_s: float, servos: ServosConfig, safety: SafetyConfig
 ) -> Rejection | None:
-    """Why the measured positions are no ground to stand on, or None."""
+    """Why the measured positions are not valid; None: they are."""
     if measurement is None:
         return Rejection(RejectReason.NO_MEASUREMENT)
     if (wrong := _not_seven_numbers(measurement.positions_mm)) is not None:
@@ -175,7 +169,7 @@ def measurement_problem(
 
 
 def outside_envelope(positions_mm: Sequence[float], servos: ServosConfig) -> tuple[str, ...]:
-    """The joints farther outside their envelope than one bounded step brings them back, with their positions."""
+    """The joints too far outside their envelope to come back in one bounded step, with their positions."""
     found = []
     for joint, position_mm in zip(servos.joints, positions_mm, strict=True):
         low_mm, high_mm = joint_room(position_mm, joint)
@@ -185,7 +179,7 @@ def outside_envelope(positions_mm: Sequence[float], servos: ServosConfig) -> tup
 
 
 def too_far(request: GoalRequest, base_mm: Joints, servos: ServosConfig, safety: SafetyConfig) -> Rejection | None:
-    """Goals that no honest source asks for: beyond the envelope, or farther than the joint travels while a command is valid."""
+    """Goals that no honest source asks for: beyond the envelope, or further than the joint travels while a command is valid."""
     for joint, goal_mm, from_mm in zip(servos.joints, request.goals_mm, base_mm, strict=True):
         rounding_mm = abs(1.0 / joint.ticks_per_mm)
         if not joint.low_mm - rounding_mm <= goal_mm <= joint.high_mm + rounding_mm:
@@ -198,7 +192,7 @@ def too_far(request: GoalRequest, base_mm: Joints, servos: ServosConfig, safety:
 
 
 _AT_REST: Joints = (0.0,) * len(JOINT_NAMES)
-_RECORDED_MM = 1e-9  # smaller differences are the arithmetic's
+_RECORDED_MM = 1e-9  # smaller differences are rounding errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +207,7 @@ class Clamp:
 
 @dataclass(frozen=True, slots=True)
 class GateState:
-    """What the gate remembers from one tick to the next. ``goals_mm`` are the last goals that left it."""
+    """State of the gate. ``goals_mm`` are the last goals that left it."""
 
     time_s: float | None = None
     goals_mm: Joints | None = None
@@ -223,7 +217,7 @@ class GateState:
 
     @property
     def sent(self) -> SentGoals | None:
-        """Where the next command starts from; None when a new motion must start from the measured positions."""
+        """Where the next command starts; None when a new motion must start from the measured positions."""
         if not self.moving or self.goals_mm is None or self.time_s is None:
             return None
         return SentGoals(self.goals_mm, self.time_s)
@@ -231,7 +225,7 @@ class GateState:
 
 @dataclass(frozen=True, slots=True)
 class GateStep:
-    """What leaves the gate: the goals to write (None: write nothing), and why they are not what was asked for."""
+    """Result of a tick: the goals to write (None: write nothing), and why they differ from the requested ones."""
 
     goals_mm: Joints | None
     state: GateState
@@ -256,10 +250,9 @@ def gate_step(
 
     Parameters
     ----------
-    state : the state that the last tick returned.
-    request : the newest command's goals; None when there is none.
-    measurement : the newest positions; None when none were read yet.
-    permitted : whose commands the supervisor lets through now; None: nobody's.
+    state : as returned by the last tick.
+    request, measurement : the newest ones; None when there is none yet.
+    permitted : the source that the supervisor permits now.
     now_s : monotonic clock of the frames and commands.
 
     Returns
@@ -331,13 +324,13 @@ def _move(
 
 
 def _inside(positions_mm: Joints, servos: ServosConfig) -> Joints:
-    """The positions, those just outside the envelope brought to its end; that is one bounded step at most."""
+    """The positions, clipped to the envelope; that is one bounded step at most."""
     return tuple(min(max(at, joint.low_mm), joint.high_mm) for at, joint in zip(positions_mm, servos.joints, strict=True))
 
 
 def _hold(state: GateState, measured_mm: Joints | None, now_s: float, why: Rejection, servos: ServosConfig) -> GateStep:
     time_s = now_s if math.isfinite(now_s) else state.time_s
-    # on a new time line the times of the old one say nothing
+    # times from before the clock went back do not count
     issued_s = None if why.reason is RejectReason.CLOCK_WENT_BACK else state.issued_s
     held_mm = None if state.moving else state.goals_mm
     if measured_mm is None:

@@ -1,9 +1,7 @@
-"""Command -> goals of the seven joints in mm: bends become pulls of antagonistic tendons, speeds are integrated.
+"""Command -> goals of the seven joints in mm (bends become pulls of antagonistic tendons, speeds are integrated), and joint limits.
 
-The mapping starts from the goals that the gate really let through, so nothing winds up while the gate limits or holds. It already
-keeps within speed and envelope; the gate checks it all the same.
-
-The limits of one joint, and of those that move the same thing: how far a goal may go in one tick.
+The mapping starts from the goals that the gate really let through, so nothing winds up while the gate limits or holds. It keeps
+within speed and envelope itself, and the gate checks it all the same.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ Joints = tuple[float, ...]
 NO_GOALS: Joints = (math.nan,) * len(JOINT_NAMES)
 
 ONE_CATHETER = slice(JOINT_NAMES.index("delivery_1"), JOINT_NAMES.index("delivery_2") + 1)
-"""Places of the joints that move the same catheter: driven apart they would stretch or buckle it."""
+"""Indices of the joints that move the same catheter: driven apart they would stretch or buckle it."""
 
 _TOUCHING_MM = 1e-9
 _ADVANCE = JOINT_NAMES.index("advance")
@@ -37,7 +35,7 @@ class SentGoals:
 
 @dataclass(frozen=True, slots=True)
 class JointRequest:
-    """Goals to ask the gate for, and the joints that were stopped short by the end of their envelope."""
+    """Goals to request of the gate, and the joints that the end of their envelope stopped short."""
 
     goals_mm: Joints
     at_end: tuple[JointName, ...] = ()
@@ -46,7 +44,7 @@ class JointRequest:
 def joint_goals(
     command: Command, last: SentGoals | None, measured_mm: Sequence[float], now_s: float, servos: ServosConfig, safety: SafetyConfig
 ) -> JointRequest:
-    """The goals that a command means now.
+    """The goals of a command now.
 
     Parameters
     ----------
@@ -58,8 +56,8 @@ def joint_goals(
     Returns
     -------
     JointRequest
-        All seven goals are NaN when a number of the command or the time is not finite: the gate rejects that by name, while a clamp
-        would turn it into full speed (``min(1.0, nan)`` is 1.0). A pause longer than a command may be old counts as that age.
+        All seven goals are NaN when a number of the command or the time is not finite: the gate rejects NaN by name, while a clamp
+        would turn it into full speed (``min(1.0, nan)`` is 1.0). A pause counts as the maximal age of a command at most.
     """
     numbers = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s, now_s)
     if not all(math.isfinite(number) for number in numbers):
@@ -87,14 +85,14 @@ def _tendon_goals(command: Command, last_mm: Joints, elapsed_s: float, servos: S
 
 
 def _pair_pull(asked_mm: float, one: JointConfig, other: JointConfig, pretension_mm: float) -> float:
-    """One tendon pulls as far as the other lets go: what the envelope of either forbids, the pair leaves, so that no wire hangs."""
+    """One tendon pulls as far as the other lets go, within the envelope of both, so that no wire hangs slack."""
     most_mm = max(0.0, min(one.high_mm - pretension_mm, pretension_mm - other.low_mm))
     least_mm = min(0.0, max(one.low_mm - pretension_mm, pretension_mm - other.high_mm))
     return min(max(asked_mm, least_mm), most_mm)
 
 
 def _fed(last_mm: Sequence[float], speed_mm_s: float, elapsed_s: float, joints: Sequence[JointConfig]) -> list[tuple[float, bool]]:
-    """Joints that move the same catheter go the same way: where one of them must stop, all of them do."""
+    """Joints that move the same catheter move equally: where one of them must stop, all of them do."""
     speed_mm_s = _limited(speed_mm_s, min(joint.max_speed_mm_s for joint in joints))
     asked_mm = speed_mm_s * elapsed_s
     forward = asked_mm > 0
@@ -152,8 +150,8 @@ def limited_goal(
     Returns
     -------
     tuple
-        The goal is inside envelope and step in any case. It lies farther from `last_mm` than the speed allows only when the joint
-        was moved away from where it was sent; the gate then rejects it.
+        The goal is inside envelope and step. It lies further from `last_mm` than the speed allows only when the joint was moved
+        away from its goal; the gate then rejects it.
     """
     direction = 1.0 if asked_mm > last_mm else -1.0
     to_end_mm = joint.high_mm - last_mm if direction > 0 else last_mm - joint.low_mm
@@ -180,18 +178,11 @@ def limited_goal(
 def together(
     goals: Sequence[Goal], last_mm: Sequence[float], measured_mm: Sequence[float], joints: Sequence[JointConfig]
 ) -> list[Goal]:
-    """The goals of joints that move the same thing: the tightest limit of one of them holds for all, so that none pulls ahead.
+    """The goals of joints that move the same catheter: the tightest limit of one of them holds for all, so that none pulls ahead.
 
-    Parameters
-    ----------
-    goals : of each joint by its own limits.
-    last_mm : last goals.
-
-    Returns
-    -------
-    list
-        All go as far as the one that goes least far, and where they would part, none goes. What the step from its measured position
-        demands of a joint, as when it was pushed, comes before that; no joint ever goes farther than by its own limits.
+    `goals` are of each joint by its own limits. All go as far as the one with the shortest step, and where they would part, none
+    moves. The maximal step from its measured position comes before that, as when a joint was pushed; no joint ever exceeds its own
+    limits.
     """
     steps = [goal - last for (goal, _), last in zip(goals, last_mm, strict=True)]
     common_mm = max(0.0, min(steps)) + min(0.0, max(steps))  # forwards or backwards; neither where they would part

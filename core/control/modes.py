@@ -1,4 +1,4 @@
-"""Who drives, what the operator may ask for, and what the supervisor answers."""
+"""Modes, requests and results of the supervisor."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Mode(StrEnum):
 
 
 class Act(StrEnum):
-    """What the operator does. INPUT is a movement of the controls; TAKE_BACK ends autonomy without one, also at the destination."""
+    """Acts of the operator. INPUT is a movement of the controls; TAKE_BACK ends autonomy without one, also at the destination."""
 
     STOP = "stop"
     ACKNOWLEDGE = "acknowledge"
@@ -33,7 +33,7 @@ class Act(StrEnum):
 
 
 class Hindrance(StrEnum):
-    """Why a request is refused, beside active faults."""
+    """Why a request is refused, apart from active faults."""
 
     IS_STOPPED = "stopped"
     UNACKNOWLEDGED = "fault not acknowledged"
@@ -59,7 +59,7 @@ ARMED_MODES = DRIVING_MODES | {Mode.ARMED}
 
 @dataclass(frozen=True, slots=True)
 class RequestRefused:
-    """A request that was not granted, and all its reasons at once."""
+    """A refused request, with all reasons."""
 
     act: Act
     reasons: tuple[Hindrance | Cause, ...]
@@ -75,7 +75,7 @@ class Latched:
 
 @dataclass(frozen=True, slots=True)
 class SupervisorState:
-    """All that the supervisor remembers; a fresh one is the boot: disarmed, nothing known."""
+    """State of the supervisor; a fresh one is disarmed, with nothing known."""
 
     mode: Mode = Mode.ADVISORY
     health: Health = field(default_factory=Health)
@@ -92,10 +92,10 @@ class SupervisorState:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What follows from the tick.
+    """Result of a tick.
 
-    ``permitted`` is whose commands the gate may let through. ``blanked`` is why no advice may be shown. ``writes_blocked``: after
-    one last hold nothing is written to the bus. ``raised`` are the faults that were not active in the tick before.
+    ``permitted`` is the source whose commands the gate may let through. ``blanked`` is why no advice may be shown.
+    ``writes_blocked``: after one last hold nothing is written to the bus. ``raised`` are the faults that were not active before.
     """
 
     mode: Mode

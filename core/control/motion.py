@@ -1,7 +1,4 @@
-"""The operator's hands: held keys and sticks are rates, and become the motion that is asked of the robot.
-
-Advice -> command, for autonomous driving: turns of the head become bend, speeds become feed. Time is injected.
-"""
+"""Controls -> command for driving by hand, and advice -> command for autonomous driving. Time is injected."""
 
 from __future__ import annotations
 
@@ -14,12 +11,14 @@ from core.config.safety import JointConfig, ServosConfig
 from core.types import Advice, Command
 
 _LONGEST_STEP_S = 0.1
-_AHEAD = 0.25
+"""A longer pause between two commands counts as this."""
+_MOST_AHEAD = 0.25
+"""Largest lead of the commanded bend over the one sent, of full bend."""
 
 
 @dataclass(frozen=True, slots=True)
 class Jog:
-    """How the controls are held, each -1..1 of full speed; ``straighten`` brings bend and pitch back to the middle."""
+    """Deflection of the controls, each -1..1 of full speed; ``straighten`` brings bend and pitch back to the middle."""
 
     bend: float = 0.0
     pitch: float = 0.0
@@ -37,7 +36,7 @@ AT_REST = Jog()
 
 @dataclass(frozen=True, slots=True)
 class JogSpeeds:
-    """What a held key makes of the joints, mm/s: robot and catheter are fed, tendons pulled by ``bend_mm_s`` and ``pitch_mm_s``."""
+    """Speeds of the joints by a held key: feed of robot and catheter, pull of the tendons."""
 
     advance_mm_s: float
     delivery_mm_s: float
@@ -46,14 +45,14 @@ class JogSpeeds:
 
 
 def hand_speeds(hand: JogConfig, servos: ServosConfig, share: float = 1.0) -> JogSpeeds:
-    """As fast as `hand` asks for at `share` (0..1) of full speed, and not faster than the slowest joint that takes part may go."""
+    """The speeds of `hand` at `share` (0..1) of full speed, limited to the slowest joint that takes part."""
     right, left, up, down, advance, *delivery = servos.joints
     pull_mm_s = share * hand.bend_rate_per_s * servos.max_pull_mm
     return JogSpeeds(
-        _as_they_may(share * hand.advance_mm_s, advance),
-        _as_they_may(share * hand.delivery_mm_s, *delivery),
-        _as_they_may(pull_mm_s, right, left),
-        _as_they_may(pull_mm_s, up, down),
+        _speed_limited(share * hand.advance_mm_s, advance),
+        _speed_limited(share * hand.delivery_mm_s, *delivery),
+        _speed_limited(pull_mm_s, right, left),
+        _speed_limited(pull_mm_s, up, down),
     )
 
 
@@ -74,9 +73,11 @@ def combined(jogs: Iterable[Jog]) -> Jog:
 
 
 class JogIntegrator:
-    """Bend and pitch move while they are held and stay when let go; advance and delivery are speeds, zero when nothing is held.
+    """Controls -> command: bend and pitch change while a control is held and stay when it is released; advance and delivery are
+    speeds.
 
-    What is asked for runs ahead of the robot by ``_AHEAD`` at most, so that letting go of a robot that does not follow ends it.
+    The command runs ahead of the robot by ``_MOST_MOST_AHEAD`` at most, so that releasing the control of a robot that lags ends
+    its motion.
     """
 
     def __init__(self, config: JogConfig) -> None:
@@ -89,10 +90,7 @@ class JogIntegrator:
         self._last_s: float | None = None
 
     def command(self, jog: Jog, now_s: float, at: Command | None = None, speed: float = 1.0) -> Command:
-        """The motion for this moment; `now_s` is monotonic, `at` where the robot was told to be last (None: not known).
-
-        `speed` is the share of full speed, 0..1, of whatever is held.
-        """
+        """The command now; `now_s` is monotonic, `at` the motion sent last (None: not known), `speed` the share of full speed."""
         config = self._config
         elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), _LONGEST_STEP_S)
         self._last_s = now_s
@@ -104,8 +102,8 @@ class JogIntegrator:
             self._bend = _limited(self._bend + step * _limited(jog.bend, 1.0), 1.0)
             self._pitch = _limited(self._pitch + step * _limited(jog.pitch, 1.0), 1.0)
         if at is not None:
-            self._bend = at.bend + _limited(self._bend - at.bend, _AHEAD)
-            self._pitch = at.pitch + _limited(self._pitch - at.pitch, _AHEAD)
+            self._bend = at.bend + _limited(self._bend - at.bend, _MOST_AHEAD)
+            self._pitch = at.pitch + _limited(self._pitch - at.pitch, _MOST_AHEAD)
         return Command(
             bend=self._bend,
             pitch=self._pitch,
@@ -114,7 +112,7 @@ class JogIntegrator:
         )
 
 
-def _as_they_may(speed_mm_s: float, *joints: JointConfig) -> float:
+def _speed_limited(speed_mm_s: float, *joints: JointConfig) -> float:
     return min(speed_mm_s, *(joint.max_speed_mm_s for joint in joints))
 
 
@@ -123,11 +121,11 @@ def _limited(value: float, limit: float) -> float:
 
 
 class AdviceController:
-    """Follows advice with a rate-limited PI loop.
+    """Advice -> command with a rate-limited PI loop, which the camera closes.
 
-    Advice says by how much the head is to *turn from where it is now*; the bend that holds a vessel's curve is not part of it. So
-    the bend is mainly the integral of the advice, which also takes up slack and set of the wires, with a small part that acts at
-    once. The loop is closed by the camera. While there is no advice the bend is kept and the feed stops at once.
+    Advice is the turn of the head *from where it is now*; the bend that holds a vessel's curve is not part of it. So the bend is
+    mainly the integral of the advice, which also takes up slack and set of the wires, with a small proportional part. Without
+    advice the bend is kept and the feed stops at once.
     """
 
     def __init__(self, config: DriveConfig, bend: float = 0.0) -> None:
@@ -142,7 +140,7 @@ class AdviceController:
         self._last_s: float | None = None
 
     def command(self, advice: Advice | None, now_s: float) -> Command:
-        """The command for this moment; `now_s` is on any monotonic clock, the same for all calls."""
+        """The command now; `now_s` is on any monotonic clock, the same for all calls."""
         config = self._config
         elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), config.max_gap_s)
         self._last_s = now_s
@@ -154,7 +152,7 @@ class AdviceController:
         wanted = integral + config.proportional * turn
         reach = config.max_bend_rate_per_s * elapsed_s
         bend = _limited(self._bend + _limited(wanted - self._bend, reach), 1.0)
-        # While rate or range hold the bend back, the integral waits, so that it need not unwind later.
+        # anti-windup: the integral waits while rate or range limit the bend
         held_back = (wanted - bend) * turn > 0.0
         self._integral = self._integral if held_back else _limited(integral, 1.0)
         self._bend = bend

@@ -1,7 +1,4 @@
-"""The policies by name. All of them take a scene and give advice; the same object advises the operator and drives.
-
-Pose -> advice: the paper's state table ("4 states of interventional robot" and the control advice beside them).
-"""
+"""The policies by name: scene -> advice. The same object advises the operator and drives."""
 
 from __future__ import annotations
 
@@ -10,15 +7,15 @@ from typing import Protocol, get_args
 import numpy as np
 
 from core.config.models import AdviceConfig, Config, PolicyName
+from core.control.look_ahead import limited
 from core.control.pursuit import Pursuit, speed_word
 from core.types import Advice, PoseState, RobotStatus, Scene, Speed
 
 
 def table_policy(scene: Scene, config: AdviceConfig) -> Advice | None:
-    """The paper's advice for a scene; None when there is no pose (nothing stale is ever shown).
+    """The paper's state table ("4 states of interventional robot"); None when there is no pose.
 
-    A: fast, no steering. B: slow, no steering. C: slowest, steer hardest. D: moderate, steer. The degree follows theta, and
-    the turn is always the one that closes theta.
+    A: fast, no steering. B: slow, no steering. C: slowest, steer hardest. D: moderate, steer. The steering closes theta.
     """
     pose = scene.pose
     if pose is None:
@@ -30,25 +27,19 @@ def table_policy(scene: Scene, config: AdviceConfig) -> Advice | None:
     if pose.state is PoseState.B:
         return Advice(Speed.SLOW, config.slow_mm_s, 0.0, f"coming back to the centerline from the {where}")
     if pose.state is PoseState.C:
-        steer = _limited(config.steer_gain_away * turn_deg, config)
+        steer = limited(config.steer_gain_away * turn_deg, config.max_steer_deg)
         return Advice(Speed.SLOWEST, config.slowest_mm_s, steer, f"moving away from the centerline to the {where}")
-    steer = _limited(config.steer_gain * turn_deg, config)
+    steer = limited(config.steer_gain * turn_deg, config.max_steer_deg)
     return Advice(Speed.MODERATE, config.moderate_mm_s, steer, f"crossed the centerline to the {where}, angle left")
-
-
-def _limited(steer_deg: float, config: AdviceConfig) -> float:
-    return max(-config.max_steer_deg, min(config.max_steer_deg, steer_deg))
 
 
 POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
 
 
 class Policy(Protocol):
-    """Advice for a scene; `status` adds what the robot itself reports, `followed` tells whether its advice drives the robot.
+    """Advice for a scene; `status` is the robot's own, `followed` tells whether the advice drives the robot. None: no advice.
 
-    None: no advice, so nothing stale is shown or driven.
-
-    A policy may remember the frames before; ``reset`` makes it forget them.
+    ``reset`` makes a policy forget the frames before.
     """
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None: ...
@@ -68,7 +59,7 @@ class Table:
 
 
 class Push:
-    """Baseline: straight on at moderate speed without steering, whatever the picture shows."""
+    """Baseline: straight on at moderate speed without steering."""
 
     def __init__(self, config: Config) -> None:
         self._advice = Advice(Speed.MODERATE, config.advice.moderate_mm_s, 0.0, "straight on")
@@ -80,7 +71,7 @@ class Push:
 
 
 class RandomOperator:
-    """Baseline: an operator who changes speed and steering at random every half to one and a half seconds; seeded."""
+    """Baseline: changes speed and steering at random every 0.5 to 1.5 s; seeded."""
 
     def __init__(self, config: Config, seed: int) -> None:
         self._config = config.advice
@@ -104,7 +95,7 @@ class RandomOperator:
 
 
 class StopsAtTarget:
-    """Any policy, which stops where the way to the target is used up: the paper's table knows no target."""
+    """Wraps a policy, and stops at the target, which the paper's table does not know."""
 
     def __init__(self, policy: Policy, arrive_px: float) -> None:
         self._policy = policy
@@ -120,7 +111,7 @@ class StopsAtTarget:
 
 
 def make_policy(name: PolicyName, config: Config, seed: int = 0) -> Policy:
-    """A new policy; `seed` matters to the random operator only."""
+    """A new policy; `seed` is for the random operator."""
     policy: Policy
     if name == "pursuit":
         policy = Pursuit(config.policy.pursuit, config.advice)

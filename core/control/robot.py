@@ -1,4 +1,4 @@
-"""What the pilot needs of a robot: every command passes the gate, and it stops by itself when the program falls silent."""
+"""The pilot's interface to a robot: every command passes the gate, and it stops by itself when the program falls silent."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from core.types import Command
 class SentMotion:
     """What left the gate in the newest cycle.
 
-    ``motion`` holds where the robot was told to be; ``source`` whose order it was (None: a hold) and ``captured_s`` the capture of
-    the frame behind it; ``rejection`` why an order was not followed; ``at_end`` the joints at the end of their envelope.
+    ``motion`` is the commanded one; ``source`` whose command it was (None: a hold) and ``captured_s`` the capture of the frame
+    behind it; ``rejection`` why a command was not followed; ``at_end`` the joints at the end of their envelope.
     """
 
     cycle: int
@@ -34,8 +34,8 @@ class GuardedRobot(Robot, Protocol):
     """All methods may be called from any thread. ``stop`` never waits and never fails.
 
     ``connect``, ``arm``, ``disarm``, ``acknowledge``, ``zero``, ``reboot`` and ``torque_off`` may take seconds and raise
-    ``DeviceError``; all the others are quick. ``kept_back`` is why nothing at all has left the gate since arming, not even a hold:
-    while it is not None there is no ``sent_motion`` either, and nobody can drive.
+    ``DeviceError``; all the others are quick. ``kept_back`` is why nothing has left the gate since arming, not even a hold: while
+    it is not None there is no ``sent_motion`` either, and neither source can drive.
     """
 
     @property

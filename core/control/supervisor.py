@@ -1,18 +1,18 @@
-"""The mode machine: who may drive, and why not.
+"""The mode machine: which source may drive, and why not.
 
-ADVISORY: the operator drives, the program advises. ARMED: the same, and the program may be handed over to. AUTONOMOUS: the program
-drives while the deadman is held. HOLD: an autonomous motion is interrupted. STOPPED: nothing moves, latched.
+ADVISORY: the operator drives, the program advises. ARMED: the same, and control may be handed over to the program. AUTONOMOUS: the
+program drives while the deadman is held. HOLD: an autonomous motion is interrupted. STOPPED: nothing moves, latched.
 
-Arming arms the *program*. The operator drives by hand in ADVISORY, too, as soon as the servos were checked: he must be able to
+Arming arms the *program*. The operator drives by hand in ADVISORY, too, as soon as the servos were checked: they must be able to
 bring back a robot that perception lost. So a fault of camera or perception never takes the hand controls away, one of the servos
 always does.
 
-In one tick, however its events are ordered: an acknowledgement comes first and never clears what the same tick reports; every
-report counts, even when a later one in the tick is better; faults react; then requests are heard, the more careful ones last; and
+In one tick, in whatever order its events come: an acknowledgement is handled first and never clears what the same tick reports;
+every report counts, even when a later one in the tick is better; faults take effect; then requests, the more careful ones last; and
 the operator's input comes last of all and ends autonomy. Only a stop beats it.
 
-Nothing re-arms itself: out of ADVISORY and STOPPED leads only an operator's request. HOLD alone clears itself, within
-``hold_clear_s`` and with the deadman held; later it needs a new hand-over.
+Nothing re-arms itself: only a request of the operator leads out of ADVISORY and STOPPED. HOLD alone clears itself, within
+``hold_clear_s`` and with the deadman held; later it needs another hand-over.
 """
 
 from __future__ import annotations
@@ -42,36 +42,29 @@ from core.control.modes import (
 def supervise(
     state: SupervisorState, events: Sequence[Event], now_s: float, servos: ServosConfig, safety: SafetyConfig
 ) -> tuple[SupervisorState, Decision]:
-    """One tick: at least every 20 ms, whether anything happened or not.
-
-    Parameters
-    ----------
-    state : the state that the last tick returned.
-    events : what was reported and asked for since then, in any order.
-    now_s : monotonic clock of the frames.
-    """
+    """One tick, at least every 20 ms: the state after `events`, in any order, and the decision. `now_s` is the frames' clock."""
     were_on = state.health.servos_ready
     state, now_s, clock = _read_clock(state, now_s, safety)
     acts = {event for event in events if isinstance(event, Act)}
     if Act.ACKNOWLEDGE in acts:
-        if state.mode is Mode.STOPPED:  # whatever was checked meanwhile: nothing moves by an acknowledgement
+        if state.mode is Mode.STOPPED:  # nothing moves by an acknowledgement, whatever was checked meanwhile
             state = replace(state, mode=Mode.ADVISORY, health=replace(state.health, servo_problems=None))
         state = replace(state, latched=None)
     reports = [event for event in events if not isinstance(event, Act)]
     before = state.active
-    health, active = _listen(state, reports, now_s, servos, safety)
+    health, active = _collect_faults(state, reports, now_s, servos, safety)
     stop = [Fault(Cause.STOP_PRESSED)] if Act.STOP in acts else []
     in_use = were_on or health.servos_ready
     state = _react(replace(state, health=health, active=(*stop, *clock, *active)), in_use, now_s, safety)
     refused = []
     if Act.ACKNOWLEDGE in acts and state.latched is not None:
         refused.append(RequestRefused(Act.ACKNOWLEDGE, (state.latched.fault.cause,)))
-    state, denied = _obey(state, acts, now_s, safety)
+    state, denied = _handle_requests(state, acts, now_s, safety)
     return state, _decide(state, before, (*refused, *denied), now_s, safety)
 
 
 def _read_clock(state: SupervisorState, now_s: float, safety: SafetyConfig) -> tuple[SupervisorState, float, list[Fault]]:
-    """Times from before a jump of the clock mean nothing any more: all knowledge of the world but the model's is forgotten."""
+    """The state at `now_s`. A jump of the clock invalidates all times: everything known but the model's check is reset."""
     if math.isfinite(now_s) and state.time_s is None:
         return replace(state, time_s=now_s, camera_unwell_s=now_s, perception_unwell_s=now_s), now_s, []
     last_s = state.time_s if state.time_s is not None else 0.0
@@ -90,10 +83,10 @@ def _read_clock(state: SupervisorState, now_s: float, safety: SafetyConfig) -> t
     return fresh, known_s, [Fault(Cause.CLOCK, f"from {last_s:.3f} s to {now_s:.3f} s")]
 
 
-def _listen(
+def _collect_faults(
     state: SupervisorState, reports: Sequence[Report], now_s: float, servos: ServosConfig, safety: SafetyConfig
 ) -> tuple[Health, tuple[Fault, ...]]:
-    """The health after all reports; the faults that are active then, and those that any of the reports brought in between."""
+    """The health after all reports, and the faults that are active then or were in between."""
     driving = state.mode in DRIVING_MODES
 
     def faults(health: Health) -> dict[Cause, Fault]:
@@ -106,7 +99,7 @@ def _listen(
         health = health.update(report, armed=state.mode in ARMED_MODES, now_s=now_s, servos=servos, safety=safety)
         before, active = active, faults(health)
         brought |= {cause: fault for cause, fault in active.items() if cause not in before}
-        # another one may be held: as of when this was said, for in a late tick that one's next word is still to come
+        # another one may be held, as of when this was said: in a late tick that one's next report is still to come
         is_let_go = isinstance(report, DeadmanReport) and not (report.pressed or health.deadman_held(report.at_s(now_s), safety))
         if driving and is_let_go:
             brought[Cause.DEADMAN] = Fault(Cause.DEADMAN)
@@ -114,13 +107,13 @@ def _listen(
 
 
 def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyConfig) -> SupervisorState:
-    """The state after the active faults had their effect. Servos not `in_use` hinder arming, but there is nothing to stop."""
+    """The state after the active faults took effect. Servos not `in_use` hinder arming, but there is nothing to stop."""
     state = _note_unwell(state, now_s)
     faults = tuple(fault for fault in state.active if in_use or fault.cause.area is not Area.SERVOS)
     recheck = any(fault.cause.recheck for fault in state.active)
     stop, disarm = worst(faults, Reaction.STOP), worst(faults, Reaction.DISARM)
     if state.mode is Mode.ADVISORY:
-        # what was known of the servos is forgotten with the clock: they are off, and the operator is told
+        # a jump of the clock resets what is known of the servos: they are off, and the operator is told
         told = (fault for fault in faults if fault.cause.area is Area.SERVOS or (in_use and fault.cause is Cause.CLOCK))
         disarm = worst(tuple(told), Reaction.DISARM)
     if stop is not None:
@@ -128,7 +121,7 @@ def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyCon
     elif disarm is not None and state.mode is not Mode.STOPPED:
         state = _leave(state, Mode.ADVISORY, disarm, now_s)
     elif state.mode is Mode.AUTONOMOUS and any(fault.holds for fault in faults):
-        # soon after the last one it is the same hold, or a fault that comes and goes would never end
+        # soon after the last one it is the same hold, or one with a fault that comes and goes would never expire
         again = state.resumed_s is not None and now_s - state.resumed_s < safety.hold_repeat_s
         state = replace(state, mode=Mode.HOLD, hold_since_s=state.hold_since_s if again else now_s, well_since_s=None)
     elif state.mode is Mode.HOLD:
@@ -136,7 +129,7 @@ def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyCon
     if recheck:
         state = replace(state, health=replace(state.health, servo_problems=None))
     if state.mode in ARMED_MODES and not state.health.servos_ready:
-        # No fault: the operator has asked for something that they must be checked after.
+        # no fault: the operator's request requires a check of the servos
         state = replace(state, mode=Mode.ADVISORY, health=state.health.disarmed())
     return state
 
@@ -169,10 +162,10 @@ def _hold_expired(state: SupervisorState, now_s: float, safety: SafetyConfig) ->
     return state.mode is Mode.HOLD and now_s - state.hold_since_s > safety.hold_clear_s
 
 
-def _obey(
+def _handle_requests(
     state: SupervisorState, acts: Set[Act], now_s: float, safety: SafetyConfig
 ) -> tuple[SupervisorState, tuple[RequestRefused, ...]]:
-    """The state after the operator's requests, and those that were refused."""
+    """The state after the operator's requests, and the refused ones."""
     refused = []
     if Act.INPUT in acts:
         state = replace(state, input_s=now_s)
@@ -238,7 +231,7 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
 def hindrances(
     state: SupervisorState, now_s: float, safety: SafetyConfig
 ) -> tuple[tuple[Hindrance | Cause, ...], tuple[Hindrance | Cause, ...]]:
-    """Why arming, and why a hand-over, would be refused now; of the deadman, which comes with the hand-over, nothing is said."""
+    """Why arming, and why a hand-over, would be refused now; without the deadman, which is pressed with the hand-over."""
     deadman = {Hindrance.DEADMAN_NOT_HELD, Hindrance.DEADMAN_HELD_BEFORE}
     over = _against_hand_over(state, now_s, safety)
     return _against_arming(state, now_s, safety), tuple(reason for reason in over if reason not in deadman)

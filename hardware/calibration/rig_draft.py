@@ -20,7 +20,7 @@ from core.calibration.camera import (
     fit_lens,
     scale_of_board,
     scale_of_clicks,
-    straighten,
+    undistort,
 )
 from core.calibration.servos import Assignment, HeadNotSeen, NotIdentified, ServoFinding, SteeringNotSeen, assign, feed_disagreement
 from core.config.calibration import CalibrationConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
@@ -140,7 +140,7 @@ class RigDraft:
         straight: Sequence[BoardView] = self.views
         if bent_px * 640.0 / max(size) > _NOTICEABLE_PX:
             self.lens = lens
-            straight = [BoardView(straighten(view.pixels, lens), view.board_mm) for view in self.views]
+            straight = [BoardView(undistort(view.pixels, lens), view.board_mm) for view in self.views]
             self.say(f"lens: up to {bent_px:.1f} px at the border, {lens.residual_px:.2f} px left over")
         else:
             self.lens = None

@@ -39,7 +39,7 @@ class UndistortedCamera:
         if frame is None or self.lens is None or frame.image.ndim != 3 or frame.image.dtype != np.uint8:
             return frame
         maps = self._maps(self.lens, (frame.image.shape[1], frame.image.shape[0]))
-        return frame if maps is None else replace(frame, image=lenses.straightened(frame.image, *maps))
+        return frame if maps is None else replace(frame, image=lenses.undistorted(frame.image, *maps))
 
     def close(self) -> None:
         self._camera.close()

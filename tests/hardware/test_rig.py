@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from core.calibration.camera import BoardSpec, BoardView, find_board, fit_lens, scale_of_board, straighten
+from core.calibration.camera import BoardSpec, BoardView, find_board, fit_lens, scale_of_board, undistort
 from core.config.calibration import CalibrationConfig, LensConfig
 from core.config.models import RigConfig, TwinConfig, load_config
 from core.config.rig_file import RigFileError, make_rig, with_rig, write_rig
@@ -184,7 +184,7 @@ def test_the_board_in_the_twin_gives_lens_and_scale(twin: dict[str, object]) -> 
     pictures = BoardPictures(config, spec)
     views = [find_board(pictures.picture(k, k), spec) for k in range(3)]
     lens = fit_lens(views, (640, 480))
-    scale = scale_of_board([BoardView(straighten(view.pixels, lens), view.board_mm) for view in views], (640, 480))
+    scale = scale_of_board([BoardView(undistort(view.pixels, lens), view.board_mm) for view in views], (640, 480))
     middle = pictures.view.unproject(np.array([[319.5, 239.5]]))[0]
     true = 1.0 / pictures.view.pixels_per_mm((float(middle[0]), float(middle[1])))
     assert scale.mm_per_px == pytest.approx(true, rel=0.003)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def mutation() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("mutation_script", ROOT / "scripts" / "mutation.py")
+    spec = importlib.util.spec_from_file_location("mutation_script", ROOT / "tools" / "mutation.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -48,7 +48,7 @@ def test_every_explained_survivor_is_a_change_of_todays_code(mutation: ModuleTyp
         for mutant in mutation.mutants(module, source):
             assert mutant.source != same, f"{module}:{mutant.number}: {mutant.change}"
             known[module, mutant.line, mutant.change] += 1
-        assert all((ROOT / "tests" / "core" / name).exists() for name in (*tests, *mutation.LONG_TESTS))
+        assert all((ROOT / mutation.TEST_FOLDER / name).exists() for name in (*tests, *mutation.LONG_TESTS))
     assert {key: known[key] for key in mutation.EXPLAINED} == dict.fromkeys(mutation.EXPLAINED, 1), "one change each"
 
 
@@ -67,9 +67,10 @@ def test_changes_that_read_alike_say_what_they_change(mutation: ModuleType) -> N
 def test_a_test_that_fails_as_it_is_finds_nothing(
     mutation: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "tests" / "core").mkdir(parents=True)
-    (tmp_path / "tests" / "core" / "test_red.py").write_text("def test_red():\n    assert False\n")
-    (tmp_path / "tests" / "core" / "test_green.py").write_text("def test_green():\n    pass\n")
+    folder = tmp_path / mutation.TEST_FOLDER
+    folder.mkdir(parents=True)
+    (folder / "test_red.py").write_text("def test_red():\n    assert False\n")
+    (folder / "test_green.py").write_text("def test_green():\n    pass\n")
     monkeypatch.setattr(mutation, "LONG_TESTS", ("test_green.py",))
     monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)  # what is asked of all tests, a report's file say, is not asked of these
     monkeypatch.setattr(mutation, "TESTS", {"gate": ("test_red.py", "test_missing.py")})
@@ -94,7 +95,4 @@ def test_a_survivor_without_an_explanation_is_a_failure(mutation: ModuleType, ca
 
 def test_an_unknown_module_is_one_line(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
     assert mutation.main(["pedal"]) == 2
-    assert (
-        capsys.readouterr().err
-        == "unknown: pedal; known are gate, gate_checks, joint_limits, supervisor, health, bus_watch, deadman\n"
-    )
+    assert capsys.readouterr().err == "unknown: pedal; known are gate, joints, supervisor, health, bus_monitor\n"

@@ -1,4 +1,4 @@
-"""From advice to command: turns become bend, speeds become feed; rate-limited, without wind-up, quiet without advice."""
+"""Commands from advice and from held controls."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.config.models import DriveConfig
-from core.control.motion import AdviceController
+from core.config.models import DriveConfig, JogConfig
+from core.config.safety import ServosConfig
+from core.control.motion import AdviceController, JogSpeeds, hand_speeds
 from core.types import Advice, Command, Speed
 
 PLAIN = DriveConfig(
@@ -114,3 +115,29 @@ def test_every_command_is_finite_in_range_and_within_its_rate(turns: list[tuple[
         assert abs(command.bend - before.bend) <= config.max_bend_rate_per_s * min(wait_s, config.max_gap_s) + 1e-9
         assert abs(command.advance_mm_s) <= (0.0 if steer is None else abs(advance_mm_s))
         before = command
+
+
+HAND = JogConfig(bend_rate_per_s=1.5, advance_mm_s=10.0, delivery_mm_s=5.0)
+
+
+def servos(**slow_mm_s: float) -> ServosConfig:
+    """Some joints may go no faster than that."""
+    plain = ServosConfig(max_pull_mm=2.0)
+    joints = (
+        joint.model_copy(update={"max_speed_mm_s": slow_mm_s.get(joint.name, joint.max_speed_mm_s)}) for joint in plain.joints
+    )
+    return plain.model_copy(update={"joints": tuple(joints)})
+
+
+def test_a_rate_of_bend_is_a_pull_of_the_wires() -> None:
+    assert hand_speeds(HAND, servos()) == JogSpeeds(advance_mm_s=10.0, delivery_mm_s=5.0, bend_mm_s=3.0, pitch_mm_s=3.0)
+
+
+def test_a_share_of_full_speed_is_of_all() -> None:
+    assert hand_speeds(HAND, servos(), 0.5) == JogSpeeds(advance_mm_s=5.0, delivery_mm_s=2.5, bend_mm_s=1.5, pitch_mm_s=1.5)
+
+
+def test_the_slowest_joint_that_takes_part_holds_the_others_back() -> None:
+    slow = servos(advance=4.0, delivery_2=2.0, left=1.0)
+    assert hand_speeds(HAND, slow) == JogSpeeds(advance_mm_s=4.0, delivery_mm_s=2.0, bend_mm_s=1.0, pitch_mm_s=3.0)
+    assert hand_speeds(HAND, slow, 0.25) == JogSpeeds(advance_mm_s=2.5, delivery_mm_s=1.25, bend_mm_s=0.75, pitch_mm_s=0.75)

@@ -23,8 +23,8 @@ from core.calibration.camera import (
     scale_of_board,
     scale_of_clicks,
     scaled_to,
-    straighten,
-    straightened,
+    undistort,
+    undistorted,
 )
 from core.config.calibration import LensConfig, ScaleConfig
 from core.types import Scene
@@ -63,7 +63,7 @@ def test_a_point_on_half_the_diagonal_moves_by_k1_and_k2() -> None:
 @pytest.mark.parametrize("lens", [_lens(-0.15), _lens(0.2), _lens(-0.1, 0.03), _lens(0.0)])
 def test_straightening_undoes_the_lens(lens: LensConfig) -> None:
     points = np.array([[0.0, 0.0], [639.0, 479.0], [100.0, 400.0], [319.5, 239.5]])
-    assert straighten(distort(points, lens), lens) == pytest.approx(points, abs=1e-6)
+    assert undistort(distort(points, lens), lens) == pytest.approx(points, abs=1e-6)
 
 
 @pytest.mark.parametrize("k1", [-0.12, 0.0, 0.15])
@@ -71,7 +71,7 @@ def test_the_fit_finds_the_lens_whatever_the_angle(k1: float) -> None:
     true = _lens(k1)
     found = fit_lens([_board(STRAIGHT, true), _board(TILTED, true)], SIZE)
     corners = np.array([[0.0, 0.0], [639.0, 0.0], [0.0, 479.0], [639.0, 479.0]])
-    assert straighten(distort(corners, true), found) == pytest.approx(corners, abs=0.5)
+    assert undistort(distort(corners, true), found) == pytest.approx(corners, abs=0.5)
     assert found.residual_px < 0.02
     assert found.pictures == 2
 
@@ -94,11 +94,11 @@ def test_a_straightened_picture_is_the_one_without_the_lens() -> None:
     x, y = np.meshgrid(np.arange(640.0), np.arange(480.0))
     waves = lambda x, y: 128 + 60 * np.sin(x / 40.0) + 60 * np.cos(y / 30.0)  # noqa: E731 - a picture as a formula
     lens = _lens(-0.12)
-    places = straighten(np.column_stack([x.ravel(), y.ravel()]), lens)
+    places = undistort(np.column_stack([x.ravel(), y.ravel()]), lens)
     seen = np.repeat(waves(places[:, 0], places[:, 1]).reshape(480, 640, 1), 3, axis=2).astype(np.uint8)
     plain = np.repeat(waves(x, y)[..., None], 3, axis=2)
     inner = (slice(40, 440), slice(40, 600))
-    assert np.abs(straightened(seen, *maps(lens))[inner].astype(float) - plain[inner]).max() < 3.0
+    assert np.abs(undistorted(seen, *maps(lens))[inner].astype(float) - plain[inner]).max() < 3.0
     assert np.abs(seen[inner].astype(float) - plain[inner]).max() > 40.0
 
 

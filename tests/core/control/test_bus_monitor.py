@@ -1,0 +1,204 @@
+"""Health of the servo bus: silence, missing answers, disarming, currents."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from core.config.safety import SafetyConfig, ServosConfig
+from core.control.bus_monitor import BusMonitor, BusReport
+from core.control.faults import Cause, Fault, Reaction
+from tests.core.healthy import GOOD_BUS
+
+SERVOS, SAFETY = ServosConfig(), SafetyConfig()
+CYCLE_S = 1.0 / 64.0  # no rounding
+
+
+def _misses(*joints: int) -> tuple[int, ...]:
+    return tuple(int(joint in joints) for joint in range(7))
+
+
+def _watched(reports: list[BusReport], watch: BusMonitor | None = None, start_s: float = 0.0) -> tuple[BusMonitor, float]:
+    """The watch after a report in each cycle, and the time of the last one."""
+    watch, now_s = watch or BusMonitor(), start_s
+    for now_s in (start_s + CYCLE_S * n for n in range(len(reports))):
+        watch = watch.update(reports[round((now_s - start_s) / CYCLE_S)], now_s, SERVOS, SAFETY)
+    return watch, now_s
+
+
+def _faults(watch: BusMonitor, now_s: float) -> list[Fault]:
+    return watch.faults(now_s, SERVOS, SAFETY)
+
+
+# --- silent in turns -------------------------------------------------------------------------------------------------------------
+
+IN_TURNS = [BusReport(misses=_misses(0)), BusReport(misses=_misses(4))]
+
+
+def test_servos_that_are_silent_in_turns_are_a_fault_after_half_a_second_of_cycles() -> None:
+    """25 of them, at 50 a second."""
+    watch, now_s = _watched([*IN_TURNS * 12, IN_TURNS[0]])
+    assert _faults(watch, now_s) == []
+    watch, now_s = _watched([IN_TURNS[1]], watch, now_s + CYCLE_S)
+    assert _faults(watch, now_s) == [Fault(Cause.SERVO_SILENT, "in turns, right, advance: not all in one cycle for 0.5 s")]
+
+
+def test_a_process_that_stands_still_between_two_gaps_is_none() -> None:
+    watch, now_s = _watched(IN_TURNS * 6)
+    watch, now_s = _watched(IN_TURNS * 6, watch, now_s + 0.8)
+    assert _faults(watch, now_s) == []
+
+
+def test_a_cycle_in_which_all_answer_ends_it_and_who_was_silent_before_is_forgotten() -> None:
+    watch, now_s = _watched([*IN_TURNS * 40, BusReport(misses=_misses())])
+    assert _faults(watch, now_s) == []
+    late = [BusReport(misses=_misses(1)), BusReport(misses=_misses(2))]
+    watch, now_s = _watched([*late * 12, late[0]], watch, now_s + CYCLE_S)
+    assert _faults(watch, now_s) == []
+    watch, now_s = _watched([late[1]], watch, now_s + CYCLE_S)
+    assert [fault.detail for fault in _faults(watch, now_s)] == ["in turns, left, up: not all in one cycle for 0.5 s"]
+
+
+def test_a_report_that_read_nothing_neither_makes_a_gap_nor_ends_one() -> None:
+    unread = BusReport()
+    watch, now_s = _watched([*IN_TURNS * 12, *[unread] * 20, IN_TURNS[0]])
+    assert _faults(watch, now_s) == []
+    watch, now_s = _watched([unread, IN_TURNS[1]], watch, now_s + CYCLE_S)
+    assert [fault.cause for fault in _faults(watch, now_s)] == [Cause.SERVO_SILENT]
+
+
+def test_one_that_is_silent_three_times_in_a_row_is_named_alone() -> None:
+    gone = BusReport(misses=(0, 0, 3, 0, 1, 0, 0))
+    watch, now_s = _watched([*IN_TURNS * 40, gone])
+    assert _faults(watch, now_s) == [Fault(Cause.SERVO_SILENT, "up")]
+
+
+# --- the rest --------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_report_without_currents_forgets_no_strain() -> None:
+    strained = BusReport(currents_ma=(40.0, 40.0, 40.0, 40.0, -601.0, 40.0, 40.0))
+    watch, now_s = _watched([*[strained] * 60, *[BusReport()] * 6])
+    assert [fault.cause for fault in _faults(watch, now_s)] == [Cause.STRAINED]
+
+
+def test_a_silent_bus_says_for_how_long() -> None:
+    watch, now_s = _watched([BusReport()])
+    assert _faults(watch, now_s + 0.1875) == [Fault(Cause.BUS_SILENT, "for 188 ms")]
+    assert _faults(watch, now_s + 0.4994) == [Fault(Cause.BUS_SILENT, "for 499 ms")]
+
+
+def test_reports_of_servos_that_follow_nobody_are_counted_in_a_row() -> None:
+    off, on = BusReport(armed=False), BusReport()
+    assert _watched([])[0].disarmed_run == 0
+    assert _watched([off, off, off])[0].disarmed_run == 3
+    assert _watched([off, off, on])[0].disarmed_run == 0
+    assert _watched([off, off])[0].checked().disarmed_run == 0
+
+
+SERVOS, SAFETY = ServosConfig(), SafetyConfig()
+BUS_S = 0.02
+Current = Callable[[int], float | None]
+
+
+def seconds_until_strained(
+    current_ma: Current, servos: ServosConfig = SERVOS, cycle_s: float = BUS_S, most_s: float = 3.0
+) -> float | None:
+    """When the fault comes, from the first reading on; `current_ma` of the third joint by cycle. None: not within `most_s`."""
+    watch = BusMonitor()
+    for n in range(round(most_s / cycle_s)):
+        now_s = 64.0 + n * cycle_s
+        report = replace(GOOD_BUS, currents_ma=(40.0, 40.0, current_ma(n), None, 40.0, 40.0, 40.0))
+        watch = watch.update(report, now_s, servos, SAFETY)
+        faults = [fault for fault in watch.faults(now_s, servos, SAFETY) if fault.cause is Cause.STRAINED]
+        if faults:
+            assert faults[0].detail.startswith("up up to ")
+            assert faults[0].detail.endswith("(at most 600 mA)")
+            return now_s - 64.0
+    return None
+
+
+def test_it_stops() -> None:
+    assert Cause.STRAINED.reaction is Reaction.STOP
+
+
+@pytest.mark.parametrize("current_ma", [601.0, -601.0, 2300.0, math.nan])
+def test_a_current_beyond_the_limit_for_half_a_second(current_ma: float) -> None:
+    assert seconds_until_strained(lambda n: current_ma) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "current_ma",
+    [
+        lambda n: 900.0 if n % 2 == 0 else 100.0,
+        lambda n: 700.0 if n % 3 else 300.0,
+        lambda n: -900.0 if n % 5 else 0.0,
+        lambda n: 900.0 if n % 5 < 3 else 100.0,
+        lambda n: 900.0 if n % 3 else None,
+    ],
+    ids=["every second", "below on the average", "now and then", "60 ms of 100", "not read in every cycle"],
+)
+def test_a_ripple_that_dips_below_the_limit_hides_nothing(current_ma: Current) -> None:
+    found_s = seconds_until_strained(current_ma)
+    assert found_s is not None
+    assert found_s <= 0.62
+
+
+@pytest.mark.parametrize(
+    "current_ma",
+    [
+        lambda n: 600.0,
+        lambda n: 2300.0 if n == 30 else 100.0,
+        lambda n: 2300.0 if n % 5 == 0 else 100.0,
+        lambda n: 900.0 if n % 4 == 0 else 100.0,
+        lambda n: 900.0 if n % 50 < 24 else 100.0,
+        lambda n: 900.0 if n % 12 < 5 else 500.0,
+        lambda n: None,
+        lambda n: 900.0 if n % 12 == 0 else None,
+    ],
+    ids=[
+        "at the limit",
+        "one spike",
+        "spikes",
+        "a spike each 80 ms",
+        "0.48 s",
+        "starts and stops",
+        "no current told",
+        "seldom read",
+    ],
+)
+def test_no_strain(current_ma: Current) -> None:
+    assert seconds_until_strained(current_ma) is None
+
+
+def test_a_strain_after_long_spikes_is_seen_as_soon() -> None:
+    began = 100
+    found_s = seconds_until_strained(lambda n: 900.0 if n >= began or n % 4 == 0 else 100.0, most_s=4.0)
+    assert found_s is not None
+    assert 0.1 <= found_s - began * BUS_S <= 0.5
+
+
+def test_a_late_status_is_no_strain() -> None:
+    """Two readings beyond the limit with a pause between them tell nothing of that time."""
+    watch, high = BusMonitor(), replace(GOOD_BUS, currents_ma=(900.0,) * 7)
+    for now_s in (0.0, 0.02, 0.5, 0.52):
+        watch = watch.update(high, now_s, SERVOS, SAFETY)
+        assert Cause.STRAINED not in [fault.cause for fault in watch.faults(now_s + 0.1, SERVOS, SAFETY)]
+
+
+@pytest.mark.parametrize("bus_hz", [200.0, 20.0, 5.0])
+def test_a_bus_of_any_rate_sees_it(bus_hz: float) -> None:
+    servos = SERVOS.model_copy(update={"bus_hz": bus_hz})
+    found_s = seconds_until_strained(lambda n: 900.0, servos, 1.0 / bus_hz)
+    assert found_s is not None
+    assert 0.5 <= found_s <= 0.5 + 1.0 / bus_hz + 1e-6
+
+
+def test_it_is_over_when_the_current_is() -> None:
+    watch = BusMonitor()
+    for n in range(40):
+        watch = watch.update(replace(GOOD_BUS, currents_ma=(900.0 if n < 30 else 40.0,) * 7), n * BUS_S, SERVOS, SAFETY)
+    assert watch.strained == ""
