@@ -28,14 +28,8 @@ from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
 
 LEFT = Qt.MouseButton.LeftButton
-
-
 OFF = DriveView(0.0)
-
-
 ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
-
-
 STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
 
 
@@ -51,8 +45,7 @@ def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
 
 @pytest.fixture
 def picture(own: Own) -> QWidget:
-    widget = own(QWidget(), 775, 408, show=True)
-    return widget
+    return own(QWidget(), 775, 408, show=True)
 
 
 @pytest.fixture
@@ -181,11 +174,7 @@ def test_screen_readers_are_told_once_and_urgently_what_interrupts(strip: AlertS
 
 
 FOLDER = RESOURCES / "sounds"
-
-
 posix_only = pytest.mark.skipif(sys.platform == "win32", reason="the fake player is a shell script")
-
-
 Install = Callable[..., Path]
 
 

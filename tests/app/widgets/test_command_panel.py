@@ -78,8 +78,7 @@ ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
 
 @pytest.fixture
 def panel(own: Own, clock: Clock) -> CommandPanel:
-    widget = own(CommandPanel(clock, lambda: "12:00:00"), 446, 205, show=True)
-    return widget
+    return own(CommandPanel(clock, lambda: "12:00:00"), 446, 205, show=True)
 
 
 def lines(panel: CommandPanel) -> list[str]:

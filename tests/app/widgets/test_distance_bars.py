@@ -45,8 +45,7 @@ def force(newton: float | None) -> RobotStatus:
 
 @pytest.fixture
 def bar(own: Own) -> ClearanceBar:
-    widget = own(ClearanceBar(4.0), 440, 48)
-    return widget
+    return own(ClearanceBar(4.0), 440, 48)
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,6 @@ from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
 
 NARROWEST_AT_720 = 760
-
-
 ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
 
 
@@ -33,8 +31,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def bar(own: Own, clock: Clock) -> ModeBar:
-    widget = own(ModeBar(clock), NARROWEST_AT_720, HEIGHT, show=True)
-    return widget
+    return own(ModeBar(clock), NARROWEST_AT_720, HEIGHT, show=True)
 
 
 def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
@@ -43,8 +40,7 @@ def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
 
 @pytest.fixture
 def picture(own: Own) -> QWidget:
-    widget = own(QWidget(), 775, 408, show=True)
-    return widget
+    return own(QWidget(), 775, 408, show=True)
 
 
 @pytest.fixture
@@ -70,8 +66,7 @@ def wall() -> WallClock:
 
 @pytest.fixture
 def log(own: Own, wall: WallClock) -> EventLog:
-    widget = own(EventLog(wall), 470, 200)
-    return widget
+    return own(EventLog(wall), 470, 200)
 
 
 @pytest.mark.parametrize("visible", [True, False])

@@ -3,35 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
 from app.widgets.jog_panel import JogPanel, Motion
-from app.widgets.mode_bar import MouseHeld
 from core.config.models import JogConfig
 from core.config.safety import ServosConfig
 from core.types import RobotStatus
 from tests.app.widgets.conftest import Own
-
-
-def test_a_motion_held_with_the_mouse_ends_with_a_release_that_a_menu_got(qtbot: QtBot) -> None:
-    panel, menu = JogPanel(2.0), QMenu()
-    qtbot.addWidget(panel)
-    qtbot.addWidget(menu)
-    menu.addAction("Open")
-    panel.show()
-    heard: list[tuple[str, Motion]] = []
-    panel.pressed.connect(lambda motion: heard.append(("down", motion)))
-    panel.released.connect(lambda motion: heard.append(("up", motion)))
-    cap = next(cap for cap in panel.findChildren(MouseHeld) if cap.accessibleName().startswith("advance"))
-    QTest.mousePress(cap, Qt.MouseButton.LeftButton)
-    menu.popup(panel.mapToGlobal(panel.rect().topLeft()))
-    QTest.mouseRelease(menu, Qt.MouseButton.RightButton)
-    assert heard == [("down", Motion.ADVANCE)]
-    QTest.mouseRelease(menu, Qt.MouseButton.LeftButton)
-    assert heard == [("down", Motion.ADVANCE), ("up", Motion.ADVANCE)]
-    menu.close()
 
 
 def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:

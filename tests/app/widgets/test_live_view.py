@@ -97,8 +97,7 @@ def _show(view: LiveView, frame: Frame, scene: Scene, advice: Advice | None = No
 
 @pytest.fixture
 def view(own: Own) -> LiveView:
-    live = own(LiveView(), 640, 480, show=True)
-    return live
+    return own(LiveView(), 640, 480, show=True)
 
 
 def blank_frame(width: int = 640, height: int = 480) -> Frame:

@@ -22,29 +22,13 @@ from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
 
 LEFT = Qt.MouseButton.LeftButton
-
-
 NARROWEST_AT_720 = 760
-
-
 OFF = DriveView(0.0)
-
-
 READY = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True)
-
-
 ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
-
-
 DRIVING = DriveView(0.0, Mode.AUTONOMOUS, Source.PROGRAM, servos_on=True, deadman=True)
-
-
 HELD = DriveView(0.0, Mode.HOLD, servos_on=True, deadman=False, active=(Fault(Cause.DEADMAN),))
-
-
 STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
-
-
 VIEWS = (OFF, READY, ARMED, DRIVING, HELD, STOPPED)
 
 
@@ -60,8 +44,7 @@ def arming_refused(*reasons: Hindrance | Cause, time_s: float = 0.0) -> DriveVie
 
 @pytest.fixture
 def bar(own: Own, clock: Clock) -> ModeBar:
-    widget = own(ModeBar(clock), NARROWEST_AT_720, HEIGHT, show=True)
-    return widget
+    return own(ModeBar(clock), NARROWEST_AT_720, HEIGHT, show=True)
 
 
 def asked(bar: ModeBar) -> list[str]:

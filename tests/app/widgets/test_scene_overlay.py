@@ -9,11 +9,7 @@ from app.widgets.scene_overlay import foot, scene_shapes
 from core.types import Pose, PoseState, RobotPath, Scene, Vector
 
 VESSEL = Vector((0.0, 10.0), (20.0, 10.0), (40.0, 10.0))
-
-
 ROBOT = Vector((0.0, 14.0), (15.0, 27.0), (30.0, 40.0))
-
-
 POSE = Pose(40.9, 40.9, 30.0, 4.0, False, PoseState.C, 0.9)
 
 
