@@ -13,9 +13,9 @@ import json
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import av
 import av.error
@@ -89,44 +89,33 @@ _COLUMNS = (
 )
 
 
+# Where the values of CSV and MCAP are in a row, by the names that they have there.
+_PATHS = {
+    "novelty": "scene.novelty",
+    **{name: f"scene.pose.{name}" for name in ("theta_deg", "theta_signed_deg", "c_head_px", "c_tail_px", "crossed")},
+    **{name: f"scene.pose.{name}" for name in ("state", "confidence")},
+    **{f"advice_{name}": f"advice.{name}" for name in ("speed", "advance_mm_s", "steer_deg")},
+    **{name: f"drive.{name}" for name in ("mode", "permitted", "sent_by", "latency_s")},
+    **{f"asked_{name}": f"drive.asked.{name}" for name in Command.__slots__},
+    **{f"commanded_{name}": f"drive.commanded.{name}" for name in Command.__slots__},
+    **{f"sent_{name}": f"sent.{name}" for name in Command.__slots__},
+    **{name: f"status.{name}" for name in ("insertion_mm", "delivery_mm", "wall_contact_n")},
+    **{name: name for name in ("row", "index", "captured_s", "video", "pts_ms", "frames_per_second", "dropped_frames")},
+    **{name: name for name in ("camera_lost", "dropped_rows", "source_px_per_working_px")},
+}
+
+
 def _flat(row: RecordedRow) -> dict[str, Any]:
-    """The values of a row by the names that they have in CSV and MCAP; None where something is missing."""
-    scene, drive, path = row.scene, row.drive, row.scene.path
-    head, tail = (scene.to_source(path.head), scene.to_source(path.tail)) if path else ((None, None), (None, None))
+    """The values of a row by name; None where something is missing."""
+    scene, path, start = row.scene, row.scene.path, cast(Any, row)
     values: dict[str, Any] = {
-        "row": row.row,
-        "index": row.index,
-        "captured_s": row.captured_s,
-        "video": row.video,
-        "pts_ms": row.pts_ms,
-        "frames_per_second": row.frames_per_second,
-        "dropped_frames": row.dropped_frames,
-        "camera_lost": row.camera_lost,
-        "dropped_rows": row.dropped_rows,
-        "width_px": row.size[0],
-        "height_px": row.size[1],
-        "source_px_per_working_px": row.source_px_per_working_px,
-        "novelty": scene.novelty,
-        "refusal": str(scene.refusal) if scene.refusal else None,
-        "advice_speed": row.advice.speed if row.advice else None,
-        "advice_advance_mm_s": row.advice.advance_mm_s if row.advice else None,
-        "advice_steer_deg": row.advice.steer_deg if row.advice else None,
-        "perception_ms": scene.latency_ms.get("total"),
+        name: reduce(lambda found, part: getattr(found, part, None), place.split("."), start) for name, place in _PATHS.items()
     }
-    for name, value in zip(("head_x_px", "head_y_px", "tail_x_px", "tail_y_px"), (*head, *tail), strict=True):
-        values[name] = round(value, 3) if value is not None else None
-    for name in ("theta_deg", "theta_signed_deg", "c_head_px", "c_tail_px", "crossed", "state", "confidence"):
-        values[name] = getattr(scene.pose, name, None)
-    for name in ("mode", "permitted", "sent_by", "latency_s"):
-        values[name] = getattr(drive, name, None)
-    for who, motion in (
-        ("asked", getattr(drive, "asked", None)),
-        ("commanded", getattr(drive, "commanded", None)),
-        ("sent", row.sent),
-    ):
-        values |= {f"{who}_{name}": getattr(motion, name, None) for name in Command.__slots__}
-    for name in ("insertion_mm", "delivery_mm", "wall_contact_n"):
-        values[name] = getattr(row.status, name, None)
+    values |= {"width_px": row.size[0], "height_px": row.size[1], "perception_ms": scene.latency_ms.get("total")}
+    values["refusal"] = str(scene.refusal) if scene.refusal else None
+    for end, point in (("head", path.head), ("tail", path.tail)) if path else (("head", None), ("tail", None)):
+        x, y = scene.to_source(point) if point is not None else (None, None)
+        values[f"{end}_x_px"], values[f"{end}_y_px"] = (None, None) if x is None or y is None else (round(x, 3), round(y, 3))
     for name in ("pull_mm", "force_mn"):
         four = getattr(row.status, f"tendon_{name}", (None,) * 4)
         values |= {f"tendon_{name}_{side}": value for side, value in zip(_SIDES, four, strict=True)}
@@ -318,8 +307,10 @@ def export_mcap(reader: SessionReader, path: Path, on_row: Advance = lambda: Non
     reader.wait()
     clock = _Clock(reader)
     sources = [_rows(reader, clock, on_row), _events(reader, clock)]
-    codec = reader.manifest.codec if reader.manifest is not None else ""
-    sources.append(_images(reader, clock) if codec == "lossless" else _video(reader, clock))
+    if reader.manifest is not None and reader.manifest.codec == "lossless":
+        sources.append(_camera(_jpegs(reader), clock, "/camera/image", "jpeg"))
+    else:
+        sources.append(_camera(_packets(reader), clock, "/camera/video", "h264"))
     written = 0
     with new_file(path) as part, part.open("wb") as file:
         writer = Writer(file)
@@ -327,7 +318,9 @@ def export_mcap(reader: SessionReader, path: Path, on_row: Advance = lambda: Non
         channels: dict[str, int] = {}
         for at_ns, _, topic, content in heapq.merge(*sources, key=lambda message: message[:2]):
             if topic not in channels:
-                channels[topic] = _channel(writer, topic)
+                name = TOPICS[topic]
+                schema = writer.register_schema(name=name, encoding="jsonschema", data=json.dumps(SCHEMAS[name]).encode())
+                channels[topic] = writer.register_channel(topic=topic, message_encoding="json", schema_id=schema)
             data = json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
             writer.add_message(channels[topic], log_time=at_ns, publish_time=at_ns, data=data, sequence=written)
             written += 1
@@ -336,12 +329,6 @@ def export_mcap(reader: SessionReader, path: Path, on_row: Advance = lambda: Non
             writer.add_metadata("session", {key: json.dumps(value) for key, value in about.items()})
         writer.finish()  # type: ignore[no-untyped-call]
     return written
-
-
-def _channel(writer: Writer, topic: str) -> int:
-    name = TOPICS[topic]
-    schema = writer.register_schema(name=name, encoding="jsonschema", data=json.dumps(SCHEMAS[name]).encode())
-    return writer.register_channel(topic=topic, message_encoding="json", schema_id=schema)
 
 
 class _Clock:
@@ -431,14 +418,9 @@ def _overlays(row: RecordedRow, stamp: dict[str, int]) -> dict[str, Any]:
 
 def _events(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
     for event in reader.events:
-        text = f"{event.kind.value}: {event.text}" if event.text else event.kind.value
-        log = {
-            "timestamp": clock.stamp(event.time_s),
-            "level": _LEVELS.get(event.kind, 2),
-            "message": text,
-            "name": event.kind.value,
-        }
-        yield clock.ns(event.time_s), 6, "/events", log | {"file": "", "line": 0}
+        name, level = event.kind.value, _LEVELS.get(event.kind, 2)
+        log = {"timestamp": clock.stamp(event.time_s), "level": level, "message": f"{name}: {event.text}" if event.text else name}
+        yield clock.ns(event.time_s), 6, "/events", log | {"name": name, "file": "", "line": 0}
 
 
 def _times(reader: SessionReader) -> Callable[[int, int], float]:
@@ -452,8 +434,17 @@ def _times(reader: SessionReader) -> Callable[[int, int], float]:
     return lambda video, pts_ms: known.get((video, pts_ms), zero_s.get(video, start_s) + pts_ms / 1000)
 
 
-def _video(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
-    time_of, floor = _times(reader), 0
+def _camera(pictures: Iterator[tuple[float, bytes]], clock: _Clock, topic: str, kind: str) -> Iterator[Message]:
+    floor = 0
+    for time_s, data in pictures:
+        floor = max(floor, clock.ns(time_s))
+        coded = base64.b64encode(data).decode()
+        yield floor, 0, topic, {"timestamp": clock.stamp(time_s), "frame_id": "camera", "data": coded, "format": kind}
+
+
+def _packets(reader: SessionReader) -> Iterator[tuple[float, bytes]]:
+    """Capture time (s) and H.264 packet in Annex B form of each picture."""
+    time_of = _times(reader)
     for path in reader.videos:
         number = video_number(path)
         if number is None:
@@ -465,23 +456,14 @@ def _video(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
             to_annex_b = BitStreamFilterContext("h264_mp4toannexb", container.streams.video[0])
             for pts_ms, packet in sound_packets(container, partial(reader.number_of, number)):
                 for filtered in to_annex_b.filter(packet):
-                    time_s = time_of(number, pts_ms)
-                    floor = max(floor, clock.ns(time_s))
-                    coded = base64.b64encode(bytes(filtered)).decode()
-                    content = {"timestamp": clock.stamp(time_s), "frame_id": "camera", "data": coded, "format": "h264"}
-                    yield floor, 0, "/camera/video", content
+                    yield time_of(number, pts_ms), bytes(filtered)
 
 
-def _images(reader: SessionReader, clock: _Clock) -> Iterator[Message]:
-    floor = 0
+def _jpegs(reader: SessionReader) -> Iterator[tuple[float, bytes]]:
     for place in range(len(reader)):
         frame = reader.frame(place)
-        if frame is None:
-            continue
-        bgr = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
-        done, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-        if done:
-            floor = max(floor, clock.ns(frame.captured_s))
-            coded = base64.b64encode(data.tobytes()).decode()
-            content = {"timestamp": clock.stamp(frame.captured_s), "frame_id": "camera", "data": coded, "format": "jpeg"}
-            yield floor, 0, "/camera/image", content
+        if frame is not None:
+            bgr = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
+            done, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+            if done:
+                yield frame.captured_s, data.tobytes()

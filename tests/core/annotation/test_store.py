@@ -154,27 +154,6 @@ def test_a_flipped_bit_in_a_record_is_found_and_the_others_are_read(tmp_path: Pa
         assert "rater ann, repeat 1: damaged (its check sum does not fit); left out" in store.problems[0]
 
 
-def test_after_a_damaged_last_edit_editing_goes_on(tmp_path: Path) -> None:
-    """Its number stays taken: the next edit must not ask for it again, here or in a salvaged file."""
-    path = tmp_path / "a.sqlite"
-    with known(path) as store:
-        history = History()
-        for note in ("one", "two", "three"):
-            save(store, history, Annotation(note=note))
-        store._database.execute("UPDATE journal SET content = replace(content, 'three', 'thrae')")
-    salvage(path, tmp_path / "b.sqlite")
-    for name in ("a.sqlite", "b.sqlite"):
-        with AnnotationStore(tmp_path / name) as store:
-            history = store.history(KEY)
-            assert history.current == Annotation(note="two")
-            assert "edit 3" in store.problems[0]
-            save(store, history, Annotation(note="four"))
-            history.undo()
-            assert history.current == Annotation(note="two")
-        with AnnotationStore(tmp_path / name) as store:
-            assert store.annotations()[0].content.note == store.history(KEY).current.note == "four"
-
-
 def test_a_study_keeps_its_settings(tmp_path: Path) -> None:
     with known(tmp_path / "a.sqlite") as store:
         assert store.study_settings("pilot") is None

@@ -41,6 +41,8 @@ def test_a_row_as_it_stands(table) -> None:
     (row,) = read_measurements(table(f"{HEADER}\n{ROW}\n"))
     assert row == Measurement("a.png", 10.0, 12.0, "B", 14.5, "C")
     assert row.manual_angle_deg == 11.0
+    (row,) = read_measurements(table(f"{HEADER},group\n{ROW},session 1", "utf-16"))  # as spreadsheets write Unicode text
+    assert row == Measurement("a.png", 10.0, 12.0, "B", 14.5, "C", "session 1")
 
 
 @pytest.mark.parametrize(

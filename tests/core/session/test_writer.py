@@ -24,7 +24,7 @@ from core.evaluation.replay import event_target
 from core.session import files as session_files
 from core.session import writer as session_writer
 from core.session.files import EncodedFrame, SessionFiles, is_being_written
-from core.session.manifest import About, Event, EventKind, SessionError, event_of_target, frames_lost, read_manifest, write_manifest
+from core.session.manifest import About, Event, EventKind, SessionError, event_of_target, frames_lost, read_manifest
 from core.session.reader import SessionReader
 from core.session.video import FrameEncoder, Packet
 from core.session.writer import Ring, SessionWriter, faults_between
@@ -227,6 +227,7 @@ def test_what_is_dropped_after_the_stop_was_asked_is_not_the_sessions(tmp_path: 
 def test_events_of_driving_and_the_mode_at_the_start_are_written(tmp_path: Path) -> None:
     with writer_in(tmp_path) as writer:
         writer.start()
+        writer.event(EventKind.NOTE, "ready", time_s=1000.15)  # before the first frame
         writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.ADVISORY))
         writer.put(tick_of(1, 1000.1), drive_of(1000.1, Mode.ARMED))
         writer.drive(drive_of(1000.1, Mode.ARMED))
@@ -237,6 +238,7 @@ def test_events_of_driving_and_the_mode_at_the_start_are_written(tmp_path: Path)
     with opened(session) as reader:
         kinds = [event.kind for event in reader.events]
         assert kinds[:2] == [EventKind.MODE, EventKind.VIDEO]
+        assert EventKind.NOTE in kinds
         assert kinds.count(EventKind.FAULT) == 2
         assert EventKind.ARM in kinds
         assert kinds[-1] is EventKind.TARGET
@@ -327,15 +329,6 @@ def test_nothing_is_written_before_start_and_after_stop(tmp_path: Path) -> None:
     counts = sorted(read_manifest(path).counts.frames for path in tmp_path.iterdir())
     assert counts == [1, 1]
     assert not writer.put(tick_of(4, 1000.4))
-
-
-def test_a_note_between_start_and_the_first_frame_is_kept(tmp_path: Path) -> None:
-    with writer_in(tmp_path) as writer:
-        writer.start()
-        writer.event(EventKind.NOTE, "ready")
-        writer.put(tick_of(0, 1000.0))
-    session = saved(writer)
-    assert [event.text for event in events_of(session, EventKind.NOTE)] == ["ready"]
 
 
 def test_the_destination_that_was_chosen_before_is_told_at_the_start(tmp_path: Path) -> None:
@@ -501,41 +494,6 @@ def test_the_last_seconds_tell_where_driving_stood_when_they_began(tmp_path: Pat
     ]
 
 
-def test_what_the_ring_has_from_the_very_beginning_is_not_told_twice(tmp_path: Path) -> None:
-    with writer_in(tmp_path, replace_config(ring_s=20.0)) as writer:
-        for tick in ticks(5):
-            writer.put(tick, DriveView(1000.001, Mode.ADVISORY))
-        writer.save_last()
-        wait_for(lambda: writer.status().saved is not None)
-    session = saved(writer)
-    assert [event.text for event in events_of(session, EventKind.MODE)] == ["ADVISORY"]
-
-
-def test_last_seconds_that_were_saved_in_part_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the folder, too: the message in the window is gone the next day."""
-    writes = SessionFiles.write_frame
-    written: list[int] = []
-
-    def full_after_twenty(files: SessionFiles, frame: EncodedFrame) -> None:
-        if len(written) == 20:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(files.folder))
-        written.append(1)
-        writes(files, frame)
-
-    monkeypatch.setattr(SessionFiles, "write_frame", full_after_twenty)
-    with writer_in(tmp_path, replace_config(ring_s=60.0)) as writer:
-        for tick in ticks(50):
-            writer.put(tick)
-        writer.save_last()
-        wait_for(lambda: writer.status().notice)
-        assert writer.status().notice.startswith("of the last seconds only 20 of 50 frames were saved: ")
-        assert writer.status().saved is None
-    (session,) = (path for path in tmp_path.iterdir() if path.is_dir())
-    manifest = read_manifest(session)
-    assert (manifest.counts.frames, manifest.counts.dropped) == (20, 30)
-    assert manifest.ended.endswith("No space left on device")
-
-
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_fault_of_the_program_while_the_last_seconds_are_saved_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And the next ones can be saved: it does not stand there as being saved for ever."""
@@ -637,47 +595,6 @@ def test_the_ring_is_bounded_by_bytes_and_begins_at_a_key_picture() -> None:
 # --- disks that fail
 
 
-@pytest.mark.parametrize("name", ["frames.jsonl", "video_0000.mkv"])
-def test_a_full_disk_stops_the_recording_visibly_and_keeps_what_was_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    real_line, real_track = session_files.LineFile.write, session_files.VideoTrack.write
-    written: list[str] = []
-
-    def line(self: session_files.LineFile, text: str) -> int:
-        if name == "frames.jsonl" and '"index":' in text and len(written) >= 5:
-            self._file.close()
-            self._file = open("/dev/full", "wb", buffering=0)
-        size = real_line(self, text)
-        if '"index":' in text:
-            written.append(text)
-        return size
-
-    def track(self: session_files.VideoTrack, packet: Packet) -> int:
-        if name == "video_0000.mkv" and len(written) >= 5:
-            raise session_files.VideoError("video_0000.mkv: cannot be written (No space left on device)")
-        return real_track(self, packet)
-
-    monkeypatch.setattr(session_files.LineFile, "write", line)
-    monkeypatch.setattr(session_files.VideoTrack, "write", track)
-    with writer_in(tmp_path) as writer:
-        writer.start()
-        for tick in ticks(20):
-            writer.put(tick)
-        wait_for(lambda: writer.status().problem)
-        status = writer.status()
-        assert "recording stopped" in status.problem
-        assert "No space left" in status.problem
-        assert not status.recording
-        assert status.folder is not None
-    with opened(status.folder) as reader:
-        reader.wait(10.0)
-        assert len(reader) == 5
-        frame = reader.frame(4)
-        assert frame is not None
-        assert number_in(frame.image) == 4
-
-
 def test_with_the_disk_nearly_full_it_warns_and_before_it_is_full_it_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     free = [10_000_000_000]
     monkeypatch.setattr(shutil, "disk_usage", lambda _: (100_000_000_000, 0, free[0]))
@@ -745,21 +662,6 @@ def test_a_disk_that_is_really_full_loses_nothing_written(tmp_path: Path, codec:
         assert lost <= 8
 
 
-def test_the_manifest_is_written_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    session = record(tmp_path, ticks(2))
-    manifest = read_manifest(session)
-
-    def full(_: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space"):
-        write_manifest(session, manifest.model_copy(update={"rig": "other"}))
-    monkeypatch.undo()
-    assert read_manifest(session).rig == "twin"
-    assert [path.name for path in session.iterdir() if path.name.startswith(".")] == []
-
-
 def test_an_unexpected_failure_ends_the_recorder_visibly(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     with writer_in(tmp_path) as writer:
         writer.start()
@@ -798,12 +700,3 @@ def test_a_drive_without_locks_can_be_recorded_on(tmp_path: Path, monkeypatch: p
     assert read_manifest(session).closed
     assert not is_being_written(session)
     assert session_files.add_event(session, Event(1000.0, EventKind.NOTE, "kink")).text == "kink"
-
-
-def test_the_largest_pictures_at_the_largest_rate_have_an_encoder() -> None:
-    FrameEncoder((4096, 3072), QUICK.model_copy(update={"max_mbit_s": 100.0, "codec": "lossy"})).close()
-
-
-def test_pictures_without_a_size_have_no_encoder() -> None:
-    with pytest.raises(session_files.VideoError, match="no encoder"):
-        FrameEncoder((0, 0), QUICK)
