@@ -22,7 +22,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from app.commands.options import ConfigOption, RigOption, SourceOption
 from core.devices import UserError
-from core.system import keep_freed, limit_pictures, share_heaps
+from core.system import keep_freed_memory, limit_heaps, limit_pictures
 
 COMMANDS = {
     "gui": ("app.cli", "The operator window (the same as no command)."),
@@ -146,8 +146,8 @@ def main() -> None:
     """Run the command line. Known errors end as one line on standard error and exit code 2; Ctrl-C as exit code 130."""
     with suppress(OSError, RuntimeError, ValueError):  # there is not always a standard error
         faulthandler.enable()
-    share_heaps()
-    keep_freed()
+    limit_heaps()
+    keep_freed_memory()
     limit_pictures()
     if sys.stdout is None:  # started with a closed one
         sys.stdout = open(os.devnull, "w")

@@ -29,7 +29,7 @@ LEFT_AFTER_S = 60.0
 _UNFINISHED = re.compile(r"\.[0-9a-f]{16}\.part")
 
 
-def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path | None = None) -> None:
+def write_atomic(path: Path, data: bytes, *, durable: bool = False, older: Path | None = None) -> None:
     """Atomic write: a reader, even after a crash, finds the old file or the new one. A link is followed.
 
     An old file's permissions are kept where possible. With `durable` it also survives a power cut, which takes some milliseconds.
@@ -51,7 +51,7 @@ def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path |
                 file.flush()
                 os.fsync(file.fileno())
         if older is not None and target.exists():
-            write_whole(older, target.read_bytes(), durable=durable)
+            write_atomic(older, target.read_bytes(), durable=durable)
         aside.replace(target)
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -62,14 +62,14 @@ def write_whole(path: Path, data: bytes, *, durable: bool = False, older: Path |
             sync_folder(target.parent)
 
 
-def is_aside(path: Path) -> bool:
+def is_unfinished(path: Path) -> bool:
     """Whether a file has the name that ``write_atomic`` uses until the file is complete."""
     return _UNFINISHED.fullmatch(path.name) is not None
 
 
 def sweep_unfinished(folder: Path) -> None:
     """Remove unfinished files of processes that were killed a minute ago or longer; a file that cannot be removed stays."""
-    for path in filter(is_aside, folder.glob(".*.part")):
+    for path in filter(is_unfinished, folder.glob(".*.part")):
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFT_AFTER_S:
                 path.unlink()

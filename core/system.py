@@ -47,7 +47,7 @@ _FROM_HEAP_BYTES = 32 << 20
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # malloc.h
 
 
-def share_heaps() -> None:
+def limit_heaps() -> None:
     """Let all threads allocate from two heaps; to be called before there are threads.
 
     By default there are up to eight heaps a core, in which the threads of each rig leave holes: 40 rigs one after the other grew
@@ -58,7 +58,7 @@ def share_heaps() -> None:
         limit(_M_ARENA_MAX, _ARENAS)
 
 
-def keep_freed() -> None:
+def keep_freed_memory() -> None:
     """Let each heap keep what is freed at its end for the next picture: saves 1200 page faults and 1.5 ms a frame."""
     option = _c_function("mallopt")
     if option is not None:
@@ -66,7 +66,7 @@ def keep_freed() -> None:
         option(_M_MMAP_THRESHOLD, _FROM_HEAP_BYTES)
 
 
-def give_back() -> None:
+def release_memory() -> None:
     """Collect garbage, 30 MB of cyclic references per closed rig, and return free memory of the heaps to the system."""
     gc.collect()
     trim = _c_function("malloc_trim")
@@ -86,7 +86,7 @@ _BEHIND = 4
 """Steps of niceness: two threads that both want a core share it as 7 to 3."""
 
 
-def let_the_window_first() -> None:
+def lower_priority() -> None:
     """Lower the priority of the calling thread, and of those that it starts from now on, below window, pilot and servos.
 
     For perception, which computes all the time. With it the window freezes for 31 to 75 ms at most, instead of 49 to 84, and the

@@ -50,7 +50,7 @@ from core.perception.pipeline import Pipeline
 from core.session.manifest import SessionError, about_rig, event_of_alert, read_manifest
 from core.session.reader import SessionReader
 from core.session.writer import RecordStatus, SessionWriter, faults_between
-from core.system import give_back
+from core.system import release_memory
 from core.types import Frame, Mask, Point, Points, Scene
 from hardware.rig import Rig, RigKind
 from hardware.servos.servo_robot import ServoRobot
@@ -709,7 +709,7 @@ class Soak:
         self._left_over = rig.close()
         self.tally.frames += rig.frames
         del rig
-        give_back()  # as when the window opens the next rig
+        release_memory()  # as when the window opens the next rig
 
     def _turn_over(self) -> None:
         """End the session that is being written, begin the next, and look at what is complete."""

@@ -25,7 +25,7 @@ from core.devices import UserError
 from core.evaluation import evaluation
 from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, read_measurements, write_measurements
 from core.evaluation.paper import PAPER, against_paper, choose_images, measure_twice, wanted_images
-from core.files import name_as_text, name_of, write_whole
+from core.files import name_as_text, name_of, write_atomic
 from core.types import Frame
 
 
@@ -209,7 +209,7 @@ def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
     from app.commands.figures import ENDINGS, FIGURES, draw_figures, drawn
 
     told = json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_whole(out / "metrics.json", told.encode())
+    write_atomic(out / "metrics.json", told.encode())
     write_measurements(out / "measurements.csv", rows)
     (out / "raters.csv").unlink(missing_ok=True)  # of an earlier evaluation, as figures below; it would belie this one
     figures = {
@@ -220,11 +220,11 @@ def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
         for ending in ENDINGS:
             path = out / f"{name}{ending}"
             if name in figures:
-                write_whole(path, figures[name][ending])
+                write_atomic(path, figures[name][ending])
             else:
                 path.unlink(missing_ok=True)
     report = render_report(metrics, {name: files[".svg"] for name, files in figures.items()})
-    write_whole(out / "report.html", report.encode())
+    write_atomic(out / "report.html", report.encode())
 
 
 def _annotation_file(given: Path, study: str | None) -> Path | None:

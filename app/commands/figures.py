@@ -35,7 +35,7 @@ from core.config.models import RESOURCES
 from core.evaluation.evaluation import AnglePairs
 from core.evaluation.metrics import LIMITS_SD, RANGE_DEG
 from core.evaluation.replay import STATES, Change, FrameResult
-from core.files import write_whole
+from core.files import write_atomic
 from core.geometry import normals
 from core.types import PoseState
 from hardware.twin.phantoms import make_phantom
@@ -105,7 +105,7 @@ def drawn(figure: Figure, ending: str) -> bytes:
 def save_figure(figure: Figure, path: Path) -> None:
     """``drawn`` to `path`, by its ending; raises OSError."""
     # Drawn before: a disk that is full makes the PDF's writer fail in ways of its own.
-    write_whole(path, drawn(figure, path.suffix))
+    write_atomic(path, drawn(figure, path.suffix))
 
 
 def _on_axes(draw: Callable[[Axes], None], size_in: tuple[float, float] = _SIZE_IN) -> Figure:

@@ -25,7 +25,7 @@ from core.config.models import PolicyName, choose_model, load_config
 from core.control.policies import POLICY_NAMES
 from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
-from core.files import write_whole
+from core.files import write_atomic
 from hardware.twin.catalog import BENCH_LOOK
 from hardware.twin.trial import RANDOM_LOOK, TRIAL_LOOKS, TrialPlan
 
@@ -148,7 +148,7 @@ class KeptTrials:
         try:
             out.mkdir(parents=True, exist_ok=True)
             if not path.is_file():
-                write_whole(path, f"{json.dumps(described, indent=1)}\n".encode())
+                write_atomic(path, f"{json.dumps(described, indent=1)}\n".encode())
             elif json.loads(path.read_text(encoding="utf-8")) != described:
                 raise TrialError(f"{out}: holds trials with other settings ({path.name}); choose another --out")
             self._read()
@@ -165,7 +165,7 @@ class KeptTrials:
         text = self._file.read_text(encoding="utf-8")
         if text and not text.endswith("\n"):
             text = text[: text.rfind("\n") + 1]
-            write_whole(self._file, text.encode())
+            write_atomic(self._file, text.encode())
         for line in text.splitlines():
             row = json.loads(line)
             if not row.keys() >= _KEYS:

@@ -17,7 +17,7 @@ from core.config.models import PerceptionConfig
 from core.control.modes import Act
 from core.control.pilot import Pilot
 from core.devices import EndOfStream, Latest
-from core.system import let_the_window_first
+from core.system import lower_priority
 from core.types import Point, Tick
 from hardware.servos.bus_ipc import BusStatus
 
@@ -189,7 +189,7 @@ class EngineThread(QThread):
                 self._opened(engine)
                 self._report(EngineStatus(EnginePhase.RUNNING))
                 # In a thread of its own: what another engine will start (pilot, servos) must not wait behind perception.
-                with ThreadPoolExecutor(1, "engine turns", let_the_window_first) as turns:
+                with ThreadPoolExecutor(1, "engine turns", lower_priority) as turns:
                     turns.submit(self._turn, engine).result()
         finally:
             try:

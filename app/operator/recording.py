@@ -23,7 +23,7 @@ from core.config.models import Config
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause
-from core.files import write_whole
+from core.files import write_atomic
 from core.session.manifest import About, Event, EventKind, about_rig, event_of_alert, event_of_target
 from core.session.recovery import CutSession, find_cut_sessions
 from core.session.writer import STOPPED, RecordStatus, SessionWriter, faults_between
@@ -217,7 +217,7 @@ class Declined:
     def add(self, name: str) -> None:
         """Raises OSError."""
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(self._path, json.dumps(sorted(self.names() | {name})).encode())
+        write_atomic(self._path, json.dumps(sorted(self.names() | {name})).encode())
 
 
 class RecoveryController(QObject):

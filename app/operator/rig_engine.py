@@ -15,7 +15,7 @@ from core.control.policies import make_policy
 from core.perception.inference import cores
 from core.perception.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
-from core.system import give_back, let_the_window_first
+from core.system import lower_priority, release_memory
 from core.types import Frame, Point, Scene
 from hardware.rig import Rig, RigKind, open_rig
 from hardware.servos.bus_ipc import BusStatus
@@ -78,8 +78,8 @@ class EngineMaker:
         config = as_calibrated(config)
         if self._pilot is not None:  # a rig that could not be opened, or that nobody drives, acknowledges nothing either
             self._left_over, self._pilot = self._pilot.left_over, None
-            give_back()
-        with ExitStack() as undo, ThreadPoolExecutor(1, "network", let_the_window_first) as beside:
+            release_memory()
+        with ExitStack() as undo, ThreadPoolExecutor(1, "network", lower_priority) as beside:
             loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
             ahead, self._ahead = self._ahead, None
             rig = open_rig(config, ahead)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from core.calibration.camera import BoardSpec, board_bitmap
 from core.devices import UserError
-from core.files import write_whole
+from core.files import write_atomic
 
 _PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0)}
 _MARGIN_MM, _FOOT_MM = 8.0, 16.0
@@ -70,7 +70,7 @@ def print_board(path: Path, spec: BoardSpec) -> str:
     kind = path.suffix.lower().removeprefix(".")
     figure.savefig(printed, format=kind, dpi=_PNG_DPI, metadata={"Title": "LumenPilot calibration board"})
     try:
-        write_whole(path, printed.getvalue())
+        write_atomic(path, printed.getvalue())
     except OSError as error:
         raise BoardPrintError(f"{path}: cannot be written ({error.strerror})") from None
     return paper

@@ -24,7 +24,7 @@ from typing import IO, Any, Generic, TypeVar
 import shiboken6
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
-from core.system import let_the_window_first
+from core.system import lower_priority
 
 Receiver = TypeVar("Receiver", bound=QObject)
 Job = Callable[[], object]
@@ -176,7 +176,7 @@ class Worker(QObject):
 def _work(name: str, queue: _JobQueue, worker: QueuedCallback[Worker], behind: bool) -> None:
     """The thread of a worker."""
     if behind:
-        let_the_window_first()
+        lower_priority()
     while True:
         with queue.changed:
             queue.changed.wait_for(lambda: queue.jobs or queue.is_stopped)

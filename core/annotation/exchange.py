@@ -23,7 +23,7 @@ from core.annotation.masks import area_polygon, fill, polygons_of, polygons_of_a
 from core.annotation.model import Annotation, AnnotationError, Line, MaskPolygon, MaskTarget, line_from, measure_lines
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.config.models import PerceptionConfig
-from core.files import ImageError, read_image, write_whole
+from core.files import ImageError, read_image, write_atomic
 from core.learning.dataset import IMAGE_ENDINGS, UNMEASURED, write_mask, write_png
 from core.types import Mask, Points, Pose, Refusal, Scene, Vector
 
@@ -365,7 +365,7 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
     if out.exists():
         raise AnnotationError(f"{out}: is there already; choose another --out")
     try:
-        write_whole(out, json.dumps(content, allow_nan=False).encode())
+        write_atomic(out, json.dumps(content, allow_nan=False).encode())
     except OSError as error:
         raise AnnotationError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
     return len(content["images"])

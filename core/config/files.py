@@ -26,7 +26,7 @@ from core.config.models import RESOURCES, Config, ConfigError, load_config, merg
 from core.config.schema import JOINTS, FieldKind, settings_by_key, value_at
 from core.config.section import plain_message
 from core.devices import UserError
-from core.files import write_whole
+from core.files import write_atomic
 
 UNKNOWN = "unknown key, kept but not used"
 _TOO_MUCH = "too much is wrong"
@@ -145,7 +145,7 @@ def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
         text, is_lossless = settings_text(old, config)
         if not is_lossless and not note:
             note = _kept(path, "had values that are not allowed")
-        write_whole(path, text.encode("utf-8"), durable=True)
+        write_atomic(path, text.encode("utf-8"), durable=True)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written ({error.strerror}); nothing was changed") from None
     return note

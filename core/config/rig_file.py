@@ -24,7 +24,7 @@ from core.config.models import CameraConfig, Config, RigConfig, TwinConfig
 from core.config.safety import ServosConfig
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
-from core.files import write_whole
+from core.files import write_atomic
 
 FORMAT = 1
 RESERVED = ("twin", "realsense", "webcam")
@@ -183,7 +183,7 @@ def write_rig(rig: RigFile, path: Path | None = None, *, keeps_older: bool = Tru
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         older = target.with_name(target.stem + _OLDER) if keeps_older else None
-        write_whole(target, tomlkit.dumps(document).encode(), durable=True, older=older)
+        write_atomic(target, tomlkit.dumps(document).encode(), durable=True, older=older)
     except OSError as error:
         raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
     return target

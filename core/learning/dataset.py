@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
 from core.devices import UserError
-from core.files import ImageError, read_image, write_whole
+from core.files import ImageError, read_image, write_atomic
 from core.types import Image, Mask
 
 WORKING_SIZE_PX = 640
@@ -212,7 +212,7 @@ def leave_out_looks(folder: Path, samples: Sequence[Sample], looks: Sequence[str
 
 def write_mask(path: Path, mask: Mask) -> None:
     """A mask as 0/255 PNG; raises OSError when it cannot be written (OpenCV alone would only return False)."""
-    write_whole(path, mask_png(mask))
+    write_atomic(path, mask_png(mask))
 
 
 def mask_png(mask: Mask) -> bytes:
@@ -222,7 +222,7 @@ def mask_png(mask: Mask) -> bytes:
 
 def write_png(path: Path, image: np.ndarray) -> None:
     """RGB or grey uint8 as PNG, never half a file; raises OSError."""
-    write_whole(path, png(image))
+    write_atomic(path, png(image))
 
 
 def png(image: np.ndarray) -> bytes:

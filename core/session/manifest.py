@@ -27,7 +27,7 @@ from core.control.drive_view import DriveView
 from core.control.gate import Source
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Mode
 from core.devices import UserError
-from core.files import write_whole
+from core.files import write_atomic
 from core.perception.model_file import ModelError, model_folder, read_model_info
 from core.session.codec import JsonLayout, Moment, Text, finite, finite_tree, read_json
 from core.types import Point
@@ -170,7 +170,7 @@ def new_manifest(about: About, session_id: str, started: datetime, monotonic_s: 
 def write_manifest(folder: Path, manifest: Manifest) -> int:
     """Write it atomically: whenever the process or the power goes, the old or the new one is there. Returns its bytes; OSError."""
     data = (manifest.model_dump_json(indent=1) + "\n").encode()
-    write_whole(folder / MANIFEST, data, durable=True)
+    write_atomic(folder / MANIFEST, data, durable=True)
     return len(data)
 
 

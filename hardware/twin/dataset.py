@@ -22,7 +22,7 @@ import numpy as np
 
 from core.config.models import PerceptionConfig
 from core.devices import UserError
-from core.files import is_aside, sweep_unfinished, write_whole
+from core.files import is_unfinished, sweep_unfinished, write_atomic
 from core.learning.dataset import mask_png, png
 from core.system import begin_as_worker
 from core.types import Points
@@ -180,8 +180,8 @@ def _write_episode(plan: SynthPlan, number: int) -> int:
 def _keep(plan: SynthPlan, made: Episode) -> int:
     """Write an episode; its truth file comes last, by rename, and marks it as complete. Returns how many frames it has."""
     for name, data in made.files.items():
-        write_whole(plan.out / name, data)
-    write_whole(_episode_file(plan, made.number), ("\n".join(made.truth) + "\n").encode())
+        write_atomic(plan.out / name, data)
+    write_atomic(_episode_file(plan, made.number), ("\n".join(made.truth) + "\n").encode())
     return len(made.truth)
 
 
@@ -258,7 +258,7 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
                 for worker in set(multiprocessing.active_children()) - others:
                     worker.terminate()
     rows = [_episode_file(plan, episode).read_bytes() for episode in range(plan.episodes)]
-    write_whole(plan.out / "truth.jsonl", b"".join(rows))
+    write_atomic(plan.out / "truth.jsonl", b"".join(rows))
 
 
 def _prepare(plan: SynthPlan) -> None:
@@ -272,7 +272,7 @@ def _prepare(plan: SynthPlan) -> None:
         described["poses"] = plan.poses
     path = plan.out / "plan.json"
     try:
-        if not path.is_file() and plan.out.is_dir() and not all(map(is_aside, plan.out.iterdir())):
+        if not path.is_file() and plan.out.is_dir() and not all(map(is_unfinished, plan.out.iterdir())):
             raise SynthFolderError(f"{plan.out}: holds something that synth did not write")
         plan.out.mkdir(parents=True, exist_ok=True)
         if any(int(image.stem) >= plan.count for image in (plan.out / "images").glob("*.png") if image.stem.isdecimal()):
@@ -281,7 +281,7 @@ def _prepare(plan: SynthPlan) -> None:
             if json.loads(path.read_text(encoding="utf-8")) != described:
                 raise SynthFolderError(f"{plan.out}: holds a set with other settings ({path.name})")
         else:
-            write_whole(path, f"{json.dumps(described)}\n".encode())  # first: it says whose folder this is
+            write_atomic(path, f"{json.dumps(described)}\n".encode())  # first: it says whose folder this is
         folders = [plan.out / name for name in ("images", "masks", "episodes")]
         for folder in folders:
             folder.mkdir(exist_ok=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core.system import give_back
+from core.system import release_memory
 
 
 class _Knot:
@@ -25,7 +25,7 @@ def test_what_refers_to_itself_alone_is_collected() -> None:
     knot = _Knot()
     there = weakref.ref(knot)
     del knot
-    give_back()
+    release_memory()
     assert there() is None
 
 
@@ -40,21 +40,21 @@ def test_what_other_threads_have_freed_goes_back_to_the_system() -> None:
         kept.append(pieces[-1])
 
     kept: list[np.ndarray] = []
-    give_back()
+    release_memory()
     thread = threading.Thread(target=litter)
     thread.start()
     thread.join()
     before_mb = used_mb()
-    give_back()
+    release_memory()
     assert kept
     assert used_mb() < before_mb - 20
 
 
 _MANY_THREADS = """
 import ctypes, sys, threading
-from core.system import share_heaps
+from core.system import limit_heaps
 if sys.argv[1] == "shared":
-    share_heaps()
+    limit_heaps()
 libc = ctypes.CDLL(None)
 libc.malloc.restype = ctypes.c_void_p
 libc.fopen.restype = ctypes.c_void_p
@@ -82,9 +82,9 @@ def test_threads_share_two_heaps(how: str, fewest: int, most: int, tmp_path: Pat
 _PICTURES = """
 import resource, sys
 import numpy as np
-from core.system import keep_freed
+from core.system import keep_freed_memory
 if sys.argv[1] == "kept":
-    keep_freed()
+    keep_freed_memory()
 def picture():
     masks = [np.ones(1_200_000, np.uint8) for _ in range(8)]
 for _ in range(5):

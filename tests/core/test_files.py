@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.files import ImageError, read_image, sweep_unfinished, to_rgb8, write_whole
+from core.files import ImageError, read_image, sweep_unfinished, to_rgb8, write_atomic
 
 
 @pytest.mark.parametrize("durable", [False, True])
@@ -21,7 +21,7 @@ def test_it_takes_the_old_ones_place_and_permissions_and_leaves_nothing_else(tmp
     path = tmp_path / "a.toml"
     path.write_bytes(b"old")
     path.chmod(0o640)
-    write_whole(path, b"new", durable=durable)
+    write_atomic(path, b"new", durable=durable)
     assert path.read_bytes() == b"new"
     assert path.stat().st_mode & 0o777 == 0o640
     assert list(tmp_path.iterdir()) == [path]
@@ -31,7 +31,7 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     path, link = tmp_path / "kept" / "a.toml", tmp_path / "a.toml"
     path.parent.mkdir()
     link.symlink_to(path)
-    write_whole(link, b"new", durable=True)
+    write_atomic(link, b"new", durable=True)
     assert link.is_symlink()
     assert path.read_bytes() == b"new"
 
@@ -51,7 +51,7 @@ def test_a_disk_that_does_not_take_it_leaves_the_old_one_and_is_named(
     else:
         monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(OSError, match="No space left") as caught:
-        write_whole(path, b"new", durable=True)
+        write_atomic(path, b"new", durable=True)
     assert caught.value.filename == str(path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
@@ -64,7 +64,7 @@ def test_a_folder_that_cannot_be_synced_is_no_failure_for_the_new_file_is_there(
         raise OSError(errno.EINVAL, "Invalid argument")
 
     monkeypatch.setattr("core.files.sync_folder", cannot)
-    write_whole(tmp_path / "a.toml", b"new", durable=True)
+    write_atomic(tmp_path / "a.toml", b"new", durable=True)
     assert (tmp_path / "a.toml").read_bytes() == b"new"
 
 
@@ -75,7 +75,7 @@ def test_where_permissions_cannot_be_set_it_is_written_all_the_same(tmp_path: Pa
     path = tmp_path / "a.toml"
     path.write_bytes(b"old")
     monkeypatch.setattr(shutil, "copymode", not_ours)
-    write_whole(path, b"new")
+    write_atomic(path, b"new")
     assert path.read_bytes() == b"new"
 
 
@@ -84,7 +84,7 @@ def test_what_was_there_is_kept_beside_it_only_once_the_new_one_has_found_room(
 ) -> None:
     path, older = tmp_path / "a.toml", tmp_path / "a.older.toml"
     for text in (b"one", b"two", b"three"):
-        write_whole(path, text, durable=True, older=older)
+        write_atomic(path, text, durable=True, older=older)
     assert (path.read_bytes(), older.read_bytes()) == (b"three", b"two")
 
     def full(*_: object) -> None:
@@ -92,7 +92,7 @@ def test_what_was_there_is_kept_beside_it_only_once_the_new_one_has_found_room(
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left"):
-        write_whole(path, b"four", durable=True, older=older)
+        write_atomic(path, b"four", durable=True, older=older)
     assert (path.read_bytes(), older.read_bytes()) == (b"three", b"two")
 
 

@@ -39,7 +39,7 @@ from core.control.pilot import PERIOD_S, LeftOver, Pilot
 from core.control.policies import make_policy
 from core.devices import CameraLost
 from core.evaluation.accuracy import TrueMasks
-from core.files import write_whole
+from core.files import write_atomic
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.perception.segmentation import Segmenter
 from core.session.manifest import Event, Manifest, about_rig, event_of_alert, read_manifest
@@ -513,7 +513,7 @@ def run_faults(only: list[int], out: Path | None, *, quick: bool, as_json: bool)
             sys.stdout.flush()
     finally:  # neither costs the other
         if out is not None and results:
-            write_whole(out, page_of(results, live=not quick).encode())
+            write_atomic(out, page_of(results, live=not quick).encode())
     if len(results) < len(cases):
         raise KeyboardInterrupt
     return 0 if all(result.seen.ok for result in results) else 1
