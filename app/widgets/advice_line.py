@@ -45,7 +45,7 @@ class AdviceLine(PaintedWidget):
         is_unsure: bool = False,
         renew_text: bool = True,
     ) -> None:
-        """The advice for `state`, whose pose may be unsure, or why there is none."""
+        """The advice for `state`, whose pose may be unsure, or the reason why there is no advice."""
         changed = (advice is None) is not (self._advice is None) or state is not self._state or why_none != self._why_none
         if not changed and not renew_text:
             return

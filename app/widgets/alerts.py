@@ -1,4 +1,4 @@
-"""Alerts over the upper edge of the live picture, most urgent first, which go away by themselves; and their sounds."""
+"""Alerts over the upper edge of the live picture, most urgent first, which disappear after some time; and their sounds."""
 
 from __future__ import annotations
 
@@ -38,11 +38,10 @@ LOOK = {
 
 @dataclass(frozen=True, slots=True)
 class ShownAlert:
-    """An alert with how often it came, its turn and when it last mattered."""
+    """An alert with its count and when it was last active."""
 
     alert: Alert
     times: int
-    turn: int
     last_s: float
 
     @property
@@ -178,7 +177,6 @@ class AlertStrip(QWidget):
         self._clock = clock
         self._entries: dict[AlertKey, ShownAlert] = {}
         self._latched: Cause | None = None
-        self._turn = 0
         self._rows = [AlertRow(self) for _ in range(MOST_ROWS)]
         for row in self._rows:
             row.dismissed.connect(self._dismiss)
@@ -200,8 +198,7 @@ class AlertStrip(QWidget):
         for alert in alerts:
             before = self._entries.pop(alert.key, None)
             times = 1 + alert.repeats + (before.times if before is not None else 0)
-            self._turn += 1
-            self._entries[alert.key] = ShownAlert(alert, times, self._turn, now)
+            self._entries[alert.key] = ShownAlert(alert, times, now)  # the newest one is the last
             if before is None:
                 self._announce(self._entries[alert.key])
         self._show()
@@ -225,7 +222,7 @@ class AlertStrip(QWidget):
         self._expire()
 
     def clear(self) -> None:
-        """Show nothing: what comes next is another rig."""
+        """Remove all alerts, before another rig is opened."""
         self._entries.clear()
         self._show()
 
@@ -240,7 +237,8 @@ class AlertStrip(QWidget):
             self._show()
 
     def _in_order(self) -> list[ShownAlert]:
-        return sorted(self._entries.values(), key=lambda entry: (-entry.alert.spec.priority, -entry.turn))
+        newest_first = reversed(self._entries.values())
+        return sorted(newest_first, key=lambda entry: -entry.alert.spec.priority)
 
     def _heights(self) -> list[int]:
         """Of the rows that have room, from above: the most urgent ones with two lines, the others with one."""
@@ -254,18 +252,12 @@ class AlertStrip(QWidget):
                 heights[k] = FULL
         return heights
 
-    def _width(self, entries: Sequence[ShownAlert], heights: Sequence[int]) -> int:
-        """As wide as the longest row needs, if there is room."""
-        least, most = _WIDTHS
-        shown = zip(entries, heights, strict=False)
-        needed = max((entry.needed_width(full=height == FULL) for entry, height in shown), default=0)
-        return min(max(least, needed), most, self._parent.width() - 2 * _MARGIN)
-
     def _show(self) -> None:
         entries, heights = self._in_order(), self._heights()
         hidden = len(entries) - len(heights)
-        width = self._width(entries, heights)
-        top = 0
+        least, most = _WIDTHS
+        needed = (entry.needed_width(full=height == FULL) for entry, height in zip(entries, heights, strict=False))
+        width, top = min(max(least, *needed, 0), most, self._parent.width() - 2 * _MARGIN), 0
         for k, row in enumerate(self._rows):
             if k >= len(heights):
                 row.show_entry(None, 0)
@@ -338,7 +330,7 @@ class AlertSounds(QObject):
         if application is not None:
             application.aboutToQuit.connect(self.close)
         if parent is not None:
-            parent.destroyed.connect(self.close)  # comes before its children go, and Qt warns of a process that goes while it runs
+            parent.destroyed.connect(self.close)  # before its children are destroyed: Qt warns of a process that still runs then
 
     def play(self, name: str) -> None:
         """Play the sound `name` (one of ``SOUNDS``), unless an equally or more urgent one is being heard. Returns at once."""
@@ -353,7 +345,7 @@ class AlertSounds(QObject):
 
     @Slot()
     def close(self) -> None:
-        """End what is being heard; waits for it half a second at most."""
+        """Stop the sound; waits for its process half a second at most."""
         self._next = None
         if self._process.state() != QProcess.ProcessState.NotRunning:
             self._cut()

@@ -35,7 +35,7 @@ _TOP_PX = 4  # margin above the panels of a window
 
 
 Part = QWidget | QLayout | tuple[QWidget | QLayout, int]
-"""What stands in a layout, with its stretch."""
+"""A part of a layout, with its stretch."""
 Margins = tuple[int, int, int, int]
 _NO_MARGINS = (0, 0, 0, 0)
 
@@ -104,7 +104,7 @@ def card_note(text: str) -> QLabel:
 
 
 def text_button(text: str, action: Callable[[], object], tool_tip: str = "", name: str = "") -> QPushButton:
-    """A button that takes the focus by Tab only: a click must not take the keys from the robot. `name` is for screen readers."""
+    """A button that takes the focus by Tab only, so that a click leaves the keys to the robot. `name` is for screen readers."""
     button = QPushButton(text)
     button.setToolTip(tool_tip)
     button.setAccessibleName(name)
@@ -139,7 +139,7 @@ class Card(QFrame):
 
 
 class Columns(QSplitter):
-    """Two columns with a handle between them; `share` of the width, the left one's, stays when the window grows."""
+    """Two columns with a handle between them. The left one keeps its `share` of the width when the window grows."""
 
     def __init__(self, left: QWidget, right: QWidget, share: float) -> None:
         super().__init__(Qt.Orientation.Horizontal)
@@ -213,13 +213,13 @@ def takes_enter(dialog: QWidget, event: QKeyEvent) -> bool:
 
 
 def name_list(combo: QComboBox, name: str) -> None:
-    """Under Linux Qt tells a screen reader what is chosen instead of the name, so the name is its description, too."""
+    """Set accessible name and description: under Linux Qt gives a screen reader the choice instead of the name."""
     combo.setAccessibleName(name)
     combo.setAccessibleDescription(name)
 
 
 class QuietCombo(QComboBox):
-    """A click opens it, or Enter when Tab has come to it; in the open list the arrows choose, Enter takes and Escape leaves.
+    """A click opens it, or Enter when it has the focus; in the open list the arrows move, Enter chooses and Escape closes.
 
     Closed it takes no key and no turn of the wheel, which would choose unnoticed.
 
@@ -252,7 +252,7 @@ class QuietCombo(QComboBox):
 
 Key = Qt.Key
 SCROLL_KEYS = frozenset({Key.Key_Up, Key.Key_Down, Key.Key_PageUp, Key.Key_PageDown, Key.Key_Home, Key.Key_End})
-"""Keys that a list keeps for itself while it has the focus, so that none of them reaches the robot by way of its parent."""
+"""Keys that a focused list uses itself, so that they do not reach the robot."""
 
 
 class ScrollKeys(QObject):

@@ -34,7 +34,7 @@ _LASTING = 3  # renewals in a row: the speed of a single cycle of the bus swings
 
 @dataclass(frozen=True, slots=True)
 class ProvenanceRow:
-    """``cells`` under the headings; or a ``note`` instead. ``drives``: what was sent comes from here."""
+    """``cells`` under the headings, or a ``note``. ``drives``: the source of the command that was sent."""
 
     label: str
     cells: tuple[Cell, ...] = ()
@@ -179,7 +179,7 @@ class ClampLog:
     def _add(self, key: Hashable, joint: str, text: str, count: int, now_s: float, clock: str) -> None:
         for row, entry in enumerate(self.entries[:_LOOK_BACK]):
             if entry.key == key and 0.0 <= now_s - entry.last_s <= _BURST_S:
-                # the detail of an earlier rejection is kept where the newer one has none
+                # a newer rejection without a detail keeps the earlier one's
                 kept = entry.text if entry.is_rejection and ":" not in text else text
                 self.entries[row] = replace(entry, text=kept, count=entry.count + count, last_s=now_s)
                 return
@@ -319,7 +319,7 @@ class CommandPanel(QWidget):
         return f"{self._table.text}\n{self._heading.text()}"
 
     def show_view(self, view: DriveView | None, status: BusStatus | None) -> None:
-        """The newest state of driving, and of the bus; None where there is none."""
+        """The newest state of driving and of the bus; None without a robot, or without a bus."""
         if status is not None:
             self.log.log.add_status(status, self._time_of_day())
         known = view is not None

@@ -38,7 +38,7 @@ _SMALLEST_PX, _LARGEST_PX = 13, 24  # of the numbers
 
 
 class DistanceBars(PaintedWidget):
-    """Two bars that grow from the centerline to the side on which head and tail lie; the green band is what is allowed.
+    """Two bars that grow from the centerline to the side on which head and tail lie; the green band is the allowed range.
 
     Bars on opposite sides mean that the robot has crossed. A bar that leaves the range ends in an arrow.
     """
@@ -119,7 +119,7 @@ class DistanceBars(PaintedWidget):
 
 
 FORCE_MARKS_N = (0.15, 0.5)
-"""What 95 % of a trial's forces should keep below, and what none may exceed."""
+"""Limits of 95 % of a trial's forces, and of all of them."""
 _FORCE_RANGE_N = 0.6
 _FORCE_BAND_N = 0.03  # how far a force must be below a mark to count as below it again
 _NEAR_USED, _USED_BAND = 0.85, 0.1
@@ -131,7 +131,7 @@ _ROLE = ("ALLOWED", "ORANGE", "FAULT")  # colour of each level
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """One half of the widget. ``texts`` are the same said longer and shorter; the first that fits is shown."""
+    """One half of the widget. ``texts`` are versions of one text, the longest first; the first that fits is shown."""
 
     texts: tuple[str, ...]
     share: float | None
@@ -169,7 +169,7 @@ class ClearanceBar(PaintedWidget):
 
     @property
     def text(self) -> str:
-        """All that is said, in full."""
+        """The full texts."""
         return self._room.texts[0] if self._force is None else f"{self._room.texts[0]}; {self._force.texts[0]}"
 
     @property
@@ -268,7 +268,7 @@ def _paint_block(painter: QPainter, box: QRectF, block: _Block) -> None:
     draw_track(painter, track)
     if block.share is not None:
         share = max(0.0, min(1.0, block.share))
-        if block.level == 2 and share < 0.1:  # no room: nothing to fill, and yet it must be seen
+        if block.level == 2 and share < 0.1:  # without room there is nothing to fill, so the track is hatched
             painter.setBrush(QBrush(QColor(theme.FAULT), Qt.BrushStyle.BDiagPattern))
             painter.drawRoundedRect(track, 3, 3)
         draw_bar(painter, track, share, theme.of(_ROLE[block.level]))

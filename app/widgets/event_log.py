@@ -139,7 +139,7 @@ class _EventList(QListWidget):
         self.setAccessibleName(tr("Events, newest first"))
 
     def add(self, event: LoggedEvent) -> None:
-        """Put `event` in front; the oldest one goes when there are too many."""
+        """Put `event` in front; above ``MOST_ROWS`` the oldest one is removed."""
         item, bar = QListWidgetItem(), self.verticalScrollBar()
         self.insertItem(0, item)
         self.replace_newest(event)

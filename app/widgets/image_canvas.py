@@ -16,7 +16,7 @@ from app.ui.theme import ON_PICTURE
 from core.types import Image, Point
 
 _ZOOM_MAX = 40.0
-_MARGIN_PX = 60.0  # of the surroundings that may be seen
+_MARGIN_PX = 60.0  # around the image, which may be in view
 _LARGE_PIXEL = 1 / 3  # image pixels per screen pixel
 _WHEEL_FACTOR = 1.2
 _CLOSE_UP = 5.0
@@ -160,7 +160,7 @@ class ImageCanvas(QWidget):
         return self._pan_from is not None
 
     def show_levels(self, levels: tuple[Image, ...]) -> None:
-        """Another image, the whole of it; none: nothing."""
+        """Show another image, all of it; without levels nothing is shown."""
         if levels:
             size = levels[0].shape[1], levels[0].shape[0]
             self.view = Viewport.fitted(size, self._room)
@@ -182,7 +182,7 @@ class ImageCanvas(QWidget):
         self._set_view(self.view.zoomed(factor, at))
 
     def close_up_at(self, middle: Point) -> None:
-        """A place of the image several times as large; once more: the whole image."""
+        """Magnify a place of the image; a second call shows the whole image."""
         whole = Viewport.fitted(self.view.size, self.view.room)
         near = replace(whole, zoom=whole.zoom * _CLOSE_UP, center=middle).inside()
         self._set_view(whole if self.view == near else near)

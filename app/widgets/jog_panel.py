@@ -191,7 +191,7 @@ class JogPanel(QWidget):
         return self._readout.speeds
 
     def set_speeds(self, hand: JogConfig, servos: ServosConfig) -> None:
-        """Whose speeds the keys have: a share of `hand`'s full speeds, as far as the joints may go that fast."""
+        """The speeds of the keys: a share of `hand`'s full speeds, limited by the joints' speeds."""
         self._rig = hand, servos
         self._show_speeds()
 
@@ -210,7 +210,7 @@ class JogPanel(QWidget):
                 self._caps[motion].setToolTip(tr(text, motion=tr(motion.value), speed=speed_mm_s))
 
     def show_held(self, held: frozenset[Motion]) -> None:
-        """Light the caps of what is held."""
+        """Light the caps of the held motions."""
         for motion, cap in self._caps.items():
             cap.light(motion in held)
 

@@ -280,7 +280,7 @@ class LiveView(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        QTimer.singleShot(0, self, self._show_loupe)  # a picture that stands still has no next frame to put it right
+        QTimer.singleShot(0, self, self._show_loupe)  # a still picture has no next frame that would place it
 
     def drop_ghost(self) -> None:
         """Remove the predicted path: the advice has ended."""
@@ -297,7 +297,7 @@ class LiveView(QWidget):
             self._show_loupe()
 
     def clear(self) -> None:
-        """Show nothing at all: what comes next is another rig."""
+        """Show nothing at all, before another rig is opened."""
         self.blank_overlays()
         self._size = None
         self._image = None
@@ -385,7 +385,7 @@ class LiveView(QWidget):
 
 
 class _SmoothImage(pg.ImageItem):  # type: ignore[misc]
-    """Interpolated when enlarged: whole pixels would hide where a thin robot is.
+    """An image that is interpolated when enlarged: whole pixels would hide the course of a thin robot.
 
     It paints from the screen's own pixel formats. Qt would convert others in its thread pool and wait for it: measured with both
     cores busy, a picture with masks then took 5-9 ms instead of 3.
@@ -453,7 +453,7 @@ class _PictureBox(pg.ViewBox):  # type: ignore[misc]
 
 
 def _label_colours() -> NDArray[np.uint32]:
-    """Premultiplied ARGB (16,) for every combination of label bits; what is thinner wins."""
+    """Premultiplied ARGB (16,) for every combination of label bits; the thinner structure wins."""
     table = np.zeros(16, np.uint32)
     for bits in range(16):
         for bit, name, alpha in (

@@ -187,7 +187,7 @@ class OfferButton:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What can be done. Of several, one is shown at a time, oldest first; an offer with a known key takes the old one's place.
+    """Something that the operator can do now. One is shown at a time, oldest first; a new one replaces that of the same key.
 
     Attributes
     ----------
@@ -375,7 +375,7 @@ class QuestionStrip(QWidget):
 
     @property
     def text(self) -> str:
-        """The open question; empty when there is none."""
+        """The open question, or an empty text."""
         return self._text
 
     def ask(self, question: str, answer: str, action: Callable[[], None]) -> None:

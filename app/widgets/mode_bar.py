@@ -265,11 +265,11 @@ class DeadmanField(MouseHeld):
 
     @property
     def word(self) -> str:
-        """What the program sees of the deadman."""
+        """The state of all deadmen in a word."""
         return {None: tr("none"), False: tr("not held"), True: tr("held")}[self._deadman]
 
     def show_deadman(self, deadman: bool | None, *, matters: bool) -> None:
-        """What the program sees of all deadmen, and whether anything depends on it now."""
+        """The state of all deadmen, and whether anything depends on it now."""
         if (deadman, matters) != (self._deadman, self._matters):
             self._deadman, self._matters = deadman, matters
             self.setAccessibleDescription(self.word)
@@ -370,7 +370,7 @@ HEIGHT = 66
 REASON_DWELL_S = 1.0
 _NARROW, _WIDE = 600, 1150
 _LARGEST_PX, _SMALLEST_PX = 18, 11
-# widths at a bar of 600 px and of 1150 px; what is left is the text's
+# widths at a bar of 600 px and of 1150 px; the text gets the rest
 _STEP_WIDTH, _DEADMAN_WIDTH, _STOP_WIDTH = (170, 270), (124, 200), (94, 180)
 
 
@@ -481,7 +481,7 @@ class ModeBar(PaintedWidget):
 
 
 class _Line(PaintedWidget):
-    """What is the matter, in bold, and what to do; as large as fits."""
+    """The situation in bold, and what to do; as large as fits."""
 
     def __init__(self) -> None:
         super().__init__(tr("What is next"))

@@ -165,7 +165,7 @@ def draw_bar(painter: QPainter, track: QRectF, share: float, colour: str) -> Non
 def draw_middle_bar(
     painter: QPainter, track: QRectF, share: float, colour: str, *, inset: float = 0.0, least: float = 2.0, arrow: float = 0.0
 ) -> None:
-    """A bar from the middle of `track` to a `share` (-1..1) of its half; with `arrow` (px) a tip shows that it goes on beyond."""
+    """A bar from the middle of `track` to a `share` (-1..1) of its half; with `arrow` (px) a tip marks a larger share."""
     middle = track.center().x()
     end = middle + track.width() / 2 * max(-1.0, min(1.0, share))
     set_colours(painter, colour)

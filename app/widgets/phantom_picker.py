@@ -70,7 +70,7 @@ class PhantomPicker(QWidget):
 
     @Slot()
     def open_list(self) -> None:
-        """The list of phantoms, by keyboard: the arrows choose, Enter takes, Escape leaves."""
+        """The list of phantoms by keyboard: the arrows move, Enter chooses, Escape closes."""
         if not self.isEnabled():
             return
         self._combo.setFocus()

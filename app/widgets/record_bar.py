@@ -1,4 +1,4 @@
-"""Whether a session is being recorded, for how long, and how it goes."""
+"""Whether a session is being recorded, for how long, and whether frames are dropped."""
 
 from __future__ import annotations
 

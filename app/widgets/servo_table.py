@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 
 class Tone(IntEnum):
-    """How a text is meant. A warning also carries a sign, as some operators see no difference in colour."""
+    """How urgent a text is. A warning also carries a sign, as some operators see no difference in colour."""
 
     FAINT = 0
     PLAIN = 1
@@ -128,7 +128,7 @@ _ERROR_WORDS = {
 
 
 def error_words(error: HardwareError) -> str:
-    """The error bits as a few words, worst first; empty when there is none."""
+    """The error bits as a few words, worst first; empty without an error."""
     words = [tr(short) for flag, (short, _) in _ERROR_WORDS.items() if error & flag]
     rest = int(error) & ~sum(int(flag) for flag in _ERROR_WORDS)
     return ", ".join(words + ([tr("error {number}", number=rest)] if rest else []))
@@ -149,9 +149,9 @@ def servo_rows(status: BusStatus | None, servos: ServosConfig, safety: SafetyCon
 
 
 def known_joints(status: BusStatus | None, now_s: float) -> tuple[bool, ...]:
-    """Of which joints it is known where they are: those that are zeroed, and whose servo has answered lately.
+    """Which joints have a known position: those that are zeroed, and whose servo has answered lately.
 
-    Without a bus it is known of all: such a robot tells it itself. `now_s` is monotonic, as ``BusStatus.time_s`` is.
+    Without a bus all of them: such a robot reports its own position. `now_s` is monotonic, as ``BusStatus.time_s`` is.
     """
     if status is None:
         return (True,) * 7
@@ -161,9 +161,9 @@ def known_joints(status: BusStatus | None, now_s: float) -> tuple[bool, ...]:
 
 
 def status_by_servos(status: BusStatus | None) -> RobotStatus | None:
-    """Where the robot is by its servos alone, for while no picture brings its status along; None when not all of them answer.
+    """The robot's status from its servos alone, while there is no picture; None when not all of them answer.
 
-    What it says of a joint that is not zeroed is nothing that is known: see ``known_joints``.
+    The position of a joint that is not zeroed is meaningless: see ``known_joints``.
     """
     states = [reading for reading in status.servos if isinstance(reading, ServoState)] if status is not None else []
     if status is None or len(states) != len(JOINT_NAMES):
@@ -261,7 +261,7 @@ class PairBalance:
 
     @property
     def share(self) -> float | None:
-        """Excess over what is wanted: -1 no tension left, 0 as wanted, 1 twice as much."""
+        """Excess over the wanted sum: -1 no tension left, 0 as wanted, 1 twice as much."""
         if self.sum_mm is None:
             return None
         return (self.sum_mm - self.wanted_mm) / max(self.wanted_mm, 0.1)
@@ -354,7 +354,7 @@ QHeaderView::section { background: @PANEL; color: @TEXT_FAINT; border: none;
     border-bottom: 1px solid @LINE; font-size: 11px; padding: 0 3px; }
 """
 _PAD, _GAP = 3.0, 6.0
-"""The words of the last column stand clear of those before, which end at its edge."""
+"""The last column is left-aligned beside right-aligned ones, so it has a gap before it."""
 _NUMBER_PX = 48.0
 
 _Index = QModelIndex | QPersistentModelIndex
@@ -421,7 +421,7 @@ class ServoView(QTableWidget):
 
 
 class ServoDelegate(QStyledItemDelegate):
-    """Numbers to the right, words to the left, the position with a bar of its envelope; what is wrong is tinted."""
+    """Numbers to the right, words to the left, the position with a bar of its envelope; warnings are tinted."""
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
         cell = index.data(Qt.ItemDataRole.UserRole)

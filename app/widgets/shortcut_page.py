@@ -51,7 +51,7 @@ class KeyPage(PaintedWidget):
 
     @property
     def tables(self) -> Column:
-        """What it says, as of the last opening."""
+        """The tables shown since the last opening."""
         return self._tables
 
     def toggle(self) -> None:
@@ -123,7 +123,7 @@ def _in_columns(tables: Column, count: int) -> tuple[Column, ...]:
 
 
 def _widths(columns: Sequence[Column], room: float) -> list[float]:
-    """Each as its longest row needs; what is left over, or missing, is shared."""
+    """The width of each column's longest row; the difference to `room` is shared."""
     texts = [max(text_width(theme.font(13), text) for _, rows in column for _, text in rows) for column in columns]
     needed = [_keys_width(column) + text + 2.0 for column, text in zip(columns, texts, strict=True)]
     spare = room - _GUTTER * (len(columns) - 1) - sum(needed)

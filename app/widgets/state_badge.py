@@ -89,7 +89,7 @@ class StateBadge(PaintedWidget):
         if confidence is None:
             return False, ""
         is_unsure = confidence < self._confident_from
-        # Rounded down, so that it says what was decided; and never 100 %: nothing is as sure as that.
+        # rounded down, so that it agrees with `is_unsure`; 100 % is never shown
         percent = min(math.floor(100.0 * confidence + 1e-9), 99)
         return is_unsure, tr("unsure: {percent} %", percent=percent) if is_unsure else tr("{percent} % sure", percent=percent)
 

@@ -23,7 +23,7 @@ _FORWARD, _BACK = (Qt.Key.Key_Return, Qt.Key.Key_Enter), (Qt.Key.Key_Backspace,)
 
 @dataclass(frozen=True, slots=True)
 class TourStop:
-    """What is said, and the widgets that it is said of; they are shown together."""
+    """A text, and the widgets that it describes; they are lit together."""
 
     title: str
     text: str
@@ -31,7 +31,7 @@ class TourStop:
 
 
 class TourOverlay(QObject):
-    """Leads over `parent` from stop to stop. ``ended`` comes when it is over.
+    """Shows one stop of a tour after the other over `parent`. ``ended`` comes when it is over.
 
     The shade lets every click through, and neither shade nor card ever lies over the widgets `kept_clear`. The keys are Enter and
     Backspace, where the window has no other use for them.
@@ -240,7 +240,7 @@ class _TourCard(PaintedWidget):
 
     @property
     def text(self) -> str:
-        """All that is said."""
+        """Title and text."""
         return f"{self._title.text()}. {self._text.text()}"
 
     def show_stop(self, stop: TourStop, place: int, count: int) -> None:

@@ -74,7 +74,7 @@ class TrendPlot(QWidget):
             part.follow_theme()
 
     def set_limits(self, limits: PoseConfig) -> None:
-        """Other limits for the bands of what is allowed."""
+        """The limits of the green bands."""
         self._angle.set_allowed(limits.theta_allow_deg)
         self._distance.set_allowed(limits.d_allow_px)
 
