@@ -1,10 +1,6 @@
 """The piece of the vessel's centerline beside the robot's head, and the route along the vessel graph (METHOD section 5).
 
-Lengths are in the graph's own unit: pixels in perception, and the same functions serve analytic graphs in any unit.
-
-Which edges of the vessel graph a head may belong to: those near it within its own lumen.
-
-The operator's route: the shortest way along the vessel graph to a destination. Lengths are in the graph's own unit.
+Lengths are in the graph's own unit: pixels in perception; the same functions serve analytic graphs in any unit.
 """
 
 from __future__ import annotations
@@ -18,16 +14,15 @@ from numpy.typing import NDArray
 from core import geometry
 from core.config.models import VectorConfig
 from core.perception.vectors import is_walled_off, project
-from core.perception.vessel_graph import build_graph
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
 
 REACH_RADII = 1.5
-"""Vessels farther from the head than this many of their radii are not looked at."""
+"""Vessels farther from the head than this many of their radii are ignored."""
 
 
 @dataclass(frozen=True, slots=True)
 class EdgeProjection:
-    """The place on an edge nearest to the head within its lumen: its distance, its arc-length position, the radius there."""
+    """The head's projection on an edge within its lumen: its distance, its arc-length position, the radius there."""
 
     distance: float
     edge: int
@@ -35,14 +30,14 @@ class EdgeProjection:
     radius: float
 
 
-def feet_of(graph: VesselGraph, head: Point, half_length: float, vessel: Mask | None) -> list[EdgeProjection]:
+def project_on_edges(graph: VesselGraph, head: Point, half_length: float, vessel: Mask | None) -> list[EdgeProjection]:
     """The edges that the head may belong to, in the graph's order.
 
     Parameters
     ----------
     graph, head : in the graph's unit; in pixels where there is a mask.
     half_length : of the piece of centerline that is wanted; a radius below a quarter of it counts as that.
-    vessel : mask (h, w), or None: then nobody can tell what lies beyond a wall. What does is left aside, unless everything does.
+    vessel : mask (h, w), or None: then walls are ignored. Edges beyond a wall are left out, unless all are.
     """
     plain = []
     for index, edge in enumerate(graph.edges):
@@ -72,11 +67,11 @@ def _is_in_reach(one: EdgeProjection, found: list[EdgeProjection]) -> bool:
 
 
 OFF_VESSEL_PX = 15.0
-"""A click so far beside the lumen is still taken for one on the vessel."""
+"""A click this far beside the lumen still counts as on the vessel."""
 
 
 def route_or_reason(graph: VesselGraph, start: Point, target: Point, vessel: Mask | None = None) -> Route | str:
-    """The route, or in plain words why there is none: the target is beside the vessel, or no vessel that was found leads there."""
+    """The route, or why there is none: the target is beside the vessel, or no vessel that was found leads there."""
     there = _lumen(graph, target)
     if there is None:
         return "no vessel was found"
@@ -87,13 +82,10 @@ def route_or_reason(graph: VesselGraph, start: Point, target: Point, vessel: Mas
 
 
 def plan_route(graph: VesselGraph, start: Point, target: Point, vessel: Mask | None = None) -> Route | None:
-    """The shortest way along the graph from the place beside `start` to the one beside `target`, in the vessel that this lies in.
+    """The shortest route along the graph from the place beside `start` to the one in the vessel that `target` lies in.
 
-    With the vessel's mask (h, w), in pixels, no wall lies between `start` and the place beside it.
-
-    Returns
-    -------
-    The route, or None when the graph is empty or has no way between the two places.
+    With the vessel's mask (h, w), in pixels, no wall lies between `start` and the place beside it. None when the graph is empty or
+    does not connect the two places.
     """
     here, there = _place(graph, start, vessel), _lumen(graph, target)
     if here is None or there is None:
@@ -102,13 +94,13 @@ def plan_route(graph: VesselGraph, start: Point, target: Point, vessel: Mask | N
     lengths = [float(geometry.arc_length(e.points)[-1]) for e in graph.edges]
     reached, came_by = distances(graph, lengths, edge, position)
     last = graph.edges[last_edge]
-    ways: list[tuple[float, int | None]] = [
+    options: list[tuple[float, int | None]] = [
         (reached[last.start] + last_position, last.start),
         (reached[last.end] + lengths[last_edge] - last_position, last.end),
     ]
     if edge == last_edge:
-        ways.append((abs(last_position - position), None))
-    length, node = min(ways, key=lambda way: way[0])
+        options.append((abs(last_position - position), None))
+    length, node = min(options, key=lambda option: option[0])
     if not np.isfinite(length):
         return None
     if node is None:
@@ -125,23 +117,23 @@ def plan_route(graph: VesselGraph, start: Point, target: Point, vessel: Mask | N
 
 
 def _place(graph: VesselGraph, point: Point, vessel: Mask | None) -> tuple[int, float] | None:
-    """The edge nearest to a point and the arc-length position on it; beyond a wall only where nothing lies before it."""
+    """The edge nearest to a point and the arc-length position on it; beyond a wall only where there is no other."""
     lines = [(index, edge.points) for index, edge in enumerate(graph.edges) if len(edge.points) > 1]
     nearest = [(*geometry.nearest(points, point), index) for index, points in lines]
     if not nearest:
         return None
     _, position, place, index = min(nearest, key=lambda found: (found[0], found[1]))
     if vessel is not None and is_walled_off(point, place, vessel):
-        feet = [(found[0], found[1], index) for index, points in lines if (found := project(points, point, vessel)) is not None]
-        if feet:
-            _, position, index = min(feet)
+        projections = [(found[0], found[1], i) for i, points in lines if (found := project(points, point, vessel)) is not None]
+        if projections:
+            _, position, index = min(projections)
     return index, position
 
 
 def _lumen(graph: VesselGraph, point: Point) -> tuple[float, int, float] | None:
-    """The vessel that a point lies in, or nearest to: how far outside its lumen (negative: inside), its edge, the position on it.
+    """The vessel that a point lies in, or nearest to: distance outside its lumen (negative: inside), its edge, the position on it.
 
-    By the walls, not by the centerlines: inside a wide vessel the centerline of a narrow one may be nearer.
+    Measured from the walls: inside a wide vessel the centerline of a narrow one may be nearer.
     """
     found = []
     for index, edge in enumerate(graph.edges):
@@ -156,7 +148,7 @@ def _lumen(graph: VesselGraph, point: Point) -> tuple[float, int, float] | None:
 
 
 def distances(graph: VesselGraph, lengths: list[float], edge: int, position: float) -> tuple[list[float], list[int | None]]:
-    """Dijkstra from a place on an edge: each node's distance, and the edge it is reached by (None: straight from the place)."""
+    """Dijkstra from a place on an edge: each node's distance, and the edge it is reached by (None: directly from the place)."""
     reached = [np.inf] * len(graph.nodes)
     came_by: list[int | None] = [None] * len(graph.nodes)
     incidence = incidence_of(graph)
@@ -177,7 +169,7 @@ def distances(graph: VesselGraph, lengths: list[float], edge: int, position: flo
 
 def go_back(graph: VesselGraph, came_by: list[int | None], node: int, pieces: list[Points]) -> int:
     """Add to `pieces` the edges by which a node was reached, the last one first, each in the direction of travel; returns the node
-    that was reached straight from the place."""
+    that was reached directly from the place."""
     while (via := came_by[node]) is not None:
         edge = graph.edges[via]
         pieces.append(edge.points if edge.end == node else edge.points[::-1])
@@ -186,7 +178,7 @@ def go_back(graph: VesselGraph, came_by: list[int | None], node: int, pieces: li
 
 
 def joined(pieces: list[Points]) -> Points:
-    """Lines one after the other as one (N, 2), without the points that stand twice."""
+    """Consecutive lines as one (N, 2), without repeated points."""
     points = np.concatenate(pieces)
     return np.asarray(points[np.concatenate([[True], np.any(np.diff(points, axis=0) != 0.0, axis=1)])])
 
@@ -200,8 +192,6 @@ def incidence_of(graph: VesselGraph) -> list[list[tuple[int, bool]]]:
     return touching
 
 
-__all__ = ["build_graph", "centerline_at", "find", "plan_route", "window_at"]
-
 MIN_PIECE_SHARE = 0.2
 """A piece shorter than this share of the wanted length (8 of 40 px) gives no direction."""
 PLACE_WEIGHT = 0.5
@@ -209,21 +199,21 @@ SHORTNESS_WEIGHT = 0.5
 ROUTE_WEIGHT = 1.0
 WALL_WEIGHT = 4.0
 LEAVES_ROUTE, SAME_ROUTE = 0.5, 0.1
-"""Off the route by more than the first (0 to 1), a path leaves it; by up to the second more than another one, both keep to it."""
+"""Off the route by more than the first (0 to 1), a path leaves it; within the second of another one, both follow it."""
 FORK_SHARE = 0.25
-"""Of half the piece's length (5 of 20 px): so near to a fork a route passes it, even one that was found in an earlier frame."""
+"""Of half the piece's length (5 of 20 px): this near to a fork a route passes it, even one that was found in an earlier frame."""
 TIE_COST = 0.2
-"""A path whose cost is this much above the best one's no longer counts as nearly as good."""
+"""A path whose cost is this much above the best one's is no rival."""
 SAME_COST = 1e-9
 TIE_ANGLE_DEG = 20.0
-"""Two nearly as good paths that differ by this much make the answer fully ambiguous; by less, proportionally less so."""
+"""Rivals that differ by this much make the answer fully ambiguous; by less, proportionally less."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Ahead:
-    """What of the operator's route lies ahead of the head; ``goes_back``: to a fork first that the robot has passed.
+class _LookAhead:
+    """The part of the operator's route ahead of the head; ``goes_back``: it leads to a fork first that the robot has passed.
 
-    Then the robot is beside the route, however that goes on, and travels the way that it points.
+    Then the robot is beside the route and travels in its own direction.
     """
 
     points: Points
@@ -266,8 +256,7 @@ def find(
 
 
 def window_at(skeleton: Mask, head: Point, robot_direction: Point, half_length_px: float) -> Centerline | None:
-    """The paper's way: all vessel-skeleton pixels within `half_length_px` of the one nearest to the head, whatever branch they are
-    of.
+    """The paper's rule: all vessel-skeleton pixels within `half_length_px` of the one nearest to the head, of whatever branch.
 
     The pixels have no order, so the piece is the straight line through them; the radius is not known (0). None where they are fewer
     than ``MIN_PIECE_SHARE`` of the wanted length.
@@ -298,11 +287,10 @@ def centerline_at(
 ) -> Centerline | None:
     """The piece of centerline beside the head, along one path of the vessel graph, in the robot's direction of travel.
 
-    Near a junction the nearest edge may be a side branch that the robot merely passes. So every path that leads past the head
-    within reach is a candidate, and the one is taken that the robot's straight line fits best, in direction and in place. Where
-    the operator's route passes, only those that keep to it are asked, whichever branch the robot points into. The cost changes
-    smoothly with head and direction, so that a small disturbance changes the choice only where two branches fit equally well;
-    `ambiguity` says how near that is.
+    Near a junction the nearest edge may be a side branch that the robot merely passes. So every path past the head within reach is
+    a candidate, and the one is taken that the robot's straight line fits best, in direction and in place. Where the operator's
+    route passes, only those that follow it are candidates. The cost changes smoothly with head and direction, so that a small
+    disturbance changes the choice only where two branches fit equally well; ``ambiguity`` measures how near that is.
 
     Parameters
     ----------
@@ -311,22 +299,22 @@ def centerline_at(
     robot_direction : unit vector of the robot's last 40 px, pointing to the head.
     half_length_px : arc length of the piece to each side of the nearest point; cut short where the vessel ends.
     route : the operator's route; it decides between branches where it passes the head.
-    vessel : its mask (h, w), if there is one: what lies beyond a wall from the head is not beside it, however near.
+    vessel : its mask (h, w), if known: edges beyond a wall from the head are not beside it.
 
     Returns
     -------
     The piece, or None when the graph is empty or ends too soon (less than ``MIN_PIECE_SHARE`` of the wanted length).
     """
-    feet = feet_of(graph, head, half_length_px, vessel)
+    projections = project_on_edges(graph, head, half_length_px, vessel)
     incidence = incidence_of(graph)
-    # One scale for all candidates: a narrow branch must not count the same distance for more than its wide trunk does.
-    scale = max((near.radius for near in feet), default=1.0)
+    # One scale for all candidates: the same distance counts equally in a narrow branch and in its wide trunk.
+    scale = max((near.radius for near in projections), default=1.0)
     direction = np.asarray(robot_direction, np.float64)
     meeting = [touching[0] for touching in incidence if len(touching) > 2] if route is not None else []
     forks = [graph.edges[index].points[0 if starts else -1] for index, starts in meeting]
     ahead = _route_ahead(route, head, direction, half_length_px, scale, vessel, forks)
     candidates = []
-    for near in feet:
+    for near in projections:
         backward = _walks(graph, incidence, near.edge, near.position, False, 2.0 * half_length_px)
         forward = _walks(graph, incidence, near.edge, near.position, True, 2.0 * half_length_px)
         for back, used_behind in backward:
@@ -345,7 +333,7 @@ def centerline_at(
         return None
     if ahead is not None and not _is_turned(ahead.points, direction):
         candidates = _on_route(candidates)
-    # The same line is found from each edge it runs along: rounding alone must not decide which one's radius counts.
+    # The same line is found from each edge it runs along: rounding must not decide which radius counts.
     least = min(candidate.cost for candidate in candidates)
     best = next(candidate for candidate in candidates if candidate.cost <= least + SAME_COST)
     ambiguity = max(_rivalry(best, other) for other in candidates)
@@ -355,10 +343,9 @@ def centerline_at(
 def _walks(
     graph: VesselGraph, incidence: list[list[tuple[int, bool]]], edge: int, position: float, onward: bool, reach: float
 ) -> list[tuple[Points, frozenset[int]]]:
-    """All ways to walk `reach` along the graph from a place on an edge: polylines from that place, and the other edges they use.
+    """All walks of length `reach` along the graph from a place on an edge: polylines from that place, and the other edges they use.
 
-    An edge that is a loop is come back to by its other end, and then is one of them; unless it is so short that the ways to both
-    sides would meet on it.
+    A walk may return to an edge that is a loop by its other end, unless it is so short that the walks to both sides would meet.
     """
     first = graph.edges[edge]
     along = geometry.arc_length(first.points)
@@ -381,8 +368,8 @@ def _walks(
             following = graph.edges[index]
             points = following.points if starts else following.points[::-1]
             along = geometry.arc_length(points)
-            joined = np.concatenate([line, geometry.cut(points, 0.0, left, along)])
-            pending.append((joined, following.end if starts else following.start, left - float(along[-1]), used | {index}))
+            longer = np.concatenate([line, geometry.cut(points, 0.0, left, along)])
+            pending.append((longer, following.end if starts else following.start, left - float(along[-1]), used | {index}))
     return walks
 
 
@@ -394,7 +381,7 @@ def _route_ahead(
     radius: float,
     vessel: Mask | None,
     forks: list[Points],
-) -> _Ahead | None:
+) -> _LookAhead | None:
     """The part of the route that lies ahead of the head, or None where the route does not pass by."""
     if route is None or len(route.points) < 2:
         return None
@@ -406,7 +393,7 @@ def _route_ahead(
     near = distance <= max(1.5 * radius, 0.5 * half_length)
     if not near or float(geometry.arc_length(ahead)[-1]) <= MIN_PIECE_SHARE * half_length:
         return None
-    return _Ahead(ahead, _goes_back(ahead, direction, half_length, forks))
+    return _LookAhead(ahead, _goes_back(ahead, direction, half_length, forks))
 
 
 def _candidate(
@@ -418,7 +405,7 @@ def _candidate(
     head: Point,
     direction: NDArray[np.float64],
     half_length: float,
-    ahead: _Ahead | None,
+    ahead: _LookAhead | None,
     forks: list[Points],
 ) -> _Candidate | None:
     distance, position, nearest = place
@@ -429,7 +416,7 @@ def _candidate(
         return None
     travel = float((piece[-1] - piece[0]) @ direction)
     if ahead is not None and not ahead.goes_back and not _is_turned(ahead.points, direction):
-        # On the route its direction is the direction of travel, even if the head is bent to a bit beyond a right angle.
+        # On the route its direction is the direction of travel, even if the head is bent a bit beyond a right angle.
         travel = float((piece[-1] - piece[0]) @ (ahead.points[-1] - ahead.points[0]))
     if travel < 0.0:
         piece, before, after = piece[::-1], after, before
@@ -439,7 +426,7 @@ def _candidate(
     robot_line = np.asarray(head) + np.outer([-before, 0.0, after], direction)
     place_cost = float(np.mean(np.sum((places - robot_line) ** 2, axis=1))) / scale**2
     cost = turn_cost + PLACE_WEIGHT * place_cost + SHORTNESS_WEIGHT * (1.0 - length / (2.0 * half_length))
-    # A path whose lumen the head is outside of is another vessel, however well it would fit.
+    # If the head is outside a path's lumen, the path is another vessel.
     cost += WALL_WEIGHT * max(0.0, distance / radius - 1.0)
     off_route = 0.0
     if ahead is not None:
@@ -449,25 +436,25 @@ def _candidate(
     return _Candidate(piece, nearest, radius, cost + ROUTE_WEIGHT * off_route, off_route, distance <= radius)
 
 
-def _goes_back(way: Points, direction: NDArray[np.float64], half_length: float, forks: list[Points]) -> bool:
-    """Whether a way from the head leads to a fork that lies behind the robot, as to the other branch of one that it has passed."""
-    along = geometry.arc_length(way)
-    met = (geometry.nearest(way, (float(x), float(y)), along) for x, y in forks)
+def _goes_back(path: Points, direction: NDArray[np.float64], half_length: float, forks: list[Points]) -> bool:
+    """Whether a path from the head leads to a fork behind the robot, as to the other branch of one that it has passed."""
+    along = geometry.arc_length(path)
+    met = (geometry.nearest(path, (float(x), float(y)), along) for x, y in forks)
     first = min((position for distance, position, _ in met if distance <= FORK_SHARE * half_length), default=0.0)
-    # All of the way there is behind: one round a bend of the robot's own vessel is not.
+    # All of it is behind the robot; a bend of the robot's own vessel is not.
     return first > 0.0 and all(
-        float((geometry.cut(way, 0.0, share * first, along)[-1] - way[0]) @ direction) < 0.0 for share in (0.5, 1.0)
+        float((geometry.cut(path, 0.0, share * first, along)[-1] - path[0]) @ direction) < 0.0 for share in (0.5, 1.0)
     )
 
 
 def _is_turned(ahead: Points, direction: NDArray[np.float64]) -> bool:
-    """Whether the robot points the other way than the route leads, and so is somewhere else."""
-    way = ahead[-1] - ahead[0]
-    return float(way @ direction) <= -0.5 * float(np.hypot(way[0], way[1]))
+    """Whether the robot points against the route, and so is somewhere else."""
+    chord = ahead[-1] - ahead[0]
+    return float(chord @ direction) <= -0.5 * float(np.hypot(chord[0], chord[1]))
 
 
 def _on_route(candidates: list[_Candidate]) -> list[_Candidate]:
-    """Those that keep to the route as well as any; all where none does, or the head is in none of their lumens."""
+    """Those that follow the route best; all where none does, or the head is in none of their lumens."""
     beside = [candidate for candidate in candidates if candidate.is_beside]
     least = min((candidate.off_route for candidate in beside), default=1.0)
     if least > LEAVES_ROUTE:
@@ -476,7 +463,7 @@ def _on_route(candidates: list[_Candidate]) -> list[_Candidate]:
 
 
 def _off_route(forward: Points, ahead: Points, radius: float) -> float:
-    """How far the forward half of a piece leaves the route, 0 (on it) to 1 (more than half a lumen radius off)."""
+    """Mean deviation of a piece's forward half from the route, 0 (on it) to 1 (more than half a lumen radius off)."""
     if len(forward) < 2:
         return 0.0
     probes = geometry.resample(forward, float(geometry.arc_length(forward)[-1]) / 4.0)
@@ -485,7 +472,7 @@ def _off_route(forward: Points, ahead: Points, radius: float) -> float:
 
 
 def _rivalry(best: _Candidate, other: _Candidate) -> float:
-    """How much another candidate puts the best one in doubt: it must fit nearly as well and point elsewhere."""
+    """Ambiguity through another candidate: it must fit nearly as well and point elsewhere."""
     closeness = max(0.0, 1.0 - (other.cost - best.cost) / TIE_COST)
     angle_deg = float(np.degrees(np.arccos(np.clip(best.direction @ other.direction, -1.0, 1.0))))
     return closeness * min(1.0, angle_deg / TIE_ANGLE_DEG)

@@ -1,20 +1,17 @@
-"""Where vessels meet: the junction put where the branches' own centerlines meet, not where the skeleton does.
+"""Junctions of vessels: moved to where the branches' own centerlines meet.
 
 In the widened lumen of a bifurcation the skeleton leaves the trunk's centerline towards the opening, by some pixels over some two
-radii to each side. So the part of each branch within the opening is replaced: a trunk goes on smoothly through it, and a side
-branch runs to the trunk as its walls do, as far as they can be seen. A stem that might go on into either branch does so into both;
-where the branches might be each other's trunk, too, all three go straight to one point. Junctions so near to each other that no
-branch in between leaves their openings are taken together: one trunk runs through all of them.
-
-Where branches leave a junction's opening, and which two of them go on as one: its trunk.
-
-Lines through a junction's opening: a trunk that goes on smoothly, and side branches to it, both bent as their walls are.
+radii to each side. So the part of each branch within the opening is replaced. A *gate* is where a branch leaves the opening. Two
+branches form the trunk, which continues smoothly through the opening; a side branch runs to the trunk as its walls do, as far as
+they are visible. A stem that might continue into either branch continues into both (fork); where any two branches might form the
+trunk, all three go straight to one point (star). Junctions so near to each other that no branch in between leaves their openings
+are rebuilt together: one trunk runs through all of them.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations, pairwise
 
@@ -26,30 +23,25 @@ from core.perception import compiled
 from core.types import Mask, Point, Points
 
 STEP_PX = 2.0
-"""From point to point of all lines here."""
+"""Distance of the points of all lines here."""
 TRUNK_LEAD_DEG = 10.0
-"""Where another pair of a lone junction's three arms is a trunk nearly as likely, by so much, it has no clear one."""
+"""A lone junction has no clear trunk where another pair of its three arms is as unlikely within this."""
 WIDER_DEG = 100.0
-"""A trunk is as wide as its branches: one that is left twice as wide is as unlikely as this much of a turn."""
+"""Penalty for a trunk that a branch leaves twice as wide, as a turn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
     """A branch seen from a junction.
 
-    Its centerline outwards (N, 2), the nearest wall's distance along it (N,), half the way from wall to wall across it (N,), NaN
-    where one is not seen, whether it ends in a junction, and the lumen's radius at this one.
-    """
+    ``points``: its centerline outwards (N, 2). ``radius``: distance to the nearest wall (N,). ``half_width``: half the distance
+    from wall to wall (N,), NaN where one is not visible. ``opening_px``: the lumen's radius at this junction."""
 
     points: Points
     radius: NDArray[np.float64]
     half_width: NDArray[np.float64]
     far_is_junction: bool
     opening_px: float
-
-    def along(self, points: Points, radius: NDArray[np.float64]) -> Arm:
-        """The same arm led along another line."""
-        return Arm(points, radius, self.half_width, self.far_is_junction, self.opening_px)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +54,14 @@ class Gate:
     radius_px: float
 
     def beyond(self, place: Point) -> float:
-        """How far the gate lies beyond a place, in its own direction."""
+        """Distance of the gate from a place, in the gate's direction."""
         return (self.place[0] - place[0]) * self.outward[0] + (self.place[1] - place[1]) * self.outward[1]
 
 
 def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: float = 1.0) -> Gate | None:
-    """Where an arm has left the opening: its lumen is as narrow there as it stays. None for an arm too short to tell.
+    """The gate of an arm: where its lumen becomes as narrow as it stays. None for an arm that is too short.
 
-    `along` is its arc length (N,); the gate lies at least `at_least_px` along it, and the opening counts as `wider` as it is.
+    `along` is its arc length (N,); the gate lies at least `at_least_px` along it; `wider` scales the opening.
     """
     found, x, y, across, down, position_px, radius_px = compiled.find_gate(
         arm.points,
@@ -85,7 +77,7 @@ def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: 
 
 
 def _unlikeliness(gates: dict[int, Gate], pair: tuple[int, int]) -> float:
-    """Of a trunk between two arms, in degrees: how much it turns, and how much narrower it is than the others."""
+    """Of a trunk between two arms, in degrees: its turn, and a penalty where it is narrower than the other arms."""
     first, second = gates[pair[0]], gates[pair[1]]
     narrow = max(min(first.radius_px, second.radius_px), 0.5)
     widest = max([gate.radius_px for index, gate in gates.items() if index not in pair], default=0.0)
@@ -93,13 +85,12 @@ def _unlikeliness(gates: dict[int, Gate], pair: tuple[int, int]) -> float:
 
 
 def likely_trunks(gates: dict[int, Gate]) -> list[tuple[float, tuple[int, int]]]:
-    """All pairs of arms, each with how unlikely a trunk it is, in degrees: the two that go on most smoothly and are wide enough for
-    the others come first."""
+    """All pairs of arms with their unlikeliness as a trunk, in degrees, the likeliest first."""
     return sorted((_unlikeliness(gates, pair), pair) for pair in combinations(gates, 2))
 
 
 def equal_trunks(likely: list[tuple[float, tuple[int, int]]]) -> tuple[tuple[int, int], tuple[int, int]] | None:
-    """Of the three pairs of three arms, the two that are a trunk nearly alike, the arm of both first; None for a clear trunk."""
+    """Of the three pairs of three arms, the two that are nearly equally likely, their common arm first; None for a clear trunk."""
     if len(likely) != 3:
         return None
     (best, ends), (other, others), _ = likely
@@ -111,7 +102,7 @@ def equal_trunks(likely: list[tuple[float, tuple[int, int]]]) -> tuple[tuple[int
 
 
 def turn_deg(first: Gate, second: Gate) -> float:
-    """By how much a line turns that comes in through one gate, goes straight to the other, and leaves through it."""
+    """The turns of a line that enters through one gate, goes straight to the other, and leaves through it."""
     x, y = second.place[0] - first.place[0], second.place[1] - first.place[1]
     length = max(math.hypot(x, y), 1e-9)
     coming = -(first.outward[0] * x + first.outward[1] * y) / length
@@ -120,7 +111,7 @@ def turn_deg(first: Gate, second: Gate) -> float:
 
 
 def meeting_point(gates: list[Gate]) -> Point:
-    """Least-squares meeting point of the arms' lines, held to their gates' middle by a small weight."""
+    """Least-squares meeting point of the arms' lines, drawn to their gates' middle by a small weight."""
     centre_x, centre_y = (sum(gate.place[axis] for gate in gates) / len(gates) for axis in (0, 1))
     # The sum over the gates of the projection across each one's direction: (xx, xy; xy, yy) . place = (right, below).
     xx = yy = 0.05
@@ -154,19 +145,18 @@ def trunk_between(gates: dict[int, Gate], ends: tuple[int, int]) -> Trunk:
 
 
 def between_walls(trunk: Trunk, vessel: Mask) -> Trunk:
-    """The trunk bent as its walls do, as far as they can be seen; its ends and its directions there stay.
+    """The trunk bent by its walls, as far as they are visible; its ends and its directions there stay.
 
-    Between two walls a point is wanted in the middle; beside one it is wanted a radius off. Either way by at most half a radius.
+    A point is drawn to the middle between two walls, or to a radius from one wall, by at most half a radius.
     """
-    bent = compiled.bend_trunk(trunk.points, trunk.radius, vessel)
-    return Trunk(trunk.ends, bent, trunk.radius)
+    return replace(trunk, points=compiled.bend_trunk(trunk.points, trunk.radius, vessel))
 
 
 def side_branch(gate: Gate, trunk: Trunk, vessel: Mask | None = None) -> tuple[int, Points]:
-    """Which of the trunk's points a side branch comes from, and its line from there to its gate.
+    """The index of the trunk's point where a side branch begins, and its line from there to its gate.
 
-    It leaves the gate in its direction, and goes straight or, where the `vessel` is given, as a parabola that its walls bend; a
-    wall of the trunk says nothing of it.
+    It leaves the gate in its direction, straight or, where the `vessel` is given, as a parabola that its walls bend; the trunk's
+    walls do not count.
     """
     return compiled.side_branch(
         *gate.place,
@@ -198,27 +188,27 @@ def _shares(count: int) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=64)
 def _hermite_weights(count: int) -> NDArray[np.float64]:
-    """What each of start, start direction, end and end direction adds to each of `count` points, shape (count, 4)."""
+    """Weights of start, start direction, end and end direction for each of `count` points, shape (count, 4)."""
     t = _shares(count)
     return np.column_stack([2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2])
 
 
 TOGETHER = 1.5
-"""A branch from junction to junction that has no gate even with the openings so many times as wide lies within both of them."""
+"""A branch from junction to junction that has no gate with openings this many times as wide lies within both of them."""
 CLEAR_RADII = 1.0
-"""The opening reaches at least so many of the branch's radii beyond the junction's new place."""
+"""The opening reaches at least this many of the branch's radii beyond the junction's new place."""
 ROUND_DEG = 100.0
-"""Where three arms have no clear trunk: if the way from branch to branch turns by less than this, no one is the others' stem."""
+"""Three arms without a clear trunk form a star if the path between the two less likely ends turns by less than this."""
 FORKED_PX = 0.5
-"""Two trunks that are so far apart have parted."""
+"""Distance at which two trunks have parted."""
 MISSED_PX = 6.0
-"""A side branch that passes the trunk by so much does not come from it."""
+"""A side branch that passes the trunk at this distance does not come from it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rebuilt:
-    """Junctions anew: their ``places`` along the trunk (M, 2), the trunk's pieces from each to the next (M - 1), and for each arm
-    the place that it starts from and its line."""
+    """Rebuilt junctions: their ``places`` along the trunk (M, 2), the trunk's pieces from each to the next (M - 1), and for each
+    arm the index of its place, and its line."""
 
     places: Points
     pieces: list[Points]
@@ -231,31 +221,30 @@ def are_together(arm: Arm, back: Arm) -> bool:
 
 
 def rebuild(arms: list[Arm], vessel: Mask, *, is_alone: bool) -> Rebuilt | None:
-    """A junction, or some that are together, anew.
+    """Rebuild a junction, or some that belong together.
 
-    None where too few arms are long enough to tell, where an arm of junctions that are together does not lead to the trunk (it
-    comes from a side branch, or there is no single trunk), and where a place would lie outside the vessel.
+    None where too few arms have a gate, where an arm of several junctions does not lead to the trunk (it comes from a side branch,
+    or there is no single trunk), and where a place would lie outside the vessel.
 
     Parameters
     ----------
     arms : all branches that lead out of the opening, outwards.
     vessel : the vessel's mask (h, w).
-    is_alone : whether that is one junction.
+    is_alone : whether it is one junction.
     """
-    anew = _anew(arms, vessel, is_alone)
-    return anew if anew is not None and _is_inside(anew, vessel) else None
-
-
-def _is_inside(anew: Rebuilt, vessel: Mask) -> bool:
-    """Whether all places are in the vessel and all lines in the picture, which smoothing may leave by a pixel."""
-    lines = np.concatenate([*anew.pieces, *(arm.points for _, arm in anew.arms)])
+    rebuilt = _rebuild(arms, vessel, is_alone)
+    if rebuilt is None:
+        return None
+    lines = np.concatenate([*rebuilt.pieces, *(arm.points for _, arm in rebuilt.arms)])
     limit = np.array([vessel.shape[1], vessel.shape[0]])
-    return bool((lines >= -1.0).all() and (lines <= limit).all() and (geometry.sample(vessel, anew.places) >= 0.5).all())
+    # All places are in the vessel, and all lines in the picture, which smoothing may leave by a pixel.
+    is_inside = (lines >= -1.0).all() and (lines <= limit).all() and (geometry.sample(vessel, rebuilt.places) >= 0.5).all()
+    return rebuilt if is_inside else None
 
 
-def _anew(arms: list[Arm], vessel: Mask, is_alone: bool) -> Rebuilt | None:
+def _rebuild(arms: list[Arm], vessel: Mask, is_alone: bool) -> Rebuilt | None:
     along = [geometry.arc_length(arm.points) for arm in arms]
-    gates: list[Gate | None] = [gate_of(arm, way, 0.0) for arm, way in zip(arms, along, strict=True)]
+    gates = (gate_of(arm, positions, 0.0) for arm, positions in zip(arms, along, strict=True))
     known = {index: gate for index, gate in enumerate(gates) if gate is not None}
     if len(known) < 2:
         return None
@@ -277,8 +266,7 @@ def _anew(arms: list[Arm], vessel: Mask, is_alone: bool) -> Rebuilt | None:
     if moved:
         trunk = trunk_between(known, likely_trunks(known)[0][1])
     trunk = between_walls(trunk, vessel)
-    # Who comes from elsewhere mostly shows it without its walls, too. It is asked first, with its walls, and they decide: where it
-    # does come from elsewhere the others need not be asked.
+    # A branch that does not come from the trunk mostly shows it without its walls, too. It is tested first, and saves the others.
     straight = {index: _missed_px(line) for index, (_, line) in bridges.items()}
     bridges = {}
     for index in sorted(known.keys() - set(trunk.ends), key=lambda index: -straight.get(index, 0.0)):
@@ -292,12 +280,12 @@ def _anew(arms: list[Arm], vessel: Mask, is_alone: bool) -> Rebuilt | None:
 
 
 def _missed_px(line: Points) -> float:
-    """By how much a side branch passes the trunk: its line begins on it."""
+    """Distance at which a side branch passes the trunk, on which its line begins."""
     return math.dist(line[0].tolist(), line[1].tolist())
 
 
 def _mark(index: int, trunk: Trunk, bridges: dict[int, tuple[int, Points]]) -> int:
-    """Which point of the trunk an arm starts from."""
+    """Index of the trunk's point where an arm begins."""
     if index in bridges:
         return bridges[index][0]
     marks = [mark for mark, _ in bridges.values()] or [len(trunk.points) // 2]
@@ -318,36 +306,37 @@ def _assembled(
             bridges[index] = min(max(mark, 1), len(trunk.points) - 2), np.empty((0, 2))
     marks = sorted({mark for mark, _ in bridges.values()}) or [len(trunk.points) // 2]
     pieces = [trunk.points[first : last + 1] for first, last in pairwise(marks)]
-    anew = []
-    for index, (arm, way) in enumerate(zip(arms, along, strict=True)):
+    rebuilt = []
+    for index, (arm, positions) in enumerate(zip(arms, along, strict=True)):
         mark = _mark(index, trunk, bridges)
         if index not in gates:
-            anew.append((marks.index(mark), _rejoined(arm, way, _point(trunk.points[mark]))))
+            rebuilt.append((marks.index(mark), _rejoined(arm, positions, _point(trunk.points[mark]))))
             continue
         gate = gates[index]
         if index in bridges:
             bridge = bridges[index][1]
         else:
             bridge = trunk.points[mark::-1] if index == trunk.ends[0] else trunk.points[mark:]
-        anew.append((marks.index(mark), _bridged(arm, way, gate, bridge)))
-    return Rebuilt(trunk.points[marks], pieces, anew)
+        rebuilt.append((marks.index(mark), _bridged(arm, positions, gate, bridge)))
+    return Rebuilt(trunk.points[marks], pieces, rebuilt)
 
 
 def _bridged(arm: Arm, along: NDArray[np.float64], gate: Gate, bridge: Points) -> Arm:
-    """An arm with a line from the junction to its gate in place of what it had within the opening."""
+    """An arm with `bridge`, from the junction to its gate, in place of its part within the opening."""
     rest = int(along.searchsorted(gate.position_px + 0.5 * STEP_PX, "right"))
     radius = np.concatenate([np.full(len(bridge), gate.radius_px), arm.radius[rest:]])
-    return arm.along(np.concatenate([bridge, arm.points[rest:]]), radius)
+    return replace(arm, points=np.concatenate([bridge, arm.points[rest:]]), radius=radius)
 
 
 def _rejoined(arm: Arm, along: NDArray[np.float64], place: Point) -> Arm:
-    """An arm too short to have a gate, led from the junction's new place: what lies behind that place would be a hook in it."""
+    """An arm without a gate, from the junction's new place on; its part behind that place would be a hook."""
     aside_px, position_px, _ = geometry.nearest(arm.points, place, along)
     rest = along > position_px + max(aside_px, 0.5 * STEP_PX)
     rest[-1] = True
     points, radius = arm.points[rest], arm.radius[rest]
-    way = geometry.resample(np.array([place, points[0]]), STEP_PX)[:-1]
-    return arm.along(np.concatenate([way, points]), np.concatenate([np.full(len(way), radius[0]), radius]))
+    link = geometry.resample(np.array([place, points[0]]), STEP_PX)[:-1]
+    radius = np.concatenate([np.full(len(link), radius[0]), radius])
+    return replace(arm, points=np.concatenate([link, points]), radius=radius)
 
 
 def _fork(
@@ -357,7 +346,7 @@ def _fork(
     trunks: tuple[tuple[int, int], tuple[int, int]],
     vessel: Mask,
 ) -> Rebuilt:
-    """A junction whose stem goes on smoothly into both branches, and ends where they part."""
+    """A junction whose stem continues smoothly into both branches, and ends where they part."""
     curves = [between_walls(trunk_between(gates, ends), vessel).points for ends in trunks]
     common = np.stack([curve[: min(len(curves[0]), len(curves[1]))] for curve in curves])
     is_apart = np.hypot(*(common[0] - common[1]).T) > FORKED_PX
@@ -372,7 +361,7 @@ def _fork(
 
 
 def _star(arms: list[Arm], along: list[NDArray[np.float64]], gates: dict[int, Gate]) -> Rebuilt:
-    """A junction any two of whose arms might be the trunk: all go straight to the point that fits their directions best."""
+    """A junction of which any two arms might be the trunk: all go straight to the point that fits their directions best."""
     place = meeting_point(list(gates.values()))
     straight = [geometry.resample(np.array([place, gates[index].place]), STEP_PX) for index in range(len(arms))]
     return Rebuilt(np.array([place]), [], [(0, _bridged(arm, along[k], gates[k], straight[k])) for k, arm in enumerate(arms)])

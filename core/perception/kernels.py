@@ -59,7 +59,7 @@ def arc_length(points: Floats) -> Floats:
 
 @kernel((VALUES, float64))
 def _last_at_most(along: Floats, position: float) -> int:
-    """The last of the ascending values that is at most `position`; -1 for none."""
+    """Index of the last of the ascending values that is at most `position`; -1 for none."""
     low, high = 0, len(along)
     while low < high:
         middle = (low + high) // 2
@@ -166,7 +166,7 @@ def extrapolate(points: Floats, length_px: float, over_px: float, bend_share: fl
 
 @kernel((int64, float64, boolean))
 def _smoothing_weights(pad: int, sigma: float, keeps_bends: bool) -> Floats:
-    """A Gaussian of the sum 1; to keep bends, times the parabola that leaves it no second moment, unless it is too short."""
+    """A Gaussian with sum 1; to keep bends, times the parabola that removes its second moment, unless it is too short."""
     square = np.empty(2 * pad + 1)
     weights = np.empty(2 * pad + 1)
     zeroth = second = fourth = 0.0
@@ -183,7 +183,7 @@ def _smoothing_weights(pad: int, sigma: float, keeps_bends: bool) -> Floats:
 
 @kernel((POINTS, VALUES, float64[:, :]))
 def _smooth_line(points: Floats, weights: Floats, smoothed: Floats) -> None:
-    """Weighted means, the line mirrored through its ends: so it goes on straight there, and does not shrink."""
+    """Weighted means; the line is mirrored through its ends, so it continues straight there and does not shrink."""
     count, pad = len(points), len(weights) // 2
     padded = np.empty(count + 2 * pad)
     for axis in range(2):
@@ -201,7 +201,7 @@ def _smooth_line(points: Floats, weights: Floats, smoothed: Floats) -> None:
 
 @kernel((POINTS, STARTS, float64, boolean))
 def smooth(points: Floats, starts: Ints, sigma: float, keeps_bends: bool) -> Floats:
-    """Lines one after the other, each for itself; one too short for all of the weights gets as many as it has points for."""
+    """Consecutive lines, each by itself; a line too short for all of the weights gets as many as it has points for."""
     most = int(np.ceil(3.0 * sigma))
     weights = _smoothing_weights(most, sigma, keeps_bends)
     smoothed = np.empty((len(points), 2))
@@ -218,7 +218,7 @@ def smooth(points: Floats, starts: Ints, sigma: float, keeps_bends: bool) -> Flo
 
 @kernel((POINTS, STARTS))
 def normals(points: Floats, starts: Ints) -> Floats:
-    """Of lines one after the other."""
+    """Of consecutive lines."""
     across = np.empty((len(points), 2))
     for line in range(len(starts) - 1):
         first, last = starts[line], starts[line + 1] - 1
@@ -232,21 +232,21 @@ def normals(points: Floats, starts: Ints) -> Floats:
 
 @kernel((POINTS, STARTS, float64))
 def resample_lines(points: Floats, starts: Ints, step: float) -> tuple[Floats, Ints]:
-    """Of lines one after the other; with where each one starts."""
+    """Consecutive lines resampled, and their starts."""
     lines = [resample(points[starts[line] : starts[line + 1]], step) for line in range(len(starts) - 1)]
-    anew = np.zeros(len(starts), np.int64)
+    offsets = np.zeros(len(starts), np.int64)
     for i, line in enumerate(lines):
-        anew[i + 1] = anew[i] + len(line)
-    found = np.empty((anew[-1], 2))
+        offsets[i + 1] = offsets[i] + len(line)
+    found = np.empty((offsets[-1], 2))
     for i, line in enumerate(lines):
-        found[anew[i] : anew[i + 1]] = line
-    return found, anew
+        found[offsets[i] : offsets[i + 1]] = line
+    return found, offsets
 
 
 @kernel((MAP, float64, float64), (MASK, float64, float64))
 def _value_at(values: FloatMap | BoolMap, x: float, y: float) -> float:
     height, width = values.shape
-    x = min(x, width - 1.0) if x > 0.0 else 0.0  # also what is no number
+    x = min(x, width - 1.0) if x > 0.0 else 0.0  # also NaN
     y = min(y, height - 1.0) if y > 0.0 else 0.0
     column, row = min(int(x), max(width - 2, 0)), min(int(y), max(height - 2, 0))
     right, down = min(column + 1, width - 1), min(row + 1, height - 1)
@@ -270,7 +270,7 @@ def sample(values: FloatMap | BoolMap, x: Floats, y: Floats) -> Floats:
 def wall_distance(
     level: FloatMap | BoolMap, x: float, y: float, across_x: float, across_y: float, expected: float, search_px: int
 ) -> tuple[float, float]:
-    """How far a wall is from (x, y), NaN where there is none, and how steeply the level falls there, per px."""
+    """Distance of a wall from (x, y), NaN where there is none, and the slope of the level there, per px."""
     old = here = math.nan
     distance = farther = 0.0
     for k in range(-search_px, search_px + 1):
@@ -293,10 +293,9 @@ def wall_distance(
 
 @kernel((MAP, POINTS, POINTS, VALUES, int64))
 def wall_distances(level: FloatMap, points: Floats, across: Floats, expected: Floats, search_px: int) -> tuple[Floats, Floats]:
-    """Where the level falls through 0.5 to both sides of places with unit vectors across them: distances (2, N), NaN where it does
-    not (in a branch's opening, beyond the image's border), and slopes (2, N), per px.
-
-    It is looked for so far to both sides of where it is expected (N,).
+    """Where the level falls through 0.5 on both sides of places with unit vectors across them: distances (2, N), NaN where it does
+    not (in a branch's opening, beyond the image border), and slopes (2, N), per px. It is searched `search_px` around the expected
+    distances (N,).
     """
     count = len(points)
     reach, slope = np.empty((2, count)), np.empty((2, count))
@@ -323,7 +322,7 @@ MOST_SHIFT_PX = 2.0
 def centre_offsets(
     level: FloatMap, points: Floats, starts: Ints, across: Floats, expected: Floats, sigma: float
 ) -> tuple[Floats, Floats]:
-    """Of lines one after the other: each point's distance from the middle between its walls, and half its width; (N,), (N,).
+    """Of consecutive lines: each point's distance from the middle between its walls, and half its width; (N,), (N,).
 
     0 and NaN where a wall is not seen. `sigma`, in points: smoothing of the width. A vessel's width changes slowly, so where one
     wall is soft, the middle is rather half the smoothed width away from the other one.
@@ -342,7 +341,7 @@ def centre_offsets(
     for i in range(count):
         if math.isnan(half[i]):
             continue
-        # Smoothing mirrors a line through its ends, where a weight that is nothing becomes less.
+        # Smoothing mirrors a line through its ends, where a weight of 0 becomes negative.
         around = sums[i, 0] / sums[i, 1] if sums[i, 1] > 1e-6 else half[i]
         around = min(max(around, (1.0 - WIDTH_SHARE) * half[i]), (1.0 + WIDTH_SHARE) * half[i])
         right, left = slope[0, i] ** 2, slope[1, i] ** 2
@@ -353,10 +352,10 @@ def centre_offsets(
 
 @kernel((MAP, POINTS, POINTS, int64, float64))
 def probability_centres(probability: FloatMap, points: Floats, across: Floats, side: int, most_px: float) -> tuple[Floats, Floats]:
-    """Of each place: how far across the middle of the probability lies within so many px (N,), and its sum there (N,).
+    """Of each place: the offset across of the probability's centre within `side` px (N,), and its sum there (N,).
 
-    What lies beyond the image's border is not seen: sampled as what is beside it, a robot there would be drawn outwards. Looking
-    outwards the probability may only fall: another stretch of robot close by does not pull.
+    Places beyond the image border are left out: with the border's value they would draw a robot outwards. Outwards the probability
+    may only fall, so that another part of the robot close by does not count.
     """
     height, width = probability.shape
     shift, total = np.zeros(len(points)), np.zeros(len(points))
@@ -422,7 +421,7 @@ def find_gate(
     farther = min(index + int(np.rint(max(12.0, HEADING_RADII * own) / step_px)), len(along) - 1)
     x, y = points[farther, 0] - points[index, 0], points[farther, 1] - points[index, 1]
     length = max(math.hypot(x, y), 1e-9)
-    # The distance to the nearest wall is less than half the width wherever the line is not quite in the middle.
+    # The distance to the nearest wall is less than half the width where the line is not quite in the middle.
     wide = half_width[index : index + WIDTH_POINTS].copy()
     wide = np.sort(wide[np.abs(wide - own) < WIDTH_RADII * own + 1.0])
     middle = len(wide) // 2
@@ -433,7 +432,7 @@ def find_gate(
 
 @kernel((POINTS, float64, float64))
 def _squared_gap(points: Floats, x: float, y: float) -> tuple[float, int]:
-    """The squared distance of (x, y) from the nearest of the points, and which one that is."""
+    """The squared distance of (x, y) from the nearest of the points, and its index."""
     least, best = math.inf, 0
     for i in range(len(points)):
         across, down = points[i, 0] - x, points[i, 1] - y
@@ -445,7 +444,7 @@ def _squared_gap(points: Floats, x: float, y: float) -> tuple[float, int]:
 
 @kernel((POINTS, POINTS, float64))
 def _first_meeting(line: Floats, others: Floats, near_px: float) -> tuple[int, int]:
-    """The first of the line's points that comes as near to one of the others, and from there on nearest; and that one."""
+    """The line's point nearest to the others after it first comes within `near_px`, and the index of that other point."""
     least, end, there = math.inf, 0, 0
     is_near = False
     for i in range(len(line)):
@@ -484,7 +483,7 @@ def _wall_shifts(
             if distance > WALL_RADII * radius[i] + 1.0:
                 distance = math.nan
             wall_x, wall_y = points[i, 0] + distance * x, points[i, 1] + distance * y
-            for k in range(len(trunk)):  # nothing is near to a wall that is none
+            for k in range(len(trunk)):  # a wall of NaN is near to no point
                 gap_x, gap_y = trunk[k, 0] - wall_x, trunk[k, 1] - wall_y
                 limit = WALL_RADII * trunk_radius[k] + 1.0
                 if gap_x * gap_x + gap_y * gap_y <= limit * limit:
@@ -506,7 +505,7 @@ def _wall_shifts(
 
 @kernel((VALUES, VALUES, VALUES, VALUES, float64))
 def _fit_two_shapes(first: Floats, second: Floats, wanted: Floats, weight: Floats, stiffness: float) -> tuple[float, float]:
-    """How much of each of two shapes (N,) comes nearest to what is wanted, by weights; the stiffness keeps both small."""
+    """Weighted least squares: the factors of two shapes (N,) that fit `wanted`; the stiffness keeps both small."""
     a = c = stiffness
     b = one = other = 0.0
     for i in range(len(wanted)):
@@ -524,7 +523,7 @@ def bend_trunk(points: Floats, radius: Floats, vessel: BoolMap) -> Floats:
     count = len(points)
     across = normals(points, np.array([0, count]))
     shift, weight = _wall_shifts(points, across, radius, vessel, points[:0], radius[:0])
-    # Two shapes that leave a line's ends and its directions there as they are: one to a side, and one leaning.
+    # Two shapes that keep a line's ends and its directions there: a symmetric and an antisymmetric one.
     hump, leaning = np.empty(count), np.empty(count)
     for i in range(count):
         share = i / max(count - 1, 1)
@@ -551,7 +550,7 @@ def side_branch(
     is_bent: bool,
     step_px: float,
 ) -> tuple[int, Floats]:
-    """From a gate at (x, y) inwards: which of the trunk's points the branch comes from, and its line from there."""
+    """From a gate at (x, y) inwards: the index of the trunk's point where the branch begins, and its line from there."""
     reach = max(40.0, 3.0 * math.sqrt(_squared_gap(trunk, x, y)[0]))
     count = int(np.ceil((reach + 1.0) / step_px))
     line = np.empty((count, 2))
@@ -620,8 +619,8 @@ def bend_end(onward: Floats, radius_px: float, lost_px: float, step: int, vessel
 def thin(framed: Bytes, stride: int, outer: Ints, table: Bytes) -> None:
     """Thin a mask of 0 and 1 with a frame of 0 around it, row by row in one array, in place.
 
-    `outer` are the pixels at its edges. The table tells of each of 256 neighbourhoods in which of both turns (1, 2, 3: in both) a
-    pixel goes. Only what may have changed is looked at: after one of its neighbours went, a pixel waits for a turn of each kind.
+    `outer` are the pixels at its edges. `table`: for each of 256 neighbourhoods the sub-iterations (1, 2, 3: both) in which a pixel
+    is removed. After one of its neighbours is removed, a pixel is queued for both sub-iterations; others are not examined again.
     """
     around = (-stride - 1, -stride, -stride + 1, 1, stride + 1, stride, stride - 1, -1)  # clockwise from the upper left
     size = 0
@@ -669,10 +668,10 @@ def thin(framed: Bytes, stride: int, outer: Ints, table: Bytes) -> None:
 
 @kernel((int64[:], int64))
 def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Ints]:
-    """The graph of a skeleton's pixels, given in order by their places in a picture of so many columns.
+    """The graph of a skeleton's pixels, given by their sorted flat indices in a picture of `width` columns.
 
-    Nodes (K, 2); the first and the last node of each chain (C,), (C,); the chains' points one after the other (N, 2), and where
-    each one starts (C + 1,).
+    Nodes (K, 2); the first and the last node of each chain (C,), (C,); the chains' consecutive points (N, 2), and their starts
+    (C + 1,).
     """
     count = len(flat)
     left, right = width, 0
@@ -695,7 +694,7 @@ def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Int
     step_x, step_y = (0, -1, 1, 0, -1, 1, -1, 1), (-1, 0, 0, 1, -1, -1, 1, 1)
     near = np.zeros((count + 1, 8), np.int32)
     links = np.zeros(count + 1, np.int64)
-    both = np.full(count + 1, -1, np.int64)  # of a chain's pixel: each neighbour tells from it the other one
+    both = np.full(count + 1, -1, np.int64)  # of a chain's pixel: XOR with one neighbour gives the other
     for i in range(1, count + 1):
         pair = 0
         for k in range(8):

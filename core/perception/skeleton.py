@@ -1,13 +1,8 @@
-"""One-pixel skeletons of vessel and robot (METHOD section 2).
+"""One-pixel skeletons of vessel and robot, the repair of gaps, and skeletons as graphs (METHOD sections 2 and 3).
 
-Thinning of a mask to lines of one pixel (METHOD section 2), by Zhang and Suen's algorithm.
-
-Repair of a broken skeleton: near end points are joined (METHOD section 3, the paper's Algorithm 1).
-
-A skeleton as a graph: chains of pixels between junctions and ends.
-
-The paper follows the skeleton recursively, pixel by pixel. Here each chain of pixels is walked once, in a loop, and everything that
-explores the skeleton afterwards walks some ten chains instead of a thousand pixels: no recursion limit, no endless loops.
+Thinning is Zhang and Suen's algorithm; the repair of gaps is the paper's Algorithm 1. The paper follows the skeleton recursively,
+pixel by pixel. Here each chain of pixels is walked once, in a loop, and later stages walk some ten chains instead of a thousand
+pixels: no recursion limit, no endless loops.
 """
 
 from __future__ import annotations
@@ -21,22 +16,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.config.models import CleaningConfig, GapConfig, PerceptionConfig
+from core.config.models import GapConfig, PerceptionConfig
 from core.geometry import arc_length
 from core.perception import compiled
 from core.types import Mask, Masks, Point, Points, Skeletons
 
 MIN_HALF_SIZE_SHARE = 0.35
 """Half-size thinning needs a lumen some 10 px wide. In a narrower one the step to half size leaves less than this share of it."""
-MOST_LOST_PX = 40
-"""Where the half-size step leaves nothing near more pixels than these, a vessel is lost: some 20 px of one that is 3 px wide. Tips,
-corners and ragged walls of wide ones are less (in all but 1 % of the masks that the network found on 480 frames)."""
+MAX_LOST_PX = 40
+"""Pixels that the half-size step may leave far from the rest: more are a lost vessel, some 20 px of one that is 3 px wide. Tips,
+corners and ragged walls of wide ones are fewer (in all but 1 % of the masks that the network found on 480 frames)."""
 _THREE, _FIVE = (np.ones((side, side), np.uint8) for side in (3, 5))
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
-def _turns(bits: int) -> int:
-    """In which turns (1, 2, 3: in both) a pixel with these neighbours goes: bit 0 is the upper left one, then clockwise."""
+def _removal(bits: int) -> int:
+    """Sub-iterations (1, 2, 3: both) in which a pixel with these neighbours is removed: bit 0 is the upper left one, then
+    clockwise."""
     north, east, south, west = (bool(bits >> n & 1) for n in (1, 3, 5, 7))
     around = [bits >> n & 1 for n in range(8)]
     edges = sum(not here and there for here, there in zip(around, around[1:] + around[:1], strict=True))
@@ -45,21 +41,21 @@ def _turns(bits: int) -> int:
     return int(not (east and south and (north or west))) + 2 * int(not (north and west and (east or south)))
 
 
-_OTHERWISE = (
+_EXCEPTIONS = (
     {3: 1, 6: 1, 12: 1, 24: 2, 48: 0, 96: 2, 129: 0, 192: 2}  # where a diagonal two pixels wide ends, not both at once
     | {14: 1, 56: 2, 131: 1, 224: 2}
     | {10: 3, 40: 3, 130: 3, 160: 3}  # corners of a staircase go
     | {11: 1, 26: 2, 104: 2, 108: 2, 134: 1, 161: 1, 176: 2, 194: 1, 198: 1}
 )
-"""Neighbourhoods of which the paper says something else: as it stands it wears diagonals away, and leaves staircases."""
-_TURNS = np.array([_OTHERWISE.get(bits, _turns(bits)) for bits in range(256)], np.uint8)
+"""Neighbourhoods that differ from the paper's algorithm, which wears diagonals away and leaves staircases."""
+_REMOVAL_TABLE = np.array([_EXCEPTIONS.get(bits, _removal(bits)) for bits in range(256)], np.uint8)
 
 
 def thin(mask: Mask) -> Mask:
     """The mask thinned to one pixel, with its topology: as many components and loops as before.
 
-    Zhang and Suen's algorithm [1]_ with scikit-image's corrections, pixel for pixel what its ``skeletonize`` gives in three times
-    the time: that looks at all pixels in every turn, this one only where something has changed.
+    Zhang and Suen's algorithm [1]_ with scikit-image's corrections: the same pixels as its ``skeletonize`` in a third of the time,
+    because only pixels whose neighbourhood has changed are examined again.
 
     References
     ----------
@@ -72,7 +68,7 @@ def thin(mask: Mask) -> Mask:
         framed = np.zeros((height + 2, width + 2), np.uint8)
         framed[1:-1, 1:-1] = mask[window]
         outer = np.flatnonzero(framed > cv2.erode(framed, _CROSS))
-        compiled.thin(framed.reshape(-1), width + 2, outer, _TURNS)
+        compiled.thin(framed.reshape(-1), width + 2, outer, _REMOVAL_TABLE)
         skeleton[window] = framed[1:-1, 1:-1]
     return skeleton
 
@@ -86,15 +82,11 @@ def thin_half_size(mask: Mask) -> Mask:
     """
     full = mask.view(np.uint8)
     half = np.ascontiguousarray(cv2.erode(full, _THREE, borderType=cv2.BORDER_REPLICATE)[::2, ::2]).view(np.uint8)
-    if 4 * cv2.countNonZero(half) < MIN_HALF_SIZE_SHARE * cv2.countNonZero(full) or 4 * _count_lost(full, half) > MOST_LOST_PX:
+    # Every second pixel of the mask that is 5 px or more from what is left of it at half size.
+    lost = cv2.countNonZero(cv2.subtract(np.ascontiguousarray(full[::2, ::2]), cv2.dilate(half, _FIVE)))
+    if 4 * cv2.countNonZero(half) < MIN_HALF_SIZE_SHARE * cv2.countNonZero(full) or 4 * lost > MAX_LOST_PX:
         return thin(mask)
     return _double(thin(half.view(np.bool_)), mask.shape)
-
-
-def _count_lost(full: NDArray[np.uint8], half: NDArray[np.uint8]) -> int:
-    """How many of a mask's pixels (h, w), of every second one, are 5 px or more from what is left of it at half size."""
-    near = cv2.dilate(half, _FIVE)
-    return cv2.countNonZero(cv2.subtract(np.ascontiguousarray(full[::2, ::2]), near))
 
 
 def _double(skeleton: Mask, shape: tuple[int, ...]) -> Mask:
@@ -102,7 +94,7 @@ def _double(skeleton: Mask, shape: tuple[int, ...]) -> Mask:
     height, width = skeleton.shape
     framed = np.zeros((height + 2, width + 2), np.bool_)
     framed[1:-1, 1:-1] = skeleton
-    # Only some hundred pixels are set, so each one looks at its neighbours ahead instead of all at theirs.
+    # Only some hundred pixels are set, so their neighbours are read instead of all pixels'.
     flat, places = framed.ravel(), np.flatnonzero(framed)
     right, down, left = flat[places + 1], flat[places + width + 2], flat[places - 1]
     falling = flat[places + width + 3] & ~(right | down)
@@ -119,7 +111,7 @@ def _double(skeleton: Mask, shape: tuple[int, ...]) -> Mask:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelChain:
-    """Pixels ``points`` (N, 2) from node ``start`` to node ``end``, both nodes' places included."""
+    """Pixels ``points`` (N, 2) from node ``start`` to node ``end``, both nodes included."""
 
     start: int
     end: int
@@ -152,7 +144,7 @@ def trace(skeleton: Mask) -> PixelGraph:
 
 
 MAX_KNOTS = 200
-"""A robot's skeleton has some ten ends and junctions; one of so many is noise, that no mending makes a robot of."""
+"""A robot's skeleton has some ten ends and junctions; one of more than these is noise."""
 SPUR_RADII = 2.5
 """The arms of a fork at a broken end of the robot run to its corners: at most about one and a half radii, and a bit for noise."""
 TANGENT_PX = 10
@@ -171,26 +163,22 @@ def thin_robot(mask: Mask, config: PerceptionConfig) -> Mask:
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
     if width:
         window = np.s_[y : y + height, x : x + width]
-        robot[window] = _robot_skeleton(np.ascontiguousarray(mask[window]), config.cleaning)
+        cut_out = np.ascontiguousarray(mask[window])
+        skeleton = thin(cut_out)
+        if np.count_nonzero(_count_links(skeleton)[1] != 2) <= MAX_KNOTS:
+            if config.cleaning.prune_spurs:
+                skeleton = without_spurs(skeleton, cut_out)
+            if config.cleaning.extend_ends:
+                skeleton = extend_ends(skeleton, cut_out)
+        robot[window] = skeleton
     return robot
-
-
-def _robot_skeleton(mask: Mask, config: CleaningConfig) -> Mask:
-    """The robot's skeleton in a mask that is cut to its bounding box."""
-    skeleton = thin(mask)
-    links = _count_links(skeleton)[1]
-    if np.count_nonzero(links != 2) > MAX_KNOTS:
-        return skeleton
-    if config.prune_spurs and np.any(links >= 3):
-        skeleton = without_spurs(skeleton, mask)
-    return extend_ends(skeleton, mask) if config.extend_ends else skeleton
 
 
 def end_pixels(skeleton: Mask) -> list[tuple[int, int]]:
     """End points (x, y) of a skeleton.
 
-    The paper's convolution with [[1, 1, 1], [1, 10, 1], [1, 1, 1]] gives 11 at a pixel with exactly one neighbour. That misses an
-    end whose last step is a corner (two neighbours that touch each other), so here all 256 neighbourhoods are told apart.
+    The paper's convolution with [[1, 1, 1], [1, 10, 1], [1, 1, 1]] gives 11 at a pixel with exactly one neighbour. It misses an end
+    whose last step is a corner (two neighbours that touch each other), so here a table holds all 256 neighbourhoods.
     """
     x, y, width, height = cv2.boundingRect(skeleton.view(np.uint8))
     window = np.ascontiguousarray(skeleton[y : y + height, x : x + width])
@@ -224,7 +212,7 @@ _AROUND = ((-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1))
 _LINKS = np.array([_links(bits) for bits in range(256)], np.uint8)
 
 
-class Walker:
+class BranchWalker:
     """Walks along a skeleton's branches from their ends."""
 
     def __init__(self, skeleton: Mask) -> None:
@@ -256,16 +244,6 @@ class Walker:
         return None if len(walked) < 4 else _direction(walked)
 
 
-def walk_back(skeleton: Mask, end: tuple[int, int], steps: int) -> list[tuple[int, int]]:
-    """Pixels (x, y) from an end point back along its branch: at most `steps` of them, and not beyond a junction."""
-    return Walker(skeleton).back(end, steps)
-
-
-def end_direction(skeleton: Mask, end: tuple[int, int]) -> Point | None:
-    """Unit vector in which the branch leaves through its end, or None for a branch of less than 4 pixels."""
-    return Walker(skeleton).direction(end)
-
-
 def _direction(walked: list[tuple[int, int]]) -> Point | None:
     across, down = walked[0][0] - walked[-1][0], walked[0][1] - walked[-1][1]
     length = math.hypot(across, down)
@@ -275,14 +253,15 @@ def _direction(walked: list[tuple[int, int]]) -> Point | None:
 def without_spurs(skeleton: Mask, mask: Mask) -> Mask:
     """The robot's skeleton without its shortest branches: a broken or blunt end is thinned to a fork, which has no direction.
 
-    A branch goes if it is shorter than ``SPUR_RADII`` of the robot's mean radius. Where only one other branch is left at its
-    junction, the junction goes too, so that the skeleton ends in one clean pixel.
+    A branch shorter than ``SPUR_RADII`` of the robot's mean radius is removed. Where only one other branch is left at its junction,
+    the junction is removed too, so that the skeleton ends in one pixel.
     """
     if not np.any(_count_links(skeleton)[1] >= 3):
         return skeleton
     graph = trace(skeleton)
     degrees = graph.degrees()
     lengths = [float(arc_length(chain.points)[-1]) for chain in graph.chains]
+    ends = [(chain.start, chain.end) for chain in graph.chains]
     limit_px = SPUR_RADII * mean_radius(skeleton, mask) + 1.0
     pruned = skeleton.copy()
     chains_at: list[list[int]] = [[] for _ in graph.nodes]
@@ -291,7 +270,7 @@ def without_spurs(skeleton: Mask, mask: Mask) -> Mask:
             chains_at[node].append(index)
     for node in np.flatnonzero(degrees >= 3).tolist():
         touching = chains_at[node]
-        spurs = [i for i in touching if lengths[i] < limit_px and degrees[_other_end(graph.chains[i], node)] == 1]
+        spurs = [i for i in touching if lengths[i] < limit_px and degrees[sum(ends[i]) - node] == 1]
         kept = [graph.chains[i] for i in touching if i not in spurs]
         if not spurs or not kept:
             continue
@@ -306,30 +285,26 @@ def without_spurs(skeleton: Mask, mask: Mask) -> Mask:
     return pruned
 
 
-def _other_end(chain: PixelChain, node: int) -> int:
-    return chain.end if chain.start == node else chain.start
-
-
 def _set(skeleton: Mask, points: Points, value: bool) -> None:
     places = np.rint(points).astype(int)
     skeleton[places[:, 1], places[:, 0]] = value
 
 
 def extend_ends(skeleton: Mask, mask: Mask) -> Mask:
-    """Each end of the robot's skeleton led along its tangent to the edge of the mask.
+    """Each end of the robot's skeleton extended along its tangent to the edge of the mask.
 
-    Thinning stops about one radius short of a blunt end, which would put the robot's head one radius too far back, and bends the
-    last radius towards a corner. So that much is taken off first, where the branch is long enough.
+    Thinning stops about one radius short of a blunt end, and bends the last radius towards a corner. So one radius is removed
+    first, where the branch is long enough.
     """
     extended = skeleton.copy()
     trim = round(mean_radius(skeleton, mask))
-    walker = Walker(skeleton)
+    walker = BranchWalker(skeleton)
     ends = end_pixels(skeleton)
     for end in ends:
         walked = walker.back(end, 2 * trim + TANGENT_PX)
         if len(walked) < 4:
             continue
-        # A short branch is taken off at both of its ends. A third of it stays between them, which has its direction.
+        # Of a short branch, which is trimmed at both ends, a third stays and gives the direction.
         is_whole = walked[-1] in ends
         hook = min(trim, len(walked) // 3 if is_whole else len(walked) - 4)
         direction = _direction(walked[hook : min(len(walked) - hook if is_whole else len(walked), hook + TANGENT_PX + 1)])
@@ -342,7 +317,7 @@ def extend_ends(skeleton: Mask, mask: Mask) -> Mask:
 
 
 def mean_radius(skeleton: Mask, mask: Mask) -> float:
-    """Mean radius of what was thinned, in px: half its area over the skeleton's pixels."""
+    """Mean radius of the mask in px: half its area over the skeleton's pixels."""
     return 0.5 * cv2.countNonZero(mask.view(np.uint8)) / max(cv2.countNonZero(skeleton.view(np.uint8)), 1)
 
 
@@ -359,9 +334,9 @@ def _last_inside(mask: Mask, start: tuple[int, int], direction: Point) -> tuple[
 
 
 MAX_ENDS = 150
-"""A robot broken to pieces, and some specks, have some tens of ends. What has more is noise, and every two ends are compared."""
+"""A broken robot with some specks has some tens of ends; more are noise, and every two ends are compared."""
 TOUCHING_PX = 3.0
-"""Two ends this near are joined however they look."""
+"""Two ends this near are joined whatever their directions."""
 NEAR_PX = 10.0
 """The step between two ends this near is too short to have a direction: there only the ends' own directions must agree."""
 
@@ -386,9 +361,13 @@ def repair(skeletons: Skeletons, config: GapConfig) -> Skeletons:
         return skeletons
     if not any(math.dist(a, b) < config.gap_threshold_px for a, b in combinations(places, 2)):
         return skeletons
-    ends = _described(places, skeletons.robot)
+    x, y, width, height = cv2.boundingRect(skeletons.robot.view(np.uint8))
+    window = np.ascontiguousarray(skeletons.robot[y : y + height, x : x + width])
+    _, labels = cv2.connectedComponents(window.view(np.uint8), connectivity=8)
+    walker = BranchWalker(window)
+    ends = [_End((u, v), walker.direction((u - x, v - y)), int(labels[v - y, u - x])) for u, v in places]
     if config.rule == "every_pair":
-        pairs = [(a, b) for a, b in combinations(ends, 2) if _distance(a, b) < config.gap_threshold_px]
+        pairs = [(a, b) for a, b in combinations(ends, 2) if math.dist(a.place, b.place) < config.gap_threshold_px]
     else:
         pairs = _plausible_pairs(ends, config)
     if not pairs:
@@ -400,21 +379,13 @@ def repair(skeletons: Skeletons, config: GapConfig) -> Skeletons:
     return Skeletons(skeletons.vessel, robot.view(np.bool_), bridges)
 
 
-def _described(places: list[tuple[int, int]], skeleton: Mask) -> list[_End]:
-    x, y, width, height = cv2.boundingRect(skeleton.view(np.uint8))
-    window = np.ascontiguousarray(skeleton[y : y + height, x : x + width])
-    _, labels = cv2.connectedComponents(window.view(np.uint8), connectivity=8)
-    walker = Walker(window)
-    return [_End((u, v), walker.direction((u - x, v - y)), int(labels[v - y, u - x])) for u, v in places]
-
-
-def _distance(a: _End, b: _End) -> float:
-    return math.dist(a.place, b.place)
-
-
 def _plausible_pairs(ends: list[_End], config: GapConfig) -> list[tuple[_End, _End]]:
     """Pairs to join: of different components, nearest first, and only where neither end has to turn too far."""
-    near = [(d, i, j) for (i, a), (j, b) in combinations(enumerate(ends), 2) if (d := _distance(a, b)) < config.gap_threshold_px]
+    near = [
+        (d, i, j)
+        for (i, a), (j, b) in combinations(enumerate(ends), 2)
+        if (d := math.dist(a.place, b.place)) < config.gap_threshold_px
+    ]
     merged = {end.component: end.component for end in ends}
     used: set[int] = set()
     chosen = []
@@ -441,9 +412,9 @@ def _turn_deg(a: _End, b: _End, distance: float) -> float:
 def turns_deg(
     a: Sequence[float] | Points, leaving: Point | Points | None, b: Sequence[float] | Points, arriving: Point | Points | None
 ) -> tuple[float, float]:
-    """How far a path turns, leaving through end `a` towards end `b`, and entering there: degrees, 0 for an end without direction.
+    """Turns of a path that leaves through end `a` towards end `b`, and enters there: degrees, 0 for an end without direction.
 
-    Both directions are unit vectors that point out of their own piece.
+    Both directions are unit vectors that point out of their own component.
     """
     step = np.asarray(b, np.float64) - np.asarray(a, np.float64)
     step /= max(float(np.hypot(step[0], step[1])), 1e-9)

@@ -22,7 +22,7 @@ class UNetShape:
     ``widths`` are the channels of the five encoder levels, ``decoder_widths`` those of the four decoder levels from fine to coarse,
     ``fold`` the block of pixels folded into channels (1 = none). ``encoder_convolutions`` are the 3x3 convolutions of each encoder
     level (the paper has two everywhere), ``decoder_convolutions`` those of every decoder level. ``inputs`` are the planes of the
-    input: 3 of a picture, 5 where a first look's probabilities come with it (``second_look.py``).
+    input: 3 of a picture, 5 where the first network's probabilities come with it (``tip_refinement.py``).
     """
 
     widths: tuple[int, int, int, int, int] = (16, 32, 64, 128, 256)
@@ -61,7 +61,7 @@ class UNetShape:
             raise ValueError("encoder_convolutions are five counts between 1 and 8")
         inputs = int(data.get("inputs", 3))
         if inputs not in (3, 5):
-            raise ValueError("inputs are 3 (a picture) or 5 (with a first look's probabilities)")
+            raise ValueError("inputs are 3 (a picture) or 5 (with the first network's probabilities)")
         return cls(widths, decoder, convolutions, fold, depths, inputs)
 
 

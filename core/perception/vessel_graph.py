@@ -1,8 +1,7 @@
 """The vessel's skeleton as a graph of smooth, sub-pixel centerlines with the lumen's radius along them (METHOD section 2).
 
-A vessel of which the picture's border cuts off one side: where its middle is, as far as the other side tells.
-
-Ends of vessels: thinning turns the last radius or two of a skeleton towards a corner, and stops short of the image's border.
+Also: the middle of a vessel that the image border cuts lengthwise, and the ends of vessels, where thinning turns the last radius or
+two of a skeleton towards a corner, and stops short of the image border.
 """
 
 from __future__ import annotations
@@ -24,32 +23,32 @@ from core.perception.vectors import RadiusMap
 from core.types import GraphEdge, Mask, Points, VesselGraph
 
 WIDTH_RADII = 4.0
-"""A width that was seen so many radii away is believed by a third (1/e): a vessel that the picture cuts lengthwise may taper."""
+"""A width measured this many radii away counts by 1/e: a vessel that the picture cuts lengthwise may taper."""
 ALONG = 0.87
-"""Cosine of the angle to the border up to which a vessel is cut lengthwise. One that runs out of the picture lacks a wall for a
-short way only: its end is led anew (``vessel_ends``), and until there the map tells more than a skeleton that turns aside."""
+"""Cosine of the angle to the border up to which a vessel is cut lengthwise. One that runs out of the picture lacks a wall only over
+a short length at its end, which is replaced (``led_on``)."""
 END_RADII = 1.5
-"""So near to its ends a line runs into a corner, or through a junction's opening, where no width is the vessel's."""
+"""This near to its ends a line runs into a corner, or through a junction's opening, where the width is not the vessel's."""
 MAP_PX = 2.0
 MAP_SHARE = 0.03
-"""The map of distances is not farther off than this and a share of the radius: steps from pixel to pixel are no straight way."""
+"""Error of the distance map: this, and a share of the radius, because steps from pixel to pixel are not straight."""
 
 
 def by_wall_in_view(
     lines: Bundle, step_px: float, normal: Points, reach: NDArray[np.float64], shift: NDArray[np.float64], shape: tuple[int, ...]
 ) -> NDArray[np.float64]:
-    """`shift` (N,) by the map of distances, but where the image's border cuts off one side of the vessel by what is seen of it.
+    """`shift` (N,) by the distance map, but by the visible wall where the image border cuts off one side of the vessel.
 
-    Beyond the border the map goes on as if there were no wall, and would draw the line out of the picture. Where the border is
-    nearer than the wall, `reach` (N,), the middle is as far from the wall that is seen as it is where both are; where that is
-    nowhere to be seen on a line, the middle of what is in the picture is all that is known.
+    Beyond the border the map continues as if there were no wall, and would draw the line out of the picture. Where the border is
+    nearer than the wall, `reach` (N,), the middle is as far from the visible wall as it is where both walls are visible; where
+    they are nowhere on a line, the middle of the visible part is taken.
 
     Parameters
     ----------
-    lines, step_px : places in the lumen, and how far they are from each other along a line.
+    lines, step_px : places in the lumen, and their distance along a line.
     normal : unit vectors (N, 2) across the lines.
     reach : distance to the nearest wall (N,).
-    shift : by how much each point lies beside the middle of the map (N,), along the normals.
+    shift : offset (N,) of each point from the middle of the map, along the normals.
     shape : of the picture, (h, w).
     """
     nearest, limit = _to_nearest_border(lines.points, shape), (1.0 + MAP_SHARE) * reach + MAP_PX
@@ -75,28 +74,28 @@ def by_wall_in_view(
 
 
 def _to_border(points: Points, direction: Points, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """How far it is from places in the picture (N, 2) along unit vectors (N, 2) to its border: to the last pixels' centres."""
+    """Distance from places in the picture (N, 2) along unit vectors (N, 2) to its border: to the last pixels' centres."""
     limit = np.array([shape[1] - 1.0, shape[0] - 1.0])
     room = np.where(direction > 0.0, limit - points, points)
     return np.asarray(np.maximum((room / np.maximum(np.abs(direction), 1e-9)).min(axis=1), 0.0))
 
 
 def _to_nearest_border(points: Points, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """How far it is from places in the picture (N, 2) to its nearest side, to the last pixels' centres."""
+    """Distance from places in the picture (N, 2) to its nearest side, to the last pixels' centres."""
     return np.asarray(np.minimum(points, (shape[1] - 1.0, shape[0] - 1.0) - points).min(axis=1))
 
 
 def _to_ends(lines: Bundle) -> NDArray[np.int64]:
-    """How many points each point (N,) is away from the nearer end of its line."""
+    """Number of points from each point (N,) to the nearer end of its line."""
     counts = np.diff(lines.starts)
     place = np.arange(len(lines.points)) - np.repeat(lines.starts[:-1], counts)
     return np.asarray(np.minimum(place, np.repeat(counts, counts) - 1 - place), np.int64)
 
 
 def _from_the_nearest(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The values (N,) of a line, NaN where they are not known, filled up from the places around, and how many points away that is.
+    """The values (N,) of a line with NaN interpolated, and the distance, in points, of the nearest known value; shape (2, N).
 
-    Shape (2, N). Of a line where nothing is known the values are 0, infinitely far away.
+    Of a line without any known value the values are 0, infinitely far away.
     """
     places, known = np.arange(len(values)), np.flatnonzero(np.isfinite(values))
     if not len(known):
@@ -116,9 +115,9 @@ REACH_RADII = 3.0
 
 
 def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
-    """A centerline without the last part, which thinning has turned aside, and in its place one that runs between the walls there.
+    """A centerline with its last part, which thinning has turned aside, replaced by one that runs between the walls.
 
-    It ends as far out as the skeleton did, or goes on to the image's border.
+    It ends as far out as the skeleton did, or at the image border.
 
     Parameters
     ----------
@@ -130,7 +129,6 @@ def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
     kept = points[: len(points) - min(_hook(points, radius_px, limit), 2 * len(points) // 3)]
     lost_px = math.dist(points[-1].tolist(), kept[-1].tolist())
     onward = geometry.extrapolate(kept, max(REACH_RADII * radius_px, 1.5 * lost_px) + 1.0, max(radius_px, HEADING_PX))
-    # Walls are looked for as far as the mask is known to reach.
     onward = compiled.bend_end(onward, radius_px, lost_px, round(STEP_PX), vessel)
     way_out = _way_out(onward, limit)
     reach = lost_px if way_out is None or way_out > max(REACH_RADII * radius_px, lost_px) else way_out
@@ -140,7 +138,7 @@ def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
 
 
 def _hook(points: Points, radius_px: float, limit: NDArray[np.float64]) -> int:
-    """How many of the last points thinning may have turned aside."""
+    """Number of the last points that thinning may have turned aside."""
     count = round(TRIM_RADII * radius_px / STEP_PX)
     if float(np.minimum(points[-1], limit - points[-1]).min()) < 1.5 * radius_px:
         to_side = np.minimum(points, limit - points)
@@ -150,7 +148,7 @@ def _hook(points: Points, radius_px: float, limit: NDArray[np.float64]) -> int:
 
 
 def _way_out(onward: Points, limit: NDArray[np.float64]) -> float | None:
-    """How far a line of points, 1 px apart, runs up to the image's last row or column of pixels; None: it does not get there."""
+    """Length of a line of points, 1 px apart, up to the image's last row or column; None: it does not reach them."""
     beyond = np.maximum(-onward, onward - limit).max(axis=1)
     first = int((beyond >= 0.0).argmax())
     if beyond[first] < 0.0:
@@ -165,11 +163,11 @@ STEP_PX = 2.0
 SMOOTHING_PX = 9.0
 """Standard deviation of the smoothing along the way, which keeps bends: more than a radius of boundary noise."""
 WIDTH_PX = 20.0
-"""The same of a vessel's width."""
+"""Standard deviation of the smoothing of a vessel's width."""
 SPUR_RADII = 1.5
 """A spur of thinning runs from the middle to a bump or corner of the wall: at most about one and a half lumen radii."""
 RADIUS_POINTS = 30
-"""So many points of a vessel's end tell its radius there."""
+"""Points of a vessel's end that give its radius there."""
 
 
 @dataclass(slots=True, eq=False)
@@ -179,7 +177,7 @@ class _Line:
     points: Points
     radius: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     half_width: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    """Of the line as it was centred: where it is led elsewhere since then, nobody asks for it."""
+    """Of the centred line; not valid for parts that are replaced later."""
 
 
 def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability: NDArray[np.float32] | None = None) -> VesselGraph:
@@ -196,7 +194,7 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
     if len(traced.chains) > MAX_CHAINS:
         return VesselGraph(np.empty((0, 2)), ())
     radius = RadiusMap(mask)
-    # A junction of pixels may have two chains only, where its third one was too short to be one.
+    # A junction of pixels has only two chains where its third one was too short.
     lines = _merged([_Line(chain.start, chain.end, chain.points) for chain in traced.chains])
     if config.prune_spurs:
         radius_at = radius.at(traced.nodes)
@@ -215,21 +213,20 @@ def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability:
 
 
 def _lead_on_ends(lines: list[_Line], nodes: Points, mask: Mask) -> None:
-    """Ends of vessels without the hook that thinning leaves there; at the image border they go on to the border."""
+    """Remove the hook that thinning leaves at ends of vessels; near the image border, continue to it."""
     degrees = _degrees(lines, len(nodes)).tolist()
-    # Of a short line with two ends the first one takes most.
     starts = [(line, -1, line.start) for line in lines if degrees[line.start] == 1]
     ends = [(line, 1, line.end) for line in lines if degrees[line.end] == 1]
     for line, side, node in (*starts, *ends):
         if len(line.points) >= 4:
-            # In the corner where the skeleton ends the radius would be nearly nothing.
+            # The median, because in the corner where the skeleton ends the radius is nearly 0.
             radius_px = geometry.median(line.radius[::side][-RADIUS_POINTS:])
             points = led_on(line.points[::side], radius_px, mask)
             line.points, nodes[node] = points[::side], points[-1]
 
 
 def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, mask: Mask) -> Points:
-    """The lines led to junctions that are put anew; returns the nodes, some of which may be new, too."""
+    """Rebuild the junctions and the lines at them; returns the nodes, of which some may be new."""
     degrees, sizes = _degrees(lines, len(nodes)).tolist(), radius.at(nodes).tolist()
     places: list[Points] = list(nodes)
     pending = _openings(lines, degrees, sizes)
@@ -241,19 +238,19 @@ def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, mas
             for outward in (True, False)
             if line not in inner and (line.start if outward else line.end) in group
         ]
-        anew = rebuild([_arm(line, outward, degrees, sizes) for line, outward in sides], mask, is_alone=len(group) == 1)
-        if anew is None:
+        rebuilt = rebuild([_arm(line, outward, degrees, sizes) for line, outward in sides], mask, is_alone=len(group) == 1)
+        if rebuilt is None:
             if len(group) > 1:
                 pending += [({node}, []) for node in sorted(group)]
             continue
-        numbers = sorted(group)[: len(anew.places)]
-        numbers += range(len(places), len(places) + len(anew.places) - len(numbers))
-        places += [np.empty(2)] * (len(anew.places) - len(group))
-        for number, place in zip(numbers, anew.places, strict=True):
+        numbers = sorted(group)[: len(rebuilt.places)]
+        numbers += range(len(places), len(places) + len(rebuilt.places) - len(numbers))
+        places += [np.empty(2)] * (len(rebuilt.places) - len(group))
+        for number, place in zip(numbers, rebuilt.places, strict=True):
             places[number] = place
         lines[:] = [line for line in lines if line not in inner]
-        lines += [_Line(*ends, piece) for ends, piece in zip(pairwise(numbers), anew.pieces, strict=True)]
-        arms = {(id(line), outward): anew.arms[index] for index, (line, outward) in enumerate(sides)}
+        lines += [_Line(*ends, piece) for ends, piece in zip(pairwise(numbers), rebuilt.pieces, strict=True)]
+        arms = {(id(line), outward): rebuilt.arms[index] for index, (line, outward) in enumerate(sides)}
         for line in {id(line): line for line, _ in sides}.values():
             out, back = arms.get((id(line), True)), arms.get((id(line), False))
             if out is not None:
@@ -265,7 +262,7 @@ def _rebuild_junctions(lines: list[_Line], nodes: Points, radius: RadiusMap, mas
 
 
 def _openings(lines: list[_Line], degrees: list[int], sizes: list[float]) -> list[tuple[set[int], list[_Line]]]:
-    """Junctions that are to be put anew together, each time with the lines between them."""
+    """Groups of junctions to rebuild together, with the lines between them."""
     group_of = {node: {node} for node, degree in enumerate(degrees) if degree >= 3}
     inner: list[_Line] = []
     with_island: set[int] = set()
@@ -275,7 +272,7 @@ def _openings(lines: list[_Line], degrees: list[int], sizes: list[float]) -> lis
         if not are_together(_arm(line, True, degrees, sizes), _arm(line, False, degrees, sizes)):
             continue
         if group_of[line.start] is group_of[line.end]:
-            with_island.add(line.start)  # two ways round something: no single trunk runs through such an opening
+            with_island.add(line.start)  # two lines round an island: no single trunk runs through such an opening
             continue
         inner.append(line)
         joined = group_of[line.start] | group_of[line.end]
@@ -287,7 +284,7 @@ def _openings(lines: list[_Line], degrees: list[int], sizes: list[float]) -> lis
 
 
 def _arm(line: _Line, outward: bool, degrees: list[int], sizes: list[float]) -> Arm:
-    """A line seen from its start (`outward`) or from its end. Nodes beyond the lists are junctions that were put in meanwhile."""
+    """A line seen from its start (`outward`) or from its end. Nodes beyond the lists are junctions that were added meanwhile."""
     near, far = (line.start, line.end) if outward else (line.end, line.start)
     step = 1 if outward else -1
     far_is_junction = far >= len(degrees) or degrees[far] >= 3
@@ -295,25 +292,21 @@ def _arm(line: _Line, outward: bool, degrees: list[int], sizes: list[float]) -> 
 
 
 def _lead(line: _Line, out: Arm | None, back: Arm | None) -> None:
-    """Give a line the arms that it is, seen from its start and from its end: both, where it comes back to the same opening."""
+    """Replace a line by the arms that it is, seen from its start and from its end: both, where it returns to the same opening."""
     if out is not None and back is not None:
-        _close_loop(line, out, back)
+        # The first half as seen from its start, the second half as seen from its end.
+        count = len(line.points)
+        first, second = max(1, len(out.points) - (count - count // 2)), max(1, len(back.points) - count // 2)
+        line.points = np.concatenate([out.points[:first], back.points[:second][::-1]])
+        line.radius = np.concatenate([out.radius[:first], back.radius[:second][::-1]])
     elif out is not None:
         line.points, line.radius = out.points, out.radius
     elif back is not None:
         line.points, line.radius = back.points[::-1], back.radius[::-1]
 
 
-def _close_loop(line: _Line, out: Arm, back: Arm) -> None:
-    """A line from a junction to itself: its first half as seen from its start, its second half as seen from its end."""
-    count = len(line.points)
-    first, second = max(1, len(out.points) - (count - count // 2)), max(1, len(back.points) - count // 2)
-    line.points = np.concatenate([out.points[:first], back.points[:second][::-1]])
-    line.radius = np.concatenate([out.radius[:first], back.radius[:second][::-1]])
-
-
 def _packed(lines: list[_Line], nodes: Points, radius: RadiusMap) -> VesselGraph:
-    """The graph with only those nodes that are still used, and the radius along the lines as they are now."""
+    """The graph with only those nodes that are still used, and the radius along the final lines."""
     used = sorted({node for line in lines for node in (line.start, line.end)})
     number = {node: index for index, node in enumerate(used)}
     whole = Bundle.of([line.points for line in lines])
@@ -337,7 +330,7 @@ def _without_spurs(lines: list[_Line], degrees: NDArray[np.int64], radius_at: ND
                 spurs.setdefault(root, []).append((length, index))
     doomed: set[int] = set()
     for root, found in spurs.items():
-        # A junction that has nothing but spurs is a blob: its longest spur stays, as the vessel.
+        # A junction that has only spurs is a blob: its longest spur stays, as the vessel.
         found.sort()
         doomed |= {index for _, index in (found[:-1] if len(found) == degrees[root] else found)}
     return [line for index, line in enumerate(lines) if index not in doomed]
@@ -365,11 +358,11 @@ def _merged(lines: list[_Line]) -> list[_Line]:
 
 
 def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -> None:
-    """All lines made even, smooth and centred in the lumen, with the radius along them.
+    """Make all lines even, smooth and centred in the lumen, with the radius along them.
 
-    Twice: by the map of distances, which knows the middle to some half a pixel from anywhere in the lumen (where both walls are in
-    the picture), and then between both walls, to a fraction of a pixel. Where one of these is not to be seen, beside an opening,
-    the first result stays.
+    They are centred twice: by the distance map, to some half a pixel from anywhere in the lumen (where both walls are in the
+    picture), and then between both walls, to a fraction of a pixel. Where a wall is not visible, beside an opening, the first
+    result stays.
     """
     even = Bundle.of([line.points for line in lines]).resample(STEP_PX).smooth(SMOOTHING_PX / STEP_PX, keeps_bends=True)
     # A line's ends stay in their nodes, and one of two points has no others.
@@ -390,5 +383,5 @@ def _centre(lines: list[_Line], radius: RadiusMap, level: NDArray[np.float32]) -
 
 
 def _moved(lines: Bundle, normal: Points, shift: NDArray[np.float64]) -> Bundle:
-    """All points moved across their lines, and these smoothed."""
+    """The lines with all points moved across them, smoothed."""
     return Bundle(lines.points + shift[:, None] * normal, lines.starts).smooth(SMOOTHING_PX / STEP_PX, keeps_bends=True)

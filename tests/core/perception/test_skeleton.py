@@ -7,7 +7,7 @@ from skimage.morphology import skeletonize
 
 from core.config.models import CleaningConfig, GapConfig, PerceptionConfig
 from core.perception.skeleton import (
-    end_direction,
+    BranchWalker,
     end_pixels,
     extend_ends,
     repair,
@@ -15,7 +15,6 @@ from core.perception.skeleton import (
     thin_half_size,
     thin_masks,
     trace,
-    walk_back,
     without_spurs,
 )
 from core.types import Mask, Skeletons
@@ -139,18 +138,18 @@ def test_walking_back_stops_at_a_junction() -> None:
 .....#....
 .....#....
 """)
-    assert walk_back(fork, (1, 0), 10) == [(1, 0), (2, 1), (3, 2), (4, 3)] or len(walk_back(fork, (1, 0), 10)) <= 6
-    assert walk_back(fork, (1, 0), 2) == [(1, 0), (2, 1), (3, 2)]
+    assert BranchWalker(fork).back((1, 0), 10) == [(1, 0), (2, 1), (3, 2), (4, 3)] or len(BranchWalker(fork).back((1, 0), 10)) <= 6
+    assert BranchWalker(fork).back((1, 0), 2) == [(1, 0), (2, 1), (3, 2)]
 
 
 def test_a_branch_leaves_through_its_end() -> None:
     row = np.zeros((9, 30), bool)
     row[4, 5:25] = True
-    assert end_direction(row, (24, 4)) == pytest.approx((1.0, 0.0))
-    assert end_direction(row, (5, 4)) == pytest.approx((-1.0, 0.0))
+    assert BranchWalker(row).direction((24, 4)) == pytest.approx((1.0, 0.0))
+    assert BranchWalker(row).direction((5, 4)) == pytest.approx((-1.0, 0.0))
     dot = np.zeros((9, 30), bool)
     dot[4, 5:7] = True
-    assert end_direction(dot, (5, 4)) is None
+    assert BranchWalker(dot).direction((5, 4)) is None
 
 
 def test_ends_are_extended_to_the_masks_edge() -> None:
