@@ -33,7 +33,7 @@ from app.commands.workers import over_cluster, over_processes
 from app.ui.texts import signed_degrees
 from core.config.models import Config, choose_model, load_config, merge
 from core.devices import UserError
-from core.evaluation.replay import STATES, Change, FrameResult, RecordedTargets, ReplayTally, changed_most, runs, seen
+from core.evaluation.replay import STATES, Change, FrameResult, RecordedTargets, ReplayTally, changed_most, frame_result, runs
 from core.files import name_as_text, name_of
 from core.perception.model_file import check_model, model_folder, read_model_info
 from core.session.codec import scene_to_json, unread_to_json
@@ -207,7 +207,9 @@ def replay_frames(
                 record = unread_to_json(name, "the picture is lost")
             else:
                 scene: Scene = perceive(Frame(row.index, row.captured_s, frame.image), target)
-                done.changes.append(Change(row.row, row.index, row.captured_s - first_s, seen(row.scene), seen(scene)))
+                done.changes.append(
+                    Change(row.row, row.index, row.captured_s - first_s, frame_result(row.scene), frame_result(scene))
+                )
                 record = scene_to_json(name, scene)
             if lines is not None:
                 placed = {"frame": row.index, "captured_s": round(row.captured_s, 6), "time_s": round(row.captured_s - first_s, 6)}

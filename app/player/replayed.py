@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.ui.i18n import tr
 from app.ui.texts import signed_degrees
 from core.devices import UserError
-from core.evaluation.replay import Change, seen
+from core.evaluation.replay import Change, frame_result
 from core.session.codec import InvalidRecord, PerceivedLine, read_json, scene_from_json
 from core.session.files import lines_of, read_line
 from core.types import PoseState, Scene
@@ -83,7 +83,7 @@ class Replayed:
 
 def compared_line(before: Scene, after: Scene) -> str:
     """The change of state, angle and head in one line."""
-    change = Change(0, 0, 0.0, seen(before), seen(after))
+    change = Change(0, 0, 0.0, frame_result(before), frame_result(after))
     states = tr("state {before} \N{RIGHTWARDS ARROW} {after}", before=change.before.state or "-", after=change.after.state or "-")
     if after.pose is None:
         return tr("{states}: no pose, {why}", states=states, why=after.refusal)

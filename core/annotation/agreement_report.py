@@ -36,7 +36,7 @@ _Table = Mapping[tuple[str, str, int], StoredAnnotation]
 
 
 def finished(annotations: Iterable[StoredAnnotation]) -> list[StoredAnnotation]:
-    """Those with both lines and a state, and those of whom could not tell."""
+    """Those with both lines and a state, and those with "can't tell"."""
     is_done = (Status.DONE, Status.CANNOT_TELL)
     return [one for one in annotations if status_of(one.content, measured=one.theta_deg is not None) in is_done]
 
@@ -146,7 +146,7 @@ def _pair(table: _Table, first: str, second: str, draw: _Draw) -> dict[str, Any]
 
 
 def _compare(both: Sequence[tuple[StoredAnnotation, StoredAnnotation]], draw: _Draw) -> dict[str, Any]:
-    """Two answers about the same images: angles and states where both have one, and how often one or both could not tell."""
+    """Two answers about the same images: angles and states where both have one, and how often one or both are "can't tell"."""
     telling = [(a, b) for a, b in both if not a.content.cannot_tell and not b.content.cannot_tell]
     measured = [(a, b) for a, b in telling if a.theta_deg is not None and b.theta_deg is not None]
     known = np.array([(a.theta_deg, b.theta_deg) for a, b in measured], np.float64).reshape(-1, 2)

@@ -37,7 +37,7 @@ _LABELS = {
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """What a file says about one image."""
+    """The annotation of one image in a file."""
 
     image: FoundImage
     content: Annotation
@@ -91,7 +91,7 @@ def _image_of(
     told = str(name).replace("\\", "/")
     base = told.rpartition("/")[2]
     candidates = by_name.get(base, [])
-    if len(candidates) > 1:  # in several folders: the name may say in which
+    if len(candidates) > 1:  # in several folders: the name may include one
         ending = "/" + told.lstrip("./")
         candidates = [one for one in candidates if one.path.absolute().as_posix().endswith(ending)] or candidates
     if not candidates:
@@ -232,7 +232,7 @@ def export_training_set(
 
     Parameters
     ----------
-    annotations : whose masks count, of whatever study.
+    annotations : whose masks count, of any study.
     measured : finished answers of one study, whose angles and states go along; None: those among `annotations`.
 
     Returns

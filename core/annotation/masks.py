@@ -197,7 +197,7 @@ def polygons_of_area(points: Points, target: MaskTarget, size: tuple[int, int]) 
 
 
 def area_polygon(mask: Mask) -> NDArray[np.float64] | None:
-    """The polygon (N, 2) around a mask (H, W), whose ``area_of`` it is; None where one cannot tell: several pieces, or holes."""
+    """The polygon (N, 2) around a mask (H, W), whose ``area_of`` it is; None for several components or holes."""
     outlines = find_contours(np.pad(mask, 1).astype(np.float64), 0.5, fully_connected="high")
     if len(outlines) != 1:
         return None

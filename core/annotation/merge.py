@@ -25,13 +25,15 @@ from core.annotation.study import StudySettings, settings_from
 
 @dataclass(frozen=True, slots=True)
 class Persons:
-    """``names``: by their names there, what raters are called here. ``declared``: of these, who was only said to be so."""
+    """``names``: names of raters there -> here. ``declared``: names here that only the operator has matched, no common answer."""
 
     names: Mapping[str, str]
     declared: frozenset[str]
 
 
-def whose(there: Sequence[KeptAnnotation], here: Sequence[KeptAnnotation], names: Mapping[str, str], where: str) -> Persons:
+def identify_raters(
+    there: Sequence[KeptAnnotation], here: Sequence[KeptAnnotation], names: Mapping[str, str], where: str
+) -> Persons:
     """Who is who, over all studies: a rater whose answers are in both files is one person, whatever the names in the two files.
 
     Parameters
@@ -86,7 +88,7 @@ def raters_alike(raters: Iterable[str]) -> list[str]:
 
 @dataclass(slots=True)
 class Joined:
-    """What a join did: answers that came in, that went on, that were here already; raters by file; and what is to be told."""
+    """What a join did: answers that are new, that have more edits, that were here already; raters by file; and messages."""
 
     new: int = 0
     grown: int = 0
@@ -103,7 +105,7 @@ def join(target: AnnotationStore, files: Sequence[Path], study: str | None, name
     target : open for writing.
     files : annotation files, or folders with one; they are only read.
     study : only this one; None: all, and what lies outside studies.
-    names : what raters of the files are called here, where their names alone do not tell.
+    names : what raters of the files are called here, where their names alone do not identify them.
 
     Raises
     ------
@@ -144,7 +146,7 @@ def _join_file(
     if theirs.execute("PRAGMA foreign_key_check").fetchone() is not None:
         raise AnnotationError(f"{where}: damaged; annotate --salvage writes what is readable into a new file")
     kept, here = read_kept(theirs), read_kept(database)
-    persons = whose(kept, here, names, str(where))
+    persons = identify_raters(kept, here, names, str(where))
     wanted = [one for one in kept if study in (None, one.study)]
     if study is not None and not wanted:
         there = ", ".join(sorted({repr(one.study) if one.study else "'' (outside studies)" for one in kept})) or "nothing"
@@ -325,7 +327,7 @@ class _Found:
 
 
 def _read(damaged: Path) -> _Found:
-    """Read copies of a file: the database itself takes back in them what a crash has left half done, as its journal says.
+    """Read copies of a file, in which SQLite rolls back what a crash has left half done, by the journal.
 
     That may be damaged, too: then the file is read without.
     """
@@ -350,7 +352,7 @@ def _read_copy(path: Path) -> _Found:
     found = _Found()
     try:
         with closing(sqlite3.connect(path, isolation_level=None)) as source:
-            source.execute("PRAGMA writable_schema = ON")  # without it a file that was cut short is not looked into at all
+            source.execute("PRAGMA writable_schema = ON")  # without it SQLite refuses a file that was cut short
             source.text_factory = lambda data: data.decode("utf-8", errors="replace")
             for table in _TABLES:
                 found.columns[table], found.tables[table] = _readable(source, table, found.problems)
@@ -382,7 +384,7 @@ _INDEXED = {
 
 
 def _astray(source: sqlite3.Connection, table: str) -> set[int]:
-    """Rows that the table's index knows otherwise: one of the two is damaged, and an answer might be given to another image."""
+    """Rows that differ from the table's index: one of the two is damaged, and an answer might be assigned to another image."""
     if table not in _INDEXED:
         return set()
     same = " AND ".join(f"b.{name} IS a.{name}" for name in ("id", *_INDEXED[table]))

@@ -1,4 +1,4 @@
-"""What a rater draws and says about one image, what is measured from it (METHOD section 5), and the journal of edits for undo.
+"""What a rater draws and answers about one image, what is measured from it (METHOD section 5), and the journal of edits for undo.
 
 Everything a rater draws is kept in source pixels of the image as it is on disk, however it was shown.
 """
@@ -385,7 +385,7 @@ class History:
         return self._add("edit", self._now, action, content) if content != self.current else None
 
     def renewed(self, action: str) -> JournalEntry | None:
-        """What is in force once more, because its record was lost; None where nothing was ever said."""
+        """What is in force once more, because its record was lost; None for an empty annotation."""
         return self._add("edit", self._now, action, self.current) if self.current != Annotation() else None
 
     def undo(self) -> JournalEntry | None:

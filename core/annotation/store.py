@@ -425,7 +425,7 @@ class AnnotationStore:
             database.execute(ADD_LOOK, (key.study, key.rater, key.repeat, after, key.sha256))
 
     def given_after_look(self) -> set[ItemKey]:
-        """Annotations that were edited after their rater had been shown the algorithm's answer; older files tell none."""
+        """Annotations that were edited after their rater had been shown the algorithm's answer; older files do not record looks."""
         return self._keys(
             "looks l JOIN annotations a USING (image_id, study, rater, repeat)"
             " JOIN journal j ON j.annotation_id = a.id AND j.number > l.after"
@@ -483,7 +483,7 @@ class AnnotationStore:
 
     def _prepare(self, read_only: bool) -> None:
         database = self._database
-        # Bytes that are no text any more become replacement characters: the record's check sum tells, the others are read.
+        # Bytes that are not UTF-8 become replacement characters; the check sum of that record then differs.
         database.text_factory = lambda data: data.decode("utf-8", errors="replace")
         if not read_only:
             database.execute("PRAGMA locking_mode = EXCLUSIVE")

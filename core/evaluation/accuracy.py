@@ -226,7 +226,7 @@ def summarise_looks(
     ----------
     scores : of the frames.
     looks : family of every frame, by its stem.
-    unseen : families that training has left out; their mean is given by itself.
+    unseen : families that training has left out; their mean is separate.
     confident_from : as ``summarise`` has it.
 
     Returns

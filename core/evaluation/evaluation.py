@@ -124,7 +124,7 @@ def read_measurements(path: Path) -> list[Measurement]:
     lines = [line for line in text.splitlines() if line.strip()]
     if not lines:
         raise EvaluationError(f"{path}: empty; needs the columns {', '.join(COLUMNS)}")
-    # Spreadsheets may say in a line before the header what separates the cells.
+    # Spreadsheets may name the separator in a line before the header.
     said = re.fullmatch(r"sep=([,;\t])", lines[0].strip(' "'))
     separator = said[1] if said else max(",;\t", key=lines[0].count)
     table = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)

@@ -20,7 +20,7 @@ _NO_POSE_DEG = 180.0  # size of a change by which a pose was lost or gained
 
 @dataclass(frozen=True, slots=True)
 class FrameResult:
-    """What one perception says of a frame. ``head`` is in source pixels; one of ``theta_signed_deg`` and ``reason`` is set."""
+    """The result of one perception of a frame. ``head`` is in source pixels; one of ``theta_signed_deg`` and ``reason`` is set."""
 
     theta_signed_deg: float | None = None
     head: Point | None = None
@@ -75,8 +75,8 @@ class Change:
         return abs(self.theta_deg or 0.0)
 
 
-def seen(scene: Scene) -> FrameResult:
-    """What a scene says."""
+def frame_result(scene: Scene) -> FrameResult:
+    """The result of a scene."""
     pose, path = scene.pose, scene.path
     return FrameResult(
         pose.theta_signed_deg if pose else None,
@@ -120,7 +120,7 @@ def event_target(event: Event) -> Point | None:
 
 
 def changed_most(changes: Sequence[Change], count: int) -> list[Change]:
-    """The frames that changed most, largest first; equal ones in their order. Frames that say the same are left out."""
+    """The frames that changed most, largest first; equal ones in their order. Frames with equal results are left out."""
     differing = [c for c in changes if c.kind not in ("same state", "same reason") or c.size_deg > 0.0 or (c.head_px or 0.0) > 0.0]
     return sorted(differing, key=lambda c: (-c.size_deg, -(c.head_px or 0.0), c.row))[:count]
 
@@ -163,7 +163,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReplayTally:
-    """What is told of many frames. Tallies may be added; medians are of all frames then, not of medians.
+    """Sums over many frames. Tallies may be added; medians are of all frames then, not of medians.
 
     ``theta_deg`` and ``head_px`` are the absolute changes of the frames that have both; ``states`` the table of counts, rows
     before, columns after, in the order of ``STATES``; ``gained`` and ``lost`` refusals by reason; ``confidence`` and ``latency_ms``

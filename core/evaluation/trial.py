@@ -1,4 +1,4 @@
-"""The result of a closed-loop trial and the sums over many: pure numbers, whatever made them."""
+"""The result of a closed-loop trial and the sums over many: plain numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class TrialSample:
-    """One look at the truth during a trial; what is unknown is None.
+    """One sample of the truth during a trial; unknown values are None.
 
     ``head_mm`` lies on the board; ``offset_ratio`` is the head's distance from the centerline over the lumen's radius, ``d_px``
     that distance in working px; the errors are perception's.
@@ -47,7 +47,7 @@ class TrialLog:
     back_offs: int = 0
 
     def count(self, pose: Pose | None, refusal: str, wall_contact_n: float) -> None:
-        """Take in a frame: what perception said, and the contact force."""
+        """Count a frame: the result of perception, and the contact force."""
         if pose is not None:
             self.states[pose.state.value] += 1
         else:

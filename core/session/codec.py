@@ -82,7 +82,7 @@ def read_json(kind: type[Read], data: bytes) -> Read:
 
 
 def finite(value: float | None, digits: int) -> float | None:
-    """Rounded; None when it is missing or no finite number, as JSON knows none."""
+    """Rounded; None when it is missing or not finite, which JSON cannot hold."""
     return round(float(value), digits) if value is not None and math.isfinite(value) else None
 
 
@@ -475,7 +475,7 @@ class RecordedRow:
 
     @property
     def source_px_per_working_px(self) -> float:
-        """Places are told in source pixels, distances to the centerline (``c_head_px``, ``c_tail_px``) in working pixels."""
+        """For distances to the centerline (``c_head_px``, ``c_tail_px``), which are in working pixels."""
         return 1.0 / self.scene.scale
 
     def tick(self, image: Image) -> Tick:

@@ -133,8 +133,7 @@ def _append(file: FileIO, line: str, end: int) -> int:
 class LineFile:
     """A new file of JSON lines, each handed to the system at once. A line that cannot be written whole is taken back.
 
-    The lock on it lasts as long as this process: it tells a session that is being recorded from one that was cut. A drive without
-    locks knows only when it was last written to.
+    The lock on it lasts as long as this process: it distinguishes a session that is being recorded from one that was cut.
     """
 
     def __init__(self, path: Path) -> None:
@@ -355,7 +354,7 @@ class SessionFiles:
                 self._track.close()
             except VideoError as error:
                 problem = str(error)
-        # before the manifest says that all is well, all must be on the disk
+        # all must be on the disk before the manifest is closed
         _sync_files(self.folder, all_videos=True)
         self.counts.dropped = dropped
         changes = {"closed": not problem, "ended": name_as_text(ended), "ended_utc": datetime.now(UTC), "counts": self.counts}

@@ -39,7 +39,7 @@ _MAX_BYTES = 8_000_000
 _PACKAGES = ("av", "mujoco-core", "numba", "numpy", "opencv-python-headless", "openvino", "scikit-image", "scipy", "torch")
 
 Kind = Literal["SIM", "LIVE", "PLAYBACK", "UNKNOWN"]
-"""What the banner said; UNKNOWN only in a copy that was recovered without its manifest."""
+"""The banner's word; UNKNOWN only in a copy that was recovered without its manifest."""
 Origin = Literal["recorded", "last seconds"]
 
 
@@ -53,7 +53,7 @@ class NewerVersion(SessionError):
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """Where the pictures come from. ``calibration`` is whatever the rig knows of px and mm (None: not calibrated)."""
+    """Where the pictures come from. ``calibration`` is the rig's (None: not calibrated)."""
 
     kind: Kind
     rig: str

@@ -109,7 +109,7 @@ class _Pictures:
     Parameters
     ----------
     number_of : file and time in it (ms) -> number of the row, or None.
-    on_problem : is told of each file and each picture that cannot be read, once.
+    on_problem : gets a line for each file and each picture that cannot be read, once.
     """
 
     def __init__(self, folder: Path, number_of: Callable[[int, int], int | None], on_problem: Callable[[str], None]) -> None:
@@ -250,7 +250,7 @@ class _RowIndex:
 
     Parameters
     ----------
-    on_problem : is told of each bad record, in the thread.
+    on_problem : gets a line for each bad record, in the thread.
     """
 
     def __init__(self, path: Path, on_problem: Callable[[str], None]) -> None:

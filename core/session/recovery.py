@@ -37,7 +37,7 @@ from core.session.video import VideoError, packet_times, remux, video_number
 
 _PROBLEMS_KEPT = 50
 OnBytes = Callable[[int], None]
-"""Is told how many more bytes were read."""
+"""Called with the number of bytes that were read since the last call."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ class _Salvage:
     """What was found so far.
 
     ``rows`` are the numbers of all good rows, ``captured_s`` their times, ``expected`` the time in its video file (ms) and the row
-    number of each picture that they tell of, by file; ``kept`` are the files and times of the pictures that are there.
+    number of each of their pictures, by file; ``kept`` are the files and times of the pictures that are there.
     """
 
     problems: list[str] = field(default_factory=list)
@@ -196,7 +196,7 @@ class _Salvage:
 
 
 def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda _: None) -> Recovery:
-    """Repair a session into a copy beside it, or in `into`: ``<name>_recovered``. `on_bytes` hears how much was read.
+    """Repair a session into a copy beside it, or in `into`: ``<name>_recovered``. `on_bytes` is called with progress.
 
     Raises
     ------
@@ -274,7 +274,7 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
         on_bytes(path.stat().st_size)
     found.check_anything(session)
     if is_unknown and found.rows:
-        # The clock of the rows began at any time; the moment that the folder's name tells of is the first row's.
+        # The zero of the rows' clock is unknown; the time in the folder's name is that of the first row.
         manifest = manifest.model_copy(update={"started_monotonic_s": found.captured_s[0]})
     loss = _loss(session, manifest, found)
     counts = Counts(frames=len(found.rows), events=found.events, videos=found.videos)
@@ -296,12 +296,12 @@ def _unknown(session: Path) -> Manifest:
 
 
 def _loss(session: Path, manifest: Manifest, found: _Salvage) -> Loss:
-    """Rows that should be there and are not, pictures that rows tell of and that are not there, and how long all that lasted."""
-    told = {(video, pts_ms) for video, pictures in found.expected.items() for pts_ms in pictures}
-    pictures = len(told - found.kept)
+    """Rows that are missing, pictures of rows that are missing, and the time that both make up."""
+    expected = {(video, pts_ms) for video, pictures in found.expected.items() for pts_ms in pictures}
+    pictures = len(expected - found.kept)
     before = manifest.recovered  # of a copy that is recovered again: it has counted the rows that it has
     whole = max(found.rows[-1] + 1 if found.rows else 0, manifest.counts.frames + (before.rows if before else 0))
-    rows = max(whole - len(found.rows), len(found.kept - told))
+    rows = max(whole - len(found.rows), len(found.kept - expected))
     seconds = (pictures + rows) * found.period_s()
     if found.last_event_s is not None and found.rows and not manifest.closed:
         seconds = max(seconds, found.last_event_s - found.captured_s[-1])  # it was recording at least until its last event

@@ -57,7 +57,7 @@ class Packet:
 class FrameEncoder:
     """Turns pictures of one size into packets, one for one and without delay.
 
-    Its packets may go to several files, each beginning at a key picture; `template` tells those files what is in them.
+    Its packets may go to several files, each beginning at a key picture; `template` describes the stream to those files.
     """
 
     def __init__(self, size: tuple[int, int], config: RecordConfig) -> None:
@@ -164,7 +164,7 @@ def _words(error: Exception) -> str:
 
 _SQUARE = 0.005
 _MOST_ASPECT = 4.0
-"""No camera's pixels are so much wider than high, or higher than wide: what a file says beyond that is damaged."""
+"""No camera has pixels of a larger aspect: beyond it the file is damaged."""
 
 
 class NoPictures(ValueError):
@@ -180,7 +180,7 @@ def open_video(path: Path) -> InputContainer:
 
 
 def pictures_of(container: InputContainer) -> av.VideoStream:
-    """The stream that is looked at: the first video. Raises NoPictures."""
+    """The first video stream, which is the one that is decoded. Raises NoPictures."""
     if not container.streams.video:
         raise NoPictures("has no video in it")
     stream = container.streams.video[0]
@@ -190,7 +190,7 @@ def pictures_of(container: InputContainer) -> av.VideoStream:
 
 
 def is_avi(container: InputContainer) -> bool:
-    """Whether nothing in the file says when a picture is shown."""
+    """Whether the file has no presentation times."""
     return container.format.name == "avi"
 
 
@@ -204,15 +204,15 @@ class UndecodablePicture:
 def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.VideoFrame | UndecodablePicture]:
     """Each picture from here on, in order.
 
-    Decoders conceal damage: they show something, until the next picture that stands for itself, and that must not be measured.
-    Damage that the decoder does not notice (another content of the right form) passes. Raises av.error.FFmpegError where the file
+    Decoders conceal damage until the next key picture; concealed pictures must not be measured.
+    Damage that the decoder does not notice passes. Raises av.error.FFmpegError where the file
     itself cannot be read on.
     """
     is_whole, waiting = True, list[int]()
     broken_pts: int | None = None
     # Of other codecs packets may rightly give no picture.
     gives_all = stream.codec_context.name == "h264"
-    # An AVI knows no times: packets of H.264 are counted there in the order in which they are decoded, not shown.
+    # An AVI has no presentation times: packets of H.264 are numbered in the order of decoding, not of showing.
     is_counted = gives_all and is_avi(container)
     for packet in container.demux(stream):
         if gives_all and packet.pts is not None and packet.size and not packet.is_discard:
@@ -227,7 +227,7 @@ def decoded(container: InputContainer, stream: av.VideoStream) -> Iterator[av.Vi
                 yield UndecodablePicture(packet.pts)
             continue
         for frame in frames:
-            # One that had gone in before the damage, and comes out after it, says nothing of what follows.
+            # A key picture from before the damage may come out after it.
             stands_alone = frame.key_frame and (broken_pts is None or frame.pts is None or frame.pts > broken_pts)
             if is_counted:
                 while frame.key_frame and waiting and frame.pts is not None and waiting[0] < frame.pts:
@@ -251,13 +251,13 @@ def upright(frame: av.VideoFrame, stream: av.VideoStream | None = None) -> Image
         frame = frame.reformat(width=max(1, round(frame.width * aspect)), height=frame.height, format="rgb24")
     image = np.asarray(frame.to_ndarray(format="rgb24"), np.uint8)
     turns = round(frame.rotation / 90) % 4  # to the left
-    if _is_mirrored(frame):  # what it says of the turn is of the picture as it would be without that
+    if _is_mirrored(frame):  # the rotation is that of the picture before mirroring
         return np.ascontiguousarray(np.rot90(image, -turns)[::-1])
     return np.ascontiguousarray(np.rot90(image, turns)) if turns else image
 
 
 def _is_mirrored(frame: av.VideoFrame) -> bool:
-    """Whether the file shows it as in a mirror: the determinant of its display matrix, 3x3 numbers in 16.16 bits, says so."""
+    """By the determinant of the display matrix (3x3 numbers of 16.16 bits)."""
     matrix = frame.side_data.get("DISPLAYMATRIX")
     if not isinstance(matrix, SideData):
         return False
@@ -265,7 +265,7 @@ def _is_mirrored(frame: av.VideoFrame) -> bool:
     return bool(across_x * down_y - across_y * down_x < 0)
 
 
-_MAX_STEP_MS = 5_000  # a larger step between pictures of which no row tells is a damaged time
+_MAX_STEP_MS = 5_000  # a larger step to a picture without a row is a damaged time
 NumberOf = Callable[[int], int | None]
 """Time in the file (ms) -> number of the row whose picture it is; None: no row has it."""
 
@@ -324,7 +324,7 @@ def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int]
 
     Parameters
     ----------
-    rows : time (ms) -> row number of the pictures that rows tell of.
+    rows : time (ms) of a picture -> number of its row.
 
     Returns
     -------

@@ -56,8 +56,8 @@ class RecordStatus:
     warning : disk nearly full, in plain words.
     problem : why the recording stopped, or could not start; empty when all is well. The next start clears it.
     is_disk_full : the disk is why.
-    problems : how often there was one: the same twice is told twice.
-    notice : the last thing to say of "save the last seconds" that went wrong; `notices` counts them.
+    problems : how often there was one; a repetition counts.
+    notice : what last went wrong with "save the last seconds"; `notices` counts them.
     ring_s : how much "save the last seconds" would give now.
     saving : the last seconds are being written.
     saved : the newest session that was completed, by stop or from the ring.
@@ -111,7 +111,7 @@ class _SharedStatus:
             self.now = replace(self.now, problem=problem, is_disk_full=is_disk_full, problems=self.now.problems + 1)
 
     def notify(self, text: str) -> None:
-        """Something to say that stops no recording."""
+        """A message that does not stop the recording."""
         with self._lock:
             self.now = replace(self.now, notice=text, notices=self.now.notices + 1)
 
@@ -247,7 +247,7 @@ class RingSaver:
             problem = f"{error.filename or self._parent}: {error.strerror or error}"
         finally:  # also after an unexpected error, which goes on to the log
             try:
-                if files is not None:  # the folder itself must say that it is not whole
+                if files is not None:  # its manifest must record that it is incomplete
                     lost = frames[-1].dropped - frames[0].dropped + len(frames) - written
                     at_end = files.close(problem or "saved from memory", lost)
                     problem = problem or at_end
@@ -268,7 +268,7 @@ class RingSaver:
 
 
 def _beginning(first: EncodedFrame, events: Sequence[Event]) -> Iterator[Event]:
-    """Mode and faults at the first frame, which every session must tell by itself; nothing where the ring has the beginning."""
+    """Mode and faults at the first frame, which every session must hold; none where the ring has the beginning."""
     drive = json.loads(first.row)["drive"]
     mode = next((event for event in events if event.kind is EventKind.MODE), None)
     if drive is None or (mode is not None and "from" not in mode.data):
@@ -375,7 +375,7 @@ class Recording:
         return EncodedFrame(frame.captured_s, packet, self._encoder, written, picture.dropped)
 
     def write_drive(self, view: DriveView) -> None:
-        """Write what changed since the last view; one that is overtaken by a newer one tells nothing new. Raises OSError."""
+        """Write what changed since the last view; one that is older than the last is ignored. Raises OSError."""
         if self._drive is not None and view.time_s < self._drive.time_s:
             return
         for event in events_between(self._drive, view):
@@ -443,7 +443,7 @@ class Recording:
         self._status.update(armed=False, recording=True, folder=self._files.folder, frames=0, bytes=self._files.counts.bytes)
         drive = picture.drive or self._drive
         if drive is not None:
-            # the session must tell by itself how it began
+            # every session holds how it began
             self._drive = replace(drive, time_s=first_s)
             self._files.write_event(next(events_between(None, self._drive)))
             for fault in drive.active:
@@ -559,7 +559,7 @@ class SessionWriter:
         self._enqueue_end(lambda dropped: self._recording.end(ended, dropped))
 
     def save_last(self) -> None:
-        """Write what the ring holds as a session, in the background; the status tells when it is there."""
+        """Write what the ring holds as a session, in the background; the status says when it is complete."""
         self._enqueue(self._recording.save_ring)
 
     def set_about(self, about: About) -> None:
@@ -603,7 +603,7 @@ class SessionWriter:
 
     @property
     def is_alive(self) -> bool:
-        """False once it is closed, or has ended because of a fault of the program: the status tells which."""
+        """False once it is closed, or has ended because of a fault of the program (see the status)."""
         return self._thread.is_alive()
 
     @property
@@ -708,7 +708,7 @@ class SessionWriter:
 
 
 def _is_disk_full(error: BaseException | None) -> bool:
-    """Whether an error, or the one that it was made of, says that there is no room: on the disk, or for this user."""
+    """Whether an error or its cause is a full disk or an exceeded quota."""
     while error is not None:
         if getattr(error, "errno", None) in {errno.ENOSPC, errno.EDQUOT}:
             return True

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from core.evaluation.replay import Change, FrameResult, RecordedTargets, ReplayTally, Run, changed_most, runs, seen
+from core.evaluation.replay import Change, FrameResult, RecordedTargets, ReplayTally, Run, changed_most, frame_result, runs
 from core.session.codec import row_from_json, row_of
 from core.session.manifest import Event, EventKind
 from core.types import PoseState, Reason
@@ -105,7 +105,7 @@ def test_lost_poses_are_told_as_runs() -> None:
 
 
 def test_what_a_scene_says() -> None:
-    said = seen(full_scene(4, 2.0))
+    said = frame_result(full_scene(4, 2.0))
     assert (said.theta_signed_deg, said.state, said.confidence, said.reason, said.total_ms) == (-5.5, D, 0.875, None, 20.25)
     assert said.head == pytest.approx((49.0, 32.0 - 0.1535), abs=0.5)
 
