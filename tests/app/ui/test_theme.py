@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from itertools import combinations
 
+import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
@@ -16,19 +17,18 @@ from pytestqt.qtbot import QtBot
 from app.operator.window import OperatorWindow
 from app.player.course import MARK_LOOK
 from app.ui import theme
-from app.ui.theme import DARK, LIGHT, ON_PICTURE, Scheme
+from app.ui.theme import DARK, LIGHT, ON_PICTURE, Scheme, fitted, semi_bold
 from app.widgets.alerts import LOOK
 from app.widgets.event_log import LogKind
 from app.widgets.messages import NoticeKind
 from app.widgets.mode_bar import MODE_LOOK
 from app.widgets.servo_table import TONE_ROLE
-from app.widgets.state_badge import StateBadge
+from app.widgets.state_badge import StateBadge, state_outline
 from app.widgets.theta_gauge import ThetaGauge
 from app.widgets.trend_plot import TrendPlot
 from core.config.models import PoseConfig
 from core.types import PoseState
 from tests.app.fakes import make_pose, make_scene, until
-from tests.app.ui.test_palette import _as_deuteranope
 
 ROLES = [field.name for field in fields(Scheme)]
 SURFACES = ("WINDOW", "PANEL", "RAISED")
@@ -157,3 +157,52 @@ def test_a_running_window_follows(running: OperatorWindow, qapp: QApplication, q
     assert running.panels.badge.grab().toImage().pixelColor(1, 1).name().upper() == LIGHT.PANEL
     shown = running.shown_tick
     until(qtbot, lambda: running.shown_tick is not shown)
+
+
+def test_contrast_after_wcag() -> None:
+    assert theme.contrast("#000000", "#FFFFFF") == pytest.approx(21.0)
+    assert theme.contrast("#777777", "#FFFFFF") == pytest.approx(4.48, abs=0.01)
+
+
+@pytest.mark.parametrize("text", [theme.TEXT, theme.TEXT_DIM, theme.TEXT_FAINT, theme.FAULT, theme.D_HEAD, theme.THETA])
+@pytest.mark.parametrize("ground", [theme.WINDOW, theme.PANEL, theme.RAISED])
+def test_text_can_be_read_on_every_surface(text: str, ground: str) -> None:
+    assert theme.contrast(text, ground) >= 4.5
+
+
+def test_letters_can_be_read_on_their_state() -> None:
+    for state in PoseState:
+        assert theme.contrast(theme.INK, theme.STATE_COLOUR[state]) >= 4.5
+
+
+def _as_deuteranope(name: str) -> np.ndarray:
+    """Viénot, Brettel and Mollon (1999), linear RGB."""
+    linear = (np.array(theme.rgb(name)) / 255.0) ** 2.2
+    matrix = np.array([[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]])
+    return np.clip(matrix @ linear, 0, 1) ** (1 / 2.2)
+
+
+def test_state_colours_differ_for_a_deuteranope() -> None:
+    for first, second in combinations(PoseState, 2):
+        gap = np.linalg.norm(_as_deuteranope(theme.STATE_COLOUR[first]) - _as_deuteranope(theme.STATE_COLOUR[second]))
+        assert gap > 0.12, (first, second)
+
+
+def test_states_differ_in_shape_too() -> None:
+    """At least a tenth of the larger of two shapes lies outside the other one."""
+
+    def filled(state: PoseState) -> np.ndarray:
+        canvas = np.zeros((220, 220), np.uint8)
+        cv2.fillPoly(canvas, [np.round(110 + 100 * state_outline(state)).astype(np.int32)], 1)
+        return canvas.astype(bool)
+
+    for first, second in combinations(PoseState, 2):
+        one, other = filled(first), filled(second)
+        assert (one ^ other).sum() > 0.1 * max(one.sum(), other.sum()), (first, second)
+
+
+def test_text_is_fitted_to_its_place(themed: None) -> None:
+    font = semi_bold(40)
+    assert fitted(font, "Moving away", 10_000).pixelSize() == 40
+    assert fitted(font, "Moving away", 120).pixelSize() < 30
+    assert fitted(font, "Moving away", 1).pixelSize() == 11

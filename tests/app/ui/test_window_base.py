@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -36,8 +38,10 @@ from app.annotator.canvas import CANVAS_KEYS
 from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
 from app.player.window import PlayerWindow
-from app.ui.actions import ICON, KEY_HINT, MenuEntry, add_menu, key_name, key_names, menu_tables, mnemonic, plain, program_version
+from app.ui import window_base
+from app.ui.actions import KEY_HINT, MenuEntry, add_menu, key_name, key_names, menu_tables, mnemonic, plain, program_version
 from app.ui.texts import STOP_KEY, OperatorStep
+from app.ui.window_base import GuiLatencyMonitor, run_until_closed
 from app.widgets.jog_panel import KEYS
 from app.widgets.scene_overlay import Layer
 from core.annotation.model import ImageView
@@ -187,10 +191,6 @@ def test_about_says_what_it_is_not(window: QMainWindow) -> None:
     assert program_version() in box.text()
     assert not box.iconPixmap().isNull()
     box.close()
-
-
-def test_the_icon_is_there() -> None:
-    assert ICON.is_file()
 
 
 # ---- the page of keys
@@ -369,3 +369,60 @@ def test_tab_reaches_every_button_list_and_field_of_the_drive_page(make_window: 
             reached.add(_named(place))
     assert {"Phantom", "Speed by hand", "Another random phantom", "STOP"} <= reached
     assert any(name.startswith("Servos on") or name.startswith("Arm") for name in reached)
+
+
+def test_a_busy_slot_is_measured(qtbot: QtBot) -> None:
+    beat, began_s = GuiLatencyMonitor(), time.monotonic()
+    beat.start()
+    qtbot.wait(60)
+    time.sleep(0.15)  # what a slow slot does
+    qtbot.wait(40)
+    assert 120 <= beat.max_block_ms <= 1000 * (time.monotonic() - began_s), "in milliseconds"
+    beat.stop()
+
+
+def test_blocks_are_forgotten_after_the_window(monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> None:
+    now = [50.0]
+    monkeypatch.setattr(window_base.time, "monotonic", lambda: now[0])
+    beat = GuiLatencyMonitor(window_s=10.0)
+    for step_s in (0.0, 0.010, 0.110, 0.010, 0.060):
+        now[0] += step_s
+        beat._beat()
+    assert beat.max_block_ms == pytest.approx(100.0)
+    now[0] += 10.0 - 0.065
+    beat._last_s = now[0] - 0.010
+    beat._beat()
+    assert beat.max_block_ms == pytest.approx(50.0), "the block of 100 ms is older than ten seconds"
+
+
+@pytest.fixture(autouse=True)
+def handlers() -> Iterator[None]:
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in kept.items():
+        signal.signal(number, handler)
+
+
+class Window:
+    def __init__(self) -> None:
+        self.done: list[str] = []
+
+    def show(self) -> None:
+        self.done.append("show")
+
+    def start(self) -> None:
+        self.done.append("start")
+
+    def shut_down(self) -> None:
+        self.done.append("shut down")
+
+
+def test_what_goes_wrong_after_the_start_leaves_no_thread_running(qapp: QApplication) -> None:
+    def fail() -> None:
+        raise RuntimeError("no such order")
+
+    window = Window()
+    with pytest.raises(RuntimeError, match="no such order"):
+        run_until_closed(qapp, window, lambda *_: None, fail)  # type: ignore[arg-type]
+    assert window.done == ["show", "start", "shut down"]
+    qapp.aboutToQuit.disconnect(window.shut_down)
