@@ -1,4 +1,4 @@
-"""The thread around the engine: opens the rig, turns the loop, hands the newest tick to the window."""
+"""The thread of the engine: opens the rig, runs the loop, hands the newest tick to the window."""
 
 from __future__ import annotations
 
@@ -86,17 +86,17 @@ class EngineThread(QThread):
         self._engine: EngineLike | None = None
 
     def end_engine(self) -> None:
-        """From now on no tick of the running engine is handed over; it is closed soon."""
+        """Hand over no tick of the running engine any more; it is closed soon."""
         with self._lock:
             self._changed.set()
 
     def announce_engine(self) -> None:
-        """One will be started soon: a STOP until then is kept for it."""
+        """An engine will be started soon: a STOP until then is kept for it."""
         with self._lock:
             self._opening = True
 
     def start_engine(self, open_engine: OpenEngine) -> None:
-        """Close what runs and open this engine instead; of several orders in a row the last one wins."""
+        """Close the running engine and open this one; the last of several orders wins."""
         with self._lock:
             self._order = open_engine
             self._opening = True
@@ -112,19 +112,19 @@ class EngineThread(QThread):
 
     @property
     def pilot(self) -> Pilot | None:
-        """The running engine's; None when there is no engine, or nobody to drive."""
+        """The running engine's; None without an engine or a robot."""
         engine = self._engine
         return engine.pilot if engine is not None else None
 
     @property
     def problem(self) -> str | None:
-        """Why there are no pictures although the rig is open; None when nothing is known to be wrong."""
+        """Why the open rig gives no pictures, where that is known."""
         engine = self._engine
         return engine.problem if engine is not None else None
 
     @property
     def is_ending(self) -> bool:
-        """The running engine is not wanted any more; what it still says belongs to nobody."""
+        """Whether the running engine is about to be closed; what it still reports is dropped."""
         return self._changed.is_set()
 
     def stop_opening(self) -> bool:
@@ -188,7 +188,7 @@ class EngineThread(QThread):
                 self._engine = engine
                 self._opened(engine)
                 self._report(EngineStatus(EnginePhase.RUNNING))
-                # In a thread of its own: what another engine will start (pilot, servos) must not wait behind perception.
+                # In a thread of its own: what the next engine starts (pilot, servos) must not wait behind perception.
                 with ThreadPoolExecutor(1, "engine turns", lower_priority) as turns:
                     turns.submit(self._turn, engine).result()
         finally:
@@ -198,7 +198,7 @@ class EngineThread(QThread):
                 self._engine = None
 
     def _opened(self, engine: EngineLike | None) -> None:
-        """What was stopped before it was there is stopped now; where it could not be opened the next one is."""
+        """Apply a STOP that was kept for the engine; without an engine it is kept for the next one."""
         with self._lock:
             self._opening = self._order is not None
             stop = self._stop_next and engine is not None
@@ -212,7 +212,7 @@ class EngineThread(QThread):
             if tick is None:
                 continue
             with self._lock:
-                if self._changed.is_set():  # what this engine saw last must not be taken for the next one's
+                if self._changed.is_set():  # its last tick must not be taken for one of the next engine
                     return
                 if (on_tick := self.on_tick) is not None:
                     on_tick(tick)

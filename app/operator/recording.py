@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -284,56 +285,31 @@ class RecoveryController(QObject):
 
     def _measure_next(self) -> None:
         """How much would be lost is measured before the operator is asked."""
-        if not self._waiting:
-            return
-        session = self._waiting[0].folder
-        told: dict[str, Any] = {}
-        self._run("--only-look", session, told.update, lambda code, line: self._on_measured(session, told, code, line))
+        if self._waiting:
+            self._run("--only-look", self._waiting[0].folder, lambda _record: None, self._on_measured, self._measure_next)
 
     def _on_measured(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
-        self._child = None
         lost = told.get("lost")
-        if _is_inconclusive(code):
-            self._offer_again(session, code, line, self._measure_next)
-            return
+        never = OfferButton(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one"))
         if code != 0 or not isinstance(lost, dict):
-            never = OfferButton(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one"))
             text = tr("A recording was cut, and it cannot be recovered")
-            self._offers.offer(Offer(_KEY, text, line or session.name, (never,), is_fault=True, dismissed=self._next))
+            self._ask(text, line or session.name, (never,), is_fault=True)
             return
-        place = (
-            tr(" ({place} of {count})", place=self._found - len(self._waiting) + 1, count=self._found) if self._found > 1 else ""
-        )
-        text = tr("A recording was cut{place}: {loss}", place=place, loss=loss_words(lost))
+        number = self._found - len(self._waiting) + 1
+        place = tr(" ({place} of {count})", place=number, count=self._found) if self._found > 1 else ""
         kept = tr("{count} pictures are whole", count=told.get("pictures", 0))
-        self._offers.offer(
-            Offer(
-                _KEY,
-                text,
-                tr("{name}; {kept}. The damaged original stays as it is.", name=session.name, kept=kept),
-                (
-                    OfferButton(
-                        tr("Recover"), lambda: self._recover(session), tr("Make a whole copy beside {session}", session=session)
-                    ),
-                    OfferButton(tr("Not now"), self._next, tr("Ask again at the next start")),
-                    OfferButton(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one")),
-                ),
-                dismissed=self._next,
-            )
+        recover = tr("Make a whole copy beside {session}", session=session)
+        self._ask(
+            tr("A recording was cut{place}: {loss}", place=place, loss=loss_words(lost)),
+            tr("{name}; {kept}. The damaged original stays as it is.", name=session.name, kept=kept),
+            (OfferButton(tr("Recover"), lambda: self._recover(session), recover), self._not_now(), never),
         )
 
-    def _offer_again(self, session: Path, code: int, line: str, again: Callable[[], None]) -> None:
-        """The session may well be recovered at another time, so it is not declined."""
-        if code == NOT_STARTED:
-            text = tr("A recording was cut; the program that recovers it could not be started")
-        else:
-            text = tr("A recording was cut; the program that recovers it was ended from outside")
-        why = f": {tr_text(line)}" if line else ""
-        answers = (
-            OfferButton(tr("Try again"), again, tr("Once there is memory and room on the disk, for instance")),
-            OfferButton(tr("Not now"), self._next, tr("Ask again at the next start")),
-        )
-        self._offers.offer(Offer(_KEY, text, f"{session.name}{why}", answers, is_fault=True, dismissed=self._next))
+    def _ask(self, text: str, detail: str, answers: tuple[OfferButton, ...], *, is_fault: bool = False) -> None:
+        self._offers.offer(Offer(_KEY, text, detail, answers, is_fault=is_fault, dismissed=self._next))
+
+    def _not_now(self) -> OfferButton:
+        return OfferButton(tr("Not now"), self._next, tr("Ask again at the next start"))
 
     def _next(self) -> None:
         self._waiting.pop(0)
@@ -347,27 +323,15 @@ class RecoveryController(QObject):
         self._next()
 
     def _recover(self, session: Path) -> None:
-        told: dict[str, Any] = {}
+        def show_share(record: dict[str, Any]) -> None:
+            done, total = record.get("done"), record.get("total")
+            share = min(1.0, done / total) if done is not None and total else -1.0
+            self._offers.offer(Offer(_KEY, tr("Recovering a copy"), session.name, share=share))
 
-        def on_told(record: dict[str, Any]) -> None:
-            if "done" in record:  # progress
-                self._show_share(session, record)
-            else:
-                told.update(record)
-
-        self._show_share(session, {})
-        self._run("--progress-json", session, on_told, lambda code, line: self._on_recovered(session, told, code, line))
-
-    def _show_share(self, session: Path, record: dict[str, Any]) -> None:
-        done, total = record.get("done"), record.get("total")
-        share = min(1.0, done / total) if done is not None and total else -1.0
-        self._offers.offer(Offer(_KEY, tr("Recovering a copy"), session.name, share=share))
+        show_share({})
+        self._run("--progress-json", session, show_share, self._on_recovered, lambda: self._recover(session))
 
     def _on_recovered(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
-        self._child = None
-        if _is_inconclusive(code):
-            self._offer_again(session, code, line, lambda: self._recover(session))
-            return
         self._offers.withdraw(_KEY)
         if code == 0 and "session" in told:
             words = loss_words(told["lost"])
@@ -378,17 +342,39 @@ class RecoveryController(QObject):
         self._next()
 
     def _run(
-        self, option: str, session: Path, on_told: Callable[[dict[str, Any]], None], on_ended: Callable[[int, str], None]
+        self,
+        option: str,
+        session: Path,
+        on_progress: Callable[[dict[str, Any]], None],
+        on_result: Callable[[Path, dict[str, Any], int, str], None],
+        again: Callable[[], None],
     ) -> None:
+        told: dict[str, Any] = {}
+
+        def on_told(record: dict[str, Any]) -> None:
+            if "done" in record:
+                on_progress(record)
+            else:
+                told.update(record)
+
+        def on_ended(code: int, line: str) -> None:
+            self._child = None
+            if code != NOT_STARTED and code >= 0:
+                on_result(session, told, code, line)
+                return
+            # It never began, or a signal ended it: the session may well be recovered at another time.
+            if code == NOT_STARTED:
+                text = tr("A recording was cut; the program that recovers it could not be started")
+            else:
+                text = tr("A recording was cut; the program that recovers it was ended from outside")
+            why = f": {tr_text(line)}" if line else ""
+            retry = OfferButton(tr("Try again"), again, tr("Once there is memory and room on the disk, for instance"))
+            self._ask(text, f"{session.name}{why}", (retry, self._not_now()), is_fault=True)
+
         self._child = ChildProcess(command_of("session", "recover", str(session), option, "--json"), self)
         self._child.told.connect(on_told)
         self._child.ended.connect(on_ended)
         self._child.start()
-
-
-def _is_inconclusive(code: int) -> bool:
-    """Whether the process never began, or a signal ended it: that says nothing about the session."""
-    return code == NOT_STARTED or code < 0
 
 
 def loss_words(lost: dict[str, Any]) -> str:
@@ -438,23 +424,18 @@ class AfterSession(QObject):
     def offer(self, session: Path, text: str = mark("Session saved")) -> None:
         """A session has ended, or was recovered; `text` says which."""
         self.session = session
+        report = tr("The algorithm against angles measured by hand, as a report")
+        measure = tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES)
         answers = (
-            OfferButton(
-                tr("Evaluate"), lambda: self.evaluate(session), tr("The algorithm against angles measured by hand, as a report")
-            ),
-            OfferButton(
-                tr("Annotate"),
-                lambda: self.annotate(session),
-                tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES),
-            ),
-            OfferButton(tr("Play"), lambda: self.play(session), tr("The player, with everything as it was understood")),
+            OfferButton(tr("Evaluate"), partial(self.evaluate, session), report),
+            OfferButton(tr("Annotate"), partial(self.annotate, session), measure),
+            OfferButton(tr("Play"), partial(self.play, session), tr("The player, with everything as it was understood")),
         )
-        self._offers.offer(
-            Offer(_OFFER, tr_text(text), tr("{name}, in {parent}", name=session.name, parent=session.parent), answers)
-        )
+        detail = tr("{name}, in {parent}", name=session.name, parent=session.parent)
+        self._offers.offer(Offer(_OFFER, tr_text(text), detail, answers))
 
     def withdraw(self) -> None:
-        """Another recording has begun: the offer is outdated."""
+        """Another recording has begun."""
         self._offers.withdraw(_OFFER)
 
     def close(self) -> None:
@@ -469,15 +450,8 @@ class AfterSession(QObject):
 
     def annotate(self, session: Path) -> None:
         """The annotation tool on pictures evenly over the session."""
-        self._open(
-            tr("Opening the annotation tool: {name}", name=session.name),
-            "annotate",
-            str(session),
-            "--frames",
-            str(FRAMES),
-            "--order",
-            "even",
-        )
+        options = ("--frames", str(FRAMES), "--order", "even")
+        self._open(tr("Opening the annotation tool: {name}", name=session.name), "annotate", str(session), *options)
 
     def play(self, session: Path) -> None:
         """The player."""
@@ -504,19 +478,15 @@ class AfterSession(QObject):
         if "done" not in record:
             told.update(record)
             return
-        done, total = record["done"], record["total"]
+        done, total, what = record["done"], record["total"], tr_text(record["what"])
         left = tr(", {left:.0f} s left", left=record["left_s"]) if record.get("left_s") else ""
-        self._show_share(
-            session,
-            done / total if total else -1.0,
-            tr("{done:.0f} of {total:.0f} {what}{left}", done=done, total=total or 0, what=tr_text(record["what"]), left=left),
-        )
+        detail = tr("{done:.0f} of {total:.0f} {what}{left}", done=done, total=total or 0, what=what, left=left)
+        self._show_share(session, done / total if total else -1.0, detail)
 
     def _show_share(self, session: Path, share: float, detail: str) -> None:
         cancel = OfferButton(tr("Cancel"), self._cancel, tr("Stop; a report of before stays"))
-        self._offers.offer(
-            Offer(_WORK, tr("Evaluating {name}", name=session.name), detail, (cancel,), share=share, dismissed=self._cancel)
-        )
+        text = tr("Evaluating {name}", name=session.name)
+        self._offers.offer(Offer(_WORK, text, detail, (cancel,), share=share, dismissed=self._cancel))
 
     def _cancel(self) -> None:
         child, self._evaluation = self._evaluation, None
@@ -530,27 +500,20 @@ class AfterSession(QObject):
         self._offers.withdraw(_WORK)
         if code == 0:
             report = session / "evaluation" / REPORT
-            shown = self._show_file(report)
-            judged = tr(
-                "{answered} of {measured} pictures answered", answered=told.get("answered", 0), measured=told.get("measured", 0)
-            )
-            self.said.emit(
-                (
-                    tr("Evaluated: {judged}. Report opened: {report}", judged=judged, report=report)
-                    if shown
-                    else tr("Evaluated: {judged}. The report is: {report}", judged=judged, report=report)
-                ),
-                False,
-            )
+            answered, measured = told.get("answered", 0), told.get("measured", 0)
+            judged = tr("{answered} of {measured} pictures answered", answered=answered, measured=measured)
+            if self._show_file(report):
+                self.said.emit(tr("Evaluated: {judged}. Report opened: {report}", judged=judged, report=report), False)
+            else:
+                self.said.emit(tr("Evaluated: {judged}. The report is: {report}", judged=judged, report=report), False)
         elif "no finished annotation" in line:
             self._needs_annotations(session, tr("No picture is measured to the end yet: both lines and a state, or can't tell"))
         else:
             self.said.emit(tr("Not evaluated: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
 
     def _needs_annotations(self, session: Path, why: str) -> None:
-        measure = OfferButton(
-            tr("Annotate"), lambda: self.annotate(session), tr("{frames} pictures, evenly over the session", frames=FRAMES)
-        )
+        pictures = tr("{frames} pictures, evenly over the session", frames=FRAMES)
+        measure = OfferButton(tr("Annotate"), partial(self.annotate, session), pictures)
         detail = tr("The annotation tool takes {frames} pictures, evenly over the session. Then evaluate again.", frames=FRAMES)
         self._offers.offer(Offer(_OFFER, why, detail, (measure,)))
 

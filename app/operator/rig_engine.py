@@ -1,4 +1,4 @@
-"""Opens a rig and puts engine and pilot on it; the window's thread runs what comes out."""
+"""Opens a rig with its engine and pilot; the engine's thread runs it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-from core.config.models import Config, PerceptionConfig, SegmentationConfig
+from core.config.models import Config, PerceptionConfig
 from core.config.rig_file import as_calibrated
 from core.control.engine import Engine, Perceive
 from core.control.health import ModelReport
@@ -36,10 +36,10 @@ class RigEngine(Engine):
         self._network: Pipeline | None = None
         self._knows_past = True
         if pilot is not None and rig.kind is RigKind.SIM and left_over is None:
-            pilot.switch_on()  # there is nobody whom the twin could hurt
+            pilot.switch_on()  # the twin can hurt no one
 
     def use_network(self, network: Pipeline, *, knows_past: bool) -> None:
-        """What ``set_perception`` makes others from; without a past every frame stands by itself."""
+        """What ``set_perception`` changes; without `knows_past` every frame is perceived by itself."""
         self._network, self._knows_past = network, knows_past
 
     def set_perception(self, config: PerceptionConfig) -> bool:
@@ -60,8 +60,8 @@ class RigEngine(Engine):
 class EngineMaker:
     """Opens rig and engine for a configuration, in the engine's thread, one at a time.
 
-    The network is loaded once and kept. So is what the operator has not acknowledged when a rig is closed: starting again is no
-    acknowledgement, or F5 would clear a latched STOP.
+    The network is loaded once and kept. What the operator has not acknowledged when a rig is closed is kept, too, or F5 would clear
+    a latched STOP.
 
     `ahead` is what ``start_ahead`` gave for the first rig.
     """
@@ -76,7 +76,7 @@ class EngineMaker:
     def __call__(self, config: Config) -> RigEngine:
         """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
         config = as_calibrated(config)
-        if self._pilot is not None:  # a rig that could not be opened, or that nobody drives, acknowledges nothing either
+        if self._pilot is not None:  # nor does a rig that cannot be opened acknowledge anything
             self._left_over, self._pilot = self._pilot.left_over, None
             release_memory()
         with ExitStack() as undo, ThreadPoolExecutor(1, "network", lower_priority) as beside:
@@ -113,7 +113,7 @@ class EngineMaker:
                 self._perceive.warm_up()
                 self._loaded = config
             except ModelError as error:
-                # Not remembered: once the model is restored, starting the rig again is enough.
+                # Not kept: once the model is restored, starting the rig again is enough.
                 return NoPerception(str(error)), ModelReport(False, str(error))
         assert self._perceive is not None
         return self._perceive, ModelReport(True)
@@ -126,12 +126,9 @@ class EngineMaker:
 
 
 def _same_network(first: PerceptionConfig, second: PerceptionConfig) -> bool:
-    """Whether only thresholds differ: what the network itself is set to is the same."""
-    return _network_of(first.segmentation) == _network_of(second.segmentation)
-
-
-def _network_of(config: SegmentationConfig) -> SegmentationConfig:
-    return config.model_copy(update={"vessel_threshold": 0.5, "robot_threshold": 0.5})
+    """Whether only thresholds differ."""
+    thresholds = {"vessel_threshold": 0.5, "robot_threshold": 0.5}
+    return first.segmentation.model_copy(update=thresholds) == second.segmentation.model_copy(update=thresholds)
 
 
 def leaving_a_core(config: PerceptionConfig) -> PerceptionConfig:

@@ -384,8 +384,7 @@ class SettingsDialog(QDialog):
             return
         self.page.add_all()
         if key not in self.page.fields:
-            self.search.clear()
-            self._search_soon.stop()
+            self._leave_search()
             self.show_section(section)
         self.page.go_to(key)
 
@@ -450,13 +449,8 @@ class SettingsDialog(QDialog):
                 if item.text(1) == mark and item.toolTip(0):
                     continue
                 item.setText(1, mark)
-                words = (
-                    tr("something is not allowed")
-                    if is_wrong
-                    else tr("{count} differ from the default", count=count)
-                    if count
-                    else tr("as by default")
-                )
+                words = tr("{count} differ from the default", count=count) if count else tr("as by default")
+                words = tr("something is not allowed") if is_wrong else words
                 item.setToolTip(0, f"{section.key}: {words}")
                 item.setData(0, Qt.ItemDataRole.AccessibleTextRole, f"{tr(section.title)}, {words}")
         effects = self.draft.effects()
@@ -500,13 +494,14 @@ class SettingsDialog(QDialog):
 
     def _on_tree(self) -> None:
         item = self.tree.currentItem()
-        if item is None or not item.isSelected():
-            return
-        key = item.data(0, _KEY_ROLE)
-        section = next(section for section in schema().walk() if section.key == key)
+        if item is not None and item.isSelected():
+            key = item.data(0, _KEY_ROLE)
+            self._leave_search()
+            self.show_section(next(section for section in schema().walk() if section.key == key))
+
+    def _leave_search(self) -> None:
         self.search.clear()
         self._search_soon.stop()
-        self.show_section(section)
 
     # ---- profiles
 
@@ -538,19 +533,19 @@ class SettingsDialog(QDialog):
         if config is None:
             self.show_notice(tr("First mend what is not allowed"), is_fault=True)
             return
-        self._do(lambda: self._profiles.save(name, config)[1] or tr("Saved as profile {name}", name=name))
+        self._change_profiles(lambda: self._profiles.save(name, config)[1] or tr("Saved as profile {name}", name=name))
 
     def _delete_profile(self, profile: Profile) -> None:
         def delete() -> str:
             self._profiles.delete(profile)
             return tr("Profile {name} deleted", name=profile.name)
 
-        self._do(delete)
+        self._change_profiles(delete)
 
-    def _do(self, action: Callable[[], str]) -> None:
-        """Do something with a profile and say how it went."""
+    def _change_profiles(self, change: Callable[[], str]) -> None:
+        """Change the profiles, and show the line that this returns."""
         try:
-            self.show_notice(tr_text(action()))
+            self.show_notice(tr_text(change()))
         except ProfileError as error:
             self.show_notice(tr_text(str(error)), is_fault=True)
         self._show_profiles()

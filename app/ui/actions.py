@@ -1,11 +1,4 @@
-"""What the program is: name, version, what it is not.
-
-Menus from tables, so that all windows have theirs in one form.
-
-What the page of keys says, read from the menus of a window as they are: an entry that has a key cannot be missing or wrong.
-
-Help, Language: which language the windows speak from the next start of the program on.
-"""
+"""Menus from tables, in one form for all windows; the page of keys, which is read from them; About and the language menu."""
 
 from __future__ import annotations
 
@@ -89,18 +82,15 @@ def add_menu(window: QMainWindow, title: str, entries: Sequence[MenuEntry | None
     menu = _menu_of(window, title)
     end = _end_of(menu)
     if menu.actions():
-        _separate(menu, end)
+        _insert(menu, _separator(menu), end)
     taken = {mnemonic(text) for text in (*(a.text() for a in menu.actions()), *(e.text for e in entries if e is not None))}
     actions = []
     for entry in entries:
         if entry is None:
-            _separate(menu, end)
+            _insert(menu, _separator(menu), end)
             continue
         action = _action(window, entry, taken)
-        if end is None:
-            menu.addAction(action)
-        else:
-            menu.insertAction(end, action)
+        _insert(menu, action, end)
         window.addAction(action)  # keeps the shortcut alive while the menu bar is hidden
         actions.append(action)
     return actions
@@ -142,11 +132,17 @@ def _end_of(menu: QMenu) -> QAction | None:
     return actions[-2] if QKeySequence("Ctrl+Q") in last.shortcuts() or last.property(_STAYS_LAST) else None
 
 
-def _separate(menu: QMenu, end: QAction | None) -> None:
+def _separator(menu: QMenu) -> QAction:
+    separator = QAction(menu)
+    separator.setSeparator(True)
+    return separator
+
+
+def _insert(menu: QMenu, action: QAction, end: QAction | None) -> None:
     if end is None:
-        menu.addSeparator()
+        menu.addAction(action)
     else:
-        menu.insertSeparator(end)
+        menu.insertAction(end, action)
 
 
 def _action(window: QMainWindow, entry: MenuEntry, taken: set[str]) -> QAction:
@@ -216,7 +212,7 @@ _SIGNS = {
 
 
 def key_name(sequence: QKeySequence | str | int) -> str:
-    """As it is written on the page: "Shift+F6", "←", "PgUp"."""
+    """A key as it is written on the page: "Shift+F6", "←", "PgUp"."""
     text = QKeySequence(sequence).toString(QKeySequence.SequenceFormat.PortableText)
     before, plus, last = text.rpartition("+")
     if text.endswith("+"):  # the key plus itself
@@ -225,7 +221,7 @@ def key_name(sequence: QKeySequence | str | int) -> str:
 
 
 def key_names(sequences: Sequence[QKeySequence | str | int]) -> str:
-    """All keys that do the same. One that only adds Shift to another (for a hand that holds the deadman) is left out."""
+    """All keys that do the same, without those that only add Shift to another (for use while Shift is the deadman)."""
     names = [key_name(sequence) for sequence in sequences]
     return _BETWEEN.join(name for name in names if name.removeprefix("Shift+") == name or name.removeprefix("Shift+") not in names)
 
@@ -262,7 +258,7 @@ def _keys_of(action: QAction) -> str:
 
 
 NATIVE = {ENGLISH: "English", CHINESE: "中文"}
-"""Languages are called by their own names, so that whoever needs one finds it."""
+"""Languages are listed by their own names."""
 
 
 class LanguageMenu(QMenu):

@@ -1,7 +1,6 @@
-"""What happens when the program meets an error that nobody foresaw, in any thread or Qt slot, or dies of a memory fault.
+"""Crash reports: of an unforeseen error in any thread or Qt slot, and of a memory fault, which the next start reports.
 
-``CrashWatch`` writes a report file and tells one listener. A memory fault leaves only what ``faulthandler`` could write; the next
-start makes the report of it.
+A memory fault leaves only what ``faulthandler`` could write.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ import sys
 import threading
 import traceback
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -40,16 +39,15 @@ _Error = tuple[type[BaseException], BaseException | None, TracebackType | None]
 
 
 def state_folder() -> Path:
-    """What the program remembers between runs, and its crash reports."""
+    """What the program keeps between runs, and its crash reports."""
     return Path(platformdirs.user_state_dir("LumenPilot"))
 
 
 @dataclass(frozen=True, slots=True)
 class Crash:
-    """An error that nobody foresaw. ``what`` is one line, ``report`` the file (None: it could not be written)."""
+    """An unforeseen error. ``what`` is one line, ``report`` the file (None: it could not be written)."""
 
     what: str
-    where: str
     report: Path | None
 
 
@@ -71,7 +69,7 @@ class LastLines(logging.Handler):
 
 
 class CrashWatch:
-    """From ``install`` to ``remove``.
+    """Reports all unforeseen errors from ``install`` to ``remove``.
 
     Parameters
     ----------
@@ -113,7 +111,7 @@ class CrashWatch:
             _log.warning("crash reports cannot be written to %s (%s)", self._folder, error.strerror)
 
     def remove(self) -> None:
-        """The program ends in an orderly way: nothing is left behind but reports."""
+        """The program ends properly: only reports are left."""
         if self._hooks is not None:
             sys.excepthook, threading.excepthook = self._hooks
             self._hooks = None
@@ -131,29 +129,29 @@ class CrashWatch:
         if not issubclass(kind, Exception):  # Ctrl-C and exits are no crashes
             sys.__excepthook__(kind, error, trace)
             return
-        self.take((kind, error, trace), threading.current_thread().name)
+        self.report((kind, error, trace), threading.current_thread().name)
 
     def _on_thread_error(self, args: threading.ExceptHookArgs) -> None:
         if issubclass(args.exc_type, Exception):
             name = args.thread.name if args.thread is not None else "a thread"
-            self.take((args.exc_type, args.exc_value, args.exc_traceback), name)
+            self.report((args.exc_type, args.exc_value, args.exc_traceback), name)
 
-    def take(self, error: _Error, thread: str) -> None:
-        """An error that nobody foresaw. All make the robot safe; the first one is told, later ones are added to its report."""
+    def report(self, error: _Error, thread: str) -> None:
+        """Make the robot safe and report the error; later errors are added to the report of the first."""
         with self._lock:
             self._count += 1
             number = self._count
         text = "".join(traceback.format_exception(*error))
         if number <= _MOST_REPORTED:  # one that comes with every repaint must not fill the disk
             _log.error("unforeseen error in thread %s\n%s", thread, text)
-        with _never_again():  # later ones, too: the operator may have gone on driving
+        with _logging_errors():  # later ones, too: the operator may have gone on driving
             self.on_error(number == 1)
         if number <= _MOST_REPORTED:
             self._write(number, thread, text)
         if number == 1:
             what = " ".join(traceback.format_exception_only(error[0], error[1])[-1].split())
-            with _never_again():
-                self.on_report(Crash(what, thread, self._report))
+            with _logging_errors():
+                self.on_report(Crash(what, self._report))
 
     def _write(self, number: int, thread: str, text: str) -> None:
         path = self._folder / f"{self._name}.txt"
@@ -173,17 +171,13 @@ class CrashWatch:
             _log.error("the crash report cannot be written: %s", error.strerror)
 
 
-class _never_again:  # noqa: N801 - used as a context
-    """What goes wrong while an error is dealt with is only logged: it must not begin all over."""
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> bool:
-        if kind is not None and issubclass(kind, Exception):
-            _log.error("and another one while it was dealt with", exc_info=(kind, error or kind(), trace))
-            return True
-        return False
+@contextmanager
+def _logging_errors() -> Iterator[None]:
+    """What goes wrong while an error is dealt with is only logged: reporting it would begin all over."""
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001 - the hooks of this error are running
+        _log.error("and another one while it was dealt with", exc_info=error)
 
 
 def _head(config: Callable[[], dict[str, Any]]) -> str:
@@ -199,7 +193,7 @@ def _head(config: Callable[[], dict[str, Any]]) -> str:
 
 
 def scrubbed(text: str) -> str:
-    """Without the paths that say who the user is and where he keeps his things: the report is made to be sent."""
+    """Without the paths that name the user and private folders: the report is made to be sent."""
     places = {str(Path(sys.prefix)): "<python>", str(ROOT): "<program>", str(Path.home()): "~"}
     for path in sorted(places, key=len, reverse=True):  # one may lie in the other
         if len(path) > 1:
@@ -212,7 +206,7 @@ def scrubbed(text: str) -> str:
 
 
 def crash_of_last_run(folder: Path) -> Crash | None:
-    """The newest crash that nobody was told of yet, told once. Reports of memory faults are made now; old ones are cleared away."""
+    """The newest crash that was not shown yet. Reports of memory faults are made now; old reports are deleted."""
     try:
         natives = [path for path in folder.glob(f"crash_*{_NATIVE}") if not _is_alive(path)]
         for path in natives:
@@ -227,20 +221,18 @@ def crash_of_last_run(folder: Path) -> Crash | None:
         return None
     if not new or not (report := new[-1].with_suffix(".txt")).is_file():
         return None
-    return Crash(_summary(report), "", report)
+    return Crash(_summary(report), report)
 
 
 def _is_alive(path: Path) -> bool:
-    """Does the run that the file belongs to still go on?"""
+    """Whether the run that the file belongs to still goes on."""
     pid = path.stem.rpartition("_")[2]
-    if not pid.isdigit():
-        return False
     try:
         os.kill(int(pid), 0)
-    except ProcessLookupError:
+    except (ValueError, ProcessLookupError):
         return False
     except PermissionError:
-        return True
+        pass
     return True
 
 

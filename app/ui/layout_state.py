@@ -1,7 +1,8 @@
-"""Keeps how a window was arranged until the next run: size and place, columns, pages, switches. Whatever is broken is ignored."""
+"""Keeps the layout of a window until the next run: size and place, columns, pages, switches. Broken values are ignored."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -65,7 +66,7 @@ class LayoutState(QObject):
         return False
 
     def save(self) -> None:
-        """Keep the present arrangement. A disk that does not take it costs nothing but that."""
+        """Keep the present layout; a disk that refuses is ignored."""
         settings = layout_settings()
         settings.beginGroup(self._name)
         if not self._window.isFullScreen():
@@ -76,7 +77,7 @@ class LayoutState(QObject):
         settings.sync()
 
     def reset(self) -> None:
-        """As on the first day, now and at the next start."""
+        """The default layout, now and at the next start."""
         settings = layout_settings()
         settings.remove(self._name)
         settings.sync()
@@ -107,19 +108,20 @@ class LayoutState(QObject):
         }
 
     def _arrange(self, values: Mapping[str, object]) -> None:
-        """What is known and makes sense; a value of another kind is left out."""
+        """Apply the values that are known and valid."""
         parts = self._parts
         for name, columns in parts.columns.items():
-            share = _as_share(values.get(f"columns/{name}"))
-            if share is not None:
-                columns.set_share(share)
+            with contextlib.suppress(ValueError):  # an INI file holds texts
+                share = float(str(values.get(f"columns/{name}")))
+                if 0.0 < share < 1.0:
+                    columns.set_share(share)
         for name, pages in parts.pages.items():
             names = [_page_name(pages, place) for place in range(pages.count())]
             wanted = values.get(f"page/{name}")
             if wanted in names:
                 pages.setCurrentIndex(names.index(str(wanted)))
         for name, switch in parts.switches.items():
-            on = _as_bool(values.get(f"switch/{name}"))
+            on = {"true": True, "false": False}.get(str(values.get(f"switch/{name}")).lower())
             if on is not None and on is not switch.is_on():
                 switch.turn(on)
 
@@ -130,28 +132,12 @@ def _page_name(pages: QTabWidget, place: int) -> str:
     return (page.accessibleName() if page is not None else "") or pages.tabText(place)
 
 
-def _as_share(value: object) -> float | None:
-    """An INI file holds texts."""
-    try:
-        share = float(str(value))
-    except ValueError:
-        return None
-    return share if 0.0 < share < 1.0 else None
-
-
-def _as_bool(value: object) -> bool | None:
-    return {"true": True, "false": False}.get(str(value).lower())
-
-
 def overlay_switches(bar: OverlayBar, without: tuple[Layer, ...] = ()) -> dict[str, Switch]:
-    """The switches of the overlays, but for those that are not the user's choice."""
-    return {
-        layer.name.lower(): Switch(partial(bar.is_on, layer), toggling(partial(bar.toggle, layer)))
-        for layer in Layer
-        if layer not in without
-    }
+    """The switches of the overlays, without those that are not the user's choice."""
+    layers = [layer for layer in Layer if layer not in without]
+    return {layer.name.lower(): Switch(partial(bar.is_on, layer), toggling(partial(bar.toggle, layer))) for layer in layers}
 
 
 def toggling(toggle: Callable[[], object]) -> Callable[[bool], object]:
-    """Turning something is toggling it: it is only asked for where it is not as wanted."""
+    """A switch's ``turn`` that toggles: it is only called for another state."""
     return lambda _on: toggle()

@@ -1,9 +1,4 @@
-"""What the operator may do next, and why it would be refused. Words and keys only, no widgets.
-
-Texts that people read: states, reasons, quantities. One table each, so that wording stays consistent and can be translated.
-
-What each quantity on the screen means, after the method: the one table behind all tool tips. No Qt here.
-"""
+"""Texts that people read, in tables: the operator's next step, states, reasons, quantities (all tool tips), rigs. No Qt here."""
 
 from __future__ import annotations
 
@@ -36,7 +31,7 @@ class StepWords:
 
 
 class OperatorStep(Enum):
-    """A request of the operator that has a button. STOP is no step: it is always there."""
+    """A request of the operator that has a button; STOP is none: it is always there."""
 
     SERVOS_ON = StepWords(
         mark("Servos on"), "F3", mark("Check all servos and switch their torque on: then you can move the robot by hand")
@@ -91,9 +86,9 @@ class Undriven(Enum):
 
     NO_ROBOT = (mark("pictures only"), NO_ROBOT)
     NOT_YET = (mark("waiting for the rig"), NOT_YET)
-    """It is being opened: nobody knows yet whether there will be something to drive."""
+    """It is being opened: whether there is something to drive is not known yet."""
     CLOSED = (mark("no rig is open"), CLOSED)
-    """It stopped, and nobody opens it by himself."""
+    """It stopped, and is opened again by the operator only."""
 
     @property
     def who(self) -> str:
@@ -135,7 +130,7 @@ def next_step(view: DriveView) -> NextStep:
         rest = tr("press {key}: they are checked with the torque off, then tighten the wires", key=OperatorStep.SERVOS_ON.value.key)
         if faults:
             step = _refused(OperatorStep.SERVOS_ON, faults)
-            # What it is that is not as configured the servos' process has said, and what to do depends on it.
+            # The servos' process has named what is not as configured, and what to do depends on it.
             said = next((fault.detail for fault in view.active if fault.cause is Cause.SERVOS_WRONG), "")
             return replace(step, rest=said) if said and faults[0] is Cause.SERVOS_WRONG else step
         return NextStep(OperatorStep.SERVOS_ON, True, tr("The servos follow nobody, but may still pull"), rest)
@@ -304,7 +299,7 @@ def why_line(pose: Pose, limits: PoseConfig) -> str:
         line = tr("to the centerline: {compared}, {angle}", compared=compared, angle=angle)
     else:
         line = tr("from the centerline: {compared}, {angle}", compared=compared, angle=angle)
-    # hysteresis keeps a state for a moment beyond its limit; without a word about it the values would contradict the letter
+    # hysteresis keeps a state for a moment beyond its limit; without a note the values would contradict the letter
     return line if literal_state(pose, limits) is pose.state else tr("{line} (kept for a moment)", line=line)
 
 

@@ -1,9 +1,4 @@
-"""What every window of the program is: its size, the keys and menu entries that mean the same in all of them, and how it closes.
-
-The application that every window runs in: display, names, theme and language; and a window from its opening to its end.
-
-Measures how long the GUI thread was blocked.
-"""
+"""What all windows share: the application, size, common keys and menu entries, how they close, and how long they were blocked."""
 
 from __future__ import annotations
 
@@ -34,16 +29,14 @@ INTERVAL_MS = 10
 
 
 class GuiLatencyMonitor(QObject):
-    """A timer of 10 ms in the GUI thread; a beat that comes late by x ms means that the thread was busy for about x ms."""
+    """How long the GUI thread was blocked: a timer of 10 ms that fires x ms late was blocked for about x ms."""
 
     def __init__(self, window_s: float = 10.0, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._window_s = window_s
         self._late: deque[tuple[float, float]] = deque()
         self._last_s: float | None = None
-        self._timer = QTimer(self)
-        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
-        self._timer.setInterval(INTERVAL_MS)
+        self._timer = QTimer(self, timerType=Qt.TimerType.PreciseTimer, interval=INTERVAL_MS)
         self._timer.timeout.connect(self._beat)
 
     def start(self) -> None:
@@ -78,7 +71,7 @@ _HINT_MARGIN_PX, _HINT_DOWN_PX = 14, 5
 
 
 class WindowFrame(QMainWindow):
-    """The frame around the panels of a window. What is special to one is said by overriding what begins with an underscore."""
+    """The frame around the panels of a window; subclasses override the methods that begin with an underscore."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -151,7 +144,7 @@ class WindowFrame(QMainWindow):
 
     @Slot()
     def shut_down(self) -> None:
-        """Let go of everything, be gone from the screen at once, then wait for what must be finished; only once."""
+        """Stop everything, hide at once, then wait for what must be finished; only once."""
         if self._is_shut:
             return
         self._is_shut = True
@@ -164,7 +157,7 @@ class WindowFrame(QMainWindow):
         for line in stuck:
             logging.getLogger(type(self).__module__).error(line)
         if stuck:
-            # Qt would abort on a thread that still runs, or wait for it for ever; nobody drives any more
+            # Qt would abort on a thread that still runs, or wait for it for ever; the robot is stopped
             os._exit(1)
 
     def _may_close(self) -> bool:
@@ -208,7 +201,7 @@ def make_application(look: WindowConfig | None = None) -> QApplication:
 
 
 def check_display() -> None:
-    """Qt would end the process with a core dump; better one line."""
+    """Raise UserError without a display: Qt would end the process with a core dump."""
     if not sys.platform.startswith("linux"):
         return
     display, asked = os.environ.get("DISPLAY"), os.environ.get("QT_QPA_PLATFORM", "")
@@ -217,7 +210,7 @@ def check_display() -> None:
     is_on_x = asked.startswith("xcb") or (not asked and not os.environ.get("WAYLAND_DISPLAY"))
     if not (display and is_on_x):
         return
-    from hardware.preflight.checks import x_server_answers  # asks as Qt does; without libxcb Qt has its own say
+    from hardware.preflight.checks import x_server_answers  # asks as Qt does; without libxcb Qt reports it itself
 
     if not x_server_answers(display):
         raise UserError(
@@ -227,7 +220,7 @@ def check_display() -> None:
 
 
 def close_all(application: QApplication) -> None:
-    """Close all windows because the program is asked to end: where only results would be lost, nobody may be there to answer."""
+    """Close all windows because the program is asked to end: they ask no questions that only results depend on."""
     application.setProperty(_ENDS, True)
     application.closeAllWindows()
     application.setProperty(_ENDS, False)

@@ -92,7 +92,7 @@ def test_the_robot_is_made_safe_before_the_report_is_written(watch: CrashWatch, 
     seen: list[object] = []
     watch.on_error = lambda _is_first: seen.append(list(tmp_path.glob("*.txt")))
     watch.on_report = seen.append
-    watch.take(error(), "gui")
+    watch.report(error(), "gui")
     assert seen[0] == []
     assert isinstance(seen[1], Crash)
     assert seen[1].what == "RuntimeError: broken"
@@ -106,7 +106,7 @@ def test_what_fails_while_it_is_made_safe_hinders_no_report(watch: CrashWatch) -
         raise ValueError("no pilot")
 
     watch.on_error, watch.on_report = also_broken, told.append
-    watch.take(error(), "gui")
+    watch.report(error(), "gui")
     assert told[0].report is not None
 
 
@@ -114,7 +114,7 @@ def test_later_errors_make_the_robot_safe_as_well(watch: CrashWatch) -> None:
     asked: list[bool] = []
     watch.on_error = asked.append
     for _ in range(30):  # more than are reported
-        watch.take(error(), "gui")
+        watch.report(error(), "gui")
     assert asked == [True] + 29 * [False]
 
 
@@ -125,7 +125,7 @@ def test_without_a_folder_it_is_still_told(tmp_path: Path) -> None:
     watch.on_report = told.append
     watch.install()
     try:
-        watch.take(error(), "gui")
+        watch.report(error(), "gui")
     finally:
         watch.remove()
     assert told[0].report is None
@@ -135,7 +135,7 @@ def test_an_error_that_comes_with_every_repaint_does_not_fill_the_disk(watch: Cr
     told: list[Crash] = []
     watch.on_report = told.append
     for _ in range(200):
-        watch.take(error(), "gui")
+        watch.report(error(), "gui")
     (report,) = tmp_path.glob("*.txt")
     assert report.read_text().count("== error") == 20
     assert len(told) == 1
