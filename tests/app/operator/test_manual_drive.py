@@ -318,8 +318,8 @@ class Bench:
 
 
 @pytest.fixture
-def bench(qtbot: QtBot) -> Iterator[Bench]:
-    made = Bench(qtbot)
+def keyboard(qtbot: QtBot) -> Iterator[Keyboard]:
+    made = Keyboard(qtbot)
     yield made
     made.jog.detach()
 
@@ -342,100 +342,100 @@ def bench(qtbot: QtBot) -> Iterator[Bench]:
         (Key.Key_X, Jog(straighten=True)),
     ],
 )
-def test_a_motion_is_there_while_held_and_gone_after(bench: Bench, key: Qt.Key, jog: Jog) -> None:
-    bench.press(key)
-    assert bench.jogs == [jog]
-    bench.release(key)
-    assert bench.jogs[-1] == AT_REST
+def test_a_motion_is_there_while_held_and_gone_after(keyboard: Keyboard, key: Qt.Key, jog: Jog) -> None:
+    keyboard.press(key)
+    assert keyboard.jogs == [jog]
+    keyboard.release(key)
+    assert keyboard.jogs[-1] == AT_REST
 
 
-def test_motions_that_are_held_together_are_one_jog(bench: Bench) -> None:
-    bench.press(Key.Key_W)
-    bench.press(Key.Key_D)
-    assert bench.jogs[-1] == Jog(bend=1.0, advance=1.0)
+def test_motions_that_are_held_together_are_one_jog(keyboard: Keyboard) -> None:
+    keyboard.press(Key.Key_W)
+    keyboard.press(Key.Key_D)
+    assert keyboard.jogs[-1] == Jog(bend=1.0, advance=1.0)
 
 
-def test_holding_sends_again_and_again(bench: Bench, qtbot: QtBot) -> None:
-    bench.press(Key.Key_Right)
-    qtbot.waitUntil(lambda: len(bench.jogs) >= 3)
-    bench.release(Key.Key_Right)
-    sent = len(bench.jogs)
+def test_holding_sends_again_and_again(keyboard: Keyboard, qtbot: QtBot) -> None:
+    keyboard.press(Key.Key_Right)
+    qtbot.waitUntil(lambda: len(keyboard.jogs) >= 3)
+    keyboard.release(Key.Key_Right)
+    sent = len(keyboard.jogs)
     qtbot.wait(100)
-    assert len(bench.jogs) == sent, "nothing held, nothing sent"
+    assert len(keyboard.jogs) == sent, "nothing held, nothing sent"
 
 
-def test_opposite_keys_cancel(bench: Bench) -> None:
-    bench.press(Key.Key_W)
-    bench.press(Key.Key_S)
-    assert bench.jogs[-1].advance == 0.0
-    bench.release(Key.Key_S)
-    assert bench.jogs[-1].advance == 1.0
+def test_opposite_keys_cancel(keyboard: Keyboard) -> None:
+    keyboard.press(Key.Key_W)
+    keyboard.press(Key.Key_S)
+    assert keyboard.jogs[-1].advance == 0.0
+    keyboard.release(Key.Key_S)
+    assert keyboard.jogs[-1].advance == 1.0
 
 
-def test_two_keys_of_one_motion_count_once(bench: Bench) -> None:
-    bench.press(Key.Key_W)
-    bench.press(Key.Key_Up)
-    assert bench.jogs[-1].advance == 1.0
-    bench.release(Key.Key_W)
-    assert bench.jogs[-1].advance == 1.0, "the other key is still down"
+def test_two_keys_of_one_motion_count_once(keyboard: Keyboard) -> None:
+    keyboard.press(Key.Key_W)
+    keyboard.press(Key.Key_Up)
+    assert keyboard.jogs[-1].advance == 1.0
+    keyboard.release(Key.Key_W)
+    assert keyboard.jogs[-1].advance == 1.0, "the other key is still down"
 
 
-def test_auto_repeat_is_ignored(bench: Bench) -> None:
-    bench.press(Key.Key_W)
+def test_auto_repeat_is_ignored(keyboard: Keyboard) -> None:
+    keyboard.press(Key.Key_W)
     for _ in range(5):
-        bench.release(Key.Key_W, repeat=True)
-        bench.press(Key.Key_W, repeat=True)
-    assert bench.jogs == [Jog(advance=1.0)]
+        keyboard.release(Key.Key_W, repeat=True)
+        keyboard.press(Key.Key_W, repeat=True)
+    assert keyboard.jogs == [Jog(advance=1.0)]
 
 
-def test_a_held_key_types_nothing_into_a_field_that_is_clicked_meanwhile(bench: Bench) -> None:
-    bench.press(Key.Key_W)
-    bench.text.setFocus()
-    QApplication.sendEvent(bench.text, QKeyEvent(QEvent.Type.KeyPress, Key.Key_W, NONE, "w", True))
-    assert bench.text.text() == ""
-    bench.release(Key.Key_W, to=bench.text)
-    QApplication.sendEvent(bench.text, QKeyEvent(QEvent.Type.KeyPress, Key.Key_W, NONE, "w"))
-    assert bench.text.text() == "w"
+def test_a_held_key_types_nothing_into_a_field_that_is_clicked_meanwhile(keyboard: Keyboard) -> None:
+    keyboard.press(Key.Key_W)
+    keyboard.text.setFocus()
+    QApplication.sendEvent(keyboard.text, QKeyEvent(QEvent.Type.KeyPress, Key.Key_W, NONE, "w", True))
+    assert keyboard.text.text() == ""
+    keyboard.release(Key.Key_W, to=keyboard.text)
+    QApplication.sendEvent(keyboard.text, QKeyEvent(QEvent.Type.KeyPress, Key.Key_W, NONE, "w"))
+    assert keyboard.text.text() == "w"
 
 
-def test_a_key_that_was_down_before_does_not_count(bench: Bench) -> None:
-    bench.press(Key.Key_W, repeat=True)
-    assert bench.jog.held == frozenset()
+def test_a_key_that_was_down_before_does_not_count(keyboard: Keyboard) -> None:
+    keyboard.press(Key.Key_W, repeat=True)
+    assert keyboard.jog.held == frozenset()
 
 
 @pytest.mark.parametrize("lost", [QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked])
-def test_losing_the_focus_or_a_dialog_in_front_lets_go(bench: Bench, lost: QEvent.Type) -> None:
+def test_losing_the_focus_or_a_dialog_in_front_lets_go(keyboard: Keyboard, lost: QEvent.Type) -> None:
     """Behind a modal dialog no release is heard, also where the desktop has not given the focus to it."""
-    bench.press(Key.Key_W)
-    bench.press(Key.Key_Right)
-    QApplication.sendEvent(bench.window, QEvent(lost))
-    assert bench.jog.held == frozenset()
-    assert bench.jogs[-1] == AT_REST
+    keyboard.press(Key.Key_W)
+    keyboard.press(Key.Key_Right)
+    QApplication.sendEvent(keyboard.window, QEvent(lost))
+    assert keyboard.jog.held == frozenset()
+    assert keyboard.jogs[-1] == AT_REST
 
 
-def test_a_release_counts_wherever_it_goes_to(bench: Bench, qtbot: QtBot) -> None:
+def test_a_release_counts_wherever_it_goes_to(keyboard: Keyboard, qtbot: QtBot) -> None:
     menu = QMenu()
     qtbot.addWidget(menu)
-    bench.press(Key.Key_W)
-    bench.release(Key.Key_W, to=menu)
-    assert bench.jogs[-1] == AT_REST
+    keyboard.press(Key.Key_W)
+    keyboard.release(Key.Key_W, to=menu)
+    assert keyboard.jogs[-1] == AT_REST
 
 
-def test_a_key_that_means_something_else_when_it_is_let_go_lets_go(bench: Bench) -> None:
+def test_a_key_that_means_something_else_when_it_is_let_go_lets_go(keyboard: Keyboard) -> None:
     """With NumLock and Shift (the deadman) down, the keypad's 8 goes down as Up, and comes up as 8 once Shift is up."""
     keypad, scan_code = Qt.KeyboardModifier.KeypadModifier, 80
     down = QKeyEvent(QEvent.Type.KeyPress, Key.Key_Up, keypad | Qt.KeyboardModifier.ShiftModifier, scan_code, 0, 0)
-    QApplication.sendEvent(bench.window, down)
-    assert bench.jogs[-1] == Jog(advance=1.0)
+    QApplication.sendEvent(keyboard.window, down)
+    assert keyboard.jogs[-1] == Jog(advance=1.0)
     other = QKeyEvent(QEvent.Type.KeyRelease, Key.Key_8, keypad, scan_code + 1, 0, 0)
-    QApplication.sendEvent(bench.window, other)
-    assert bench.jog.held == {Motion.ADVANCE}
+    QApplication.sendEvent(keyboard.window, other)
+    assert keyboard.jog.held == {Motion.ADVANCE}
     up = QKeyEvent(QEvent.Type.KeyRelease, Key.Key_8, keypad, scan_code, 0, 0)
-    QApplication.sendEvent(bench.window, up)
-    assert bench.jogs[-1] == AT_REST
+    QApplication.sendEvent(keyboard.window, up)
+    assert keyboard.jogs[-1] == AT_REST
 
 
-def test_on_a_keyboard_of_another_alphabet_the_letters_are_found_by_their_place(bench: Bench) -> None:
+def test_on_a_keyboard_of_another_alphabet_the_letters_are_found_by_their_place(keyboard: Keyboard) -> None:
     """Cyrillic, Greek, Hebrew: only the arrows steered, and nothing pitched."""
     cyrillic = {
         24: ("\N{CYRILLIC CAPITAL LETTER SHORT I}", Motion.PITCH_DOWN),
@@ -443,13 +443,13 @@ def test_on_a_keyboard_of_another_alphabet_the_letters_are_found_by_their_place(
     }
     for scan_code, (letter, motion) in cyrillic.items():
         for kind, held in ((QEvent.Type.KeyPress, {motion}), (QEvent.Type.KeyRelease, set())):
-            QApplication.sendEvent(bench.window, QKeyEvent(kind, ord(letter), NONE, scan_code, 0, 0, letter))
-            assert bench.jog.held == held
+            QApplication.sendEvent(keyboard.window, QKeyEvent(kind, ord(letter), NONE, scan_code, 0, 0, letter))
+            assert keyboard.jog.held == held
     # French: A lies where others have Q, and is the A that the legend shows
-    QApplication.sendEvent(bench.window, QKeyEvent(QEvent.Type.KeyPress, Key.Key_A, NONE, 24, 0, 0, "a"))
-    assert bench.jog.held == {Motion.STEER_LEFT}
-    QApplication.sendEvent(bench.window, QKeyEvent(QEvent.Type.KeyRelease, Key.Key_A, NONE, 24, 0, 0, "a"))
-    assert bench.jog.held == set()
+    QApplication.sendEvent(keyboard.window, QKeyEvent(QEvent.Type.KeyPress, Key.Key_A, NONE, 24, 0, 0, "a"))
+    assert keyboard.jog.held == {Motion.STEER_LEFT}
+    QApplication.sendEvent(keyboard.window, QKeyEvent(QEvent.Type.KeyRelease, Key.Key_A, NONE, 24, 0, 0, "a"))
+    assert keyboard.jog.held == set()
 
 
 def shift(kind: QEvent.Type, key: Qt.Key, scan_code: int) -> QKeyEvent:
@@ -457,50 +457,50 @@ def shift(kind: QEvent.Type, key: Qt.Key, scan_code: int) -> QKeyEvent:
 
 
 @pytest.mark.parametrize("becomes", [Key.Key_unknown, Key.Key_Mode_switch, Key.Key_Meta, Key.Key_Shift])
-def test_a_shift_that_is_another_key_when_it_is_let_go_holds_no_deadman(bench: Bench, becomes: Qt.Key) -> None:
+def test_a_shift_that_is_another_key_when_it_is_let_go_holds_no_deadman(keyboard: Keyboard, becomes: Qt.Key) -> None:
     """Where Alt and Shift together change the layout, a Shift that comes up beside Alt is no Shift any more."""
-    deadman, said = DeadmanKey(bench.window), list[bool]()
+    deadman, said = DeadmanKey(keyboard.window), list[bool]()
     deadman.reported.connect(said.append)
-    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyPress, Key.Key_Shift, 50))
-    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyRelease, Key.Key_Alt, 64))
+    QApplication.sendEvent(keyboard.window, shift(QEvent.Type.KeyPress, Key.Key_Shift, 50))
+    QApplication.sendEvent(keyboard.window, shift(QEvent.Type.KeyRelease, Key.Key_Alt, 64))
     assert deadman.is_held
     assert said == [True]
-    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyRelease, becomes, 50))
+    QApplication.sendEvent(keyboard.window, shift(QEvent.Type.KeyRelease, becomes, 50))
     assert not deadman.is_held
     assert said == [True, False]
     deadman.detach()
 
 
-def test_of_two_shifts_the_first_that_comes_up_lets_go_of_the_deadman(bench: Bench) -> None:
-    deadman = DeadmanKey(bench.window)
+def test_of_two_shifts_the_first_that_comes_up_lets_go_of_the_deadman(keyboard: Keyboard) -> None:
+    deadman = DeadmanKey(keyboard.window)
     for scan_code in (50, 62):
-        QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyPress, Key.Key_Shift, scan_code))
-    QApplication.sendEvent(bench.window, shift(QEvent.Type.KeyRelease, Key.Key_Shift, 62))
+        QApplication.sendEvent(keyboard.window, shift(QEvent.Type.KeyPress, Key.Key_Shift, scan_code))
+    QApplication.sendEvent(keyboard.window, shift(QEvent.Type.KeyRelease, Key.Key_Shift, 62))
     assert not deadman.is_held
     deadman.detach()
 
 
-def test_space_stops_once_and_lets_go_even_in_a_text_field(bench: Bench) -> None:
-    bench.press(Key.Key_Right)
-    bench.press(Key.Key_Space, to=bench.text)
-    bench.press(Key.Key_Space, repeat=True, to=bench.text)
-    assert bench.jogs[-1] == AT_REST
-    assert bench.stops == [True]
-    assert bench.text.text() == ""
+def test_space_stops_once_and_lets_go_even_in_a_text_field(keyboard: Keyboard) -> None:
+    keyboard.press(Key.Key_Right)
+    keyboard.press(Key.Key_Space, to=keyboard.text)
+    keyboard.press(Key.Key_Space, repeat=True, to=keyboard.text)
+    assert keyboard.jogs[-1] == AT_REST
+    assert keyboard.stops == [True]
+    assert keyboard.text.text() == ""
 
 
-def test_where_nothing_can_move_a_space_is_typed(bench: Bench) -> None:
+def test_where_nothing_can_move_a_space_is_typed(keyboard: Keyboard) -> None:
     page = QPlainTextEdit()
-    bench.window.layout().addWidget(page)
-    bench.can_move = False
-    bench.type(bench.text)
-    bench.type(bench.text, modifier=Qt.KeyboardModifier.ShiftModifier)
-    bench.type(page)
-    assert (bench.text.text(), page.toPlainText(), bench.stops) == ("  ", " ", [])
-    bench.can_move = True
-    bench.type(bench.text)
-    bench.type(page)
-    assert (bench.text.text(), page.toPlainText(), bench.stops) == ("  ", " ", [True, True])
+    keyboard.window.layout().addWidget(page)
+    keyboard.can_move = False
+    keyboard.type(keyboard.text)
+    keyboard.type(keyboard.text, modifier=Qt.KeyboardModifier.ShiftModifier)
+    keyboard.type(page)
+    assert (keyboard.text.text(), page.toPlainText(), keyboard.stops) == ("  ", " ", [])
+    keyboard.can_move = True
+    keyboard.type(keyboard.text)
+    keyboard.type(page)
+    assert (keyboard.text.text(), page.toPlainText(), keyboard.stops) == ("  ", " ", [True, True])
 
 
 @pytest.mark.parametrize(
@@ -514,46 +514,46 @@ def test_where_nothing_can_move_a_space_is_typed(bench: Bench) -> None:
 )
 @pytest.mark.parametrize("can_move", [True, False])
 def test_a_key_is_stop_in_any_focus_and_at_any_moment(
-    bench: Bench, key: Qt.Key, modifier: Qt.KeyboardModifier, can_move: bool
+    keyboard: Keyboard, key: Qt.Key, modifier: Qt.KeyboardModifier, can_move: bool
 ) -> None:
-    bench.can_move = can_move
-    for number, place in enumerate((bench.text, bench.spin, bench.window), 1):
-        bench.type(place, key, modifier)
-        assert len(bench.stops) == number
-    assert bench.text.text() == ""
+    keyboard.can_move = can_move
+    for number, place in enumerate((keyboard.text, keyboard.spin, keyboard.window), 1):
+        keyboard.type(place, key, modifier)
+        assert len(keyboard.stops) == number
+    assert keyboard.text.text() == ""
 
 
-def test_what_takes_no_space_leaves_it_to_stop(bench: Bench) -> None:
-    bench.can_move = False
+def test_what_takes_no_space_leaves_it_to_stop(keyboard: Keyboard) -> None:
+    keyboard.can_move = False
     locked, numbers, button = QLineEdit(), NumberEdit(is_whole=False), QPushButton()
     locked.setReadOnly(True)
-    for number, widget in enumerate((locked, numbers, button, bench.spin, bench.window), 1):
-        if widget.parent() is None and widget is not bench.window:
-            bench.window.layout().addWidget(widget)
-        bench.type(widget)
-        assert len(bench.stops) == number, widget
+    for number, widget in enumerate((locked, numbers, button, keyboard.spin, keyboard.window), 1):
+        if widget.parent() is None and widget is not keyboard.window:
+            keyboard.window.layout().addWidget(widget)
+        keyboard.type(widget)
+        assert len(keyboard.stops) == number, widget
 
 
-def test_typing_does_not_move_the_robot(bench: Bench) -> None:
-    for field in (bench.text, bench.spin):
+def test_typing_does_not_move_the_robot(keyboard: Keyboard) -> None:
+    for field in (keyboard.text, keyboard.spin):
         field.setFocus()
-        bench.press(Key.Key_W, to=field)
-        bench.press(Key.Key_Up, to=field)
-    assert bench.jog.held == frozenset()
-    assert bench.spin.value() == 1, "the arrow went to the field"
+        keyboard.press(Key.Key_W, to=field)
+        keyboard.press(Key.Key_Up, to=field)
+    assert keyboard.jog.held == frozenset()
+    assert keyboard.spin.value() == 1, "the arrow went to the field"
 
 
-def test_shortcuts_are_no_motion(bench: Bench) -> None:
+def test_shortcuts_are_no_motion(keyboard: Keyboard) -> None:
     event = QKeyEvent(QEvent.Type.KeyPress, Key.Key_S, Qt.KeyboardModifier.ControlModifier)
-    QApplication.sendEvent(bench.window, event)
-    assert bench.jog.held == frozenset()
+    QApplication.sendEvent(keyboard.window, event)
+    assert keyboard.jog.held == frozenset()
 
 
-def test_keys_of_another_window_are_not_ours(bench: Bench, qtbot: QtBot) -> None:
+def test_keys_of_another_window_are_not_ours(keyboard: Keyboard, qtbot: QtBot) -> None:
     other = QWidget()
     qtbot.addWidget(other)
-    bench.press(Key.Key_W, to=other)
-    assert bench.jog.held == frozenset()
+    keyboard.press(Key.Key_W, to=other)
+    assert keyboard.jog.held == frozenset()
 
 
 def test_every_motion_has_a_key_and_no_key_two_motions() -> None:
