@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from app.ui.i18n import COMPOSED, FIXED, TEMPLATES, texts_of_tables
+from app.ui.i18n import FIXED, TEMPLATES, texts_of_tables
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -33,7 +33,7 @@ def texts_of_code(root: Path = ROOT) -> dict[str, str]:
         for path in sorted((root / folder).rglob("*.py")):
             for text in _texts_of(path, names):
                 found.setdefault(_FORMAT.sub(r"{\1}", text) if folder != "app" else text, path.relative_to(root).as_posix())
-    for text in (*FIXED, *TEMPLATES, *COMPOSED):
+    for text in (*FIXED, *TEMPLATES):
         found.setdefault(text, "app/ui/i18n.py")
     for text in texts_of_tables():
         found.setdefault(text, "app/ui/i18n.py")

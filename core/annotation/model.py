@@ -19,6 +19,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from core import geometry
 from core.config.models import PerceptionConfig
 from core.devices import UserError
+from core.messages import message
 from core.perception.centerline import centerline_at
 from core.perception.pose import measure
 from core.perception.vectors import MIN_LENGTH_PX, fit_robot_vector, fit_vessel_vector
@@ -147,7 +148,9 @@ def measure_lines(annotation: Annotation, size: tuple[int, int], config: Percept
     vectors = config.vectors
     robot_vector = fit_robot_vector(robot, vectors.robot_length_px, vectors.line_fit)
     if robot_vector is None:
-        missing = "draw the robot, from its tail to its head" if len(robot) < 2 else f"robot line < {MIN_LENGTH_PX:g} px"
+        missing = (
+            "draw the robot, from its tail to its head" if len(robot) < 2 else message("robot line < {a:g} px", a=MIN_LENGTH_PX)
+        )
         return Readout(missing=missing)
     total = float(geometry.arc_length(robot)[-1])
     piece = geometry.cut(robot, total - vectors.robot_length_px, total)

@@ -20,6 +20,7 @@ from pydantic import ValidationError
 
 from core.config.calibration import LensConfig, ScaleConfig
 from core.devices import UserError
+from core.messages import message
 from core.types import Image, Point, Points, Scene
 
 F32 = NDArray[np.float32]
@@ -205,7 +206,9 @@ def find_board(image: Image, spec: BoardSpec) -> BoardView:
     count = 0 if ids is None else len(ids)
     if count < _MIN_CORNERS:
         seen = 0 if markers is None else len(markers)
-        why = f"{seen} of its markers and {count} of its {(spec.columns - 1) * (spec.rows - 1)} corners are seen"
+        why = message(
+            "{a} of its markers and {b} of its {c} corners are seen", a=seen, b=count, c=(spec.columns - 1) * (spec.rows - 1)
+        )
         raise BoardError(f"no board: {why}; lay it flat under the camera, without glare, as large as the picture")
     order = np.asarray(ids).ravel()
     places = np.asarray(_board(spec).getChessboardCorners(), np.float64)[order, :2]
@@ -219,7 +222,13 @@ def _board(spec: BoardSpec) -> Any:
     needed = spec.columns * spec.rows // 2
     if needed > _MARKERS:
         raise BoardError(
-            f"a board of {spec.columns} x {spec.rows} squares needs {needed} markers, and there are {_MARKERS}: take fewer squares"
+            message(
+                "a board of {a} x {b} squares needs {c} markers, and there are {count}: take fewer squares",
+                a=spec.columns,
+                b=spec.rows,
+                c=needed,
+                count=_MARKERS,
+            )
         )
     dictionary = cv2.aruco.getPredefinedDictionary(_DICTIONARY)
     return cv2.aruco.CharucoBoard((spec.columns, spec.rows), spec.square_mm, spec.marker_mm, dictionary)

@@ -24,6 +24,7 @@ from core.calibration.camera import mm_per_px_at
 from core.config.calibration import ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
 from core.config.safety import JOINT_NAMES, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
 from core.devices import UserError
+from core.messages import message
 from core.perception.vectors import fit_robot_vector
 from core.types import Image, Point, Points
 
@@ -298,21 +299,23 @@ def classify(wiggle: Wiggle) -> ServoFinding | None:
         sign: Literal[-1, 1] = 1 if sides[0] > sides[1] else -1
         lateral_px = plus.lateral_px if sign > 0 else minus.lateral_px
         function = Function.RIGHT if lateral_px > 0 else Function.LEFT
-        return ServoFinding(function, sign, f"head {abs(lateral_px):.0f} px to the {'right' if lateral_px > 0 else 'left'}")
+        return ServoFinding(
+            function, sign, message("head {a:.0f} px to the {side}", a=abs(lateral_px), side="right" if lateral_px > 0 else "left")
+        )
     longer = plus.longer_px, minus.longer_px
     if longer[0] * longer[1] < 0 and min(abs(longer[0]), abs(longer[1])) >= _CLEAR_FEED_PX:
         px_per_mm = abs(longer[0] - longer[1]) / wiggle.rest.scale / (2.0 * wiggle.amplitude_mm)
         way = FeedWay(px_per_mm, wiggle.amplitude_mm, wiggle.rest.head, wiggle.rest.scale)
-        return ServoFinding(Function.ADVANCE, 1 if longer[0] > 0 else -1, f"head {max(longer):.0f} px forward", way)
+        return ServoFinding(Function.ADVANCE, 1 if longer[0] > 0 else -1, message("head {a:.0f} px forward", a=max(longer)), way)
     shorter = -plus.longer_px, -minus.longer_px
     if max(shorter) >= _CLEAR_PITCH_PX and max(shorter) > _ONE_SIDED * abs(min(shorter)):
         sign = 1 if shorter[0] > shorter[1] else -1
-        return ServoFinding(Function.PITCH, sign, f"{max(shorter):.1f} px less of the robot seen")
+        return ServoFinding(Function.PITCH, sign, message("{a:.1f} px less of the robot seen", a=max(shorter)))
     if max(abs(value) for value in (*longer, *sides)) > _STILL_PX or wiggle.amplitude_mm < _SHEATH_FROM_MM:
         return None  # a wire that acts out of the image plane may just begin to show
     grown_px = wiggle.rest.scale * sheath_growth(wiggle.rest.path, wiggle.minus.image, wiggle.plus.image)
     if abs(grown_px) >= _CLEAR_SHEATH_PX:
-        return ServoFinding(Function.DELIVERY, 1 if grown_px > 0 else -1, f"sheath {abs(grown_px):.0f} px farther")
+        return ServoFinding(Function.DELIVERY, 1 if grown_px > 0 else -1, message("sheath {a:.0f} px farther", a=abs(grown_px)))
     return None
 
 
@@ -526,9 +529,11 @@ def feed_disagreement(
     noise = _NOISE_PX / way.scale * mm_per_px / way.amplitude_mm * turned_as
     if abs(seen - configured) <= max(_LEAST_SHARE * configured, noise):
         return ""
-    return (
-        f"the feed goes by about {seen:.0f} mm at one turn of the servo's horn, as the camera saw it, and is configured with "
-        f"{configured:g} mm: measure it, and set servos.joints, advance, mm_per_turn"
+    return message(
+        "the feed goes by about {a:.0f} mm at one turn of the servo's horn, as the camera saw it, and is "
+        "configured with {b:g} mm: measure it, and set servos.joints, advance, mm_per_turn",
+        a=seen,
+        b=configured,
     )
 
 

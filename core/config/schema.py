@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 
 from core.config.models import Config
 from core.config.safety import JOINT_NAMES
+from core.messages import message
 
 # Ends of names, longest first where one ends in the other.
 _UNITS = (
@@ -108,7 +109,7 @@ class Bounds:
         high = "" if self.high is None else f"{'below' if self.high_open else 'at most'} {_plain(self.high)}"
         both = f"{low} and {high}" if low and high else low or high
         if self.low is not None and self.high is not None and not (self.low_open or self.high_open):
-            both = f"{_plain(self.low)} to {_plain(self.high)}"
+            both = message("{a} to {rest}", a=_plain(self.low), rest=_plain(self.high))
         both = f"{both} {unit}" if both and unit else both
         return f"{both}, a multiple of {_plain(self.step)}" if both and self.step is not None else both
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault
+from core.messages import message
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +82,13 @@ def _strain(samples: Sequence[CurrentSample], servos: ServosConfig) -> str:
         over = [ma for time_s, ma in above if time_s >= starts[-1]]
         if 2 * len(over) >= len(since):
             lasted_ms = 1000.0 * (above[-1][0] - starts[-1])
-            return f"{name} up to {max(over):.0f} mA for {lasted_ms:.0f} ms (at most {servos.max_current_ma:.0f} mA)"
+            return message(
+                "{joint} up to {a:.0f} mA for {b:.0f} ms (at most {c:.0f} mA)",
+                joint=name,
+                a=max(over),
+                b=lasted_ms,
+                c=servos.max_current_ma,
+            )
     return ""
 
 
@@ -161,14 +168,18 @@ class BusMonitor:
         found: list[tuple[Cause, str | bool]] = []
         age_s = math.inf if self.reported_s is None else now_s - self.reported_s
         if age_s > safety.bus_disarm_s:
-            found.append((Cause.BUS_DEAD, "no report yet" if math.isinf(age_s) else f"silent for {1000 * age_s:.0f} ms"))
+            found.append(
+                (Cause.BUS_DEAD, "no report yet" if math.isinf(age_s) else message("silent for {a:.0f} ms", a=1000 * age_s))
+            )
         elif age_s > safety.bus_hold_s:
-            found.append((Cause.BUS_SILENT, f"for {1000 * age_s:.0f} ms"))
+            found.append((Cause.BUS_SILENT, message("for {a:.0f} ms", a=1000 * age_s)))
         found.append((Cause.PORT_LOST, not newest.port_open))
         # before the silence that it causes: the first one is what the operator reads
         bad = sum(count for time_s, count in self.errors if now_s - time_s <= safety.bus_errors_window_s)
         if bad > safety.bus_errors:
-            found.append((Cause.BUS_NOISE, f"{bad} in {safety.bus_errors_window_s:g} s (at most {safety.bus_errors})"))
+            found.append(
+                (Cause.BUS_NOISE, message("{a} in {b:g} s (at most {c})", a=bad, b=safety.bus_errors_window_s, c=safety.bus_errors))
+            )
         if silent := _listed(newest.misses, lambda misses: misses >= safety.missed_answers, ""):
             found.append((Cause.SERVO_SILENT, silent))
         elif self.gap_run > safety.bus_disarm_s * servos.bus_hz:
@@ -204,5 +215,5 @@ def _first_astray(tracking_mm: Sequence[float], limit_mm: float) -> str:
     """The first joint that is too far from its goal; NaN counts as too far."""
     for name, error_mm in zip(JOINT_NAMES, tracking_mm, strict=False):
         if not abs(error_mm) <= limit_mm:
-            return f"{name} off by {error_mm:.2f} mm (at most {limit_mm:g} mm)"
+            return message("{joint} off by {a:.2f} mm (at most {b:g} mm)", joint=name, a=error_mm, b=limit_mm)
     return ""

@@ -12,6 +12,7 @@ from core.control.faults import Cause, Fault
 from core.control.frame_reports import is_picture
 from core.control.pilot import Pilot, PilotLoop
 from core.devices import Camera, CameraLost, DeviceError, EndOfStream, Robot
+from core.messages import message
 from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene, Tick
 
 
@@ -147,7 +148,9 @@ class Engine:
     def _refuse(self, frame: Frame) -> None:
         """A frame of a wrong format is reported, and not perceived, shown or recorded."""
         shape = "x".join(map(str, frame.image.shape))
-        self.problem = f"the camera's picture is {frame.image.dtype} {shape}, not 8-bit RGB: set its colour format"
+        self.problem = message(
+            "the camera's picture is {kind} {shape}, not 8-bit RGB: set its colour format", kind=frame.image.dtype, shape=shape
+        )
         if self.pilot is not None:
             scene = Scene(frame.index, frame.captured_s, (0, 0), 1.0, refusal=Refusal(Reason.UNREADABLE, self.problem))
             self.pilot.update_scene(frame, scene, None, has_target=False)

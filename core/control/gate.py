@@ -26,6 +26,7 @@ from enum import StrEnum
 
 from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
 from core.control.joints import ONE_CATHETER, Goal, Joints, Limit, SentGoals, joint_room, limited_goal, together
+from core.messages import message
 
 _COUNT = len(JOINT_NAMES)
 
@@ -156,7 +157,7 @@ def measurement_problem(
     if measurement is None:
         return Rejection(RejectReason.NO_MEASUREMENT)
     if (wrong := _not_seven_numbers(measurement.positions_mm)) is not None:
-        return replace(wrong, detail=f"measured position: {wrong.detail}")
+        return replace(wrong, detail=message("measured position: {what}", what=wrong.detail))
     age_s = now_s - measurement.measured_s
     if not math.isfinite(age_s):
         return Rejection(RejectReason.NON_FINITE, "time of the measured positions")
@@ -174,7 +175,11 @@ def outside_envelope(positions_mm: Sequence[float], servos: ServosConfig) -> tup
     for joint, position_mm in zip(servos.joints, positions_mm, strict=True):
         low_mm, high_mm = joint_room(position_mm, joint)
         if low_mm > high_mm:
-            found.append(f"{joint.name} at {position_mm:.2f} mm ({joint.low_mm:g} to {joint.high_mm:g} mm)")
+            found.append(
+                message(
+                    "{joint} at {a:.2f} mm ({b:g} to {c:g} mm)", joint=joint.name, a=position_mm, b=joint.low_mm, c=joint.high_mm
+                )
+            )
     return tuple(found)
 
 
@@ -183,11 +188,16 @@ def too_far(request: GoalRequest, base_mm: Joints, servos: ServosConfig, safety:
     for joint, goal_mm, from_mm in zip(servos.joints, request.goals_mm, base_mm, strict=True):
         rounding_mm = abs(1.0 / joint.ticks_per_mm)
         if not joint.low_mm - rounding_mm <= goal_mm <= joint.high_mm + rounding_mm:
-            detail = f"{joint.name} to {goal_mm:.2f} mm ({joint.low_mm:g} to {joint.high_mm:g} mm)"
+            detail = message(
+                "{joint} to {a:.2f} mm ({b:g} to {c:g} mm)", joint=joint.name, a=goal_mm, b=joint.low_mm, c=joint.high_mm
+            )
             return Rejection(RejectReason.OUT_OF_ENVELOPE, detail)
         most_mm = joint.max_speed_mm_s * safety.command_max_age_s
         if abs(goal_mm - from_mm) > most_mm + rounding_mm:
-            return Rejection(RejectReason.OVER_RATE, f"{joint.name} by {abs(goal_mm - from_mm):.2f} mm (at most {most_mm:g} mm)")
+            return Rejection(
+                RejectReason.OVER_RATE,
+                message("{joint} by {a:.2f} mm (at most {b:g} mm)", joint=joint.name, a=abs(goal_mm - from_mm), b=most_mm),
+            )
     return None
 
 
@@ -312,7 +322,7 @@ def _move(
     for place, (joint, (goal_mm, limit)) in enumerate(zip(servos.joints, limited, strict=True)):
         asked_mm, from_mm, at_mm = request.goals_mm[place], base.goals_mm[place], measured_mm[place]
         if abs(goal_mm - from_mm) > joint.max_speed_mm_s * passed_s + _RECORDED_MM:
-            detail = f"{joint.name} at {at_mm:.2f} mm, sent to {from_mm:.2f} mm"
+            detail = message("{joint} at {a:.2f} mm, sent to {b:.2f} mm", joint=joint.name, a=at_mm, b=from_mm)
             return _hold(state, measured_mm, now_s, Rejection(RejectReason.OFF_COURSE, detail), servos)
         goals.append(goal_mm)
         if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:

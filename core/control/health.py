@@ -14,6 +14,7 @@ from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusMonitor, BusReport
 from core.control.faults import AFTER_SOME, AT_ONCE, Area, Cause, Fault
 from core.control.gate import RejectReason
+from core.messages import message
 from core.types import Reason
 
 
@@ -231,11 +232,11 @@ class FrameMonitor:
     def _camera_faults(self, newest: FrameReport, now_s: float, safety: SafetyConfig) -> list[Fault]:
         faults = []
         if self.equal_run >= safety.equal_frames:
-            faults.append(Fault(Cause.CAMERA_FROZEN, f"{self.equal_run} identical pictures"))
+            faults.append(Fault(Cause.CAMERA_FROZEN, message("{a} identical pictures", a=self.equal_run)))
         if not newest.format_ok:
             faults.append(Fault(Cause.WRONG_FORMAT))
         if newest.drift_px is not None and not abs(newest.drift_px) <= safety.max_drift_px:
-            moved = f"by {newest.drift_px:.0f} px (at most {safety.max_drift_px:g} px)"
+            moved = message("by {a:.0f} px (at most {b:g} px)", a=newest.drift_px, b=safety.max_drift_px)
             faults.append(Fault(Cause.CAMERA_MOVED, moved if math.isfinite(newest.drift_px) else "it shows something else"))
         share = _lost_share(self.counts, safety)
         if self.loss_since_s is not None:
@@ -244,13 +245,13 @@ class FrameMonitor:
         elif share > safety.frame_loss_warn_share:
             faults.append(Fault(Cause.FRAMES_DROPPED, f"{100 * share:.0f} %"))
         if now_s - self.out_of_order_s <= safety.frame_loss_window_s:
-            faults.append(Fault(Cause.OUT_OF_ORDER, f"{self.out_of_order} until now"))
+            faults.append(Fault(Cause.OUT_OF_ORDER, message("{a} until now", a=self.out_of_order)))
         return faults
 
     def _result_faults(self, newest: FrameReport, now_s: float, safety: SafetyConfig) -> list[Fault]:
         faults = []
         if self.broken_run >= safety.broken_results:
-            faults.append(Fault(Cause.NOT_FINITE_REPEATED, f"{self.broken_run} in a row"))
+            faults.append(Fault(Cause.NOT_FINITE_REPEATED, message("{a} in a row", a=self.broken_run)))
         elif self.broken_run > 0:
             faults.append(Fault(Cause.NOT_FINITE))
         refusal = newest.refusal
@@ -267,7 +268,7 @@ class FrameMonitor:
             if now_s - self.refusal_since_s > safety.head_lost_disarm_s:
                 cause, enough = Cause.HEAD_LOST_LONG, 1
         if self.refusal_run >= enough:
-            faults.append(Fault(cause, f"{self.refusal_run} frames"))
+            faults.append(Fault(cause, message("{a} frames", a=self.refusal_run)))
         return faults
 
 
@@ -420,14 +421,14 @@ class Health:
         faults = [*self.reported, *self.frames.faults(now_s, safety), *self.bus.faults(now_s, servos, safety)]
         for beat_s, cause in ((self.window_s, Cause.WINDOW_HUNG), (self.worker_s, Cause.WORKER_DEAD)):
             if beat_s is None or now_s - beat_s > servos.heartbeat_timeout_s:
-                silence = "no sign of life yet" if beat_s is None else f"silent for {1000 * (now_s - beat_s):.0f} ms"
+                silence = "no sign of life yet" if beat_s is None else message("silent for {a:.0f} ms", a=1000 * (now_s - beat_s))
                 faults.append(Fault(cause, silence))
         if self.servo_problems:
             faults.append(Fault(Cause.SERVOS_WRONG, "; ".join(self.servo_problems)))
         if not self.model.ok:
             faults.append(Fault(Cause.MODEL_UNFIT, self.model.detail))
         if self.rejected_run >= safety.broken_results:
-            faults.append(Fault(Cause.COMMANDS_REJECTED, f"{self.rejected_run} in a row"))
+            faults.append(Fault(Cause.COMMANDS_REJECTED, message("{a} in a row", a=self.rejected_run)))
         elif self.rejection is not None:
             faults.append(Fault(Cause.COMMAND_REJECTED, self.rejection.value))
         if driving and not self.deadman_held(now_s, safety):

@@ -41,6 +41,7 @@ from core.control.robot import GuardedRobot, SentMotion
 from core.control.servo_requests import ReleaseEvent, ServoRequests, TorqueRelease
 from core.control.supervisor import hindrances, supervise
 from core.devices import DeviceError
+from core.messages import message
 from core.system import SLEPT_S, slept_s
 from core.types import Advice, Command, Frame, RobotStatus, Scene
 
@@ -516,10 +517,12 @@ class PilotLoop:
         try:
             while not self._closing.wait(max(0.0, due_s - time.monotonic())):
                 if (now_s := self._asleep_s()) - before_s > SLEPT_S:
-                    self._pilot.report_fault(Fault(Cause.CLOCK, f"the computer slept for {now_s - before_s:.0f} s"))
+                    self._pilot.report_fault(Fault(Cause.CLOCK, message("the computer slept for {a:.0f} s", a=now_s - before_s)))
                 before_s = now_s
                 self._pilot.tick()
                 due_s = max(due_s + PERIOD_S, time.monotonic())
         except Exception as error:  # noqa: BLE001 - top of the thread: its silence stops the robot, and this says why
             _log.error("the pilot stopped", exc_info=error)
-            self.failure = f"driving stopped by an unexpected {type(error).__name__}: {error}; start the rig again"
+            self.failure = message(
+                "driving stopped by an unexpected {kind}: {why}; start the rig again", kind=type(error).__name__, why=error
+            )

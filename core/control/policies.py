@@ -9,6 +9,7 @@ import numpy as np
 from core.config.models import AdviceConfig, Config, PolicyName
 from core.control.look_ahead import limited
 from core.control.pursuit import Pursuit, speed_word
+from core.messages import message
 from core.types import Advice, PoseState, RobotStatus, Scene, Speed
 
 
@@ -25,12 +26,16 @@ def table_policy(scene: Scene, config: AdviceConfig) -> Advice | None:
     if pose.state is PoseState.A:
         return Advice(Speed.FAST, config.fast_mm_s, 0.0, "on the centerline and along it")
     if pose.state is PoseState.B:
-        return Advice(Speed.SLOW, config.slow_mm_s, 0.0, f"coming back to the centerline from the {where}")
+        return Advice(Speed.SLOW, config.slow_mm_s, 0.0, message("coming back to the centerline from the {side}", side=where))
     if pose.state is PoseState.C:
         steer = limited(config.steer_gain_away * turn_deg, config.max_steer_deg)
-        return Advice(Speed.SLOWEST, config.slowest_mm_s, steer, f"moving away from the centerline to the {where}")
+        return Advice(
+            Speed.SLOWEST, config.slowest_mm_s, steer, message("moving away from the centerline to the {side}", side=where)
+        )
     steer = limited(config.steer_gain * turn_deg, config.max_steer_deg)
-    return Advice(Speed.MODERATE, config.moderate_mm_s, steer, f"crossed the centerline to the {where}, angle left")
+    return Advice(
+        Speed.MODERATE, config.moderate_mm_s, steer, message("crossed the centerline to the {side}, angle left", side=where)
+    )
 
 
 POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from core.config.models import AdviceConfig, PursuitConfig
 from core.control.look_ahead import LookAhead, limited, look_ahead
+from core.messages import message
 from core.types import Advice, Point, RobotStatus, Scene, Speed
 
 _MOST_BACK_MM = 60.0
@@ -317,7 +318,7 @@ class Pursuit:
                 self._back_off = BackOff("the way to the target branches off behind the head", config.retry_mm)
             elif self._contact_limit.exceeded(contact_n, rises, way.left_px):
                 self._retries.add(way)
-                why = f"the robot presses against the wall with {contact_n or 0.0:.2f} N"
+                why = message("the robot presses against the wall with {a:.2f} N", a=contact_n or 0.0)
                 self._back_off = BackOff(why, config.back_off_mm / 2)
             elif stuck:
                 self._retries.add(way)
@@ -337,16 +338,20 @@ class Pursuit:
             self._is_miss_counted = self._is_miss_counted and not is_done
             return None
         # the way back is free, since the head follows its own body: going slow would only let the body lean longer
-        return self._advise(-self._words.fast_mm_s, 0.0 if way.behind else self._steer_deg, f"backing off: {self._back_off.why}")
+        return self._advise(
+            -self._words.fast_mm_s, 0.0 if way.behind else self._steer_deg, message("backing off: {why}", why=self._back_off.why)
+        )
 
     def _give_up_advice(self, way: LookAhead) -> Advice | None:
         if self._unfollowed_s > _UNFOLLOWED_S:  # the operator goes on by hand
             self._misses.count = 0
             self._retries.reset()
         if (count := self._misses.count_at(way)) >= self._config.most_misses:
-            return self._advise(0.0, 0.0, f"missed the branch {count} times: take over, or choose another destination")
+            return self._advise(0.0, 0.0, message("missed the branch {a} times: take over, or choose another destination", a=count))
         if (count := self._retries.count) >= self._config.most_tries:
-            return self._advise(0.0, 0.0, f"came no farther in {count} tries: take over, or choose another destination")
+            return self._advise(
+                0.0, 0.0, message("came no farther in {a} tries: take over, or choose another destination", a=count)
+            )
         return None
 
     def _forward_advice(self, way: LookAhead, rises: bool) -> Advice:

@@ -16,6 +16,7 @@ from core.control.health import ServosChecked, ServosOff
 from core.control.modes import Event
 from core.control.robot import GuardedRobot
 from core.devices import DeviceError
+from core.messages import message
 
 _log = logging.getLogger(__name__)
 
@@ -168,7 +169,7 @@ class ServoRequests:
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo, which clears its hardware error."""
-        self._request(f"restarting servo {servo_id}", lambda: self._disarm_and(lambda: self._robot.reboot(servo_id)))
+        self._request(message("restarting servo {a}", a=servo_id), lambda: self._disarm_and(lambda: self._robot.reboot(servo_id)))
 
     def torque_off(self, *, is_bus_lost: bool = False) -> None:
         """Let the wires go slack after what is under way; servos being switched on stay off. A lost bus is not held first."""
@@ -200,7 +201,18 @@ class ServoRequests:
                 self._post(ServosChecked((str(error),)))
             except Exception as error:  # noqa: BLE001 - top of the thread: the future is never looked at
                 _log.error("%s failed", what, exc_info=error)
-                self._post(ServosChecked((f"{what} failed ({type(error).__name__}: {error}): start the rig again",)))
+                self._post(
+                    ServosChecked(
+                        (
+                            message(
+                                "{what} failed ({kind}: {why}): start the rig again",
+                                what=what,
+                                kind=type(error).__name__,
+                                why=error,
+                            ),
+                        )
+                    )
+                )
             finally:
                 self._end(what)
 

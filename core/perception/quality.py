@@ -23,6 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from core import geometry
 from core.config.models import PerceptionConfig, QualityConfig, VectorConfig
+from core.messages import message
 from core.perception.vessel_graph import MAX_CHAINS
 from core.types import Centerline, Image, Mask, Masks, Point, Points, Reason, Refusal, RobotPath, Vector, VesselGraph
 
@@ -203,15 +204,18 @@ def check_image(image: Image, config: QualityConfig) -> Refusal | None:
     red, green, blue = (image[::SAMPLE_STEP, ::SAMPLE_STEP, channel] for channel in range(3))
     brightest = _level(np.maximum(np.maximum(red, green), blue), 0.99)
     if brightest < config.black_level:
-        return Refusal(Reason.BLACK, f"99 % of it is darker than {brightest:.0f} (black below {config.black_level:.0f} of 255)")
+        return Refusal(
+            Reason.BLACK,
+            message("99 % of it is darker than {a:.0f} (black below {b:.0f} of 255)", a=brightest, b=config.black_level),
+        )
     dimmest = _level(np.minimum(np.minimum(red, green), blue), 0.01)
     if dimmest > config.white_level:
-        detail = f"99 % of it is brighter than {dimmest:.0f} (overexposed above {config.white_level:.0f} of 255)"
+        detail = message("99 % of it is brighter than {a:.0f} (overexposed above {b:.0f} of 255)", a=dimmest, b=config.white_level)
         return Refusal(Reason.WHITE, detail)
     if config.min_sharpness > 0.0:
         found = sharpness(image)
         if found < config.min_sharpness:
-            return Refusal(Reason.BLURRED, f"sharpness {found:.3f} (at least {config.min_sharpness:.3f})")
+            return Refusal(Reason.BLURRED, message("sharpness {a:.3f} (at least {b:.3f})", a=found, b=config.min_sharpness))
     return None
 
 
@@ -268,7 +272,8 @@ def check_masks(masks: Masks) -> Refusal | None:
     share = float(np.count_nonzero(masks.robot)) / masks.robot.size
     if share > MAX_ROBOT_SHARE:
         return Refusal(
-            Reason.NO_ROBOT, f"what looks like it covers {100 * share:.0f} % of the image (at most {100 * MAX_ROBOT_SHARE:.0f} %)"
+            Reason.NO_ROBOT,
+            message("what looks like it covers {a:.0f} % of the image (at most {b:.0f} %)", a=100 * share, b=100 * MAX_ROBOT_SHARE),
         )
     return None
 
@@ -281,7 +286,9 @@ def check_kind(novelty: float | None, config: QualityConfig, *, refused_before: 
     limit = config.max_novelty * (_KNOWN_AGAIN_SHARE if refused_before else 1.0)
     if not config.enabled or novelty is None or novelty <= limit:
         return None
-    return Refusal(Reason.UNLIKE_TRAINING, f"distance {novelty:.2f} from the pictures that it knows (at most {limit:.2f})")
+    return Refusal(
+        Reason.UNLIKE_TRAINING, message("distance {a:.2f} from the pictures that it knows (at most {b:.2f})", a=novelty, b=limit)
+    )
 
 
 def hinted(refusal: Refusal, unlike: Refusal | None) -> Refusal:
@@ -295,7 +302,7 @@ def check_graph(graph: VesselGraph, config: VectorConfig) -> Refusal | None:
     """NO_VESSEL, when the mask gave no graph that the configured rule could use: it is a dot, or branches all over."""
     if graph.edges or config.vessel_rule == "window":
         return None
-    return Refusal(Reason.NO_VESSEL, f"its mask has no centerline, or more than {MAX_CHAINS} branches")
+    return Refusal(Reason.NO_VESSEL, message("its mask has no centerline, or more than {a} branches", a=MAX_CHAINS))
 
 
 def check_path(path: RobotPath, masks: Masks, config: PerceptionConfig) -> Refusal | None:
@@ -305,15 +312,22 @@ def check_path(path: RobotPath, masks: Masks, config: PerceptionConfig) -> Refus
         return None
     length_px = float(geometry.arc_length(path.points)[-1])
     if length_px < limits.min_robot_length_px:
-        return Refusal(Reason.TOO_SHORT, f"{length_px:.0f} px long (at least {limits.min_robot_length_px:.0f} px)")
+        return Refusal(
+            Reason.TOO_SHORT, message("{a:.0f} px long (at least {b:.0f} px)", a=length_px, b=limits.min_robot_length_px)
+        )
     bridged = path.bridged_px / length_px
     if bridged > limits.max_bridged_share:
-        detail = f"{100 * bridged:.0f} % of the robot is bridged (at most {100 * limits.max_bridged_share:.0f} %)"
+        detail = message("{a:.0f} % of the robot is bridged (at most {b:.0f} %)", a=100 * bridged, b=100 * limits.max_bridged_share)
         return Refusal(Reason.GAP_TOO_LONG, detail)
     inside = inside_share(path, masks.vessel, config.vectors.robot_length_px)
     if inside < limits.min_inside_vessel:
-        detail = f"{100 * inside:.0f} % of its last {config.vectors.robot_length_px:.0f} px lie in the vessel"
-        return Refusal(Reason.OUTSIDE_VESSEL, f"{detail} (at least {100 * limits.min_inside_vessel:.0f} %)")
+        detail = message(
+            "{a:.0f} % of its last {b:.0f} px lie in the vessel (at least {c:.0f} %)",
+            a=100 * inside,
+            b=config.vectors.robot_length_px,
+            c=100 * limits.min_inside_vessel,
+        )
+        return Refusal(Reason.OUTSIDE_VESSEL, detail)
     return None
 
 
@@ -324,10 +338,12 @@ def check_centerline(centerline: Centerline | None, head: Point, config: Quality
         return Refusal(Reason.NO_VESSEL, "no centerline beside the robot's head")
     gap_px, limit_px = math.dist(head, centerline.nearest), MAX_OFF_RADII * centerline.radius_px + MAX_OFF_PX
     if config.enabled and gap_px > limit_px:
-        detail = f"its head is {gap_px:.0f} px from the nearest centerline (at most {limit_px:.0f} px)"
+        detail = message("its head is {a:.0f} px from the nearest centerline (at most {b:.0f} px)", a=gap_px, b=limit_px)
         return Refusal(Reason.OUTSIDE_VESSEL, detail)
     if config.enabled and centerline.ambiguity > config.max_ambiguity:
-        detail = f"a second branch fits {100 * centerline.ambiguity:.0f} % as well (at most {100 * config.max_ambiguity:.0f} %)"
+        detail = message(
+            "a second branch fits {a:.0f} % as well (at most {b:.0f} %)", a=100 * centerline.ambiguity, b=100 * config.max_ambiguity
+        )
         return Refusal(Reason.AMBIGUOUS_BRANCH, detail)
     return None
 
@@ -346,7 +362,9 @@ def check_walls(masks: Masks, head: Point, config: QualityConfig) -> Refusal | N
 def check_confidence(confidence: float, config: QualityConfig) -> Refusal | None:
     """LOW_CONFIDENCE."""
     if config.enabled and not confidence >= config.min_confidence:  # also NaN
-        return Refusal(Reason.LOW_CONFIDENCE, f"{100 * confidence:.0f} % (at least {100 * config.min_confidence:.0f} %)")
+        return Refusal(
+            Reason.LOW_CONFIDENCE, message("{a:.0f} % (at least {b:.0f} %)", a=100 * confidence, b=100 * config.min_confidence)
+        )
     return None
 
 

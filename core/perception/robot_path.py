@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import PathConfig, PerceptionConfig
+from core.messages import message
 from core.perception import compiled, skeleton
 from core.perception.head_tail import PreviousPath, Surroundings, is_at_vessel_end, is_entry, tail_first, was_the_head
 from core.perception.skeleton import PixelChain, PixelGraph, trace
@@ -435,7 +436,7 @@ def find(
     graph = _without_short_links(traced, 3.0 * radius_px)
     components = find_components(graph, masks.vessel)
     if not components:
-        return Refusal(Reason.TOO_SHORT, f"{total_px:.0f} px long (at least {config.path.min_length_px:.0f} px)")
+        return Refusal(Reason.TOO_SHORT, message("{a:.0f} px long (at least {b:.0f} px)", a=total_px, b=config.path.min_length_px))
     around = Surroundings(masks, vessel, port, config.path, before)
     components = without_reflections(graph, components, around, config)
     refusal = check_components(graph, components, config)
@@ -451,7 +452,9 @@ def find(
     if not candidates:
         longest = max(_length(chain.points) for chain in graph.chains)
         if longest < config.path.min_length_px:
-            return Refusal(Reason.TOO_SHORT, f"{longest:.0f} px long (at least {config.path.min_length_px:.0f} px)")
+            return Refusal(
+                Reason.TOO_SHORT, message("{a:.0f} px long (at least {b:.0f} px)", a=longest, b=config.path.min_length_px)
+            )
         return Refusal(Reason.AMBIGUOUS_PATH, "the robot's outline is closed: it shows no end")
     eligible = candidates if before.path is None else [*candidates, *rivals]
     best = max(eligible, key=lambda candidate: candidate.score + candidate.continuity)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import PerceptionConfig, TrackingConfig
+from core.messages import message
 from core.perception.head_tail import ALONG_STEP_PX, STILL_HEAD_PX, PreviousPath, goes_along_px, may_go_on_outside
 from core.perception.pose import StateFilter
 from core.perception.roi import GATHERING_S, RoiSelector, VesselAverage, cells_of, has_changed
@@ -81,7 +82,7 @@ def check_jump(path: RobotPath, tracked: TrackedPath | None, captured_s: float, 
     limit_px = config.max_head_speed_px_s * (captured_s - tracked.captured_s) + SLACK_PX
     if jump_px <= limit_px:
         return None
-    return Refusal(Reason.HEAD_JUMP, f"{jump_px:.0f} px since the last frame (at most {limit_px:.0f} px)")
+    return Refusal(Reason.HEAD_JUMP, message("{a:.0f} px since the last frame (at most {b:.0f} px)", a=jump_px, b=limit_px))
 
 
 def track(path: RobotPath, mask: Mask, tracked: TrackedPath | None, captured_s: float, config: PerceptionConfig) -> TrackedPath:

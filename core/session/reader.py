@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.control.modes import Mode
+from core.messages import message
 from core.session.codec import Count, InvalidRecord, JsonLayout, Moment, RecordedRow, read_json, row_from_json
 from core.session.files import FileLine, check_seal, is_sealed, lines_of, read_line
 from core.session.manifest import (
@@ -158,7 +159,13 @@ class _Pictures:
         except (av.error.FFmpegError, OSError, ValueError) as error:
             self._unreadable.add(number)
             self._open.pop(number, None)
-            self._on_problem(f"{self._path(number).name}: cannot be read as a video ({getattr(error, 'strerror', None) or error})")
+            self._on_problem(
+                message(
+                    "{path}: cannot be read as a video ({why})",
+                    path=self._path(number).name,
+                    why=getattr(error, "strerror", None) or error,
+                )
+            )
             return
         while (found := video.next()) is not None:
             at_ms, frame = found

@@ -27,6 +27,7 @@ from av.sidedata.sidedata import SideData
 from av.video.frame import PictureType
 
 from core.config.models import GOP_FRAMES, RecordConfig
+from core.messages import message
 from core.types import Image
 
 MS = Fraction(1, 1000)
@@ -341,7 +342,7 @@ def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int]
     try:
         container = open_video(source)
     except (av.error.FFmpegError, OSError) as error:
-        return kept, [f"{source.name}: cannot be read as a video ({_words(error)})"]
+        return kept, [message("{path}: cannot be read as a video ({why})", path=source.name, why=_words(error))]
     with container:
         if not has_h264(container):
             return kept, [f"{source.name}: has no H.264 video in it"]

@@ -22,6 +22,7 @@ from typing import Any
 from core.config.models import RecordConfig, sessions_folder
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
+from core.messages import message
 from core.session.codec import light_tick, row_of
 from core.session.files import EncodedFrame, SessionFiles
 from core.session.manifest import About, Event, EventKind, SessionError, events_between
@@ -90,7 +91,7 @@ def faults_between(before: RecordStatus, now: RecordStatus) -> list[Fault]:
     elif now.warning:
         faults.append(Fault(Cause.DISK_LOW, now.warning))
     if now.dropped > before.dropped:
-        faults.append(Fault(Cause.RECORDER_BEHIND, f"{now.dropped} frames"))
+        faults.append(Fault(Cause.RECORDER_BEHIND, message("{a} frames", a=now.dropped)))
     return faults
 
 
@@ -134,8 +135,8 @@ def disk_space(folder: Path, config: RecordConfig) -> Disk | None:
         return None
     left = f"{free / _MB:,.0f}"
     is_low = free < config.warn_free_mb * _MB or free < config.warn_free_share * total
-    warning = f"disk nearly full: {left} MB left" if is_low else ""
-    full = f"disk full ({left} MB left in {folder})" if free < config.stop_free_mb * _MB else ""
+    warning = message("disk nearly full: {left} MB left", left=left) if is_low else ""
+    full = message("disk full ({left} MB left in {folder})", left=left, folder=folder) if free < config.stop_free_mb * _MB else ""
     return Disk(free, warning, full)
 
 
@@ -256,15 +257,19 @@ class RingSaver:
                 if not problem:
                     self._status.update(saved=files.folder if files is not None else None)
                 elif not written:
-                    self._status.notify(f"the last seconds were not saved: {problem}")
+                    self._status.notify(message("the last seconds were not saved: {why}", why=problem))
                 else:
-                    self._status.notify(f"of the last seconds only {written} of {len(frames)} frames were saved: {problem}")
+                    self._status.notify(
+                        message(
+                            "of the last seconds only {a} of {b} frames were saved: {why}", a=written, b=len(frames), why=problem
+                        )
+                    )
 
     def _check_room(self) -> None:
         """Raises SessionError where the disk is nearly full: its last room is for closing what is open."""
         disk = disk_space(self._parent, self._config)
         if disk is not None and disk.full:
-            raise SessionError(f"{disk.full}; make room and save them again")
+            raise SessionError(message("{why}; make room and save them again", why=disk.full))
 
 
 def _beginning(first: EncodedFrame, events: Sequence[Event]) -> Iterator[Event]:
@@ -507,7 +512,7 @@ class Recording:
 
 def _counted(kind: EventKind, time_s: float, count: int, total: int) -> Event:
     """`count` more frames were dropped or lost, `total` until now."""
-    return Event(time_s, kind, f"{count} frames", {"count": count, "total": total})
+    return Event(time_s, kind, message("{a} frames", a=count), {"count": count, "total": total})
 
 
 class SessionWriter:

@@ -28,6 +28,7 @@ from core.config.models import Config
 from core.config.rig_file import RigFile, make_rig
 from core.config.safety import JOINT_NAMES, JointName, ServosConfig
 from core.devices import DeviceError
+from core.messages import message
 from core.types import Image, Point
 from hardware.calibration import servo_identification
 from hardware.calibration.bench import CalibrationBench
@@ -104,7 +105,14 @@ class RigDraft:
         image = self.bench.board_picture(self.spec)
         view = find_board(image, self.spec)
         self.views.append(view)
-        self.say(f"board {len(self.views)}: {len(view.pixels)} of {(self.spec.columns - 1) * (self.spec.rows - 1)} corners")
+        self.say(
+            message(
+                "board {a}: {b} of {c} corners",
+                a=len(self.views),
+                b=len(view.pixels),
+                c=(self.spec.columns - 1) * (self.spec.rows - 1),
+            )
+        )
         return image, view
 
     def forget_boards(self) -> None:
@@ -141,10 +149,10 @@ class RigDraft:
         if bent_px * 640.0 / max(size) > _NOTICEABLE_PX:
             self.lens = lens
             straight = [BoardView(undistort(view.pixels, lens), view.board_mm) for view in self.views]
-            self.say(f"lens: up to {bent_px:.1f} px at the border, {lens.residual_px:.2f} px left over")
+            self.say(message("lens: up to {a:.1f} px at the border, {b:.2f} px left over", a=bent_px, b=lens.residual_px))
         else:
             self.lens = None
-            self.say(f"lens: straight enough ({bent_px:.1f} px at the border)")
+            self.say(message("lens: straight enough ({a:.1f} px at the border)", a=bent_px))
         self.scale = scale_of_board(straight, size)
         self.bench.set_lens(self.lens)
         self._say_scale()
@@ -158,7 +166,7 @@ class RigDraft:
 
     def _say_scale(self) -> None:
         assert self.scale is not None
-        self.say(f"scale: {self.scale.mm_per_px:.4f} mm/px, \N{PLUS-MINUS SIGN}{100 * self.scale.uncertainty_share:.2f} %")
+        self.say(message("scale: {a:.4f} mm/px, ±{b:.2f} %", a=self.scale.mm_per_px, b=100 * self.scale.uncertainty_share))
 
     def _picture_size(self) -> tuple[int, int]:
         frame = self.bench.feed.newest or self.bench.feed.next_frames(1, 5.0)[0]
@@ -179,7 +187,12 @@ class RigDraft:
         if found.elsewhere and len(found.servos) < len(JOINT_NAMES):
             others = "; ".join(f"{', '.join(map(str, ids))} at {baud} baud" for baud, ids in found.elsewhere)
             raise DeviceError(
-                f"servos at several speeds: {', '.join(map(str, found.ids))} at {found.baud} baud; {others}; set all seven to one"
+                message(
+                    "servos at several speeds: {ids} at {a} baud; {others}; set all seven to one",
+                    ids=", ".join(map(str, found.ids)),
+                    a=found.baud,
+                    others=others,
+                )
             )
         if len(found.servos) != len(JOINT_NAMES):
             raise DeviceError(
@@ -188,7 +201,7 @@ class RigDraft:
         models = {servo.model for servo in found.servos}
         if len(models) != 1:
             raise DeviceError(f"servos of several models: {listed}; all seven must be of one")
-        self.say(f"seven servos at {found.baud} baud: {', '.join(map(str, found.ids))}")
+        self.say(message("seven servos at {a} baud: {ids}", a=found.baud, ids=", ".join(map(str, found.ids))))
         self.found = found
         self.findings = {servo_id: finding for servo_id, finding in self.findings.items() if servo_id in found.ids}
         if any(one.id not in found.ids for one in self.assignments):  # a servo was changed for another one
@@ -281,7 +294,9 @@ class RigDraft:
             raise
         except ServoError as error:  # nothing has turned: the steering can be learnt all the same
             self.zero = None
-            self.say(f"where the servos stand could not be kept ({error}): learn the steering, which keeps it, too")
+            self.say(
+                message("where the servos stand could not be kept ({why}): learn the steering, which keeps it, too", why=error)
+            )
 
     def _set_zero(self, ticks: tuple[int, ...]) -> None:
         slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
@@ -314,7 +329,13 @@ class RigDraft:
         steering = learnt.steering
         self.steering, self.head_px = steering, learnt.head_px
         self._set_zero(learnt.zero_ticks)
-        self.say(f"steering: roll {steering.roll_deg:+.0f}°, way and heading {steering.disagreement_deg:.1f}° from a right angle")
+        self.say(
+            message(
+                "steering: roll {a:+.0f}°, way and heading {b:.1f}° from a right angle",
+                a=steering.roll_deg,
+                b=steering.disagreement_deg,
+            )
+        )
         return steering
 
     def nudge(self, name: str, way_mm: float) -> None:

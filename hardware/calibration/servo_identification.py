@@ -31,6 +31,7 @@ from core.calibration.servos import (
 from core.config.calibration import SteeringConfig
 from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
 from core.devices import DeviceError
+from core.messages import message
 from core.types import Command, Point
 from hardware.calibration.servo_probe import ProbeLimits
 from hardware.servos.dynamixel_port import ServoError
@@ -118,11 +119,11 @@ def identify_servo(bench: ServoBench, servos: ServosConfig, ids: tuple[int, ...]
     limits = ProbeLimits(-most_mm, most_mm)
     with bench.probe(servos, servo_id, limits, 1, ids) as probe, _or_back(lambda: probe.move_to(0.0)):
         for amplitude_mm in _AMPLITUDES_MM:
-            say(f"servo {servo_id}: {amplitude_mm:g} mm both ways")
+            say(message("servo {a}: {b:g} mm both ways", a=servo_id, b=amplitude_mm))
             finding = classify(_wiggled(bench, probe, amplitude_mm))
             if finding is not None and finding.function is Function.ADVANCE and amplitude_mm < most_mm:
                 # How far it feeds is clear only after a longer way.
-                say(f"servo {servo_id}: {most_mm:g} mm both ways")
+                say(message("servo {a}: {b:g} mm both ways", a=servo_id, b=most_mm))
                 try:
                     farther = classify(_wiggled(bench, probe, most_mm))
                 except HeadNotSeen:  # the head leaves the picture there
@@ -131,9 +132,17 @@ def identify_servo(bench: ServoBench, servos: ServosConfig, ids: tuple[int, ...]
                 if farther is not None and (farther.function, farther.sign) == (finding.function, finding.sign):
                     finding = farther
             if finding is not None:
-                say(f"servo {servo_id} {finding.function} ({finding.seen}), direction {'+' if finding.sign > 0 else '-'}")
+                say(
+                    message(
+                        "servo {a} {function} ({seen}), direction {sign}",
+                        a=servo_id,
+                        function=finding.function,
+                        seen=finding.seen,
+                        sign="+" if finding.sign > 0 else "-",
+                    )
+                )
                 return finding
-    say(f"servo {servo_id}: nothing clear was seen")
+    say(message("servo {a}: nothing clear was seen", a=servo_id))
     return None
 
 
@@ -289,7 +298,11 @@ def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say) -> Learned
                 pulls[name] = Pull(pull_mm, head_move(rest, _look(bench, robot)))
                 if pulls[name].move.size_px >= _ENOUGH_PX:
                     break
-            say(f"{name}: {pulls[name].pull_mm:g} mm of pull, {pulls[name].move.size_px:.1f} px of way")
+            say(
+                message(
+                    "{joint}: {a:g} mm of pull, {b:.1f} px of way", joint=name, a=pulls[name].pull_mm, b=pulls[name].move.size_px
+                )
+            )
         robot.bend_to(Command())
     assert first is not None
     return LearnedSteering(learn(pulls, first.heading), first.head, ticks)

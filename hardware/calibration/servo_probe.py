@@ -17,6 +17,7 @@ from typing import Literal
 
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause
+from core.messages import message
 from core.system import SLEPT_S, slept_s
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
@@ -415,4 +416,4 @@ class SteeredRobot:
             self._robot.hold()
             self._robot.torque_off()
             names = ", ".join(f"{state.name} ({abs(state.current_ma or 0.0):.0f} mA)" for state in strained)
-            raise Strained(f"too much current: {names}; the servos were let go: something holds the wires")
+            raise Strained(message("too much current: {names}; the servos were let go: something holds the wires", names=names))

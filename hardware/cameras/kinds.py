@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from core.config.models import CameraConfig, RigConfig
 from core.devices import Camera
+from core.messages import message
 from hardware.cameras import sysfs
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def _check_realsense_library() -> None:
     from hardware.preflight.checks import REALSENSE, load_problem
 
     if problem := load_problem(REALSENSE):
-        raise ImportError(f"the library of RealSense cameras cannot be used: {problem}")
+        raise ImportError(message("the library of RealSense cameras cannot be used: {problem}", problem=problem))
 
 
 _UDEV = (
@@ -148,7 +149,9 @@ def _check_webcam(config: CameraConfig) -> Check:
     else:
         return Check("camera", False, "no webcam", "plug it in; if it is: another cable, or another port")
     if not os.access(node, os.R_OK | os.W_OK):
-        return Check("camera", False, f"no permission for {node}", "sudo usermod -aG video $USER, then log in again")
+        return Check(
+            "camera", False, message("no permission for {node}", node=node), "sudo usermod -aG video $USER, then log in again"
+        )
     return Check("camera", True, note)
 
 

@@ -17,6 +17,7 @@ from typing import Protocol
 from core.config.calibration import LensConfig
 from core.config.models import CameraConfig
 from core.devices import Camera, CameraLost, DeviceError, Latest
+from core.messages import message
 from core.types import Frame, Image
 from hardware.cameras.undistorted import UndistortedCamera
 
@@ -89,7 +90,7 @@ class LiveCamera:
         """Start the camera; raises DeviceError when it is not there or does not start."""
         self.close()
         if self._hung is not None and self._hung.thread.is_alive():
-            raise DeviceError(f"the driver of {self.name} does not return: plug the camera out and in again")
+            raise DeviceError(message("the driver of {camera} does not return: plug the camera out and in again", camera=self.name))
         self._reader = _Reader(self._sensor, self._config)
         self._reader.thread.start()
         problem = None if self._reader.opened.wait(_OPEN_WITHIN_S) else f"{self.name} does not answer: plug it out and in again"
@@ -316,7 +317,7 @@ class CameraFeed:
             if len(found) >= count:
                 return found[:count]
             if time.monotonic() - since_s > timeout_s:
-                raise DeviceError(self.problem or f"{self.name} gives no pictures: check its cable")
+                raise DeviceError(self.problem or message("{camera} gives no pictures: check its cable", camera=self.name))
             time.sleep(_WAIT_S)
 
     def close(self) -> None:

@@ -20,6 +20,7 @@ import pyrealsense2 as rs
 
 from core.config.models import CameraConfig
 from core.devices import DeviceError, EndOfStream
+from core.messages import message
 from core.types import Frame, Image
 from hardware.cameras.files import Pacer
 from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
@@ -124,7 +125,9 @@ class RealSenseSensor:
             self._own_serial = self.info.serial
         except RuntimeError as error:
             self.stop()
-            raise DeviceError(f"{self.name} cannot be started ({_short(error)}): close other programs that use it") from None
+            raise DeviceError(
+                message("{camera} cannot be started ({why}): close other programs that use it", camera=self.name, why=_short(error))
+            ) from None
         except DeviceError:
             self.stop()
             raise
@@ -141,7 +144,7 @@ class RealSenseSensor:
             captured_s = self._clock.captured_s(arrived_s, stamp_s, wall_s if on_wall else None)
             return SensorFrame(colour_image(frame), captured_s, int(frame.get_frame_number()))
         except RuntimeError as error:
-            raise DeviceError(f"{self.name} is lost ({_short(error)}): check its cable") from None
+            raise DeviceError(message("{camera} is lost ({why}): check its cable", camera=self.name, why=_short(error))) from None
 
     def stop(self) -> None:
         sensor, self._sensor = self._sensor, None
@@ -172,7 +175,12 @@ class RealSenseSensor:
         if devices and self._own_serial is not None:
             # Another camera's pictures must not take the place of a lost one's: the operator drives by them.
             raise DeviceError(
-                f"{self.name} {wanted} is not there any more (there are: {serials}): plug it in, or start again with another one"
+                message(
+                    "{camera} {serial} is not there any more (there are: {serials}): plug it in, or start again with another one",
+                    camera=self.name,
+                    serial=wanted,
+                    serials=serials,
+                )
             )
         if len(chosen) > 1:
             raise DeviceError(f"{len(chosen)} RealSense cameras ({serials}): set camera.serial to one of them")

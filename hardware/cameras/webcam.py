@@ -17,6 +17,7 @@ import numpy as np
 
 from core.config.models import CameraConfig
 from core.devices import DeviceError
+from core.messages import message
 from hardware.cameras import sysfs
 from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
 
@@ -62,7 +63,11 @@ class WebcamSensor:
         try:
             if not capture.isOpened():
                 raise DeviceError(
-                    f"{self.name} ({node}) cannot be opened: close other programs that use it, or join the group video"
+                    message(
+                        "{camera} ({node}) cannot be opened: close other programs that use it, or join the group video",
+                        camera=self.name,
+                        node=node,
+                    )
                 )
             self._set_up(capture, node)
         except DeviceError:
@@ -79,7 +84,7 @@ class WebcamSensor:
         if not self._capture.grab():
             if self._is_new and time.monotonic() - asked_s > _AT_ONCE_S:
                 return None
-            raise DeviceError(f"{self.name} is lost: check its cable")
+            raise DeviceError(message("{camera} is lost: check its cable", camera=self.name))
         self._is_new = False
         arrived_s = time.monotonic()
         # V4L2 stamps frames on the monotonic clock. Some drivers do not, and say 0, or use another one.
@@ -118,7 +123,13 @@ class WebcamSensor:
             node = sysfs.webcam_node(wanted)
             if not node.exists():
                 paths = ", ".join(device.path for device in devices) or "none"
-                raise DeviceError(f"webcam {wanted} is not there; webcams: {paths}: plug it in, or set camera.device")
+                raise DeviceError(
+                    message(
+                        "webcam {camera} is not there; webcams: {paths}: plug it in, or set camera.device",
+                        camera=wanted,
+                        paths=paths,
+                    )
+                )
         # Resolved at every start: plugged in again, the stable path may lead to another number.
         node = node.resolve()
         self._title = next((device.title for device in devices if device.node.resolve() == node), self._title)

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from core.config.models import GamepadConfig
 from core.devices import DeviceError
+from core.messages import message
 from hardware.processes import DeviceThread
 
 EVENT = struct.Struct("IhBB")
@@ -253,7 +254,12 @@ class Gamepad:
 
     def _fail(self, error: Exception) -> None:
         self._report_device(
-            None, GamepadError(f"the gamepad is no longer read ({type(error).__name__}: {error}): start the program again")
+            None,
+            GamepadError(
+                message(
+                    "the gamepad is no longer read ({kind}: {why}): start the program again", kind=type(error).__name__, why=error
+                )
+            ),
         )
 
 
@@ -283,7 +289,9 @@ def _open(path: str, *, drives: bool) -> tuple[int, str, Layout]:
     try:
         device = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except PermissionError as error:
-        raise GamepadRefused(f"no permission for gamepad {path}: add your user to the group input, then log in again") from error
+        raise GamepadRefused(
+            message("no permission for gamepad {path}: add your user to the group input, then log in again", path=path)
+        ) from error
     except (OSError, ValueError) as error:
         missing = isinstance(error, OSError) and error.errno in {errno.ENOENT, errno.ENODEV, errno.ENXIO}
         reason = "is not there" if missing else "cannot be opened"
@@ -294,12 +302,16 @@ def _open(path: str, *, drives: bool) -> tuple[int, str, Layout]:
         layout = Layout()
     if layout is None or GAMEPAD_BUTTON not in layout.buttons:
         os.close(device)
-        raise GamepadError(f"{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is")
+        raise GamepadError(
+            message("{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is", path=path)
+        )
     raw = (_ask(device, 0x13, 128) or b"").split(b"\0")[0].decode("utf-8", "replace")
     name = " ".join(re.sub(r"[^\x20-\uffff]", " ", raw).split()) or Path(path).name
     if not RIGHT_STICK.issubset(layout.axes):
         os.close(device)
-        raise GamepadRefused(f"gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one")
+        raise GamepadRefused(
+            message("gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one", name=name)
+        )
     try:
         if drives:
             fcntl.flock(device, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -31,6 +31,7 @@ import serial
 
 from core.config.models import PedalConfig
 from core.devices import DeviceError
+from core.messages import message
 from hardware.processes import DeviceThread
 
 _CHUNK = 4096
@@ -82,8 +83,10 @@ class PedalPort:
         except BlockingIOError:
             return b""
         except OSError as error:
-            raise PedalLost(f"the pedal at {self.name} is gone ({error.strerror}): plug its USB cable in") from None
-        raise PedalLost(f"the pedal at {self.name} is gone: plug its USB cable in")
+            raise PedalLost(
+                message("the pedal at {port} is gone ({why}): plug its USB cable in", port=self.name, why=error.strerror)
+            ) from None
+        raise PedalLost(message("the pedal at {port} is gone: plug its USB cable in", port=self.name))
 
     def close(self) -> None:
         """Give the port back at once: a plug that comes back meanwhile gets another name. Never fails."""
@@ -112,17 +115,30 @@ def open_pedal_port(config: PedalConfig) -> PedalPort:
 def _port_error(config: PedalConfig, error: Exception) -> PedalPortError:
     port, code = config.port, getattr(error, "errno", None)
     if code == errno.ENOENT:
-        return PedalPortError(f"pedal port {port} does not exist: plug the pedal in, or set pedal.port")
+        return PedalPortError(message("pedal port {port} does not exist: plug the pedal in, or set pedal.port", port=port))
     if code in {errno.EACCES, errno.EPERM}:
-        return PedalPortError(f"no permission for pedal port {port}: add your user to the group dialout, then log in again")
+        return PedalPortError(
+            message("no permission for pedal port {port}: add your user to the group dialout, then log in again", port=port)
+        )
     if code in {errno.EAGAIN, errno.EBUSY}:
         return PedalPortTaken(
-            f"pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port"
+            message(
+                "pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port", port=port
+            )
         )
     if code in {errno.ENODEV, errno.ENXIO, errno.EIO}:
-        return PedalPortError(f"pedal port {port} has no device behind it: unplug the pedal and plug it in again")
+        return PedalPortError(
+            message("pedal port {port} has no device behind it: unplug the pedal and plug it in again", port=port)
+        )
     reason = " ".join(str(error).split())[:120]
-    return PedalPortError(f"{port} cannot be used as pedal port at {config.baud} baud ({reason}): set pedal.port and pedal.baud")
+    return PedalPortError(
+        message(
+            "{port} cannot be used as pedal port at {a} baud ({why}): set pedal.port and pedal.baud",
+            port=port,
+            a=config.baud,
+            why=reason,
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,7 +293,7 @@ class Pedal:
         self._on_report = on_report
         self._on_problem = on_problem
         self._thread = DeviceThread("pedal", self._serve, self._fail)
-        self._problem: PedalError | None = PedalUnheard(f"the pedal at {config.port} has not reported yet")
+        self._problem: PedalError | None = PedalUnheard(message("the pedal at {port} has not reported yet", port=config.port))
 
     @property
     def problem(self) -> PedalError | None:
@@ -350,4 +366,10 @@ class Pedal:
                 self._on_problem(problem)
 
     def _fail(self, error: Exception) -> None:
-        self._set_problem(PedalError(f"the pedal is no longer read ({type(error).__name__}: {error}): start the program again"))
+        self._set_problem(
+            PedalError(
+                message(
+                    "the pedal is no longer read ({kind}: {why}): start the program again", kind=type(error).__name__, why=error
+                )
+            )
+        )

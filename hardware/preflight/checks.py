@@ -19,6 +19,7 @@ from importlib import metadata
 from pathlib import Path
 
 from core.config.models import RecordConfig, sessions_folder
+from core.messages import message
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,12 @@ def check_machine(cores: int | None = None, memory: Callable[[], tuple[float, fl
     if cores < _CORES:
         return Check(name, False, detail, f"use a computer with {_CORES} cores or more, or allow this program more of them")
     if total_gb < _MEMORY_GB or free_gb < _FREE_GB:
-        return Check(name, False, detail, f"close other programs: {_FREE_GB:g} GB must be free, and {_MEMORY_GB:g} GB there in all")
+        return Check(
+            name,
+            False,
+            detail,
+            message("close other programs: {a:g} GB must be free, and {b:g} GB there in all", a=_FREE_GB, b=_MEMORY_GB),
+        )
     return Check(name, True, detail)
 
 
@@ -88,17 +94,17 @@ def check_disk(config: RecordConfig, usage: Callable[[Path], tuple[int, int, int
         total, _, free = usage(there)
     except OSError as error:
         return Check(name, False, f"{there}: {error.strerror}", "check the disk, or set record.folder")
-    detail = f"{folder}: {free / 1e9:.1f} GB free of {total / 1e9:.1f} GB"
+    detail = message("{folder}: {a:.1f} GB free of {b:.1f} GB", folder=folder, a=free / 1000000000.0, b=total / 1000000000.0)
     if free < config.warn_free_mb * 1e6 or (total and free / total < config.warn_free_share):
         wanted = max(config.warn_free_mb / 1e3, config.warn_free_share * total / 1e9)
-        return Check(name, False, detail, f"make room ({wanted:.1f} GB or more), or set record.folder to another disk")
+        return Check(name, False, detail, message("make room ({a:.1f} GB or more), or set record.folder to another disk", a=wanted))
     return Check(name, True, detail)
 
 
 def check_clock(wall: Callable[[], float] = time.time) -> Check:
     """The date can be true: sessions are named by it. Ages and time limits go by the monotonic clock."""
     date = time.gmtime(wall())
-    detail = f"monotonic, now {time.strftime('%Y-%m-%d %H:%M', date)} UTC"
+    detail = message("monotonic, now {time} UTC", time=time.strftime("%Y-%m-%d %H:%M", date))
     if date.tm_year < _BUILT_IN_YEAR:
         return Check("clock", False, f"{detail}: the date is wrong, and sessions are named by it", "sudo timedatectl set-ntp true")
     return Check("clock", True, detail)
@@ -158,7 +164,7 @@ def check_packages(lock: Path = LOCK, installed: Callable[[str], str] = metadata
             wrong.append(f"{name} {found or 'missing'} instead of {pin}")
     if wrong:
         return Check("packages", False, "; ".join(wrong), "rm -f .venv/.ready && make setup")
-    return Check("packages", True, f"{len(pins) - len(_REMOVED & set(pins))} as pinned")
+    return Check("packages", True, message("{a} as pinned", a=len(pins) - len(_REMOVED & set(pins))))
 
 
 def check_libraries(load: Callable[[str], object] = ctypes.CDLL) -> Check:
@@ -172,8 +178,8 @@ def check_libraries(load: Callable[[str], object] = ctypes.CDLL) -> Check:
     if missing:
         packages = " ".join(dict.fromkeys(LIBRARIES[library] for library in missing))
         fix = f"sudo apt-get install --yes --no-install-recommends {packages}"
-        return Check("system libraries", False, f"missing: {', '.join(missing)}", fix)
-    return Check("system libraries", True, f"{len(LIBRARIES)} can be loaded")
+        return Check("system libraries", False, message("missing: {names}", names=", ".join(missing)), fix)
+    return Check("system libraries", True, message("{a} can be loaded", a=len(LIBRARIES)))
 
 
 def load_elsewhere(path: Path) -> str:
@@ -226,7 +232,7 @@ def check_binaries(
         else:  # a damaged file, or one of an installed package
             is_damaged = True
     if not problems:
-        return Check(name, True, f"{', '.join(fine)} can be loaded")
+        return Check(name, True, message("{a} can be loaded", a=", ".join(fine)))
     install = f"sudo apt-get install --yes --no-install-recommends {' '.join(dict.fromkeys(packages))}"
     return Check(name, False, "; ".join(problems), " && ".join([install] * bool(packages) + [RENEW] * is_damaged))
 
@@ -257,7 +263,7 @@ def check_display(environ: Mapping[str, str], answers: Callable[[str], bool] = x
     name, advice = "display", "start it in a desktop session, or give it a virtual one: xvfb-run -a make run"
     platform = environ.get("QT_QPA_PLATFORM", "")
     if platform and not platform.startswith(("xcb", "wayland")):
-        return Check(name, True, f"QT_QPA_PLATFORM={platform}: nothing is shown on a screen")
+        return Check(name, True, message("QT_QPA_PLATFORM={name}: nothing is shown on a screen", name=platform))
     if wayland := environ.get("WAYLAND_DISPLAY"):
         socket = Path(environ.get("XDG_RUNTIME_DIR", "/")) / wayland
         if socket.exists():

@@ -18,6 +18,7 @@ from pathlib import Path
 from core.config.models import Config, GamepadConfig, PedalConfig
 from core.config.safety import ServosConfig
 from core.devices import Camera, DeviceError
+from core.messages import message
 from core.types import Frame
 from hardware.cameras import sysfs
 from hardware.cameras.kinds import CAMERA_KINDS
@@ -74,7 +75,12 @@ def check_picture(config: Config, make_camera: Callable[[Config], Camera] = _saf
     except DeviceError as error:
         return Check(name, False, one_line(error), "see the camera; close other programs that use it (fuser -v /dev/video*)")
     if len(frames) < _FEWEST_FRAMES:
-        return Check(name, False, f"{len(frames)} frames in {watched_s:g} s", "check the cable; another USB port, without a hub")
+        return Check(
+            name,
+            False,
+            message("{a} frames in {b:g} s", a=len(frames), b=watched_s),
+            "check the cable; another USB port, without a hub",
+        )
     return _judge_frames(config, frames)
 
 
@@ -85,10 +91,21 @@ def _judge_frames(config: Config, frames: Sequence[Frame]) -> Check:
     name, first, last = "picture", frames[0], frames[-1]
     rate = (last.index - first.index) / max(last.captured_s - first.captured_s, 1e-6)
     height, width = last.image.shape[:2]
-    detail = f"{width}x{height}, {rate:.1f} frames/s, {last.lost} lost, brightness {last.image.mean():.0f} of 255"
+    detail = message(
+        "{a}x{b}, {rate:.1f} frames/s, {c} lost, brightness {light:.0f} of 255",
+        a=width,
+        b=height,
+        rate=rate,
+        c=last.lost,
+        light=last.image.mean(),
+    )
     asked = config.camera.frames_per_second
     if rate < _LEAST_RATE * asked:
-        fix = f"it should give {asked}: more light, camera.exposure_ms below {1000 / asked:.0f}, or a USB 3 port without a hub"
+        fix = message(
+            "it should give {a}: more light, camera.exposure_ms below {b:.0f}, or a USB 3 port without a hub",
+            a=asked,
+            b=1000 / asked,
+        )
         return Check(name, False, detail, fix)
     refusal = check_image(to_working(last.image, config.perception.working_size_px)[0], config.perception.quality)
     if refusal is not None:
@@ -126,7 +143,7 @@ def check_servo_port(port: str | None, *, wanted: bool = False) -> Check:
         reason = "is not there" if error.errno in {errno.ENOENT, errno.ENOTDIR} else f"cannot be seen ({error.strerror})"
         return Check(name, False, f"{port} {reason}", "plug the USB adapter in, or set servos.port (ls /dev/serial/by-id)")
     if not stat.S_ISCHR(mode):
-        return Check(name, False, f"{port} is no serial port", "set servos.port (ls /dev/serial/by-id)")
+        return Check(name, False, message("{port} is no serial port", port=port), "set servos.port (ls /dev/serial/by-id)")
     if not os.access(path, os.R_OK | os.W_OK):
         group = _group(path)  # root's own is that of a port that udev has not seen
         fix = f"sudo usermod -aG {'dialout' if group in {'root', '0'} else group} $USER, then log in again"
@@ -139,15 +156,15 @@ def check_servo_port(port: str | None, *, wanted: bool = False) -> Check:
         return Check(name, False, f"{port} cannot be opened ({error.strerror})", fix)
     try:
         if not os.isatty(handle):
-            return Check(name, False, f"{port} is no serial port", "set servos.port (ls /dev/serial/by-id)")
+            return Check(name, False, message("{port} is no serial port", port=port), "set servos.port (ls /dev/serial/by-id)")
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         fix = f"close the program that has it (fuser -v {port}); it may be LumenPilot itself"
-        return Check(name, False, f"{port} is in use by another program", fix)
+        return Check(name, False, message("{port} is in use by another program", port=port), fix)
     finally:
         os.close(handle)
     target = os.path.realpath(port)
-    return Check(name, True, f"{port} is free" + (f" ({target})" if target != port else ""))
+    return Check(name, True, message("{port} is free", port=port) + (f" ({target})" if target != port else ""))
 
 
 def _group(path: Path) -> str:
@@ -184,7 +201,7 @@ def check_servos(config: ServosConfig) -> Check:
     # registers 64 (torque) to 70 (hardware error), and 144 (voltage in 0.1 V) to 146 (temperature)
     volts = min(int.from_bytes(supply[:2], "little") / 10.0 for _, supply in tables.values())
     degrees = max(float(supply[2]) for _, supply in tables.values())
-    what = f"{len(found)} answer, model {config.model}, firmware {firmware}"
+    what = message("{a} answer, model {b}, firmware {rest}", a=len(found), b=config.model, rest=firmware)
     on = ", ".join(joint for joint, (status, _) in tables.items() if status[0] == 1)
     torque = f"torque on: {on}" if on else "torque off"
     detail = f"{what}; {volts:.1f} V at least, {degrees:.0f} \N{DEGREE SIGN}C at most, {torque}"
@@ -193,9 +210,9 @@ def check_servos(config: ServosConfig) -> Check:
         fix = "find the reason (jam, heat, supply), then restart that servo in the servo table"
         return Check(name, False, f"hardware error, {'; '.join(broken)}", fix)
     if volts < config.min_voltage_v:
-        return Check(name, False, detail, f"the supply must give {config.min_voltage_v:g} V or more at every servo")
+        return Check(name, False, detail, message("the supply must give {a:g} V or more at every servo", a=config.min_voltage_v))
     if degrees > config.max_temperature_c:
-        return Check(name, False, detail, f"let it cool below {config.max_temperature_c:g} \N{DEGREE SIGN}C")
+        return Check(name, False, detail, message("let it cool below {a:g} °C", a=config.max_temperature_c))
     return Check(name, True, detail)
 
 
@@ -245,7 +262,10 @@ def check_pedal(config: PedalConfig, listen_s: float = _LISTEN_S) -> Check:
             for line in parser.feed(data):
                 if line is not None and line.stop:
                     return Check(
-                        name, False, f"{config.port}: STOP is pressed, or its wire is broken", "release STOP; check its wire"
+                        name,
+                        False,
+                        message("{port}: STOP is pressed, or its wire is broken", port=config.port),
+                        "release STOP; check its wire",
                     )
                 if line is not None:
                     return Check(name, True, f"{config.port} reports; deadman {'pressed' if line.down else 'released'}")
@@ -254,8 +274,12 @@ def check_pedal(config: PedalConfig, listen_s: float = _LISTEN_S) -> Check:
     finally:
         port.close()
     if heard:
-        return Check(name, False, f"what comes from {config.port} is no pedal's report", "check pedal.port and pedal.baud")
-    return Check(name, False, f"{config.port} is silent", "check the pedal's power and firmware, then plug it in again")
+        return Check(
+            name, False, message("what comes from {port} is no pedal's report", port=config.port), "check pedal.port and pedal.baud"
+        )
+    return Check(
+        name, False, message("{port} is silent", port=config.port), "check the pedal's power and firmware, then plug it in again"
+    )
 
 
 def check_gamepad(config: GamepadConfig) -> Check:

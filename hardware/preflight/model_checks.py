@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config.models import PerceptionConfig, SegmentationConfig, TwinConfig
+from core.messages import message
 from core.perception.model_file import ModelError, ModelInfo, check_all_files, model_folder, read_model_info, second_look_of
 from core.types import Image, Mask, Scene
 from hardware.preflight.checks import RENEW, Check, one_line
@@ -41,7 +42,7 @@ def check_model(name: str) -> Check:
             files += [f"{near.name}/{file}" for file in check_all_files(near)]
     except ModelError as error:
         return Check("model", False, one_line(error), _advice(name))
-    return Check("model", True, f"{info.name}: all {len(files)} files are whole (SHA-256)")
+    return Check("model", True, message("{name}: all {count} files are whole (SHA-256)", name=info.name, count=len(files)))
 
 
 def check_self_test(config: PerceptionConfig) -> Check:

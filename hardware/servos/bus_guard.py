@@ -23,6 +23,7 @@ from core.control.gate import (
     outside_envelope,
 )
 from core.control.joints import Joints, joint_goals
+from core.messages import message
 from core.types import Command
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
 from hardware.servos.dynamixel_port import NotReady
@@ -196,7 +197,7 @@ class BusGuard:
             advice = "switch the torque off and move it back by hand, or zero it again"
             reasons += [f"outside its envelope: {joint}: {advice}" for joint in outside_envelope(at.positions_mm, self._servos)]
         if reasons:
-            raise NotReady(f"not armed: {'; '.join(reasons)}")
+            raise NotReady(message("not armed: {why}", why="; ".join(reasons)))
 
     def set_armed(self, now_s: float) -> None:
         """The driver has armed the servos. Orders from before do not count."""

@@ -27,6 +27,7 @@ from core.control.faults import Cause, Fault
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Joints
 from core.control.robot import SentMotion
+from core.messages import message
 from core.types import Command
 from hardware.processes import MESSAGE_BYTES, DeviceProcess, ParentLink, SharedSlot
 from hardware.servos import dynamixel_port
@@ -301,7 +302,7 @@ class BusClient:
                 self._fatal = answer.get("fatal", self._fatal)
                 if answer.get("id") == number:
                     return answer["error"]  # type: ignore[no-any-return]
-        raise BusProcessLost(f"the servo bus process did not answer within {timeout_s:g} s: connect the robot again")
+        raise BusProcessLost(message("the servo bus process did not answer within {a:g} s: connect the robot again", a=timeout_s))
 
     def _read_fatal(self) -> None:
         """Read what the process still said. When it left requests of ours unread, the first try fails, the second does not."""

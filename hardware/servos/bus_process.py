@@ -25,6 +25,7 @@ from dataclasses import replace
 
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
+from core.messages import message
 from hardware.servos.bus_guard import BusGuard
 from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, Request
 from hardware.servos.dynamixel_bus import ServoBus
@@ -317,7 +318,7 @@ class BusLoop:
 
     def _arm(self) -> None:
         if not self._bus.is_open:
-            raise NotReady(f"not armed: {self._open_problem or 'the servo port is not open'}")
+            raise NotReady(message("not armed: {why}", why=self._open_problem or "the servo port is not open"))
         if not self._guard.armed:
             self._read_before_arming()
         self._guard.check_arming()
@@ -343,7 +344,7 @@ class BusLoop:
             if left:
                 time.sleep(LATE_S)
         silent = ", ".join(f"{one.name} (id {one.id}): {one.reason}" for one in missing)
-        raise NotReady(f"not armed: {silent}; check its supply and cable")
+        raise NotReady(message("not armed: {why}; check its supply and cable", why=silent))
 
     def _disarm(self) -> None:
         self._guard.disarm()

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from core.config.safety import JointConfig, JointName, ServosConfig
+from core.messages import message
 from hardware.servos import registers
 from hardware.servos.dynamixel_port import (
     LineCounts,
@@ -319,7 +320,9 @@ class ServoBus:
         answer = self._line.group_read([joint.id for joint in self._joints], TORQUE, 1)
         doubtful = [joint.name for joint in self._joints if answer.data.get(joint.id) != b"\0"]
         if doubtful:
-            raise TorqueStillOn(f"torque of {', '.join(doubtful)} is not proven to be off: cut the servos' power")
+            raise TorqueStillOn(
+                message("torque of {names} is not proven to be off: cut the servos' power", names=", ".join(doubtful))
+            )
 
     def let_go(self) -> None:
         """``torque_off`` on a closed bus that cannot be opened because not all seven answer: those that hear it obey.

@@ -27,6 +27,7 @@ from dynamixel_sdk import (
 )
 
 from core.devices import DeviceError
+from core.messages import message
 from hardware.servos.registers import TAG_BYTES
 
 
@@ -166,14 +167,24 @@ class StuffingHandler(Protocol2PacketHandler):  # type: ignore[misc]
 def _port_error(port: str, error: Exception) -> PortError:
     code = getattr(error, "errno", None)
     if code == errno.ENOENT:
-        return PortError(f"servo port {port} does not exist: plug the USB adapter in, or set servos.port")
+        return PortError(message("servo port {port} does not exist: plug the USB adapter in, or set servos.port", port=port))
     if code in {errno.EACCES, errno.EPERM}:
-        return PortError(f"no permission for servo port {port}: add your user to the group dialout, then log in again")
+        return PortError(
+            message("no permission for servo port {port}: add your user to the group dialout, then log in again", port=port)
+        )
     if code in {errno.EAGAIN, errno.EBUSY}:
-        return PortTaken(f"servo port {port} is in use by another program: close that program first")
+        return PortTaken(message("servo port {port} is in use by another program: close that program first", port=port))
     if code in {errno.ENODEV, errno.ENXIO, errno.EIO}:
-        return PortError(f"servo port {port} has no device behind it: unplug the USB adapter and plug it in again")
-    return PortError(f"{port} cannot be used as servo port ({' '.join(str(error).split())}): set servos.port to the USB adapter")
+        return PortError(
+            message("servo port {port} has no device behind it: unplug the USB adapter and plug it in again", port=port)
+        )
+    return PortError(
+        message(
+            "{port} cannot be used as servo port ({why}): set servos.port to the USB adapter",
+            port=port,
+            why=" ".join(str(error).split()),
+        )
+    )
 
 
 LATE_S = 0.04
@@ -258,7 +269,9 @@ class ServoLine:
         except (OSError, termios.error) as error:
             with contextlib.suppress(OSError, termios.error, AttributeError):
                 port.closePort()
-            raise PortError(f"servo port {self.port} vanished while it was opened ({error}): check the USB cable") from None
+            raise PortError(
+                message("servo port {port} vanished while it was opened ({why}): check the USB cable", port=self.port, why=error)
+            ) from None
         self._port, self._owner = port, threading.get_ident()
         self.counts = LineCounts()
         self._quiet_until.clear()
@@ -284,7 +297,9 @@ class ServoLine:
         except (OSError, termios.error) as error:  # SerialException is an OSError, termios.error is none
             self.close()
             reason = " ".join(str(error).split())[:80]
-            raise PortLost(f"servo port {self.port} is lost ({reason}): check the USB cable, then connect again") from None
+            raise PortLost(
+                message("servo port {port} is lost ({why}): check the USB cable, then connect again", port=self.port, why=reason)
+            ) from None
         finally:
             port.is_using = False
 
@@ -432,7 +447,12 @@ class ServoLine:
             self._note(servo_id, result)
             miss = Miss.SILENT if result == COMM_RX_TIMEOUT else Miss.CORRUPT
         raise NoAnswer(
-            f"servo {servo_id}: {miss}, {_ATTEMPTS} times: check its supply and cable, and that no two servos have the same id"
+            message(
+                "servo {a}: {miss}, {b} times: check its supply and cable, and that no two servos have the same id",
+                a=servo_id,
+                miss=miss,
+                b=_ATTEMPTS,
+            )
         )
 
     def _note(self, servo_id: int, result: int) -> None:

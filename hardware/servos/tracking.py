@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from core.config.safety import JointConfig, JointName, SafetyConfig
 from core.control.gate import JointMeasurement
 from core.control.joints import Joints
+from core.messages import message
 
 _FAR_SHARE, _MOVED_SHARE = 0.5, 0.2
 """Of the step: a goal farther ahead is far, and a joint that moved less did not move. One that lags so far in healthy motion moves
@@ -173,11 +174,22 @@ class TrackingMonitor:
         drift = self._drifts.update(goals, before.positions_mm, at_mm, now_s)
         if outside is not None:
             joint, stays_mm = outside.joint, at_mm[self._joints.index(outside.joint)]
-            return f"{joint.name} stays at {stays_mm:.2f} mm, outside its envelope ({joint.low_mm:g} to {joint.high_mm:g} mm)"
+            return message(
+                "{joint} stays at {a:.2f} mm, outside its envelope ({b:g} to {c:g} mm)",
+                joint=joint.name,
+                a=stays_mm,
+                b=joint.low_mm,
+                c=joint.high_mm,
+            )
         if drift is not None:
-            return f"{drift[0].name} went {abs(drift[1]):.2f} mm where nobody sent it"
+            return message("{joint} went {a:.2f} mm where nobody sent it", joint=drift[0].name, a=abs(drift[1]))
         if jam is not None:
-            return f"{jam.joint.name} stands {abs(jam.distance_mm):.2f} mm from its goal for {1000 * jam.for_s:.0f} ms"
+            return message(
+                "{joint} stands {a:.2f} mm from its goal for {b:.0f} ms",
+                joint=jam.joint.name,
+                a=abs(jam.distance_mm),
+                b=1000 * jam.for_s,
+            )
         return None
 
     def _inside(self, positions_mm: Sequence[float]) -> Joints:

@@ -281,7 +281,7 @@ def test_servo_requests_of_the_table_reach_the_servos(running: OperatorWindow, e
 NONE = Qt.KeyboardModifier.NoModifier
 
 
-class Bench:
+class Keyboard:
     """A window with a text field and a spin box, and jog keys."""
 
     def __init__(self, qtbot: QtBot) -> None:

@@ -105,7 +105,7 @@ def _texts_below() -> set[str]:
     for path in (
         *ROOT.glob("core/**/*.py"),
         *ROOT.glob("hardware/**/*.py"),
-        ROOT / "app" / "annotator" / "editing.py",
+        *ROOT.glob("app/annotator/*.py"),
         *ROOT.glob("app/annot*.py"),
     ):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if path != own else ():
