@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 import numpy as np
 import pytest
 
-from core.calibration.servos import Assignment, Function, HeadMove, HeadNotSeen, Look, NotIdentified, angle_deg, assign, turn_deg
+from core.calibration.servos import Assignment, Function, HeadMove, HeadNotSeen, Look, angle_deg, assign, turn_deg
 from core.config.models import Config
 from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
 from core.devices import DeviceError
@@ -219,19 +219,6 @@ def test_a_wiggle_goes_both_ways_and_comes_back() -> None:
     assert {servo_id for servo_id, _ in twin.moved} == {7}
     assert (min(ways), max(ways)) == pytest.approx((-1.5, 1.5), abs=0.02)
     assert ways[-1] == pytest.approx(0.0, abs=0.02)
-
-
-@pytest.mark.slow
-def test_servos_that_show_nothing_are_named() -> None:
-    class Still(LockBench):
-        look: Look | None = None
-
-        def observe(self, alive: Callable[[], None]) -> Look:
-            self.look = self.look or super().observe(alive)
-            return self.look
-
-    with pytest.raises(NotIdentified, match=r"1 that pulls the head to the right \(found: none\)"):
-        _identify(Still(LockTwin(_config())))
 
 
 def test_the_servo_under_test_has_bounds_and_the_others_stand() -> None:

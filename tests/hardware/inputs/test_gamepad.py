@@ -6,7 +6,6 @@ import errno
 import fcntl
 import os
 import struct
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -31,6 +30,7 @@ from hardware.inputs.gamepad import (
     find_gamepad,
     shaped,
 )
+from tests.hardware.inputs.listener import Listener
 
 LINEAR = GamepadConfig(dead_zone=0.2, expo=0.0, deadman=True)
 FULL = 32767
@@ -220,27 +220,15 @@ def test_events_are_understood_however_they_are_cut(sizes: list[int]) -> None:
 # --- the driver ------------------------------------------------------------------------------------------------------------------
 
 
-class Listener:
+class GamepadListener(Listener[GamepadState]):
     """Keeps what the gamepad's thread says."""
 
     def __init__(self) -> None:
-        self.states: list[GamepadState] = []
+        super().__init__()
         self.devices: list[tuple[str | None, GamepadError | None]] = []
-        self._news = threading.Condition()
-
-    def state(self, state: GamepadState) -> None:
-        with self._news:
-            self.states.append(state)
-            self._news.notify()
 
     def device(self, name: str | None, problem: GamepadError | None) -> None:
-        with self._news:
-            self.devices.append((name, problem))
-            self._news.notify()
-
-    def until(self, what: Callable[[], bool]) -> None:
-        with self._news:
-            assert self._news.wait_for(what, 5.0), (self.states[-3:], self.devices)
+        self.add(self.devices, (name, problem))
 
     def until_state(self, what: Callable[[GamepadState], bool]) -> None:
         self.until(lambda: bool(self.states) and what(self.states[-1]))
@@ -257,7 +245,7 @@ class FakeDevice:
     def send(self, *events: bytes) -> None:
         os.write(self._end, b"".join(events))
 
-    def settle(self, listener: Listener) -> None:
+    def settle(self, listener: GamepadListener) -> None:
         """Say the state of everything, and wait until that has been read."""
         listener.until(lambda: bool(listener.states))
         self.send(burst())
@@ -275,14 +263,14 @@ def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def listener(monkeypatch: pytest.MonkeyPatch) -> Listener:
+def listener(monkeypatch: pytest.MonkeyPatch) -> GamepadListener:
     monkeypatch.setattr(driver, "RESCAN_S", 0.02)
     monkeypatch.setattr("hardware.inputs.gamepad.SETTLE_S", 0.0)
-    return Listener()
+    return GamepadListener()
 
 
 @pytest.fixture
-def gamepad(listener: Listener) -> Iterator[Gamepad]:
+def gamepad(listener: GamepadListener) -> Iterator[Gamepad]:
     gamepad = Gamepad(LINEAR, listener.state, listener.device)
     gamepad.start()
     yield gamepad
@@ -290,7 +278,7 @@ def gamepad(listener: Listener) -> Iterator[Gamepad]:
 
 
 @pytest.mark.real_time
-def test_plugged_in_used_pulled_out_and_plugged_in_again(gamepad: Gamepad, listener: Listener, tmp_path: Path) -> None:
+def test_plugged_in_used_pulled_out_and_plugged_in_again(gamepad: Gamepad, listener: GamepadListener, tmp_path: Path) -> None:
     assert (gamepad.name, gamepad.problem) == (None, None)
     for _ in range(2):
         device = FakeDevice(tmp_path / "js0")
@@ -306,7 +294,7 @@ def test_plugged_in_used_pulled_out_and_plugged_in_again(gamepad: Gamepad, liste
 
 
 @pytest.mark.real_time
-def test_what_is_held_is_repeated_and_a_tap_on_stop_is_told(gamepad: Gamepad, listener: Listener, tmp_path: Path) -> None:
+def test_what_is_held_is_repeated_and_a_tap_on_stop_is_told(gamepad: Gamepad, listener: GamepadListener, tmp_path: Path) -> None:
     device = FakeDevice(tmp_path / "js0")
     device.settle(listener)
     device.send(axis(LY, -1.0))
@@ -323,7 +311,7 @@ def test_what_is_held_is_repeated_and_a_tap_on_stop_is_told(gamepad: Gamepad, li
 
 
 @pytest.mark.real_time
-def test_closed_all_is_at_rest(gamepad: Gamepad, listener: Listener, tmp_path: Path) -> None:
+def test_closed_all_is_at_rest(gamepad: Gamepad, listener: GamepadListener, tmp_path: Path) -> None:
     device = FakeDevice(tmp_path / "js0")
     device.settle(listener)
     device.send(button(SHOULDER, True), axis(LX, 1.0))
@@ -335,17 +323,7 @@ def test_closed_all_is_at_rest(gamepad: Gamepad, listener: Listener, tmp_path: P
     device.unplug()
 
 
-def test_switched_off_it_does_not_look(listener: Listener, tmp_path: Path) -> None:
-    device = FakeDevice(tmp_path / "js0")
-    before = set(threading.enumerate())
-    gamepad = Gamepad(GamepadConfig(enabled=False), listener.state)
-    gamepad.start()
-    assert set(threading.enumerate()) == before
-    gamepad.close()
-    device.unplug()
-
-
-def test_a_listener_that_fails_is_seen(listener: Listener, tmp_path: Path) -> None:
+def test_a_listener_that_fails_is_seen(listener: GamepadListener, tmp_path: Path) -> None:
     def fail(_: GamepadState) -> None:
         raise ZeroDivisionError("not today")
 
@@ -359,10 +337,6 @@ def test_a_listener_that_fails_is_seen(listener: Listener, tmp_path: Path) -> No
 
 
 # --- which device ----------------------------------------------------------------------------------------------------------------
-
-
-def test_none_is_no_error() -> None:
-    assert find_gamepad(GamepadConfig()) is None
 
 
 def test_the_lowest_number_is_the_first(tmp_path: Path) -> None:
@@ -380,7 +354,7 @@ def test_a_configured_one_that_is_missing_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.real_time
-def test_a_configured_one_is_waited_for(listener: Listener, tmp_path: Path) -> None:
+def test_a_configured_one_is_waited_for(listener: GamepadListener, tmp_path: Path) -> None:
     gamepad = Gamepad(GamepadConfig(device=str(tmp_path / "mine")), listener.state, listener.device)
     gamepad.start()
     listener.until(lambda: gamepad.problem is not None)
@@ -461,9 +435,9 @@ def test_one_with_its_right_stick_elsewhere_is_refused_by_name(
 
 @pytest.mark.real_time
 def test_a_second_window_says_that_the_gamepad_is_not_its_own_and_gets_it_when_the_first_closes(
-    gamepad: Gamepad, listener: Listener, tmp_path: Path
+    gamepad: Gamepad, listener: GamepadListener, tmp_path: Path
 ) -> None:
-    device, second = FakeDevice(tmp_path / "js0"), Listener()
+    device, second = FakeDevice(tmp_path / "js0"), GamepadListener()
     listener.until(lambda: gamepad.name == "js0")
     other = Gamepad(LINEAR, second.state, second.device)
     other.start()

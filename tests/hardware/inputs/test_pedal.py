@@ -34,6 +34,7 @@ from hardware.inputs.pedal import (
     open_pedal_port,
 )
 from hardware.twin.soft_pedal import SoftPedal
+from tests.hardware.inputs.listener import Listener
 
 ROOT = Path(__file__).resolve().parents[3]
 BENCH = ROOT / "docs" / "bench.md"
@@ -219,39 +220,26 @@ def test_a_press_is_always_the_second_good_report_of_a_foot_that_was_seen_lifted
 # --- the driver ------------------------------------------------------------------------------------------------------------------
 
 
-class Listener:
+class PedalListener(Listener[PedalReport]):
     """Keeps what the pedal's thread says."""
 
     def __init__(self) -> None:
-        self.reports: list[PedalReport] = []
+        super().__init__()
         self.problems: list[PedalError | None] = []
-        self._news = threading.Condition()
-
-    def report(self, report: PedalReport) -> None:
-        with self._news:
-            self.reports.append(report)
-            self._news.notify()
 
     def problem(self, problem: PedalError | None) -> None:
-        with self._news:
-            self.problems.append(problem)
-            self._news.notify()
+        self.add(self.problems, problem)
 
     @property
     def deadman(self) -> bool:
-        return bool(self.reports) and self.reports[-1].deadman
-
-    def until(self, what: Callable[[], bool]) -> None:
-        with self._news:
-            assert self._news.wait_for(what, 5.0), (self.reports[-5:], self.problems)
+        return bool(self.states) and self.states[-1].deadman
 
     def since(self, action: Callable[[], object], what: Callable[[list[PedalReport]], bool]) -> list[PedalReport]:
         """Do something; the reports from then until they are as wanted."""
-        with self._news:
-            start = len(self.reports)
+        start = len(self.states)
         action()
-        self.until(lambda: what(self.reports[start:]))
-        return self.reports[start:]
+        self.until(lambda: what(self.states[start:]))
+        return self.states[start:]
 
     def hears(self, count: int) -> list[PedalReport]:
         return self.since(lambda: None, lambda reports: len(reports) >= count)
@@ -264,13 +252,13 @@ def soft() -> Iterator[SoftPedal]:
 
 
 @pytest.fixture
-def listener() -> Listener:
-    return Listener()
+def listener() -> PedalListener:
+    return PedalListener()
 
 
 @pytest.fixture
-def pedal(soft: SoftPedal, listener: Listener) -> Iterator[Pedal]:
-    pedal = Pedal(PedalConfig(port=soft.port, reconnect_s=0.05), listener.report, listener.problem)
+def pedal(soft: SoftPedal, listener: PedalListener) -> Iterator[Pedal]:
+    pedal = Pedal(PedalConfig(port=soft.port, reconnect_s=0.05), listener.state, listener.problem)
     pedal.start()
     listener.until(lambda: listener.problems == [None])
     yield pedal
@@ -286,28 +274,28 @@ def _released(reports: list[PedalReport]) -> bool:
 
 
 @pytest.fixture
-def held(soft: SoftPedal, listener: Listener, pedal: Pedal) -> Pedal:
+def held(soft: SoftPedal, listener: PedalListener, pedal: Pedal) -> Pedal:
     listener.hears(3)
     listener.since(soft.press, _pressed)
     return pedal
 
 
 @pytest.mark.real_time
-def test_it_says_released_first_and_then_follows_the_foot(soft: SoftPedal, listener: Listener, pedal: Pedal) -> None:
-    assert listener.reports[0] == PedalReport(None, False, listener.reports[0].time_s)
+def test_it_says_released_first_and_then_follows_the_foot(soft: SoftPedal, listener: PedalListener, pedal: Pedal) -> None:
+    assert listener.states[0] == PedalReport(None, False, listener.states[0].time_s)
     assert pedal.problem is None
     listener.hears(3)
     began_s = time.monotonic()
     for _ in range(3):
         listener.since(soft.press, _pressed)
         listener.since(soft.release, _released)
-    times = [report.time_s for report in listener.reports]
+    times = [report.time_s for report in listener.states]
     assert times == sorted(times)
     assert began_s <= times[-1] <= time.monotonic()
 
 
 @pytest.mark.real_time
-def test_a_short_stop_is_not_missed_and_a_broken_wire_is_one(soft: SoftPedal, listener: Listener, pedal: Pedal) -> None:
+def test_a_short_stop_is_not_missed_and_a_broken_wire_is_one(soft: SoftPedal, listener: PedalListener, pedal: Pedal) -> None:
     def tap() -> None:
         soft.press_stop()
         soft.release_stop()
@@ -318,9 +306,9 @@ def test_a_short_stop_is_not_missed_and_a_broken_wire_is_one(soft: SoftPedal, li
 
 
 @pytest.mark.real_time
-def test_a_pedal_that_hangs_is_a_released_deadman_and_no_stop(soft: SoftPedal, listener: Listener, held: Pedal) -> None:
+def test_a_pedal_that_hangs_is_a_released_deadman_and_no_stop(soft: SoftPedal, listener: PedalListener, held: Pedal) -> None:
     reports = listener.since(soft.mute, _released)
-    last_held = next(report for report in reversed(listener.reports) if report.deadman)
+    last_held = next(report for report in reversed(listener.states) if report.deadman)
     assert reports[-1].time_s - last_held.time_s >= 0.06
     silent = listener.hears(3)
     assert not any(report.deadman or report.stop for report in silent)
@@ -337,7 +325,7 @@ def test_a_pedal_that_hangs_is_a_released_deadman_and_no_stop(soft: SoftPedal, l
 @pytest.mark.real_time
 @pytest.mark.parametrize("fault", ["damage", "garbage"])
 def test_damage_releases_the_deadman_at_once_and_stops_nothing(
-    soft: SoftPedal, listener: Listener, held: Pedal, fault: str
+    soft: SoftPedal, listener: PedalListener, held: Pedal, fault: str
 ) -> None:
     reports = listener.since(lambda: getattr(soft, fault)(3), _released)
     assert not any(report.stop for report in reports)
@@ -345,14 +333,14 @@ def test_damage_releases_the_deadman_at_once_and_stops_nothing(
 
 
 @pytest.mark.real_time
-def test_a_number_that_stands_still_is_a_released_deadman(soft: SoftPedal, listener: Listener, held: Pedal) -> None:
+def test_a_number_that_stands_still_is_a_released_deadman(soft: SoftPedal, listener: PedalListener, held: Pedal) -> None:
     listener.since(soft.stick, _released)
     assert not any(report.deadman for report in listener.hears(10))
 
 
 @pytest.mark.real_time
 def test_a_pulled_plug_is_a_released_deadman_and_the_foot_must_be_lifted_after_it(
-    soft: SoftPedal, listener: Listener, held: Pedal
+    soft: SoftPedal, listener: PedalListener, held: Pedal
 ) -> None:
     reports = listener.since(soft.vanish, _released)
     assert not any(report.stop for report in reports)
@@ -368,9 +356,9 @@ def test_a_pulled_plug_is_a_released_deadman_and_the_foot_must_be_lifted_after_i
 
 
 @pytest.mark.real_time
-def test_a_pedal_that_is_down_when_the_program_starts_does_not_count(soft: SoftPedal, listener: Listener) -> None:
+def test_a_pedal_that_is_down_when_the_program_starts_does_not_count(soft: SoftPedal, listener: PedalListener) -> None:
     soft.press()
-    pedal = Pedal(PedalConfig(port=soft.port), listener.report)
+    pedal = Pedal(PedalConfig(port=soft.port), listener.state)
     pedal.start()
     try:
         assert not any(report.deadman for report in listener.hears(10))
@@ -382,11 +370,11 @@ def test_a_pedal_that_is_down_when_the_program_starts_does_not_count(soft: SoftP
 
 @pytest.mark.real_time
 def test_what_waited_while_the_program_stood_still_is_no_press_but_a_stop(soft: SoftPedal) -> None:
-    listener, stand = Listener(), threading.Event()
+    listener, stand = PedalListener(), threading.Event()
     reached, go_on = threading.Event(), threading.Event()
 
     def report(report: PedalReport) -> None:
-        listener.report(report)
+        listener.state(report)
         if stand.is_set():
             stand.clear()
             reached.set()
@@ -399,13 +387,13 @@ def test_what_waited_while_the_program_stood_still_is_no_press_but_a_stop(soft: 
         listener.since(soft.press, _pressed)
         stand.set()
         assert reached.wait(5.0)
-        start = len(listener.reports)
+        start = len(listener.states)
         soft.press_stop()
         soft.release_stop()
         time.sleep(0.25)  # the stop is told, and is over, all while nobody reads
         go_on.set()
-        listener.until(lambda: len(listener.reports) > start + 20)
-        waited = [r for r in listener.reports[start:] if r.time_s == listener.reports[start].time_s]
+        listener.until(lambda: len(listener.states) > start + 20)
+        waited = [r for r in listener.states[start:] if r.time_s == listener.states[start].time_s]
         assert len(waited) >= 10
         assert sum(report.stop for report in waited) == 5
         assert not any(report.deadman for report in waited)
@@ -416,7 +404,7 @@ def test_what_waited_while_the_program_stood_still_is_no_press_but_a_stop(soft: 
 
 
 @pytest.mark.real_time
-def test_closed_it_is_released_and_the_port_is_free(soft: SoftPedal, listener: Listener, held: Pedal) -> None:
+def test_closed_it_is_released_and_the_port_is_free(soft: SoftPedal, listener: PedalListener, held: Pedal) -> None:
     with pytest.raises(PedalPortTaken, match=r"in use by another program.*close it there"):
         open_pedal_port(PedalConfig(port=soft.port))
     assert listener.deadman
@@ -424,25 +412,25 @@ def test_closed_it_is_released_and_the_port_is_free(soft: SoftPedal, listener: L
     held.close()
     assert not listener.deadman
     open_pedal_port(PedalConfig(port=soft.port)).close()
-    count = len(listener.reports)
+    count = len(listener.states)
     held.start()
-    listener.until(lambda: len(listener.reports) > count + 5)
+    listener.until(lambda: len(listener.states) > count + 5)
 
 
 @pytest.mark.real_time
-def test_a_port_that_talks_of_other_things(soft: SoftPedal, listener: Listener, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_talks_of_other_things(soft: SoftPedal, listener: PedalListener, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hardware.inputs.pedal._START_UP_S", 0.1)
     soft.damage(10_000)
-    pedal = Pedal(PedalConfig(port=soft.port), listener.report, listener.problem)
+    pedal = Pedal(PedalConfig(port=soft.port), listener.state, listener.problem)
     assert isinstance(pedal.problem, PedalUnheard)
     pedal.start()
     listener.until(lambda: bool(listener.problems))
     pedal.close()
     assert "no pedal's report: check pedal.baud" in str(listener.problems[0])
-    assert not any(report.deadman or report.stop for report in listener.reports)
+    assert not any(report.deadman or report.stop for report in listener.states)
 
 
-def test_a_listener_that_fails_is_seen(soft: SoftPedal, listener: Listener, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_listener_that_fails_is_seen(soft: SoftPedal, listener: PedalListener, caplog: pytest.LogCaptureFixture) -> None:
     def fail(_: PedalReport) -> None:
         raise ZeroDivisionError("not today")
 
@@ -464,9 +452,9 @@ def test_a_missing_port() -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_no_port_is_configured(listener: Listener) -> None:
+def test_no_port_is_configured(listener: PedalListener) -> None:
     with pytest.raises(PedalPortError, match=r"set pedal\.port"):
-        Pedal(PedalConfig(), listener.report)
+        Pedal(PedalConfig(), listener.state)
     with pytest.raises(PedalPortError, match=r"set pedal\.port"):
         open_pedal_port(PedalConfig())
 

@@ -19,14 +19,12 @@ import psutil
 import pytest
 
 from core.config.calibration import ZeroConfig
-from core.config.models import Config
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import RejectReason, Source
 from core.devices import DeviceError, Robot
 from core.types import Command
 from hardware.processes import PARENT_CHECK_S
-from hardware.rig import RigKind, open_rig
 from hardware.servos.bus_ipc import BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, start_bus
 from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
 from hardware.servos.servo_robot import ServoRobot
@@ -180,7 +178,6 @@ def test_hold_stops_and_disarm_refuses_orders(servos: SoftServoBus, armed: Servo
 
 def test_it_counts_and_times_its_cycles(armed: ServoRobot) -> None:
     status = _drive(armed, until=lambda status: status.cycle > 100)
-    assert status.times.period_p50_ms == pytest.approx(20.0, abs=10.0)
     assert 0.0 < status.times.work_p50_ms <= status.times.work_p99_ms
     assert len(status.servos) == 7
     report = armed.report()
@@ -714,31 +711,3 @@ def test_torque_off_is_done_though_the_application_dies_while_its_bus_process_lo
     while _lives(int(done.stdout)) and time.monotonic() < until_s:
         time.sleep(0.02)
     assert _torques(servos) == [0] * 7
-
-
-def test_the_twins_rig_with_servos() -> None:
-    config = Config.model_validate(
-        {
-            "twin": {"image_width_px": 160, "image_height_px": 120},
-            "servos": {"driver": "dynamixel", "watchdog_s": 2.5, "heartbeat_timeout_s": 3.0},
-        }
-    )
-    rig = open_rig(config)
-    try:
-        robot = rig.robot
-        assert isinstance(robot, ServoRobot)
-        assert rig.kind is RigKind.SIM
-        before_mm = robot.status().insertion_mm
-        robot.arm()
-        _drive(robot, until=lambda status: robot.status().insertion_mm > before_mm + 0.5)
-        assert robot.status().insertion_mm > before_mm + 0.5
-    finally:
-        rig.close()
-
-
-def test_the_twins_rig_refuses_a_real_port() -> None:
-    config = Config.model_validate(
-        {"twin": {"image_width_px": 160, "image_height_px": 120}, "servos": {"driver": "dynamixel", "port": "/dev/ttyUSB0"}}
-    )
-    with pytest.raises(DeviceError, match=r"leave servos\.port"):
-        open_rig(config)
