@@ -87,13 +87,6 @@ class DeviceProcess:
         """None while it runs; negative: the number of the signal that ended it."""
         return self._process.poll()
 
-    def map_memory(self, size: int) -> mmap.mmap:
-        """Give the shared memory its length, before the first message."""
-        with self._start_errors():
-            os.ftruncate(self._memory_fd, size)
-            self._memory = mmap.mmap(self._memory_fd, size)
-        return self._memory
-
     def send(self, message: dict[str, Any]) -> None:
         """Raises OSError: BlockingIOError when the child does not read, another one when it is gone."""
         self._has_message = True
@@ -146,14 +139,21 @@ class DeviceProcess:
             self.release()
 
     @staticmethod
-    def claim(prestarted: DeviceProcess | None, start: Callable[[], DeviceProcess]) -> DeviceProcess:
-        """The prestarted child if it still lives, else a new one: the caller's to end from now on."""
+    def claim(
+        prestarted: DeviceProcess | None, start: Callable[[], DeviceProcess], memory_bytes: int
+    ) -> tuple[DeviceProcess, mmap.mmap]:
+        """The prestarted child if it still lives, else a new one, with its memory: the caller's to end from now on."""
         if prestarted is not None and prestarted.exit_code() is not None:
             prestarted.discard()
             prestarted = None
         child = prestarted or start()
+        with contextlib.ExitStack() as undo, child._start_errors():
+            undo.callback(child.discard)
+            os.ftruncate(child._memory_fd, memory_bytes)
+            child._memory = mmap.mmap(child._memory_fd, memory_bytes)
+            undo.pop_all()
         child._is_claimed = True
-        return child
+        return child, child._memory
 
 
 class ParentLink:
@@ -195,6 +195,7 @@ class ParentLink:
                 return message if isinstance(message, dict) else None
 
     def map_memory(self, size: int) -> mmap.mmap:
+        """After the first message: by then the parent has given the memory its length."""
         self._memory = mmap.mmap(self._memory_fd, size)
         return self._memory
 

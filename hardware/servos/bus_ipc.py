@@ -220,8 +220,8 @@ class BusClient:
         self._fatal = ""
         self._closed = False
         self._newest: tuple[int, BusStatus] | None = None
-        self._process = DeviceProcess.claim(prestarted, start_bus)
-        self._order, self._heartbeat, self._status = SharedSlot.row(self._process.map_memory(_MEMORY_BYTES), _SLOTS)
+        self._process, memory = DeviceProcess.claim(prestarted, start_bus, _MEMORY_BYTES)
+        self._order, self._heartbeat, self._status = SharedSlot.row(memory, _SLOTS)
         with contextlib.suppress(OSError):  # the first request finds out that a process is gone
             self._process.send({"servos": servos.model_dump(), "safety": safety.model_dump()})
 

@@ -39,11 +39,9 @@ _FRAME = struct.Struct("<Qdii")  # index, captured, width, height
 _STATUS = struct.Struct("<3d8dd")  # time, insertion, delivery, pulls and forces, contact (NaN: unknown)
 
 
-def _map_slots(process: DeviceProcess | ParentLink, twin: TwinConfig) -> tuple[SharedSlot, SharedSlot]:
-    """Newest frame and newest status in the shared memory; its size follows from the twin's picture size."""
-    sizes = (_FRAME.size + 3 * twin.image_width_px * twin.image_height_px, _STATUS.size)
-    frames, status = SharedSlot.row(process.map_memory(sum(map(SharedSlot.size, sizes))), sizes)
-    return frames, status
+def _slot_sizes(twin: TwinConfig) -> tuple[int, int]:
+    """Bytes of a frame and a status in the shared memory; both processes know the twin's picture size."""
+    return _FRAME.size + 3 * twin.image_width_px * twin.image_height_px, _STATUS.size
 
 
 def pack_frame(frame: Frame) -> bytes:
@@ -88,10 +86,11 @@ class RemoteTwin:
     def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
         self._number = 0
         self._closed = False
-        self._process = DeviceProcess.claim(prestarted, start_twin)
+        sizes = _slot_sizes(config.twin)
+        self._process, memory = DeviceProcess.claim(prestarted, start_twin, sum(map(SharedSlot.size, sizes)))
+        self._frames, self._status = SharedSlot.row(memory, sizes)
         with contextlib.ExitStack() as undo:
             undo.callback(self.close)
-            self._frames, self._status = _map_slots(self._process, config.twin)
             with contextlib.suppress(OSError):  # a process that is gone has no answer either
                 self._process.send({"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm})
             answer = self._receive(_START_S)
@@ -267,7 +266,8 @@ def main(arguments: list[str]) -> int:
     if message is None:  # started ahead, and not needed
         return 0
     config = Config.model_validate(message["config"])
-    frames, status = _map_slots(link, config.twin)
+    sizes = _slot_sizes(config.twin)
+    frames, status = SharedSlot.row(link.map_memory(sum(map(SharedSlot.size, sizes))), sizes)
     try:
         world = TwinWorld(config.twin, perception=config.perception)
         world.insert(message["insertion_mm"])

@@ -170,8 +170,9 @@ def test_what_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: p
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.usefixtures("no_process_stays_behind")
 def test_a_process_that_cannot_be_started_is_a_device_error_when_the_rig_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused() -> tuple[int, int]:
+    def refused(*_: object) -> tuple[int, int]:
         raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
 
     open_before = psutil.Process().num_fds()
@@ -182,6 +183,10 @@ def test_a_process_that_cannot_be_started_is_a_device_error_when_the_rig_is_open
             open_rig(CONFIG)
         with pytest.raises(BusProcessLost, match=r"the servo bus process cannot be started \(Too many open files\)"):
             start_bus()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "ftruncate", refused)
+        with pytest.raises(DeviceError, match="the bench twin cannot be started"):
+            RemoteTwin(CONFIG, 40.0)
     assert psutil.Process().num_fds() == open_before
 
 
