@@ -14,7 +14,8 @@ import pyrealsense2 as rs
 import pytest
 
 from core.config.models import CameraConfig
-from core.types import Image
+from core.devices import Camera, CameraLost
+from core.types import Frame, Image
 from hardware.cameras import sysfs
 
 WIDTH, HEIGHT = 160, 120
@@ -204,3 +205,37 @@ class SoftWebcam:
         """In place of cv2.VideoCapture."""
         self.captures.append((node, SoftCapture(self)))
         return self.captures[-1][1]
+
+
+def take_frames(camera: Camera, count: int) -> list[Frame]:
+    found: list[Frame] = []
+    until_s = time.monotonic() + 10.0
+    while len(found) < count and time.monotonic() < until_s:
+        frame = camera.read(0.5)
+        if frame is not None:
+            found.append(frame)
+    assert len(found) == count
+    return found
+
+
+def until_lost(camera: Camera) -> CameraLost:
+    """The loss as ``read`` tells it; the frames before it are dropped."""
+    until_s = time.monotonic() + 10.0
+    while time.monotonic() < until_s:
+        try:
+            camera.read(0.05)
+        except CameraLost as error:
+            return error
+    raise AssertionError("nobody noticed")
+
+
+def until_back(camera: Camera) -> Frame:
+    until_s = time.monotonic() + 10.0
+    while time.monotonic() < until_s:
+        try:
+            frame = camera.read(0.05)
+        except CameraLost:
+            continue
+        if frame is not None:
+            return frame
+    raise AssertionError("it did not come back")

@@ -1,127 +1,40 @@
-"""Straightened cameras, camera feeds, found cameras, the board in the twin, and rigs that are opened with their lens."""
+"""Rigs: what there is, opening live, recorded and calibrated ones, and what is refused."""
 
 from __future__ import annotations
 
-import threading
-import time
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import get_args
 
-import numpy as np
 import pytest
 
-from core.calibration.camera import BoardSpec, BoardView, find_board, fit_lens, scale_of_board, undistort
 from core.config.calibration import CalibrationConfig, LensConfig
-from core.config.models import RigConfig, TwinConfig, load_config
+from core.config.models import CameraConfig, Config, RigConfig, load_config
 from core.config.rig_file import RigFileError, make_rig, with_rig, write_rig
-from core.devices import CameraLost, DeviceError
-from core.types import Frame
+from core.devices import DeviceError
 from hardware.cameras import realsense, sysfs
 from hardware.cameras.kinds import CAMERA_KINDS
-from hardware.cameras.live import CameraFeed
-from hardware.cameras.realsense import RealSenseInfo
+from hardware.cameras.live import LiveCamera
+from hardware.cameras.realsense import RealSenseInfo, RealSenseSensor
 from hardware.cameras.undistorted import UndistortedCamera
-from hardware.rig import find_devices, open_rig, with_camera, with_port
-from hardware.twin.rendering.calibration_board import BoardPictures
+from hardware.rig import RigKind, find_devices, open_rig, with_camera, with_port
+from hardware.twin.servos.bus import SoftServoBus
+from tests.hardware.soft_cameras import (
+    CONFIG,
+    HEIGHT,
+    WIDTH,
+    SoftRealSense,
+    take_frames,
+    write_bag,
+)
 
 LENS = LensConfig(k1=-0.12, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
 
 
-class ScriptedCamera:
-    """Gives what it is told: frames, None, or errors."""
-
-    name, is_live = "scripted camera", True
-
-    def __init__(self, *script: Frame | Exception | None) -> None:
-        self._script = list(script)
-        self.is_closed = False
-
-    def open(self) -> None: ...
-
-    def read(self, timeout_s: float) -> Frame | None:
-        if not self._script:
-            time.sleep(0.005)
-            return Frame(0, time.monotonic(), np.zeros((480, 640, 3), np.uint8))
-        item = self._script.pop(0)
-        if isinstance(item, Exception):
-            raise item
-        return item
-
-    def close(self) -> None:
-        self.is_closed = True
-
-
-def _frame(image: np.ndarray) -> Frame:
-    return Frame(7, 1.5, image, 3)
-
-
-# ---- the lens where frames come in
-
-
-def test_frames_come_straightened_and_keep_the_rest() -> None:
-    image = np.full((480, 640, 3), 50, np.uint8)
-    image[:, 60:64] = 255  # a straight line, as a bent lens shows it
-    frame = UndistortedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
-    assert (frame.index, frame.captured_s, frame.lost) == (7, 1.5, 3)
-    columns = [int(np.argmax(frame.image[row, :200, 0])) for row in (5, 240, 474)]
-    assert columns[0] < columns[1] - 2  # barrel: the corners go outwards
-    assert columns[0] == pytest.approx(columns[2], abs=1)
-
-
-@pytest.mark.parametrize(
-    "image", [np.zeros((720, 1280, 3), np.uint8), np.zeros((480, 640), np.uint8), np.zeros((480, 640, 3), np.uint16)]
-)
-def test_what_is_no_such_picture_is_passed_on(image: np.ndarray) -> None:
-    frame = UndistortedCamera(ScriptedCamera(_frame(image)), LENS).read(0.1)
-    assert frame.image is image
-
-
-def test_no_lens_no_work() -> None:
-    image = np.zeros((480, 640, 3), np.uint8)
-    frame = UndistortedCamera(ScriptedCamera(_frame(image)), None).read(0.1)
-    assert frame.image is image
-
-
-# ---- the feed
-
-
-def test_a_feed_gives_only_pictures_of_after_the_question() -> None:
-    camera = ScriptedCamera()
-    feed = CameraFeed(camera)
-    asked_s = time.monotonic()
-    frames = feed.next_frames(3, 5.0)
-    assert all(frame.captured_s > asked_s for frame in frames)
-    feed.close()
-    feed.close()
-    assert camera.is_closed
-
-
-def test_a_lost_camera_is_told_and_found_again() -> None:
-    back = threading.Event()
-
-    class Flaky(ScriptedCamera):
-        def read(self, timeout_s: float) -> Frame | None:
-            if not back.is_set():
-                raise CameraLost("the camera is lost: check its cable")
-            return super().read(timeout_s)
-
-    feed = CameraFeed(Flaky())
-    try:
-        with pytest.raises(DeviceError, match="check its cable"):
-            feed.next_frames(1, 0.3)
-        back.set()
-        assert feed.next_frames(1, 5.0)
-        assert feed.problem is None
-    finally:
-        feed.close()
-
-
-def test_a_camera_that_is_gone_for_good_ends_the_feed() -> None:
-    feed = CameraFeed(ScriptedCamera(DeviceError("unplugged")))
-    with pytest.raises(DeviceError, match="unplugged"):
-        feed.next_frames(1, 0.3)
-    feed.close()
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_bag(tmp_path_factory.mktemp("bag") / "run.bag", list(range(60)))
 
 
 # ---- what there is
@@ -174,24 +87,80 @@ def test_a_realsense_and_a_webcam_are_listed_once_each(computer: Path, monkeypat
     assert with_port(config, "/dev/ttyUSB0") == config
 
 
-# ---- the board in the twin
+# --- rigs ------------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("twin", [{}, {"lens_distortion": -0.12}, {"appearance_seed": 3}])
-def test_the_board_in_the_twin_gives_lens_and_scale(twin: dict[str, object]) -> None:
-    config = TwinConfig.model_validate({"phantom": "tree", **twin})
-    spec = BoardSpec()
-    pictures = BoardPictures(config, spec)
-    views = [find_board(pictures.picture(k, k), spec) for k in range(3)]
-    lens = fit_lens(views, (640, 480))
-    scale = scale_of_board([BoardView(undistort(view.pixels, lens), view.board_mm) for view in views], (640, 480))
-    middle = pictures.view.unproject(np.array([[319.5, 239.5]]))[0]
-    true = 1.0 / pictures.view.pixels_per_mm((float(middle[0]), float(middle[1])))
-    assert scale.mm_per_px == pytest.approx(true, rel=0.003)
-    assert lens.k1 == pytest.approx(pictures.view.distortion, abs=0.01)
-    seen = {tuple(place) for place in np.round(views[0].board_mm / spec.square_mm - 1).astype(int).tolist()}
-    index = [row * (spec.columns - 1) + column for column, row in seen]
-    assert len(index) >= 12
+@pytest.fixture
+def soft(monkeypatch: pytest.MonkeyPatch) -> Iterator[SoftRealSense]:
+    def made(config: CameraConfig) -> LiveCamera:
+        return LiveCamera(RealSenseSensor(config, soft.context), config)
+
+    with SoftRealSense() as soft:
+        monkeypatch.setattr("hardware.cameras.realsense.realsense_camera", made)
+        yield soft
+
+
+def _rig(**settings: object) -> Config:
+    servos = settings.pop("servos", {})
+    return Config.model_validate({"rig": {"name": "bench", "camera": "realsense"} | settings, "camera": CONFIG, "servos": servos})
+
+
+def test_a_live_rig_to_look_only(soft: SoftRealSense) -> None:
+    rig = open_rig(_rig(robot="none"))
+    try:
+        assert (rig.name, rig.kind, rig.is_live, rig.robot) == ("bench", RigKind.LIVE, True, None)
+        assert take_frames(rig.camera, 1)[0].image.shape == (HEIGHT, WIDTH, 3)
+    finally:
+        rig.close()
+
+
+@pytest.mark.real_time
+def test_a_live_rig_with_servos_that_are_checked_but_not_armed(soft: SoftRealSense) -> None:
+    bus = SoftServoBus(Config().servos, wire_time=True)
+    bus.start()
+    try:
+        rig = open_rig(_rig(robot="servos", servos={"port": bus.port}))
+        try:
+            assert rig.kind is RigKind.LIVE
+            assert rig.robot is not None
+            assert [bus.servo(joint.id).answer(2, 64, 1).data for joint in Config().servos.joints] == [b"\0"] * 7
+        finally:
+            rig.close()
+    finally:
+        bus.stop()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"robot": "twin"}, 'set rig.robot to "servos" or "none"'),
+        ({"robot": "servos"}, "set servos.port"),
+        ({"camera": "twin", "robot": "servos"}, "the twin has servos of its own"),
+        ({"camera": "twin", "robot": "twin", "servos": {"port": "/dev/ttyUSB0"}}, r"leave servos\.port"),
+        ({"camera": "webcam", "robot": "none", "source": "film.mp4"}, "a webcam plays no files"),
+        ({"camera": "image_folder"}, "needs rig.source"),
+    ],
+)
+def test_rigs_that_make_no_sense_say_what_to_do(soft: SoftRealSense, settings: dict[str, object], message: str) -> None:
+    with pytest.raises(DeviceError, match=message):
+        open_rig(_rig(**settings))
+
+
+def test_the_camera_is_let_go_when_the_servos_fail(soft: SoftRealSense, tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match="does not exist"):
+        open_rig(_rig(robot="servos", servos={"port": str(tmp_path / "ttyUSB9")}))
+    rig = open_rig(_rig(robot="none"))
+    take_frames(rig.camera, 1)
+    rig.close()
+
+
+def test_a_recording_is_played_back(bag: Path) -> None:
+    rig = open_rig(_rig(robot="none", source=str(bag)))
+    try:
+        assert (rig.name, rig.kind, rig.robot) == ("run.bag", RigKind.PLAYBACK, None)
+        assert take_frames(rig.camera, 3)[-1].index >= 2
+    finally:
+        rig.close()
 
 
 # ---- rigs

@@ -1,0 +1,274 @@
+"""RealSense cameras and recordings by the real library, on software devices."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pyrealsense2 as rs
+import pytest
+
+from core.devices import DeviceError, EndOfStream
+from core.types import Frame
+from hardware.cameras.realsense import RealSenseInfo, RealSenseRecording, RealSenseSensor, find_cameras, realsense_camera
+from tests.hardware.soft_cameras import (
+    CONFIG,
+    PERIOD_S,
+    SoftRealSense,
+    picture,
+    take_frames,
+    until_back,
+    until_lost,
+    write_bag,
+)
+
+# --- RealSense -------------------------------------------------------------------------------------------------------------------
+
+
+def test_cameras_are_listed() -> None:
+    camera = SoftRealSense("f7", usb="2.1")
+    assert find_cameras(camera.context()) == [RealSenseInfo("Intel RealSense L515", "f7", "1.5.8.1", "1.5.8.1", "2.1")]
+    camera.plugged = False
+    assert find_cameras(camera.context()) == []
+
+
+def test_versions_are_compared_as_numbers() -> None:
+    assert RealSenseInfo("a", "b", "1.5.8.1", "1.5.10.0").is_outdated
+    assert not RealSenseInfo("a", "b", "5.13.0.50", "5.9.0.1").is_outdated
+    assert not RealSenseInfo("a", "b").is_outdated
+
+
+def test_frames_come_exactly_and_with_their_time() -> None:
+    with SoftRealSense() as soft:
+        camera = realsense_camera(CONFIG, soft.context)
+        began_s = time.monotonic()
+        camera.open()
+        try:
+            frames = [(frame, time.monotonic()) for frame in (take_frames(camera, 1)[0] for _ in range(10))]
+        finally:
+            camera.close()
+    first = frames[0][0]
+    for frame, seen_s in frames:
+        assert any(np.array_equal(frame.image, picture(number)) for number in range(soft.number + 1))
+        assert frame.image.flags.owndata
+        assert began_s - 0.001 <= frame.captured_s <= seen_s + 0.001
+    assert first.lost == 0
+    assert camera.name == "Intel RealSense L515"
+
+
+def test_the_sensor_is_set_up_as_configured() -> None:
+    soft = SoftRealSense()
+    settings = {"exposure_ms": 8.0, "gain": 9000.0, "white_balance_k": 4013}
+    sensor = RealSenseSensor(CONFIG.model_copy(update=settings), soft.context)
+    sensor.start()
+    wanted = {
+        rs.option.enable_auto_exposure: 0.0,
+        rs.option.auto_exposure_priority: 0.0,
+        rs.option.exposure: 80.0,
+        rs.option.gain: 4096.0,  # the most that there is
+        rs.option.white_balance: 4010.0,  # in its steps
+    }
+    assert {option: soft.sensor.get_option(option) for option in wanted} == wanted
+    sensor.stop()
+    automatic = RealSenseSensor(CONFIG, soft.context)
+    automatic.start()
+    assert soft.sensor.get_option(rs.option.enable_auto_exposure) == 1.0
+    assert soft.sensor.get_option(rs.option.auto_exposure_priority) == 0.0
+    automatic.stop()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"width_px": 640}, r"has no 640x120 at 30/s: .*one of 160x120 at 30/s"),
+        ({"serial": "other"}, "no RealSense camera other; there are: f1"),
+    ],
+)
+def test_what_the_camera_does_not_have_is_named(change: dict[str, object], message: str) -> None:
+    soft = SoftRealSense()
+    with pytest.raises(DeviceError, match=message):
+        realsense_camera(CONFIG.model_copy(update=change), soft.context).open()
+
+
+def test_without_a_camera_open_fails_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pipeline would stop the whole program for 15 seconds here, so none is made."""
+    soft, pipelines = SoftRealSense(), []
+    soft.plugged = False
+    monkeypatch.setattr(rs, "pipeline", lambda *args: pipelines.append(args))
+    with pytest.raises(DeviceError, match="no RealSense camera: plug it"):
+        realsense_camera(CONFIG, soft.context).open()
+    assert pipelines == []
+
+
+def test_of_two_cameras_one_must_be_chosen() -> None:
+    one, other = SoftRealSense("f1"), SoftRealSense("f2")
+
+    def both() -> object:
+        context = one.context()
+        other.device.add_to(context)
+        return context
+
+    with pytest.raises(DeviceError, match=r"2 RealSense cameras \(f1, f2\): set camera.serial"):
+        realsense_camera(CONFIG, both).open()
+    chosen = RealSenseSensor(CONFIG.model_copy(update={"serial": "f2"}), both)
+    chosen.start()
+    chosen.stop()
+    assert chosen.info is not None and chosen.info.serial == "f2"
+
+
+def test_another_realsense_camera_does_not_take_the_place_of_a_lost_one() -> None:
+    """Somebody is driving by the pictures of the first."""
+    own, other = SoftRealSense("f1"), SoftRealSense("f2")
+    there = [own]
+
+    def plugged() -> object:
+        context = rs.context()
+        for camera in there:
+            camera.device.add_to(context)
+        return context
+
+    sensor = RealSenseSensor(CONFIG, plugged)
+    sensor.start()
+    sensor.stop()
+    there[:] = [other]
+    with pytest.raises(DeviceError, match=r"RealSense L515 f1 is not there any more \(there are: f2\): plug it in"):
+        sensor.start()
+    there[:] = []
+    with pytest.raises(DeviceError, match="no RealSense camera: plug it"):
+        sensor.start()
+    there[:] = [other, own]  # no choice to be made either: it is known which one
+    sensor.start()
+    sensor.stop()
+    assert sensor.info is not None and sensor.info.serial == "f1"
+
+
+@pytest.mark.parametrize("how", ["unplugged", "stalled"])
+def test_a_realsense_camera_is_lost_and_found(how: str) -> None:
+    with SoftRealSense() as soft:
+        camera = realsense_camera(CONFIG, soft.context)
+        camera.open()
+        try:
+            before = take_frames(camera, 3)[-1]
+            if how == "unplugged":
+                soft.plugged = False
+            soft.silent = True
+            silent_s = time.monotonic()
+            until_lost(camera)
+            noticed_s = time.monotonic() - silent_s
+            soft.plugged, soft.silent = True, False
+            after = until_back(camera)
+        finally:
+            camera.close()
+    assert CONFIG.lost_after_s - PERIOD_S - 0.05 <= noticed_s
+    assert after.index > before.index
+    assert after.captured_s > before.captured_s
+    assert camera.name == "Intel RealSense L515"
+
+
+# --- RealSense recordings --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_bag(tmp_path_factory.mktemp("bag") / "run.bag", list(range(60)))
+
+
+def _until_the_end(recording: RealSenseRecording) -> list[Frame | None]:
+    """All that a recording gives; it is closed then."""
+    frames: list[Frame | None] = []
+    with pytest.raises(EndOfStream, match="end of the recording"):
+        while True:
+            frames.append(recording.read(0.0))
+    recording.close()
+    return frames
+
+
+def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
+    recording = RealSenseRecording(bag, paced=False)
+    recording.open()
+    frames = _until_the_end(recording)
+    assert [frame.index for frame in frames if frame] == list(range(60))
+    for frame in frames:
+        assert np.array_equal(frame.image, picture(frame.index))
+        assert frame.captured_s == pytest.approx(frame.index * PERIOD_S, abs=1e-3)
+        assert frame.lost == 0
+
+
+def test_a_machine_that_stands_still_while_a_recording_opens_loses_no_frames(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = rs.pipeline.start
+
+    def slowly(pipeline: rs.pipeline, config: rs.config) -> rs.pipeline_profile:
+        profile = begin(pipeline, config)
+        time.sleep(1.0)  # twenty frames more than the library holds ready, at its own pace
+        return profile
+
+    monkeypatch.setattr(rs.pipeline, "start", slowly)
+    recording = RealSenseRecording(bag, paced=False)
+    recording.open()
+    assert [frame.index for frame in _until_the_end(recording) if frame] == list(range(60))
+
+
+def test_a_moment_of_silence_before_the_last_frames_is_not_the_end(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stalled:
+        """The library on a machine that stands still: it has read the whole file, and what it read comes late."""
+
+        def __init__(self, pipeline: rs.pipeline) -> None:
+            self._pipeline, self._waits = pipeline, 0
+
+        def try_wait_for_frames(self, timeout_ms: int) -> tuple[bool, rs.composite_frame | None]:
+            self._waits += 1
+            return (False, None) if self._waits in (45, 46) else self._pipeline.try_wait_for_frames(timeout_ms)
+
+        def stop(self) -> None:
+            self._pipeline.stop()
+
+    class HasReadAll:
+        def current_status(self) -> rs.playback_status:
+            return rs.playback_status.stopped
+
+    recording = RealSenseRecording(bag, paced=False)
+    recording.open()
+    monkeypatch.setattr(recording, "_pipeline", Stalled(recording._pipeline))
+    monkeypatch.setattr(recording, "_playback", HasReadAll())
+    frames = _until_the_end(recording)
+    assert [frame.index for frame in frames if frame] == list(range(60))
+
+
+def test_frames_that_the_recording_lacks_are_lost(tmp_path: Path) -> None:
+    recording = RealSenseRecording(write_bag(tmp_path / "gaps.bag", [0, 1, 4, 5]), paced=False)
+    recording.open()
+    assert [(frame.index, frame.lost) for frame in take_frames(recording, 4)] == [(0, 0), (1, 0), (2, 2), (3, 2)]
+    recording.close()
+
+
+def test_a_recording_in_bgr_is_given_in_rgb(tmp_path: Path) -> None:
+    recording = RealSenseRecording(write_bag(tmp_path / "bgr.bag", [0], form=rs.format.bgr8), paced=False)
+    recording.open()
+    assert np.array_equal(take_frames(recording, 1)[0].image, picture(0)[..., ::-1])
+    recording.close()
+
+
+def test_a_recording_can_be_left_early_and_played_again(bag: Path) -> None:
+    recording = RealSenseRecording(bag)
+    for _ in range(2):
+        recording.open()
+        assert take_frames(recording, 2)[-1].index >= 1
+        recording.close()
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not a recording", b"#ROSBAG V2.0\n"])
+def test_a_foreign_recording_is_one_clear_line(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "x.bag"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(DeviceError, match=r"x\.bag: (no such recording|cannot be played as a RealSense recording)") as caught:
+        RealSenseRecording(path).open()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_cut_recording_is_one_clear_line(bag: Path, tmp_path: Path) -> None:
+    path = tmp_path / "cut.bag"
+    path.write_bytes(bag.read_bytes()[: bag.stat().st_size // 2])
+    with pytest.raises(DeviceError, match=r"cut\.bag: cannot be played"):
+        RealSenseRecording(path).open()
