@@ -6,6 +6,7 @@ import ast
 import sys
 from collections import Counter
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -149,6 +150,36 @@ def test_no_public_class_name_occurs_twice() -> None:
 def test_folders_fit_on_a_screen() -> None:
     sizes = Counter(path.parent.relative_to(ROOT).as_posix() for path in modules().values() if path.read_text(encoding="utf-8"))
     assert not {folder: size for folder, size in sizes.items() if size > (35 if folder == "app/widgets" else 25)}
+
+
+def ours_imported_by(module: str) -> set[str]:
+    return {
+        name for name in imports_of(module) if name in modules() and name != module and not modules()[name].name.startswith("__")
+    }
+
+
+def test_imports_have_no_cycles() -> None:
+    """Imports in functions and for type checking count, too."""
+    sorter = TopologicalSorter({module: ours_imported_by(module) for module in modules()})
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_no_small_file_serves_one_neighbour_alone() -> None:
+    """A file under 80 lines that one file of its own folder imports is a part of that file."""
+    importers: dict[str, set[str]] = {}
+    for module in modules():
+        for name in ours_imported_by(module):
+            importers.setdefault(name, set()).add(module)
+    small = [
+        module
+        for module, path in modules().items()
+        if 0 < path.read_text(encoding="utf-8").count("\n") < 80
+        and [name.rpartition(".")[0] for name in importers.get(module, ())] == [module.rpartition(".")[0]]
+    ]
+    assert not small
 
 
 def test_every_folder_with_code_is_a_package() -> None:
