@@ -1,39 +1,25 @@
-"""``ablation``: from the paper taken literally to ours, step by step, on one labelled set and, if asked, on streams of the twin.
+"""Ablation: what each step of the method is worth, from the paper taken literally to ours: ``python -m tools.ablation SET``.
 
-The part of ``ablation`` that needs a stream: consecutive frames of the twin, with and without tracking.
-
-The tables of ``ablation`` on screen and in Markdown, from its result (the same object that ``--json`` prints).
-
-What each step of the method is worth: variants between the paper taken literally and ours, compared on the same frames.
-
-A variant is a configuration, nothing else: the preset ``paper`` with some steps' settings as ours has them. The *cumulative*
-variants switch the steps on one after the other; the ones *without* a step are ours with that step alone switched back.
-
-The numbers of the ablation's table: values over frames, and differences between variants with paired bootstrap intervals.
-
-Each difference comes with a 95 % interval (percentile method); the same frames are drawn for both variants.
-
-How true and steady perception is in a stream: errors, swaps of head and tail, the head's jumps, the lag and jitter of theta.
+A variant is a configuration: the preset ``paper`` with some steps' settings as ours has them. The *cumulative* variants switch the
+steps on one after the other; each variant *without* a step is ours with that step alone switched back. All variants see the same
+masks of the same frames. Each difference has a 95 % interval (paired percentile bootstrap over whole phantoms). ``--sequence`` also
+measures streams of the twin: errors, swaps of head and tail, jumps of the head, lag and jitter of theta.
 """
 
 from __future__ import annotations
 
-import csv
 import json
 import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
 
 from app.commands.options import ConfigOption, JsonOption, ModelOption, check_masks
-from app.commands.perceive import LeftOut
 from app.commands.progress import progress_bar
 from core.config.models import PerceptionConfig, TwinConfig, choose_model, load_config
 from core.devices import UserError
@@ -41,6 +27,7 @@ from core.evaluation.accuracy import WRONG_DEG, WRONG_PX, FrameScore, TrueMasks,
 from core.files import name_as_text
 from core.perception.segmentation import Probability, Segmentation, Segmenter
 from core.types import Frame, Image, Mask, Point, Scene
+from tools.run import run_tool
 
 if TYPE_CHECKING:
     from core.learning.dataset import Sample
@@ -350,6 +337,7 @@ def _lag_costs(true: NDArray[np.float64], found: NDArray[np.float64]) -> NDArray
 _FEED_MM_S = 12.0
 _START_MM = 35.0
 _WANDER = 0.6
+"""Of the driven stream: feed, insertion of its first frame, and how much the robot wanders about its route."""
 LIVE = f"{OURS}, as the window has it"
 
 
@@ -362,49 +350,38 @@ def measure_streams(
     frames: int,
     phantoms: Sequence[str],
     seed: int,
-) -> tuple[dict[str, Any] | None, bool]:
-    """The same frames of the twin, in order, through pipelines of all `configs`, and through one that looks as the window does.
+) -> dict[str, Any]:
+    """Run the same consecutive frames of the twin through a pipeline of each configuration.
 
     Parameters
     ----------
-    configs : by the variant's name, ``OURS`` among them: its settings tell the truth.
-    pipeline_of : makes a new pipeline that looks through `masks`.
-    masks : what all pipelines share.
-    live : a pipeline as the window has it, which looks for itself, mostly around the head; None: it is left out.
-    frames : to be divided among the `phantoms`.
+    configs : by the variant's name, ``OURS`` among them: its settings give the truth.
+    pipeline_of : makes a new pipeline on `masks`, which all of them share.
+    live : a pipeline as the window has it, with a network of its own and a region of interest; None: it is left out.
+    frames : divided among the `phantoms`.
     seed : of the twin.
 
     Returns
     -------
-    The phantoms that were driven through and ``stream_figures`` by variant (None when there is none); whether it was interrupted.
+    ``phantoms``, ``frames_each`` and ``rows`` with ``stream_figures`` by variant.
     """
     each = -(-frames // len(phantoms))
-    names = [*configs, *([LIVE] if live is not None else [])]
-    streams: dict[str, list[list[StreamFrame]]] = {name: [] for name in names}
-    driven: list[str] = []
-    interrupted = False
+    streams: dict[str, list[list[StreamFrame]]] = {name: [] for name in (*configs, *([LIVE] if live is not None else []))}
     with progress_bar() as bar:
         task = bar.add_task("frames of the twin", total=each * len(phantoms))
-        try:
-            for look, phantom in enumerate(phantoms):
-                pipelines = {name: pipeline_of(config) for name, config in configs.items()}
-                if live is not None:
-                    live.reset()
-                    pipelines[LIVE] = live
-                seen: dict[str, list[StreamFrame]] = {name: [] for name in names}
-                for frame, row in _stream(phantom, look, each, seed, configs[OURS], masks):
-                    for name, pipeline in pipelines.items():
-                        seen[name].append(stream_frame(pipeline(frame), row))
-                    bar.advance(task)
-                driven.append(phantom)
-                for name, part in seen.items():
-                    streams[name].append(part)
-        except KeyboardInterrupt:
-            interrupted = True
-    if not driven:
-        return None, interrupted
-    rows = [{"name": name, "figures": stream_figures(parts[: len(driven)])} for name, parts in streams.items()]
-    return {"phantoms": driven, "frames_each": each, "rows": rows}, interrupted
+        for look, phantom in enumerate(phantoms):
+            pipelines = {name: pipeline_of(config) for name, config in configs.items()}
+            if live is not None:
+                live.reset()
+                pipelines[LIVE] = live
+            for name in pipelines:
+                streams[name].append([])
+            for frame, row in _stream(phantom, look, each, seed, configs[OURS], masks):
+                for name, pipeline in pipelines.items():
+                    streams[name][-1].append(stream_frame(pipeline(frame), row))
+                bar.advance(task)
+    rows = [{"name": name, "figures": stream_figures(parts)} for name, parts in streams.items()]
+    return {"phantoms": list(phantoms), "frames_each": each, "rows": rows}
 
 
 def _stream(
@@ -473,9 +450,6 @@ class Figure:
         """Whether the interval leaves out zero."""
         return self.low is not None and self.high is not None and (self.low > 0.0 or self.high < 0.0)
 
-    def to_json(self) -> dict[str, float | None]:
-        return {"value": self.value, "difference": self.difference, "low": self.low, "high": self.high}
-
 
 def figures(
     scores: Sequence[Sequence[FrameScore]], compared_with: Sequence[int | None], groups: Sequence[Hashable], seed: int = 0
@@ -505,10 +479,10 @@ def figures(
 
 
 def _figure(plain: list[float], drawn: list[NDArray[np.float64]], index: int, other: int | None) -> Figure:
-    value = _ablation_figures_number(plain[index])
+    value = _finite(plain[index])
     if other is None:
         return Figure(value)
-    difference = _ablation_figures_number(plain[index] - plain[other])
+    difference = _finite(plain[index] - plain[other])
     differences = drawn[index] - drawn[other]
     defined = differences[np.isfinite(differences)]
     if difference is None or len(defined) < MIN_DEFINED * len(differences):
@@ -517,7 +491,7 @@ def _figure(plain: list[float], drawn: list[NDArray[np.float64]], index: int, ot
     return Figure(value, difference, float(low), float(high))
 
 
-def _ablation_figures_number(value: float) -> float | None:
+def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
@@ -586,26 +560,7 @@ def refusals(scores: Sequence[FrameScore]) -> dict[str, int]:
     return dict(sorted(counted.items(), key=lambda item: (-item[1], item[0])))
 
 
-def frame_rows(variants: Sequence[Variant], scores: Sequence[Sequence[FrameScore]]) -> list[dict[str, Any]]:
-    """What each variant found in each frame, as plain rows for a CSV."""
-    return [
-        {
-            "stem": score.stem,
-            "variant": variant.name,
-            "theta_error_deg": score.theta_error_deg,
-            "head_error_px": score.head_error_px,
-            "state": score.state,
-            "true_state": score.true_state,
-            "confidence": score.confidence if score.answered else None,
-            "reason": score.reason.value if score.reason is not None else None,
-        }
-        for variant, row in zip(variants, scores, strict=True)
-        for score in row
-    ]
-
-
 _MINUS = "\N{MINUS SIGN}"
-_CUMULATIVE, _WITHOUT = "each step added to the ones above", "ours without one step"
 _STREAM_COLUMNS = (
     ("frames", "frames"),
     ("answered_share", "answered"),
@@ -624,52 +579,18 @@ _STREAM_COLUMNS = (
 )
 
 
-def value_table(result: dict[str, Any]) -> Table:
-    """One row per variant, one column per measure."""
-    table = Table(title=_title(result), caption=None if not result.get("interrupted") else "interrupted: not all frames of the set")
-    for title in _headings():
-        table.add_column(title, justify="left" if title == "variant" else "right", no_wrap=title == "variant")
-    for row, cells in _with_cells(result, lambda figure, measure: _number(figure.value, measure)):
-        table.add_row(row["name"], *cells, f"{row['after_network_ms']:.1f}" if "after_network_ms" in row else "-")
-        if _ends_part(result, row):
-            table.add_section()
-    return table
-
-
-def difference_table(result: dict[str, Any]) -> Table:
-    """What each step changed, with its interval; a star where the interval leaves out zero."""
-    caption = "difference to the row before, or to ours; below it its 95 % bootstrap interval; * zero lies outside it; = the same"
-    table = Table(title=f"differences, drawn: {result['drawn']}", caption=caption)
-    for title in _headings()[:-1]:
-        table.add_column(title, justify="left" if title == "variant" else "right", no_wrap=title == "variant")
-    for row, cells in _with_cells(result, _difference):
-        if row.get("compared_with") is not None:
-            table.add_row(row["name"], *cells)
-        if _ends_part(result, row):
-            table.add_section()
-    return table
-
-
-def stream_table(stream: dict[str, Any]) -> Table:
-    """Errors and steadiness in a stream, one row per variant."""
-    table = Table(title=f"streams of {stream['frames_each']} frames in each of: {', '.join(stream['phantoms'])}")
-    table.add_column("variant", no_wrap=True)
-    for _, title in _STREAM_COLUMNS:
-        table.add_column(title, justify="right")
-    for row in stream["rows"]:
-        table.add_row(row["name"], *_stream_cells(row["figures"]))
-    return table
-
-
 def markdown(result: dict[str, Any]) -> str:
-    """All tables for a document."""
+    """All tables, for a document or a terminal."""
     parts = []
     if "rows" in result:
         brackets = f"the difference to the row before (below: to ours) and its 95 % bootstrap interval over {result['drawn']}"
-        parts.append(f"{_title(result)}; in brackets {brackets}; * zero lies outside it.\n")
-        parts.append(_markdown_table(_headings(), [_full_row(row) for row in result["rows"]]))
-    if result.get("stream"):
-        stream = result["stream"]
+        parts.append(
+            f"{result['set']}: {result['expected']} frames with a pose; the same masks for all rows ({result['masks']}); "
+            f"in brackets {brackets}; * zero lies outside it.\n"
+        )
+        headings = ["variant", *(column.title + (", %" if column.is_share else "") for column in MEASURES), "ms after network"]
+        parts.append(_markdown_table(headings, [_row_cells(row) for row in result["rows"]]))
+    if stream := result.get("stream"):
         phantoms = ", ".join(stream["phantoms"])
         parts.append(f"Streams of the twin, {stream['frames_each']} frames in each of: {phantoms} ({result['masks']}).\n")
         rows = [[row["name"], *_stream_cells(row["figures"])] for row in stream["rows"]]
@@ -677,46 +598,17 @@ def markdown(result: dict[str, Any]) -> str:
     return "\n".join(parts)
 
 
-def _title(result: dict[str, Any]) -> str:
-    without = f", {result['left_out']} frames left out that cannot be read" if result.get("left_out") else ""
-    return f"{result['set']}: {result['expected']} frames with a pose{without}; the same masks for all rows ({result['masks']})"
-
-
-def _headings() -> list[str]:
-    return ["variant", *(measure.title + (", %" if measure.is_share else "") for measure in MEASURES), "ms after network"]
-
-
-def _with_cells(result: dict[str, Any], show: Any) -> list[tuple[dict[str, Any], list[str]]]:
-    """Each row with its cells; a row without numbers has its note in the first cell."""
-    rows = []
-    for row in result["rows"]:
-        if "figures" in row:
-            cells = [show(Figure(**row["figures"][measure.key]), measure) for measure in MEASURES]
-        else:
-            cells = ["needs a stream", *["-"] * (len(MEASURES) - 1)]
-        rows.append((row, cells))
-    return rows
-
-
-def _full_row(row: dict[str, Any]) -> list[str]:
+def _row_cells(row: dict[str, Any]) -> list[str]:
     if "figures" not in row:
         return [row["name"], row["note"], *[""] * len(MEASURES)]
-    cells = []
-    for measure in MEASURES:
-        figure = Figure(**row["figures"][measure.key])
-        change = _difference(figure, measure).replace("\n", ", ")
-        cells.append(_number(figure.value, measure) + (f" ({change})" if change not in ("-", "=") else ""))
+    figures_of_row = [(Figure(**row["figures"][column.key]), column) for column in MEASURES]
+    cells = [_number(figure.value, column) + _difference(figure, column) for figure, column in figures_of_row]
     return [row["name"], *cells, f"{row['after_network_ms']:.1f}"]
 
 
 def _markdown_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [headings, ["---"] * len(headings), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-
-def _ends_part(result: dict[str, Any], row: dict[str, Any]) -> bool:
-    following = result["rows"][result["rows"].index(row) + 1 :]
-    return bool(following) and following[0]["kind"] != row["kind"]
 
 
 def _number(value: float | None, measure: AblationColumn, *, signed: bool = False) -> str:
@@ -727,13 +619,11 @@ def _number(value: float | None, measure: AblationColumn, *, signed: bool = Fals
 
 
 def _difference(figure: Figure, measure: AblationColumn) -> str:
-    if figure.difference is None:
-        return "-"
-    if figure.difference == figure.low == figure.high == 0.0:
-        return "="
+    if figure.difference is None or figure.difference == figure.low == figure.high == 0.0:
+        return ""
     star = "*" if figure.is_clear else ""
     low, high = (_number(value, measure, signed=True) for value in (figure.low, figure.high))
-    return f"{_number(figure.difference, measure, signed=True)}{star}\n{low} to {high}"
+    return f" ({_number(figure.difference, measure, signed=True)}{star}, {low} to {high})"
 
 
 def _stream_cells(figures: dict[str, Any]) -> list[str]:
@@ -750,98 +640,76 @@ def _stream_cells(figures: dict[str, Any]) -> list[str]:
 
 
 ALONE = "needs a stream: each frame of the set stands alone (measure it with --sequence N)"
-_WIDTH = 170
-"""Columns of the tables where the output is no terminal."""
 
 
-class AblationError(UserError):
-    """The ablation cannot be run; the message is one line and says what to do."""
+def run_ablation(
+    folder: Path | None,
+    *,
+    model: str | None = None,
+    config_path: Path | None = None,
+    true_masks: bool = False,
+    sequence: int = 0,
+    phantoms: Sequence[str] = (),
+    seed: int = 0,
+    out: Path | None = None,
+) -> dict[str, Any]:
+    """Measure on a labelled set, on `sequence` frames of the twin, or on both; write ``ablation.json`` and ``.md`` to `out`.
 
+    Parameters
+    ----------
+    phantoms : named phantoms of the stream; empty: all of them.
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What to run. ``folder`` and ``sequence`` (frames of the twin) may each be missing; ``phantoms`` empty: all named ones."""
-
-    folder: Path | None
-    model: str | None = None
-    config_path: Path | None = None
-    true_masks: bool = False
-    sequence: int = 0
-    phantoms: tuple[str, ...] = ()
-    seed: int = 0
-    out: Path | None = None
-
-
-def run_ablation(plan: Plan, *, as_json: bool) -> None:
-    """Run it and print the tables; raises UserError. An interruption (Ctrl-C) prints what was measured until then."""
+    Raises
+    ------
+    UserError
+        In one line, where there is nothing to measure on or the results cannot be written.
+    """
     from core.perception.pipeline import open_pipeline
+    from hardware.twin.phantom import PHANTOM_TITLES
 
-    if plan.folder is None and not plan.sequence:
-        raise AblationError("nothing to measure on: give a labelled set (as synth writes it), --sequence N, or both")
-    overrides = choose_model(plan.model)
-    ours = load_config(plan.config_path, None, overrides).perception
-    paper = load_config(plan.config_path, "paper", overrides).perception
-    samples, truth = _labelled(plan.folder) if plan.folder is not None else ([], {})
-    phantoms = _known_phantoms(plan.phantoms)
-    _make_folder(plan.out)
-    masks, pipeline_of = _open_masks(ours, plan.true_masks)
-    source = "true masks" if plan.true_masks else f"model {ours.segmentation.model}, {masks.engine}"
-    result: dict[str, Any] = {"set": name_as_text(plan.folder) if plan.folder else None, "masks": source, "seed": plan.seed}
-    interrupted, frames = False, []
-    if samples:
-        variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
-        pipelines = [pipeline_of(variant.config) for variant in variants]
-        left_out = LeftOut()
-        scores, latency_ms, interrupted = _measure_set(samples, truth, pipelines, masks, ours.working_size_px, left_out)
-        groups = [truth[score.stem].get("seed", score.stem) for score in scores[0]]
-        result |= _described(variants, scores, latency_ms, groups, plan.seed) | {"left_out": len(left_out)}
-        frames = frame_rows(variants, scores)
-    if plan.sequence and not interrupted:
-        named = {variant.name: variant.config for variant in make_variants(paper, ours)}
-        chosen = {name: named[name] for name in (PAPER, f"{OURS} without {TRACKING}")} | {OURS: ours}
-        result["stream"], interrupted = measure_streams(
-            chosen,
-            pipeline_of,
-            masks,
-            live=None if plan.true_masks else open_pipeline(ours),
-            frames=plan.sequence,
-            phantoms=phantoms,
-            seed=plan.seed,
-        )
-    result["interrupted"] = interrupted
+    if folder is None and not sequence:
+        raise UserError("nothing to measure on: give a labelled set (as synth writes it), --sequence N, or both")
+    if unknown := [name for name in phantoms if name not in PHANTOM_TITLES]:
+        raise UserError(f"unknown phantom {unknown[0]!r}; known: {', '.join(PHANTOM_TITLES)}")
+    overrides = choose_model(model)
+    ours = load_config(config_path, None, overrides).perception
+    paper = load_config(config_path, "paper", overrides).perception
+    samples, truth = _labelled(folder) if folder is not None else ([], {})
     try:
-        _tell(result, as_json)
-    finally:  # neither costs the other
-        if plan.out is not None:
-            _write(result, frames, plan.out)
-    if interrupted:
-        raise KeyboardInterrupt
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+        masks, pipeline_of = _open_masks(ours, true_masks)
+        source = "true masks" if true_masks else f"model {ours.segmentation.model}, {masks.engine}"
+        result: dict[str, Any] = {"set": name_as_text(folder) if folder else None, "masks": source, "seed": seed}
+        if samples:
+            variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
+            result |= _measure_set(samples, truth, variants, pipeline_of, masks, ours.working_size_px, seed)
+        if sequence:
+            named = {variant.name: variant.config for variant in make_variants(paper, ours)}
+            result["stream"] = measure_streams(
+                {name: named[name] for name in (PAPER, f"{OURS} without {TRACKING}")} | {OURS: ours},
+                pipeline_of,
+                masks,
+                live=None if true_masks else open_pipeline(ours),
+                frames=sequence,
+                phantoms=phantoms or tuple(PHANTOM_TITLES),
+                seed=seed,
+            )
+        if out is not None:
+            (out / "ablation.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+            (out / "ablation.md").write_text(markdown(result), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+    return result
 
 
 def _labelled(folder: Path) -> tuple[list[Sample], dict[str, dict[str, Any]]]:
-    from core.learning.dataset import POSE_KEYS, DatasetError, find_labelled
+    from core.learning.dataset import POSE_KEYS, find_labelled
 
     samples, truth = find_labelled(folder, POSE_KEYS)
     if all(truth[sample.stem].get("state") is None for sample in samples):
-        raise DatasetError(f"{folder}: no frame of truth.jsonl has a pose; nothing can be compared")
+        raise UserError(f"{folder}: no frame of truth.jsonl has a pose; nothing can be compared")
     return samples, truth
-
-
-def _known_phantoms(names: tuple[str, ...]) -> tuple[str, ...]:
-    from hardware.twin.phantom import PHANTOM_TITLES
-
-    for name in names:
-        if name not in PHANTOM_TITLES:
-            raise AblationError(f"unknown phantom {name!r}; known: {', '.join(PHANTOM_TITLES)}")
-    return names or tuple(PHANTOM_TITLES)
-
-
-def _make_folder(out: Path | None) -> None:
-    if out is not None:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise AblationError(f"{out}: cannot be made ({error.strerror}); choose another --out") from None
 
 
 def _open_masks(config: PerceptionConfig, true_masks: bool) -> tuple[SameMasks, Callable[[PerceptionConfig], Pipeline]]:
@@ -859,104 +727,54 @@ def _open_masks(config: PerceptionConfig, true_masks: bool) -> tuple[SameMasks, 
 def _measure_set(
     samples: Sequence[Sample],
     truth: dict[str, dict[str, Any]],
-    pipelines: Sequence[Pipeline],
+    variants: Sequence[Variant],
+    pipeline_of: Callable[[PerceptionConfig], Pipeline],
     masks: SameMasks,
     working_size_px: int,
-    left_out: LeftOut,
-) -> tuple[list[list[FrameScore]], list[list[float]], bool]:
-    """For each pipeline the scores of all frames and the milliseconds after the network, and whether it was interrupted."""
-    from core.learning.dataset import DatasetError
-    from core.perception.segmentation import to_working
-
-    scores: list[list[FrameScore]] = [[] for _ in pipelines]
-    latency_ms: list[list[float]] = [[] for _ in pipelines]
-    interrupted = False
-    with progress_bar() as bar:
-        try:
-            for sample in bar.track(samples, description=f"frames x {len(pipelines)} variants"):
-                try:
-                    image, *true = sample.load()
-                except DatasetError as error:
-                    left_out.add(error)
-                    continue
-                masks.next_frame(true[0], true[1])
-                vessel, robot = (to_working(mask.astype(np.uint8) * 255, working_size_px)[0] > 127 for mask in true)
-                for place, pipeline in enumerate(pipelines):
-                    scene = pipeline.perceive_single(Frame(0, 0.0, image))
-                    scores[place].append(score_frame(sample.stem, scene, vessel, robot, truth[sample.stem]))
-                    spent = scene.latency_ms
-                    latency_ms[place].append(spent["total"] - spent.get("prepare", 0.0) - spent.get("network", 0.0))
-        except KeyboardInterrupt:
-            interrupted = True
-    count = len(latency_ms[-1])  # an interruption leaves the last frame with some of the pipelines only
-    has_pose = any(score.expected for score in scores[-1][:count])
-    if interrupted and not has_pose:
-        raise KeyboardInterrupt
-    left_out.tell(count)
-    if not has_pose:
-        raise AblationError("no frame with a pose can be read; nothing can be compared")
-    return [row[:count] for row in scores], [row[:count] for row in latency_ms], interrupted
-
-
-def _described(
-    variants: Sequence[Variant],
-    scores: Sequence[Sequence[FrameScore]],
-    latency_ms: Sequence[Sequence[float]],
-    groups: Sequence[Any],
     seed: int,
 ) -> dict[str, Any]:
-    table = figures(scores, [variant.compared_with for variant in variants], groups, seed)
-    rows: list[dict[str, Any]] = []
-    for place, variant in enumerate(variants):
-        row: dict[str, Any] = {"name": variant.name, "kind": variant.kind}
-        row["compared_with"] = None if variant.compared_with is None else variants[variant.compared_with].name
-        row["figures"] = {key: figure.to_json() for key, figure in table[place].items()}
-        row["after_network_ms"] = float(np.median(latency_ms[place]))
-        row["refused"] = refusals(scores[place])
-        rows.append(row)
+    """``frames``, ``expected`` (with a pose), ``drawn`` (of what the bootstrap draws) and ``rows``, one for each variant."""
+    from core.perception.segmentation import to_working
+
+    pipelines = [pipeline_of(variant.config) for variant in variants]
+    scores: list[list[FrameScore]] = [[] for _ in variants]
+    latency_ms: list[list[float]] = [[] for _ in variants]
+    with progress_bar() as bar:
+        for sample in bar.track(samples, description=f"frames x {len(variants)} variants"):
+            image, *true = sample.load()
+            masks.next_frame(true[0], true[1])
+            vessel, robot = (to_working(mask.astype(np.uint8) * 255, working_size_px)[0] > 127 for mask in true)
+            for place, pipeline in enumerate(pipelines):
+                scene = pipeline.perceive_single(Frame(0, 0.0, image))
+                scores[place].append(score_frame(sample.stem, scene, vessel, robot, truth[sample.stem]))
+                spent = scene.latency_ms
+                latency_ms[place].append(spent["total"] - spent.get("prepare", 0.0) - spent.get("network", 0.0))
+    groups = [truth[sample.stem].get("seed", sample.stem) for sample in samples]
+    rows: list[dict[str, Any]] = [
+        {
+            "name": variant.name,
+            "kind": variant.kind,
+            "compared_with": None if variant.compared_with is None else variants[variant.compared_with].name,
+            "figures": {key: asdict(figure) for key, figure in row.items()},
+            "after_network_ms": float(np.median(latency_ms[place])),
+            "refused": refusals(scores[place]),
+        }
+        for place, (variant, row) in enumerate(
+            zip(variants, figures(scores, [variant.compared_with for variant in variants], groups, seed), strict=True)
+        )
+    ]
     last = next(place for place, row in enumerate(rows) if row["kind"] == "without")
     rows.insert(last, {"name": f"+ {TRACKING}", "kind": "cumulative", "note": ALONE})
     rows.append({"name": f"{OURS} without {TRACKING}", "kind": "without", "note": ALONE})
     expected = [group for group, score in zip(groups, scores[0], strict=True) if score.expected]
     drawn = f"{len(set(expected))} phantoms{'' if are_enough(expected) else ' (too few for intervals)'}"
-    return {"frames": len(scores[0]), "expected": len(expected), "drawn": drawn, "rows": rows}
+    return {"frames": len(samples), "expected": len(expected), "drawn": drawn, "rows": rows}
 
 
-def _tell(result: dict[str, Any], as_json: bool) -> None:
-    if as_json:
-        sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
-    else:
-        console = Console(markup=False, emoji=False) if sys.stdout.isatty() else Console(width=_WIDTH, markup=False, emoji=False)
-        if "rows" in result:
-            console.print(value_table(result), difference_table(result))
-        if result.get("stream"):
-            console.print(stream_table(result["stream"]))
-
-
-def _write(result: dict[str, Any], frames: list[dict[str, Any]], out: Path) -> None:
-    try:
-        (out / "ablation.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        (out / "ablation.md").write_text(markdown(result), encoding="utf-8")
-    except OSError as error:
-        raise AblationError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
-    if frames:
-        _write_frames(out / "ablation_frames.csv", frames)
-
-
-def _write_frames(path: Path, rows: list[dict[str, Any]]) -> None:
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(row | {"stem": name_as_text(row["stem"])} for row in rows)
-    except OSError as error:
-        raise AblationError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
-
-
-def main(
+def ablation(
     labelled: Annotated[Path | None, typer.Argument(metavar="SET", help="labelled set as synth writes it")] = None,
-    json: JsonOption = False,
-    out: Annotated[Path | None, typer.Option(help="folder for ablation.json, ablation.md and ablation_frames.csv")] = None,
+    as_json: JsonOption = False,
+    out: Annotated[Path | None, typer.Option(help="folder for ablation.json and ablation.md")] = None,
     true_masks: Annotated[bool, typer.Option("--true-masks", help="the true masks instead of the network's")] = False,
     sequence: Annotated[int, typer.Option(min=0, max=100_000, help="also measure streams, of so many frames of the twin")] = 0,
     phantom: Annotated[list[str] | None, typer.Option(help="named phantom of these frames; default: all, in turn")] = None,
@@ -964,14 +782,20 @@ def main(
     model: ModelOption = None,
     config: ConfigOption = None,
 ) -> None:
-    """What each step is worth: from the paper taken literally to ours, on the same masks of the same frames.
-
-    And, in streams, perception as the window has it, which looks for itself.
-    """
+    """Measure what each step is worth, on the same masks of the same frames, and in streams of the twin."""
     check_masks(model, true_masks=true_masks)
-    plan = Plan(labelled, model, config, true_masks, sequence, tuple(phantom or ()), seed, out)
-    run_ablation(plan, as_json=json)
+    result = run_ablation(
+        labelled,
+        model=model,
+        config_path=config,
+        true_masks=true_masks,
+        sequence=sequence,
+        phantoms=phantom or (),
+        seed=seed,
+        out=out,
+    )
+    sys.stdout.write(json.dumps(result, allow_nan=False) + "\n" if as_json else markdown(result))
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_tool(ablation)

@@ -1,22 +1,374 @@
-"""``ablation`` as a user calls it, on a set that ``synth`` writes now and on streams of the twin."""
+"""The ablation: its variants, figures with values counted by hand, steadiness in a stream, and a run on a set and on the twin."""
 
 from __future__ import annotations
 
-import csv
-import errno
-import io
 import json
-import os
 import shutil
-import subprocess
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from core.config.models import GapConfig, PerceptionConfig, PoseConfig, QualityConfig, load_config
 from core.devices import UserError
-from tests.app.program import run
-from tools import ablation as command
-from tools.ablation import STEPS, Plan, run_ablation
+from core.evaluation.accuracy import FrameScore, TrueMasks
+from core.perception.pipeline import Pipeline
+from core.perception.vectors import fit_line
+from core.types import Frame, Image, Reason
+from tests.core.drawing import curve, depth
+from tools.ablation import (
+    MEASURES,
+    OURS,
+    PAPER,
+    STEPS,
+    TRACKING,
+    SameMasks,
+    StreamFrame,
+    are_enough,
+    draw_weights,
+    estimate,
+    figures,
+    make_variants,
+    markdown,
+    refusals,
+    run_ablation,
+    stream_figures,
+)
+
+LITERAL = load_config(preset="paper").perception
+DEFAULTS = load_config().perception
+
+
+# ---- variants ----
+
+
+def test_the_rows_lead_from_the_papers_preset_to_ours() -> None:
+    variants = make_variants(LITERAL, DEFAULTS)
+    cumulative = [variant for variant in variants if variant.kind == "cumulative"]
+    assert cumulative[0].name == PAPER
+    literal = LITERAL.model_copy(update={"segmentation": DEFAULTS.segmentation})  # the same masks for all rows
+    assert cumulative[0].config == literal, "every setting of the preset belongs to a step"
+    assert cumulative[-1].config == DEFAULTS
+    assert [variant.name for variant in cumulative[1:]] == [f"+ {step.name}" for step in STEPS]
+    assert [variant.compared_with for variant in cumulative] == [None, *range(len(STEPS))]
+
+
+def test_every_step_switches_something_and_nothing_else() -> None:
+    variants = make_variants(LITERAL, DEFAULTS)
+    own = DEFAULTS.model_dump()
+    for step, variant in zip(STEPS, variants[len(STEPS) + 1 :], strict=True):
+        assert variant.name == f"{OURS} without {step.name}"
+        assert variants[variant.compared_with or 0].config == DEFAULTS
+        changed = [
+            (section, key)
+            for section, values in variant.config.model_dump().items()
+            if isinstance(values, dict)
+            for key, value in values.items()
+            if value != own[section][key]
+        ]
+        assert changed, step.name
+        assert all(f"{section}.{key}" in step.settings or section in step.settings for section, key in changed)
+
+
+def test_a_step_that_is_left_out_stays_on_in_all_rows() -> None:
+    variants = make_variants(LITERAL, DEFAULTS, [step for step in STEPS if step.name != TRACKING])
+    assert all(variant.config.tracking.enabled for variant in variants)
+    assert TRACKING not in " ".join(variant.name for variant in variants)
+
+
+def test_a_difference_that_no_step_switches_is_an_error() -> None:
+    with pytest.raises(ValueError, match=r"no step of the ablation switches pose\.d_allow_px"):
+        make_variants(DEFAULTS, DEFAULTS.model_copy(update={"pose": PoseConfig(d_allow_px=7.0)}))
+    with pytest.raises(ValueError, match="no step of the ablation switches working_size_px"):
+        make_variants(DEFAULTS, DEFAULTS.model_copy(update={"working_size_px": 320}))
+
+
+def test_what_a_users_file_sets_is_kept_in_all_rows() -> None:
+    ours = DEFAULTS.model_copy(update={"gaps": GapConfig(gap_threshold_px=12.0)})
+    paper = LITERAL.model_copy(update={"gaps": GapConfig(rule="every_pair", gap_threshold_px=12.0)})
+    assert all(variant.config.gaps.gap_threshold_px == 12.0 for variant in make_variants(paper, ours))
+
+
+# ---- switches that the steps need ----
+
+VESSEL = curve((-20.0, 240.0), (300.0, 240.0), (660.0, 240.0))
+
+
+def perceived(robot_depth: np.ndarray, config: PerceptionConfig) -> Reason | None:
+    masks = TrueMasks()
+    masks.show(depth(VESSEL, 22.0) > 0, robot_depth > 0)
+    scene = Pipeline(masks, config).perceive_single(Frame(0, 0.0, grey_bars()))
+    return scene.refusal.reason if scene.refusal is not None else None
+
+
+def grey_bars() -> Image:
+    """A picture that is neither dark nor bright nor blurred."""
+    picture = np.full((480, 640, 3), 60, np.uint8)
+    picture[:, ::2] = 180
+    return picture
+
+
+@pytest.mark.parametrize(
+    ("robot", "expected"),
+    [
+        (curve((-10.0, 240.0), (300.0, 240.0), (660.0, 240.0)), Reason.AMBIGUOUS_PATH),
+        (curve((-10.0, 100.0), (150.0, 100.0), (300.0, 100.0)), Reason.OUTSIDE_VESSEL),
+    ],
+)
+def test_without_the_quality_gate_every_pose_that_can_be_computed_is_given(robot: np.ndarray, expected: Reason) -> None:
+    silent = DEFAULTS.model_copy(update={"quality": QualityConfig(enabled=False)})
+    assert perceived(depth(robot, 4.0), DEFAULTS) is expected
+    assert perceived(depth(robot, 4.0), silent) is None
+    assert perceived(np.full((480, 640), -1.0), silent) is Reason.NO_ROBOT, "there is nothing to answer"
+
+
+def test_linear_regression_takes_errors_in_one_direction_only() -> None:
+    zigzag = np.array([[0.0, 0.0], [4.0, 2.0], [8.0, 0.0], [12.0, 2.0]])
+    # Regression by hand: x - 6 = -6 -2 2 6, y - 1 = -1 1 -1 1, sum xy = 8, sum xx = 80: slope 1/10.
+    along = fit_line(zigzag, "least_squares")
+    upright = fit_line(zigzag[:, ::-1], "least_squares")
+    assert along is not None
+    assert upright is not None
+    assert along.direction[1] / along.direction[0] == pytest.approx(0.1)
+    assert upright.direction[0] / upright.direction[1] == pytest.approx(0.1)
+    assert along.start[0] < along.end[0]
+    assert upright.start[1] < upright.end[1]
+
+
+def test_both_fits_find_a_straight_line() -> None:
+    line = np.column_stack([np.arange(20.0), 3.0 * np.arange(20.0)])
+    for fit in ("total_least_squares", "least_squares"):
+        found = fit_line(line, fit)  # type: ignore[arg-type]
+        assert found is not None
+        assert found.direction == pytest.approx((1 / np.sqrt(10), 3 / np.sqrt(10)))
+
+
+# ---- masks ----
+
+
+def test_the_network_runs_once_per_frame() -> None:
+    class Counting:
+        engine = "counted"
+        runs = 0
+
+        def __call__(self, image: Image) -> tuple[np.ndarray, np.ndarray]:
+            self.runs += 1
+            return np.zeros(image.shape[:2], np.float32), np.ones(image.shape[:2], np.float32)
+
+    network, nothing = Counting(), np.zeros((4, 4), bool)
+    masks = SameMasks(network)
+    image = np.zeros((4, 4, 3), np.uint8)
+    first = masks(image)[0]
+    assert masks(image)[0] is first
+    masks.next_frame(nothing, nothing)
+    assert masks(image)[0] is not first
+    assert network.runs == 2
+    assert masks.engine == "counted"
+
+
+def test_true_masks_are_shown_frame_by_frame() -> None:
+    masks = SameMasks(TrueMasks())
+    left = np.array([[True, False]])
+    image = np.zeros((1, 2, 3), np.uint8)
+    masks.next_frame(left, ~left)
+    assert (masks(image)[0] > 0.5).tolist() == [[True, False]]
+    masks.next_frame(~left, left)
+    assert (masks(image)[0] > 0.5).tolist() == [[False, True]]
+
+
+# ---- figures ----
+
+
+@pytest.mark.parametrize("quantile", [0.5, 0.95, 0.0, 1.0, None])
+def test_estimates_are_those_of_the_repeated_values(quantile: float | None) -> None:
+    rng = np.random.default_rng(3)
+    values, weights = rng.normal(size=15), rng.integers(0, 4, (20, 15))
+    found = estimate(values, weights, quantile)
+    for row, value in zip(weights, found, strict=True):
+        repeated = np.repeat(values, row)
+        assert value == pytest.approx(repeated.mean() if quantile is None else np.quantile(repeated, quantile))
+
+
+def test_estimates_leave_out_what_is_not_known() -> None:
+    values, weights = np.array([1.0, np.nan, 5.0]), np.array([[1, 7, 1], [0, 3, 2], [0, 4, 0]])
+    np.testing.assert_array_equal(estimate(values, weights, None), [3.0, 5.0, np.nan])
+    np.testing.assert_array_equal(estimate(values, weights, 0.5), [3.0, 5.0, np.nan])
+
+
+def test_whole_phantoms_are_drawn_where_there_are_enough() -> None:
+    groups = [number // 2 for number in range(20)]
+    weights = draw_weights(groups, seed=1, resamples=50)
+    assert are_enough(groups)
+    assert weights.shape == (50, 20)
+    np.testing.assert_array_equal(weights[:, ::2], weights[:, 1::2])
+    assert (weights.sum(axis=1) == 20).all()
+    np.testing.assert_array_equal(weights, draw_weights(groups, seed=1, resamples=50))
+    assert (weights != draw_weights(groups, seed=2, resamples=50)).any()
+
+
+def test_of_too_few_phantoms_no_difference_has_an_interval() -> None:
+    """Drawn one by one, twenty frames of two phantoms would make it too narrow."""
+    rng = np.random.default_rng(4)
+    rows = [[score(float(theta), stem=str(k)) for k, theta in enumerate(rng.normal(shift, 1.0, 20))] for shift in (3.0, 6.0)]
+    assert not are_enough([0] * 10 + [1] * 10)
+    few = figures(rows, [None, 0], [k // 10 for k in range(20)])[1]["theta_mean_deg"]
+    enough = figures(rows, [None, 0], [k // 2 for k in range(20)])[1]["theta_mean_deg"]
+    assert few.difference == enough.difference
+    assert (few.low, few.high, few.is_clear) == (None, None, False)
+    assert enough.is_clear
+    assert draw_weights([], seed=1, resamples=5).shape == (5, 0)
+
+
+def score(theta: float | None, head: float = 1.0, state: str = "C", stem: str = "a") -> FrameScore:
+    answered = theta is not None
+    return FrameScore(
+        stem=stem,
+        vessel_dice=1.0,
+        robot_dice=1.0,
+        expected=True,
+        answered=answered,
+        reason=None if answered else Reason.LOW_CONFIDENCE,
+        head_error_px=head if answered else None,
+        theta_error_deg=theta,
+        theta_deg=theta,
+        true_theta_deg=0.0,
+        state=state if answered else None,
+        true_state="C",
+        confidence=0.7 if answered else 0.0,
+    )
+
+
+def test_figures_by_hand() -> None:
+    nobody = replace(score(None), expected=False, true_state=None)
+    before = [score(1.0), score(-3.0, head=16.0), score(11.0, state="B"), score(2.0), nobody]
+    after = [score(1.0), score(None), score(-5.0), score(2.0, head=3.0), nobody]
+    first, second = figures([before, after], [None, 0], list("abcde"))
+    assert {key: figure.value for key, figure in first.items()} == pytest.approx(
+        {
+            "theta_median_deg": 2.5,  # of 1, 2, 3 and 11: the size counts, not the sign
+            "theta_mean_deg": 4.25,
+            "theta_p95_deg": 3 + 0.85 * 8,
+            "head_median_px": 1.0,
+            "head_p95_px": 1 + 0.85 * 15,
+            "state_agreement": 3 / 4,
+            "answered_share": 1.0,
+            "wrong_share": 2 / 4,  # one by its angle, one by its head
+        }
+    )
+    assert first["theta_median_deg"].difference is None
+    assert second["theta_median_deg"].value == 2.0
+    assert second["theta_median_deg"].difference == -0.5
+    assert second["answered_share"].value == 3 / 4, "the frame without a robot does not count"
+    assert second["wrong_share"].difference == pytest.approx(-1 / 2)
+
+
+def test_intervals_hold_the_difference_and_say_when_it_is_clear() -> None:
+    rng = np.random.default_rng(0)
+    worse = [score(float(value)) for value in rng.uniform(4, 8, 60)]
+    better = [replace(one, theta_error_deg=(one.theta_error_deg or 0.0) - 2.0) for one in worse]
+    table = figures([worse, better, better], [None, 0, 1], list(range(60)))
+    change = table[1]["theta_mean_deg"]
+    assert (change.difference, change.low, change.high) == pytest.approx((-2.0, -2.0, -2.0))  # paired: each frame by as much
+    assert change.is_clear
+    median = table[1]["theta_median_deg"]
+    assert median.low is not None
+    assert median.high is not None
+    assert median.difference is not None
+    assert median.low <= median.difference <= median.high
+    same = table[2]["theta_mean_deg"]
+    assert (same.difference, same.low, same.high) == (0.0, 0.0, 0.0)
+    assert not same.is_clear
+    again = figures([worse, better, better], [None, 0, 1], list(range(60)))
+    assert again == table, "the same seed gives the same intervals"
+
+
+def test_a_row_that_never_answers_has_no_errors() -> None:
+    table = figures([[score(1.0)] * 3, [score(None)] * 3], [None, 0], list("abc"))
+    silent = table[1]
+    assert silent["answered_share"].value == 0.0
+    assert silent["answered_share"].difference == -1.0
+    for measure in MEASURES:
+        if measure.key != "answered_share":
+            figure = silent[measure.key]
+            assert (figure.value, figure.difference, figure.low, figure.high) == (None, None, None, None)
+
+
+def test_refusals_are_counted() -> None:
+    unseen = replace(score(None), reason=Reason.NO_ROBOT)
+    scores = [score(None), unseen, unseen, score(1.0), replace(unseen, expected=False)]
+    assert list(refusals(scores).items()) == [("no robot", 2), ("low confidence", 1)]
+
+
+# ---- streams ----
+
+
+def seen(
+    theta: float | None, true_theta: float, head: tuple[float, float] = (100.0, 0.0), state: str = "C", swapped: bool = False
+) -> StreamFrame:
+    """A robot from (0, 0) to (100, 0); without theta there is no answer."""
+    if theta is None:
+        return StreamFrame(None, None, None, None, (100.0, 0.0), (0.0, 0.0), true_theta, "C")
+    found = (head, (0.0, 0.0)) if not swapped else ((0.0, 0.0), head)
+    return StreamFrame(*found, theta, state, (100.0, 0.0), (0.0, 0.0), true_theta, "C")
+
+
+def test_swaps_jumps_and_changes_are_counted() -> None:
+    stream = [
+        seen(5.0, 5.0),
+        seen(5.0, 5.0, head=(110.0, 0.0), state="B"),  # 10 px is no jump
+        seen(None, 5.0),
+        seen(5.0, 5.0, head=(131.0, 0.0)),  # 21 px since the last answer is one
+        seen(-175.0, 5.0, swapped=True),  # and so is the way to the other end
+        seen(5.0, 5.0),  # and back
+    ]
+    found = stream_figures([stream, [seen(5.0, 5.0, state="A")]])
+    assert found["frames"] == 7
+    assert found["answered_share"] == 6 / 7
+    assert found["state_agreement"] == 4 / 6
+    assert (found["theta_median_deg"], found["theta_mean_deg"]) == (0.0, 180.0 / 6)
+    assert found["head_median_px"] == 5.0  # of 0, 10, 31, 100, 0 and 0
+    assert found["wrong_share"] == 2 / 6, "the one that jumped, and the one that is turned round"
+    assert found["swapped_frames"] == 1
+    assert found["jumps"] == 3
+    assert found["state_changes"] == 2  # C B C within the first stream; the second stands alone
+    assert found["true_state_changes"] == 0
+    assert found["theta_lag_frames"] is None, "too short"
+
+
+@pytest.mark.parametrize("delay", [0.0, 1.0, 2.5])
+def test_the_lag_of_theta_is_found(delay: float) -> None:
+    def theta(frame: float) -> float:
+        return 170.0 + 25.0 * float(np.sin(frame / 9.0))  # across the seam at 180 degrees
+
+    def signed(value: float) -> float:
+        return (value + 180.0) % 360.0 - 180.0
+
+    noise = np.random.default_rng(1).normal(0.0, 0.3, 120)
+    stream = [seen(signed(theta(frame - delay) + noise[frame]), signed(theta(frame))) for frame in range(120)]
+    lag = stream_figures([stream])["theta_lag_frames"]
+    assert lag == pytest.approx(delay, abs=0.1)
+
+
+def test_no_lag_is_told_where_nothing_turns() -> None:
+    assert stream_figures([[seen(3.0, 3.0)] * 80])["theta_lag_frames"] is None
+    nothing = stream_figures([])
+    assert [nothing[key] for key in ("theta_lag_frames", "theta_median_deg", "head_median_px", "wrong_share")] == [None] * 4
+
+
+def test_jitter_is_the_spread_of_the_errors_change() -> None:
+    rng = np.random.default_rng(2)
+    stream = [seen(10.0 + rng.normal(0.0, 2.0), 10.0, head=(100.0 + rng.normal(0, 1.0), rng.normal(0, 1.0))) for _ in range(2000)]
+    found = stream_figures([stream])
+    # The difference of two independent errors has the square root of two times their spread.
+    assert found["theta_jitter_deg"] == pytest.approx(2.0 * np.sqrt(2.0), rel=0.06)
+    assert found["head_jitter_px"] == pytest.approx(np.sqrt(2.0), rel=0.06)
+    still = stream_figures([[seen(12.0, 10.0)] * 5])
+    assert still["theta_jitter_deg"] == still["head_jitter_px"] == 0.0, "a steady error is no jitter"
+
+
+# ---- a whole run ----
 
 
 @pytest.fixture(scope="module")
@@ -29,174 +381,57 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def done(frames: Path) -> subprocess.CompletedProcess[str]:
-    return run("ablation", frames, "--true-masks", "--json", "--out", frames.parent / "out")
+def done(frames: Path) -> dict[str, Any]:
+    return run_ablation(frames, true_masks=True, out=frames.parent / "out")
 
 
-class _Full(io.StringIO):
-    def write(self, _text: str) -> int:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-
-def test_results_outlive_a_broken_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing was written to --out where nothing could be told."""
-    monkeypatch.setattr(command, "measure_streams", lambda *_args, **_more: (None, False))
-    monkeypatch.setattr("sys.stdout", _Full())
-    with pytest.raises(OSError, match="No space left"):
-        run_ablation(Plan(None, out=tmp_path, sequence=1, seed=7, true_masks=True), as_json=True)
-    assert json.loads((tmp_path / "ablation.json").read_text())["seed"] == 7
-
-
-def test_json_is_one_object_with_a_row_for_each_step_on_and_off(done: subprocess.CompletedProcess[str]) -> None:
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
-    assert (result["frames"], result["masks"], result["interrupted"]) == (6, "true masks", False)
-    names = [row["name"] for row in result["rows"]]
+def test_there_is_a_row_for_each_step_on_and_off(done: dict[str, Any], frames: Path) -> None:
+    assert (done["frames"], done["masks"]) == (6, "true masks")
     steps = [step.name for step in STEPS]
-    assert names == ["paper, literally", *(f"+ {name}" for name in steps), *(f"ours without {name}" for name in steps)]
-    by_name = {row["name"]: row for row in result["rows"]}
+    assert [row["name"] for row in done["rows"]] == [
+        PAPER,
+        *(f"+ {name}" for name in steps),
+        *(f"{OURS} without {name}" for name in steps),
+    ]
+    by_name = {row["name"]: row for row in done["rows"]}
     assert by_name["+ end extension"]["compared_with"] == "+ spur pruning"
-    assert by_name["ours without end extension"]["compared_with"] == "+ quality gate"  # ours, as far as single images go
-    extension = by_name["ours without end extension"]["figures"]["head_median_px"]
+    assert by_name[f"{OURS} without end extension"]["compared_with"] == "+ quality gate"  # ours, as far as single images go
+    extension = by_name[f"{OURS} without end extension"]["figures"]["head_median_px"]
     assert extension["difference"] > 1.0, "without it the head lies a radius too far back"
     assert extension["low"] is extension["high"] is None
-    assert "too few for intervals" in result["drawn"]
-    for name in ("+ tracking", "ours without tracking"):
-        assert "needs a stream" in by_name[name]["note"]
-        assert "figures" not in by_name[name]
-
-
-def test_out_holds_the_table_and_every_frame(done: subprocess.CompletedProcess[str], frames: Path) -> None:
-    out = frames.parent / "out"
-    assert json.loads((out / "ablation.json").read_text()) == json.loads(done.stdout)
-    table = [line for line in (out / "ablation.md").read_text().splitlines() if line.startswith("|")]
+    assert "too few for intervals" in done["drawn"]
+    assert "needs a stream" in by_name["+ tracking"]["note"]
+    assert json.loads((frames.parent / "out" / "ablation.json").read_text()) == done
+    table = [line for line in (frames.parent / "out" / "ablation.md").read_text().splitlines() if line.startswith("|")]
     assert len(table) == 2 + 1 + 2 * len(STEPS)
     assert len({line.count("|") for line in table}) == 1
-    with (out / "ablation_frames.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == 6 * (1 + 2 * (len(STEPS) - 1))
-    assert {row["stem"] for row in rows} == {f"{index:06d}" for index in range(6)}
 
 
-def test_a_table_is_shown_with_values_and_differences(frames: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run_ablation(Plan(frames, true_masks=True), as_json=False)
-    shown = capsys.readouterr().out
-    for text in ("paper, literally", "+ gap repair", "ours without line fit", "95 % bootstrap interval", "needs a"):
-        assert text in shown
-
-
-def test_tracking_is_measured_on_a_stream_of_the_twin() -> None:
-    shown = run("ablation", "--true-masks", "--json", "--sequence", 8, "--phantom", "s_curve", "--phantom", "tree")
-    assert shown.returncode == 0, shown.stderr
-    stream = json.loads(shown.stdout)["stream"]
+def test_streams_of_the_twin_are_measured_with_and_without_tracking() -> None:
+    stream = run_ablation(None, true_masks=True, sequence=8, phantoms=("s_curve", "tree"))["stream"]
     assert (stream["phantoms"], stream["frames_each"]) == (["s_curve", "tree"], 4)
-    assert [row["name"] for row in stream["rows"]] == ["paper, literally", "ours without tracking", "ours"]
+    assert [row["name"] for row in stream["rows"]] == [PAPER, f"{OURS} without tracking", OURS]
     for row in stream["rows"]:
         assert row["figures"]["frames"] == 8
         assert row["figures"]["swapped_frames"] == row["figures"]["jumps"] == 0
-
-
-def test_a_stream_is_also_perceived_as_the_window_does(capsys: pytest.CaptureFixture[str]) -> None:
-    run_ablation(Plan(None, sequence=6, phantoms=("tree",)), as_json=True)
-    rows = json.loads(capsys.readouterr().out)["stream"]["rows"]
-    assert [row["name"] for row in rows] == ["paper, literally", "ours without tracking", "ours", "ours, as the window has it"]
-    assert rows[-1]["figures"]["frames"] == 6
-    assert rows[-1]["figures"]["theta_median_deg"] < 5.0
-
-
-def test_an_interruption_shows_what_was_measured_until_then(
-    frames: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    real, calls = command.score_frame, []
-
-    def interrupted(*arguments: object) -> object:
-        calls.append(1)
-        if len(calls) > 3 * 21 + 5:  # in the middle of the fourth frame's 21 variants
-            raise KeyboardInterrupt
-        return real(*arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(command, "score_frame", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        run_ablation(Plan(frames, true_masks=True, sequence=4), as_json=True)
-    result = json.loads(capsys.readouterr().out)
-    assert (result["frames"], result["interrupted"]) == (3, True)
-    assert "stream" not in result
-
-
-def test_a_damaged_frame_is_left_out_and_said(frames: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder, out = tmp_path / "set", tmp_path / "out"
-    shutil.copytree(frames, folder)
-    _cut(folder / "images" / "000002.png")
-    run_ablation(Plan(folder, true_masks=True, out=out), as_json=True)
-    shown = capsys.readouterr()
-    result = json.loads(shown.out)
-    assert (result["frames"], result["left_out"], result["interrupted"]) == (5, 1, False)
-    assert "1 of 6 frames could not be read" in shown.err
-    assert "1 frames left out that cannot be read" in (out / "ablation.md").read_text()
-    with (out / "ablation_frames.csv").open(newline="") as file:
-        assert {row["stem"] for row in csv.DictReader(file)} == {f"{index:06d}" for index in (0, 1, 3, 4, 5)}
-
-
-def test_what_leaves_nothing_to_compare_is_no_interruption(frames: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "set"
-    shutil.copytree(frames, folder)
-    rows = [json.loads(line) for line in (frames / "truth.jsonl").read_text().splitlines()]
-    rows[1:] = [row | {"state": None} for row in rows[1:]]
-    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    _cut(folder / "images" / f"{rows[0]['stem']}.png")
-    with pytest.raises(UserError, match="no frame with a pose can be read"):
-        run_ablation(Plan(folder, true_masks=True), as_json=True)
-    for image in (folder / "images").iterdir():
-        _cut(image)
-    with pytest.raises(UserError, match="none of 6 frames could be read"):
-        run_ablation(Plan(folder, true_masks=True), as_json=True)
-
-
-def _cut(image: Path) -> None:
-    image.write_bytes(image.read_bytes()[:50])
+    assert "theta lag" in markdown({"stream": stream, "masks": "true masks"})
 
 
 def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
-    untold, poseless, halved = tmp_path / "untold", tmp_path / "poseless", tmp_path / "halved"
-    for folder in (untold, poseless, halved):
-        shutil.copytree(frames, folder)
-    rows = [json.loads(line) for line in (frames / "truth.jsonl").read_text().splitlines()]
-
-    def write(folder: Path, changed: list[dict[str, object]]) -> None:
-        (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in changed))
-
-    write(untold, rows[:-1])
-    write(poseless, [row | {"state": None} for row in rows])
-    write(halved, [{key: value for key, value in row.items() if key != "head_xy"} for row in rows])
-    file = tmp_path / "file"
+    poseless, file = tmp_path / "poseless", tmp_path / "file"
+    shutil.copytree(frames, poseless)
+    rows = [json.loads(line) | {"state": None} for line in (frames / "truth.jsonl").read_text().splitlines()]
+    (poseless / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     file.write_text("")
-    for plan, words in (
-        (Plan(None), "nothing to measure on"),
-        (Plan(tmp_path / "missing"), "no labelled frames"),
-        (Plan(untold), "1 of 6 frames lack a truth (the first: 000005)"),
-        (Plan(poseless), "no frame of truth.jsonl has a pose"),
-        (Plan(halved), "lacks head_xy"),
-        (Plan(frames, out=file), "cannot be made"),
-        (Plan(None, sequence=5, phantoms=("nowhere",)), "unknown phantom 'nowhere'"),
-        (Plan(frames, model=str(tmp_path / "none")), "none"),
+    for folder, options, words in (
+        (None, {}, "nothing to measure on"),
+        (tmp_path / "missing", {}, "no labelled frames"),
+        (poseless, {}, "no frame of truth.jsonl has a pose"),
+        (frames, {"out": file}, "cannot be written"),
+        (None, {"sequence": 5, "phantoms": ("nowhere",)}, "unknown phantom 'nowhere'"),
+        (frames, {"model": str(tmp_path / "none")}, "none"),
     ):
         with pytest.raises(UserError) as failed:
-            run_ablation(plan, as_json=True)
+            run_ablation(folder, **options)  # type: ignore[arg-type]
         assert words in str(failed.value)
         assert "\n" not in str(failed.value)
-    ended = run("ablation", poseless, "--true-masks")
-    assert ended.returncode == 2
-    assert ended.stderr.startswith("error: ")
-    assert (ended.stderr.count("\n"), ended.stdout) == (1, "")
-
-
-def test_names_that_are_no_utf8_are_shown_as_bytes(frames: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    name = os.fsdecode(b"caf\xe9")
-    folder = Path(shutil.copytree(frames, tmp_path / name))
-    for path in (*folder.glob("*/000000*.png"),):
-        path.rename(path.with_name(path.name.replace("000000", name)))
-    truth = folder / "truth.jsonl"
-    truth.write_text(truth.read_text().replace('"000000"', json.dumps(name)))
-    run_ablation(Plan(folder, true_masks=True, out=tmp_path / "out"), as_json=False)
-    assert r"caf\xe9" in (tmp_path / "out" / "ablation.md").read_text()
-    assert r"caf\xe9" in (tmp_path / "out" / "ablation_frames.csv").read_text()
