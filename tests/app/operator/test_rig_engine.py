@@ -25,7 +25,7 @@ from core.perception.pipeline import Pipeline
 from core.types import Frame, Point, Reason, Refusal, Scene
 from hardware.rig import Rig, RigKind
 from hardware.twin.process import PrestartedProcesses
-from tests.core.control.test_control import _Camera
+from tests.core.control.test_engine import _Camera
 from tests.core.perception.test_pipeline import DrawnNetwork, _draw_tapered, frame
 from tests.core.pilot_bench import Robot
 
