@@ -38,13 +38,8 @@ from core.devices import DeviceError, UserError
 from core.session.manifest import SessionError, about_rig, event_of_alert, read_manifest
 from core.session.reader import SessionReader
 from core.session.writer import RecordStatus, SessionWriter, faults_between
-<<<<<<< HEAD
 from core.system import release_memory
-from core.types import Frame, Mask, Point, Points, Scene
-=======
-from core.system import give_back
 from core.types import Frame, Point, Scene
->>>>>>> 70e6ed0 (tools.soak: an entry point of its own, psutil instead of /proc, one summary as JSON)
 from hardware.rig import Rig, RigKind
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.process import drive_world
@@ -184,7 +179,7 @@ class SoakRig:
             self._writer.add_event(event_of_alert(alert, news.view.time_s))
         before, self._recorded = self._recorded, self._writer.status()
         for fault in faults_between(before, self._recorded):
-            self.pilot.report(fault)
+            self.pilot.report_fault(fault)
 
     def close(self) -> LeftOver | None:
         """End the rig as F5 or a crash does; what the next one takes over."""
