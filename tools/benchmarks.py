@@ -38,6 +38,7 @@ from core.session.manifest import about_rig
 from core.session.writer import SessionWriter
 from core.system import begin_as_worker
 from core.types import Frame, Image, Point, Scene, Tick
+from tools.run import run_tool
 
 FRAMES_PER_SECOND = 30.0
 _BLOCK = 30
@@ -452,11 +453,7 @@ def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     return watch.result()
 
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-
-
-@app.command("window")
-def run_window_pace(
+def window(
     seconds: Annotated[float, typer.Argument(min=5.0, max=3600.0, help="from the first picture on")],
     json: JsonOption = False,
     config: ConfigOption = None,
@@ -466,8 +463,7 @@ def run_window_pace(
     print_figures(measure_window(seconds, config), json, "window")
 
 
-@app.command("player")
-def run_player(
+def player(
     minutes: Annotated[float, typer.Argument(min=0.5, max=600.0, help="length of the session")],
     json: JsonOption = False,
     model: ModelOption = None,
@@ -479,8 +475,7 @@ def run_player(
     print_figures(measure_player(load_config(config, preset, choose_model(model)), minutes), json, "player")
 
 
-@app.command("recording")
-def run_recording(
+def recording(
     frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
     json: JsonOption = False,
     model: ModelOption = None,
@@ -493,4 +488,4 @@ def run_recording(
 
 
 if __name__ == "__main__":
-    app()
+    run_tool(window, player, recording)

@@ -87,6 +87,7 @@ from hardware.twin.phantom import PHANTOM_TITLES
 from hardware.twin.process import JointsToTwin
 from hardware.twin.world import TwinWorld
 from tools.lockstep import LockStepServos
+from tools.run import run_tool
 
 NAMES = {
     "operator_window": "advisory",
@@ -894,4 +895,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_tool(main)

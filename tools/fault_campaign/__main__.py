@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from tools.fault_campaign.bench import run_faults
+from tools.run import run_tool
 
 
 def main(
@@ -22,4 +23,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_tool(main)
