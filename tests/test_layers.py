@@ -168,7 +168,7 @@ def test_imports_have_no_cycles() -> None:
 
 
 def test_no_small_file_serves_one_neighbour_alone() -> None:
-    """A file under 80 lines that one file of its own folder imports is a part of that file."""
+    """A file under 80 lines that one file of its own folder imports is a part of that file; a command is imported by its name, too."""
     importers: dict[str, set[str]] = {}
     for module in modules():
         for name in ours_imported_by(module):
@@ -177,6 +177,7 @@ def test_no_small_file_serves_one_neighbour_alone() -> None:
         module
         for module, path in modules().items()
         if 0 < path.read_text(encoding="utf-8").count("\n") < 80
+        and not module.startswith("app.commands.")
         and [name.rpartition(".")[0] for name in importers.get(module, ())] == [module.rpartition(".")[0]]
     ]
     assert not small
