@@ -168,7 +168,7 @@ def test_imports_have_no_cycles() -> None:
 
 
 def test_no_small_file_serves_one_neighbour_alone() -> None:
-    """A file under 80 lines that one file of its own folder imports is a part of that file; a command is imported by its name, too."""
+    """A file under 80 lines that one file of its own folder imports is a part of it; commands are imported by name."""
     importers: dict[str, set[str]] = {}
     for module in modules():
         for name in ours_imported_by(module):
