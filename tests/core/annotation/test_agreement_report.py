@@ -68,7 +68,7 @@ def test_known_errors_come_out() -> None:
 
 
 def test_kappa_is_of_states_and_who_cannot_tell_gives_none() -> None:
-    """As above, with five images that nobody and two that only Bob could tell: they change no agreement of states."""
+    """Four images, three alike (kappa 1/2), five that neither and two that only Bob could tell: these change no agreement."""
     ann = [answer(str(k), "ann", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 3 + [PoseState.C])]
     bob = [answer(str(k), "bob", 1, 5.0, s) for k, s in enumerate([PoseState.B] * 2 + [PoseState.C] * 2)]
     dark = [answer(f"dark {k}", who, 1, None, None) for k in range(5) for who in ("ann", "bob")]

@@ -27,16 +27,6 @@ def test_exact_outlines_give_the_mask_back() -> None:
     assert not fill(polygons, MaskTarget.ROBOT, SIZE).any()
 
 
-def test_an_island_in_a_hole_is_kept() -> None:
-    y, x = np.mgrid[:48, :64]
-    away = np.hypot(x - 32, y - 24)
-    mask = np.asarray(((away <= 22) & (away > 14)) | ((away <= 9) & (away > 5)) | (away <= 2))
-    assert np.array_equal(fill(polygons_of(mask, MaskTarget.VESSEL, 0.0), MaskTarget.VESSEL, SIZE), mask)
-    hollow = polygons_of(away > 14, MaskTarget.VESSEL)
-    painted = paint(hollow, MaskTarget.VESSEL, np.array([(32.0, 24.0)]), 5.0, SIZE, erase=False)
-    assert fill(painted, MaskTarget.VESSEL, SIZE)[24, 32]
-
-
 def test_fewer_points_change_little() -> None:
     exact, few = (polygons_of(ring(), MaskTarget.VESSEL, tolerance) for tolerance in (0.0, 0.7))
     assert sum(len(p.points) for p in few) < 0.6 * sum(len(p.points) for p in exact)
@@ -51,11 +41,6 @@ def test_nothing_and_specks_make_no_polygon() -> None:
     assert polygons_of(speck, MaskTarget.ROBOT) == ()
     speck[5, 5] = True
     assert polygons_of(speck, MaskTarget.ROBOT) == ()
-
-
-def test_a_rectangle_covers_its_corners_pixels() -> None:
-    square = MaskPolygon(MaskTarget.ROBOT, ((10.0, 10.0), (19.0, 10.0), (19.0, 14.0), (10.0, 14.0)))
-    assert fill([square], MaskTarget.ROBOT, SIZE).sum() == 10 * 5
 
 
 @pytest.mark.parametrize("place", [(20.0, 24.0), (0.0, 0.0), (63.0, 47.0), (-20.0, 10.0)])

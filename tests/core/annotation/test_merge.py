@@ -1,4 +1,4 @@
-"""Raters' files joined: nothing is lost, nobody is taken for somebody else, all or nothing, and twice is once."""
+"""Raters' files joined: nothing is lost, no rater is taken for another one, all or nothing, and twice is once."""
 
 from __future__ import annotations
 

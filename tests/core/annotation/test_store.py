@@ -71,7 +71,7 @@ def test_raters_studies_and_repeats_are_kept_apart(tmp_path: Path) -> None:
 
 
 def test_answers_that_were_given_after_a_look_at_the_algorithms_are_known(tmp_path: Path) -> None:
-    """And those are not that were complete before it, nor those of whoever never looked."""
+    """Not those that were complete before it, nor those of raters who never looked."""
     before, after, never, again = (ItemKey(SHA, "", rater) for rater in ("ann", "bob", "eve", "kim"))
     with known(tmp_path / "a.sqlite") as store:
         assert store.given_after_look() == set()

@@ -10,7 +10,7 @@ from core.annotation.study import QueueOrder, StudySettings, queue_order, repeat
 IMAGES = tuple(f"image {number}" for number in range(20))
 
 
-def test_each_rater_sees_each_image_once_in_each_pass_in_an_order_of_his_own() -> None:
+def test_each_rater_sees_each_image_once_in_each_pass_in_another_order() -> None:
     settings = StudySettings(IMAGES, repeat_views(3, mirror=True, turn=True), seed=4)
     ann, bob = tasks(settings, "ann"), tasks(settings, "bob")
     for repeat, view in ((1, ImageView.AS_IS), (2, ImageView.MIRRORED), (3, ImageView.TURNED)):

@@ -1,7 +1,5 @@
 """Scores of frames against their truth, and their sums, with values counted by hand."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -52,15 +50,6 @@ def test_the_error_of_theta_is_signed_and_goes_the_short_way_round(found: float,
     assert score_frame("a", scene(found), VESSEL, ROBOT, truth).theta_error_deg == pytest.approx(error)
 
 
-def test_a_refused_frame_has_a_reason_and_no_errors() -> None:
-    refused = replace(scene(), pose=None, refusal=Refusal(Reason.LOW_CONFIDENCE))
-    score = score_frame("a", refused, VESSEL, ROBOT, TRUTH)
-    assert score.expected
-    assert not score.answered
-    assert score.reason is Reason.LOW_CONFIDENCE
-    assert (score.head_error_px, score.theta_error_deg, score.state, score.confidence) == (None, None, None, 0.0)
-
-
 def test_a_frame_without_robot_or_masks() -> None:
     nothing = Scene(0, 0.0, (1280, 960), 0.5, refusal=Refusal(Reason.BLACK))
     score = score_frame("a", nothing, VESSEL, NOTHING, {"state": None, "theta_deg": None, "head_xy": None})
@@ -91,7 +80,7 @@ def score(**more: object) -> FrameScore:
 REFUSED: dict[str, object] = {"answered": False, "head_error_px": None, "theta_error_deg": None, "theta_deg": None, "state": None}
 
 
-def test_of_what_nobody_has_measured_only_the_masks_count() -> None:
+def test_of_unmeasured_frames_only_the_masks_count() -> None:
     drawn = score(expected=False, true_state=None, true_theta_deg=None, theta_error_deg=None, head_error_px=None, is_measured=False)
     sums = summarise([score(), drawn, drawn])
     assert (sums["frames"], sums["expected"], sums["poseless_frames"], sums["empty_frames"]) == (3, 1, 0, 0)
@@ -143,13 +132,13 @@ def test_sums_by_hand() -> None:
     assert sums["theta_pearson"] == pytest.approx(float(np.corrcoef([9, 23, 60], [10, 20, 40])[0, 1]))
 
 
-def test_states_that_nobody_can_tell_are_told_apart() -> None:
+def test_toss_up_states_are_counted_apart() -> None:
     far, near = TRUTH | {"c_head_px": 12.0, "c_tail_px": 4.0}, TRUTH | {"c_head_px": 12.0, "c_tail_px": 11.9}
     scores = [
         score_frame("a", scene(), VESSEL, ROBOT, far),
         score_frame("b", scene(), VESSEL, ROBOT, far | {"state": "D"}),
         score_frame("c", scene(), VESSEL, ROBOT, near | {"state": "B"}),
-        score_frame("d", scene(), VESSEL, ROBOT, TRUTH),  # nobody has told its distances
+        score_frame("d", scene(), VESSEL, ROBOT, TRUTH),  # without distances
     ]
     assert [s.true_room_px for s in scores] == [pytest.approx(v) for v in (4.0, 4.0, 0.05)] + [None]
     sums = summarise(scores)
@@ -168,14 +157,8 @@ def test_confident_answers_are_told_apart() -> None:
     stricter = summarise(scores, 0.8)
     assert (stricter["confident_share"], stricter["confident_and_wrong_share"]) == (1 / 5, 0.0)
     assert stricter["answered_and_wrong_share"] == 2 / 4, "an answer that is unsure is one all the same"
-    nobody = summarise(scores, 0.95)
-    assert (nobody["confident_share"], nobody["confident_and_wrong_share"]) == (0.0, None)
-
-
-def test_sums_of_nothing() -> None:
-    sums = summarise([])
-    assert sums["frames"] == 0
-    assert sums["answered_share"] is sums["vessel_dice"] is sums["head_error_px"] is sums["state_kappa"] is None
+    none = summarise(scores, 0.95)
+    assert (none["confident_share"], none["confident_and_wrong_share"]) == (0.0, None)
 
 
 def test_answers_where_there_is_no_pose_are_counted() -> None:

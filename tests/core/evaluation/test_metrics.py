@@ -64,7 +64,7 @@ def test_a_second_measure_that_is_always_larger_is_no_perfect_repeat() -> None:
 
 
 def test_the_spread_of_one_measure_over_raters_and_repeats_by_hand() -> None:
-    """First image: ann 1 2 3 (squares 2, two degrees of freedom), bob 5 7 (2, one); second: ann 4 4 (0, one); third: nobody."""
+    """First image: ann 1 2 3 (squares 2, two degrees of freedom), bob 5 7 (2, one); second: ann 4 4 (0, one); third: none."""
     found = within_subject([[[1.0, 2.0, 3.0], [5.0, 7.0]], [[4.0, 4.0], [9.0]], [[1.0], [50.0]]])
     assert (found["n"], found["sd_deg"]) == (2, pytest.approx(np.sqrt((2 + 2 + 0) / (2 + 1 + 1))))
     assert within_subject([[[1.0], [2.0]]]) == within_subject([]) == {"n": 0, "sd_deg": None, "ci95": None}

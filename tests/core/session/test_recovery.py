@@ -135,16 +135,6 @@ def test_a_flipped_digit_is_found_by_the_checksum(session: Path) -> None:
     assert problems == ("frames.jsonl: line 1: checksum wrong; skipped",)
 
 
-def test_a_row_made_by_hand_needs_no_checksum(session: Path) -> None:
-    path = session / "frames.jsonl"
-    lines = path.read_text().splitlines()
-    record = json.loads(lines[3])
-    del record["crc"]
-    lines[3] = json.dumps(record)
-    path.write_text("\n".join(lines) + "\n")
-    assert read_all(session)[0] == list(range(COUNT))
-
-
 def test_rows_without_their_video_keep_their_values(session: Path) -> None:
     (session / "video_0000.mkv").unlink()
     rows, pictures, problems = read_all(session)
@@ -162,13 +152,6 @@ def test_a_hole_in_the_video_never_shows_a_wrong_picture(session: Path) -> None:
     rows, pictures, _ = read_all(session)
     assert rows == list(range(COUNT))
     assert COUNT - 40 <= len(pictures) < COUNT
-
-
-def test_a_damaged_manifest_is_named_and_the_rest_is_read(session: Path) -> None:
-    (session / "manifest.json").write_text('{"format": 1, "kind": "SIM"')
-    rows, _, problems = read_all(session)
-    assert len(rows) == COUNT
-    assert "manifest.json: damaged" in problems[0]
 
 
 @pytest.mark.parametrize(
@@ -283,15 +266,6 @@ def test_two_recoveries_of_one_session_do_not_meet(session: Path) -> None:
     assert sorted(path.name for path in session.parent.iterdir()) == [session.name, done.folder.name]
 
 
-def test_what_a_killed_recovery_left_is_in_nobodys_way(session: Path) -> None:
-    left = session.parent / f".{session.name}.recovering"
-    left.mkdir()
-    (left / "video_0007.mkv").write_bytes(b"half")
-    done = recover(session)
-    assert not (done.folder / "video_0007.mkv").exists()
-    assert checked(session, done) == (list(range(COUNT)), list(range(COUNT)))
-
-
 def test_a_copy_that_is_recovered_again_still_tells_what_was_lost_before(session: Path) -> None:
     path = session / "frames.jsonl"
     lines = path.read_bytes().splitlines()
@@ -337,13 +311,6 @@ def test_a_session_is_called_by_its_own_name_however_it_is_given(session: Path, 
     assert recover(Path("..")).folder == session.with_name(f"{session.name}_recovered")
 
 
-def test_a_name_of_other_letters_costs_no_recovery(session: Path) -> None:
-    """As archives of other systems give them; the manifest is lost, too."""
-    odd = session.rename(session.with_name(os.fsdecode(b"session_\xe9")))
-    (odd / "manifest.json").unlink()
-    assert read_manifest(recover(odd).folder).id == "\\xe9"
-
-
 def test_a_picture_that_is_lost_with_its_row_takes_along_what_builds_on_it(session: Path) -> None:
     lost = COUNT // 2
     path = session / "frames.jsonl"
@@ -358,17 +325,6 @@ def test_a_picture_that_is_lost_with_its_row_takes_along_what_builds_on_it(sessi
         assert rows == [index for index in range(COUNT) if index != lost]
         assert pictures[:lost] == list(range(lost))
         assert lost + 1 not in pictures
-
-
-def test_videos_count_by_their_numbers(tmp_path: Path) -> None:
-    """The first of three files is lost: the pictures of the others are those of their own times."""
-    config = QUICK.model_copy(update={"split_s": 1.0})
-    session = record(tmp_path, (tick_of(i, 1000.0 + i / FPS, full=True) for i in range(COUNT)), config)
-    assert len(list(session.glob("video_*.mkv"))) == 3
-    (session / "video_0000.mkv").unlink()
-    rows, pictures, _ = read_all(session)
-    assert rows == list(range(COUNT))
-    assert pictures == list(range(31, COUNT)) or pictures == list(range(30, COUNT))
 
 
 def test_a_session_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
