@@ -76,11 +76,11 @@ def _tendon_goals(command: Command, last_mm: Joints, elapsed_s: float, servos: S
     goals = []
     for first, share in ((0, command.bend), (2, command.pitch)):
         pulling, letting = servos.joints[first], servos.joints[first + 1]
-        asked_mm = _limited(share, 1.0) * servos.max_pull_mm
+        asked_mm = limited(share, 1.0) * servos.max_pull_mm
         pull_mm = _pair_pull(asked_mm, pulling, letting, servos.pretension_mm)
         for place, signed_mm in ((first, pull_mm), (first + 1, -pull_mm)):
             old_mm, reach_mm = last_mm[place], servos.joints[place].max_speed_mm_s * elapsed_s
-            goals.append((old_mm + _limited(servos.pretension_mm + signed_mm - old_mm, reach_mm), pull_mm != asked_mm))
+            goals.append((old_mm + limited(servos.pretension_mm + signed_mm - old_mm, reach_mm), pull_mm != asked_mm))
     return goals
 
 
@@ -93,16 +93,17 @@ def _pair_pull(asked_mm: float, one: JointConfig, other: JointConfig, pretension
 
 def _fed(last_mm: Sequence[float], speed_mm_s: float, elapsed_s: float, joints: Sequence[JointConfig]) -> list[tuple[float, bool]]:
     """Joints that move the same catheter move equally: where one of them must stop, all of them do."""
-    speed_mm_s = _limited(speed_mm_s, min(joint.max_speed_mm_s for joint in joints))
+    speed_mm_s = limited(speed_mm_s, min(joint.max_speed_mm_s for joint in joints))
     asked_mm = speed_mm_s * elapsed_s
     forward = asked_mm > 0
     rooms = [joint.high_mm - old if forward else old - joint.low_mm for joint, old in zip(joints, last_mm, strict=True)]
-    step_mm = _limited(asked_mm, max(0.0, min(rooms)))
+    step_mm = limited(asked_mm, max(0.0, min(rooms)))
     ended = abs(asked_mm) > abs(step_mm) + _TOUCHING_MM
     return [(old + step_mm, ended and room <= abs(step_mm) + _TOUCHING_MM) for old, room in zip(last_mm, rooms, strict=True)]
 
 
-def _limited(value: float, limit: float) -> float:
+def limited(value: float, limit: float) -> float:
+    """`value`, at most `limit` to either side of zero."""
     return max(-limit, min(limit, value))
 
 

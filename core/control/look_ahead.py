@@ -9,6 +9,7 @@ import numpy as np
 
 from core import geometry
 from core.config.models import PursuitConfig
+from core.control.joints import limited
 from core.types import Mask, Point, Points, Scene, VesselGraph
 
 _BEHIND_DEG = 100.0
@@ -158,8 +159,3 @@ def _step(start: Points | Point, end: Points | Point) -> Point:
 def _angle_deg(start: Point, end: Point) -> float:
     """Signed angle from one direction to another, positive to the right on screen."""
     return math.degrees(math.atan2(start[0] * end[1] - start[1] * end[0], start[0] * end[0] + start[1] * end[1]))
-
-
-def limited(value: float, limit: float) -> float:
-    """`value`, at most `limit` to either side of zero."""
-    return max(-limit, min(limit, value))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from core.config.models import DriveConfig, JogConfig
 from core.config.safety import JointConfig, ServosConfig
+from core.control.joints import limited
 from core.types import Advice, Command
 
 _LONGEST_STEP_S = 0.1
@@ -61,7 +62,7 @@ def combined(jogs: Iterable[Jog]) -> Jog:
     jogs = list(jogs)
 
     def total(values: Iterable[float]) -> float:
-        return _limited(sum(value for value in values if math.isfinite(value)), 1.0)
+        return limited(sum(value for value in values if math.isfinite(value)), 1.0)
 
     return Jog(
         total(jog.bend for jog in jogs),
@@ -86,7 +87,7 @@ class JogIntegrator:
 
     def take_over(self, bend: float, pitch: float) -> None:
         """Start from where the robot is now (-1..1 of full pull): the first command moves nothing."""
-        self._bend, self._pitch = _limited(bend, 1.0), _limited(pitch, 1.0)
+        self._bend, self._pitch = limited(bend, 1.0), limited(pitch, 1.0)
         self._last_s: float | None = None
 
     def command(self, jog: Jog, now_s: float, at: Command | None = None, speed: float = 1.0) -> Command:
@@ -96,28 +97,24 @@ class JogIntegrator:
         self._last_s = now_s
         step = speed * config.bend_rate_per_s * elapsed_s
         if jog.straighten:
-            self._bend -= _limited(self._bend, step)
-            self._pitch -= _limited(self._pitch, step)
+            self._bend -= limited(self._bend, step)
+            self._pitch -= limited(self._pitch, step)
         else:
-            self._bend = _limited(self._bend + step * _limited(jog.bend, 1.0), 1.0)
-            self._pitch = _limited(self._pitch + step * _limited(jog.pitch, 1.0), 1.0)
+            self._bend = limited(self._bend + step * limited(jog.bend, 1.0), 1.0)
+            self._pitch = limited(self._pitch + step * limited(jog.pitch, 1.0), 1.0)
         if at is not None:
-            self._bend = at.bend + _limited(self._bend - at.bend, _MOST_AHEAD)
-            self._pitch = at.pitch + _limited(self._pitch - at.pitch, _MOST_AHEAD)
+            self._bend = at.bend + limited(self._bend - at.bend, _MOST_AHEAD)
+            self._pitch = at.pitch + limited(self._pitch - at.pitch, _MOST_AHEAD)
         return Command(
             bend=self._bend,
             pitch=self._pitch,
-            advance_mm_s=speed * config.advance_mm_s * _limited(jog.advance, 1.0),
-            delivery_mm_s=speed * config.delivery_mm_s * _limited(jog.delivery, 1.0),
+            advance_mm_s=speed * config.advance_mm_s * limited(jog.advance, 1.0),
+            delivery_mm_s=speed * config.delivery_mm_s * limited(jog.delivery, 1.0),
         )
 
 
 def _speed_limited(speed_mm_s: float, *joints: JointConfig) -> float:
     return min(speed_mm_s, *(joint.max_speed_mm_s for joint in joints))
-
-
-def _limited(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
 
 
 class AdviceController:
@@ -134,8 +131,8 @@ class AdviceController:
 
     def take_over(self, bend: float, pitch: float = 0.0) -> None:
         """Start from the bend (-1..1) that the robot has now, at rest; the first command moves nothing."""
-        self._bend = self._integral = _limited(bend, 1.0)
-        self._pitch = _limited(pitch, 1.0)
+        self._bend = self._integral = limited(bend, 1.0)
+        self._pitch = limited(pitch, 1.0)
         self._advance_mm_s = 0.0
         self._last_s: float | None = None
 
@@ -151,10 +148,10 @@ class AdviceController:
         integral = self._integral + turn * elapsed_s / config.integral_s
         wanted = integral + config.proportional * turn
         reach = config.max_bend_rate_per_s * elapsed_s
-        bend = _limited(self._bend + _limited(wanted - self._bend, reach), 1.0)
+        bend = limited(self._bend + limited(wanted - self._bend, reach), 1.0)
         # anti-windup: the integral waits while rate or range limit the bend
         held_back = (wanted - bend) * turn > 0.0
-        self._integral = self._integral if held_back else _limited(integral, 1.0)
+        self._integral = self._integral if held_back else limited(integral, 1.0)
         self._bend = bend
         self._advance_mm_s = self._feed(advice.advance_mm_s, elapsed_s)
         return Command(bend=bend, pitch=self._pitch, advance_mm_s=self._advance_mm_s)
@@ -166,4 +163,4 @@ class AdviceController:
             before = 0.0
         if abs(wanted_mm_s) <= abs(before):
             return wanted_mm_s
-        return before + _limited(wanted_mm_s - before, self._config.max_acceleration_mm_s2 * elapsed_s)
+        return before + limited(wanted_mm_s - before, self._config.max_acceleration_mm_s2 * elapsed_s)

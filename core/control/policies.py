@@ -7,7 +7,7 @@ from typing import Protocol, get_args
 import numpy as np
 
 from core.config.models import AdviceConfig, Config, PolicyName
-from core.control.look_ahead import limited
+from core.control.joints import limited
 from core.control.pursuit import Pursuit, speed_word
 from core.messages import message
 from core.types import Advice, PoseState, RobotStatus, Scene, Speed

@@ -11,7 +11,8 @@ import math
 from dataclasses import dataclass, field
 
 from core.config.models import AdviceConfig, PursuitConfig
-from core.control.look_ahead import LookAhead, limited, look_ahead
+from core.control.joints import limited
+from core.control.look_ahead import LookAhead, look_ahead
 from core.messages import message
 from core.types import Advice, Point, RobotStatus, Scene, Speed
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from core.config.models import Config
 from core.control.bus_monitor import BusReport
+from core.control.faults import Cause
 from core.control.gate import Rejection, Source
 from core.control.health import ModelReport
 from core.control.modes import Act, Mode
@@ -187,6 +188,10 @@ class Bench:
     @property
     def mode(self) -> Mode:
         return self.pilot.view.mode
+
+    @property
+    def latched(self) -> Cause | None:
+        return self.pilot.view.latched.cause if self.pilot.view.latched is not None else None
 
     def alerts(self) -> set[object]:
         return {alert.key for alert in self.pilot.news().alerts}

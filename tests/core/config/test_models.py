@@ -127,3 +127,59 @@ def test_a_file_that_is_nested_too_deeply_is_one_short_line(tmp_path: Path) -> N
             load_config(path)
         assert str(raised.value).startswith(str(path))
         assert len(str(raised.value)) < len(str(path)) + 120
+
+
+# ---- the thresholds of gate and supervisor
+
+
+def test_the_thresholds_are_those_of_the_rules() -> None:
+    safety = Config().safety
+    assert safety == SafetyConfig()
+    assert (safety.command_max_age_s, safety.pose_hold_s, safety.pose_disarm_s) == (0.1, 0.15, 0.5)
+    assert (safety.frame_hold_s, safety.frame_disarm_s, safety.healthy_s, safety.hold_clear_s) == (0.15, 0.5, 1.0, 0.5)
+    assert (safety.clock_gap_s, safety.tracking_time_s, safety.bus_errors, safety.missed_answers) == (1.0, 0.2, 5, 3)
+    assert (safety.equal_frames, safety.dark_frames, safety.head_lost_frames, safety.broken_results) == (5, 3, 3, 3)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"command_max_age_s": 0.11},
+        {"pose_hold_s": 0.16},
+        {"pose_disarm_s": 0.6},
+        {"frame_disarm_s": 0.6},
+        {"clock_gap_s": 1.1},
+        {"healthy_s": 0.9},
+        {"hold_clear_s": 0.6},
+        {"deadman_timeout_s": 0.1},
+        {"equal_frames": 6},
+        {"tracking_time_s": 0.3},
+        {"bus_errors": 6},
+        {"missed_answers": 4},
+    ],
+)
+def test_the_rules_numbers_may_be_tightened_never_loosened(changes: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=f"safety.{next(iter(changes))}"):
+        load_config(overrides={"safety": changes})
+
+
+@pytest.mark.parametrize("changes", [{"command_max_age_s": 0.04}, {"deadman_timeout_s": 0.04}])
+def test_nor_may_they_be_tightened_below_what_it_takes_to_repeat_a_thing(changes: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=rf"safety.{next(iter(changes))}.* 0.05") as told:
+        load_config(overrides={"safety": changes})
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"pose_hold_s": 0.15, "pose_disarm_s": 0.15}, "pose_hold_s must be below pose_disarm_s"),
+        ({"frame_hold_s": 0.15, "frame_disarm_s": 0.12}, "frame_hold_s must be below frame_disarm_s"),
+        ({"bus_hold_s": 0.15, "bus_disarm_s": 0.12}, "bus_hold_s must be below bus_disarm_s"),
+        ({"frame_loss_warn_share": 0.1, "frame_loss_hold_share": 0.1}, "frame_loss_warn_share must be below"),
+        ({"min_confidence": 0.98}, "must not exceed 1"),
+    ],
+)
+def test_thresholds_that_contradict_each_other(changes: dict[str, float], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        load_config(overrides={"safety": changes})

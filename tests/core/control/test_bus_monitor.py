@@ -8,12 +8,111 @@ from dataclasses import replace
 
 import pytest
 
-from core.config.safety import SafetyConfig, ServosConfig
+from core.config.safety import ServosConfig
 from core.control.bus_monitor import BusMonitor, BusReport
 from core.control.faults import Cause, Fault, Reaction
-from tests.core.healthy import GOOD_BUS
+from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS
 
-SERVOS, SAFETY = ServosConfig(), SafetyConfig()
+
+def _bus(*reports: tuple[float, BusReport]) -> BusMonitor:
+    watch = BusMonitor()
+    for now_s, report in reports:
+        watch = watch.update(report, now_s, SERVOS, SAFETY)
+    return watch
+
+
+def _bus_causes(watch: BusMonitor, now_s: float) -> list[Cause]:
+    return [fault.cause for fault in watch.faults(now_s, SERVOS, SAFETY)]
+
+
+def _one(value: object, rest: object) -> tuple[object, ...]:
+    return (rest, rest, value, rest, rest, rest, rest)
+
+
+@pytest.mark.parametrize(
+    ("age_s", "causes"), [(0.15, []), (0.151, [Cause.BUS_SILENT]), (0.5, [Cause.BUS_SILENT]), (0.501, [Cause.BUS_DEAD])]
+)
+def test_silence_of_the_bus(age_s: float, causes: list[Cause]) -> None:
+    assert _bus_causes(_bus((0.0, GOOD_BUS)), age_s) == causes
+
+
+@pytest.mark.parametrize(
+    ("change", "causes"),
+    [
+        ({"misses": _one(2, 0)}, []),
+        ({"misses": _one(3, 0)}, [Cause.SERVO_SILENT]),
+        ({"temperatures_c": _one(64.9, 30.0)}, []),
+        ({"temperatures_c": _one(65.0, 30.0)}, [Cause.WARM]),
+        ({"temperatures_c": _one(69.9, 30.0)}, [Cause.WARM]),
+        ({"temperatures_c": _one(70.0, 30.0)}, [Cause.HOT]),
+        ({"temperatures_c": _one(math.nan, 30.0)}, [Cause.HOT]),
+        ({"voltages_v": _one(11.1, 12.0)}, []),
+        ({"voltages_v": _one(11.0, 12.0)}, [Cause.VOLTAGE_SAGS]),
+        ({"voltages_v": _one(10.6, 12.0)}, [Cause.VOLTAGE_SAGS]),
+        ({"voltages_v": _one(10.5, 12.0)}, [Cause.VOLTAGE_LOW]),
+        ({"voltages_v": _one(math.nan, 12.0)}, [Cause.VOLTAGE_LOW]),
+        ({"hardware_errors": _one(0x20, 0)}, [Cause.SERVO_ALERT]),
+        ({"port_open": False}, [Cause.PORT_LOST]),
+        ({"watchdog_tripped": True}, [Cause.WATCHDOG]),
+        ({"rebooted": True}, [Cause.REBOOTED]),
+        ({"errors": 5}, []),
+        ({"errors": 6}, [Cause.BUS_NOISE]),
+        ({"errors": 26, "misses": (3,) * 7}, [Cause.BUS_NOISE, Cause.SERVO_SILENT]),
+    ],
+)
+def test_one_report_of_the_bus(change: dict[str, object], causes: list[Cause]) -> None:
+    assert _bus_causes(_bus((0.0, replace(GOOD_BUS, **change))), 0.0) == causes  # type: ignore[arg-type]
+
+
+def test_bad_packets_count_over_one_second() -> None:
+    noisy = replace(GOOD_BUS, errors=3)
+    assert _bus_causes(_bus((0.0, noisy), (1.0, noisy)), 1.0) == [Cause.BUS_NOISE]
+    assert _bus_causes(_bus((0.0, noisy), (1.0, noisy)), 1.01) == []
+    assert _bus((0.0, noisy), (1.01, noisy)).errors == ((1.01, 3),)
+    assert _bus((0.0, GOOD_BUS)).errors == ()
+
+
+@pytest.mark.parametrize("error_mm", [1.501, -1.501, math.nan])
+def test_a_tracking_error_for_200_ms_is_a_jam(error_mm: float) -> None:
+    bad = replace(GOOD_BUS, tracking_mm=_one(error_mm, 0.0))  # type: ignore[arg-type]
+    watch = _bus((0.0, bad), (0.1, bad))
+    assert Cause.TRACKING not in _bus_causes(watch, 0.19)
+    assert Cause.TRACKING in _bus_causes(watch, 0.2)
+    blind = _bus((0.0, bad), (0.1, replace(GOOD_BUS, tracking_mm=())))  # not read in between: still astray
+    assert Cause.TRACKING in _bus_causes(blind, 0.2)
+    mended = _bus((0.0, bad), (0.1, GOOD_BUS), (0.15, bad))
+    assert Cause.TRACKING not in _bus_causes(mended, 0.3)
+    assert Cause.TRACKING in _bus_causes(mended, 0.36)
+
+
+def test_a_tracking_error_at_the_limit_is_none() -> None:
+    edge = replace(GOOD_BUS, tracking_mm=_one(-1.5, 1.5))  # type: ignore[arg-type]
+    assert _bus((0.0, edge)).astray_since_s is None
+
+
+def test_what_a_report_leaves_out_keeps_its_last_reading() -> None:
+    bad = replace(GOOD_BUS, hardware_errors=_one(4, 0), temperatures_c=_one(80.0, 30.0), voltages_v=_one(9.0, 12.0))  # type: ignore[arg-type]
+    assert _bus_causes(_bus((0.0, bad), (0.1, BusReport())), 0.1) == [Cause.SERVO_ALERT, Cause.HOT, Cause.VOLTAGE_LOW]
+
+
+def test_a_restarted_servo_stays_restarted() -> None:
+    assert _bus_causes(_bus((0.0, replace(GOOD_BUS, rebooted=True)), (0.1, GOOD_BUS)), 0.1) == [Cause.REBOOTED]
+
+
+def test_the_details_name_the_joints() -> None:
+    bad = BusReport(True, _one(4, 0), 7, _one(0x21, 0), _one(71.0, 66.0), _one(9.9, 10.8), _one(2.0, 0.0))  # type: ignore[arg-type]
+    assert _bus((0.0, bad)).faults(0.2, SERVOS, SAFETY) == [
+        Fault(Cause.BUS_SILENT, "for 200 ms"),
+        Fault(Cause.BUS_NOISE, "7 in 1 s (at most 5)"),
+        Fault(Cause.SERVO_SILENT, "up"),
+        Fault(Cause.SERVO_ALERT, "up 0x21"),
+        Fault(Cause.TRACKING, "up off by 2.00 mm (at most 1.5 mm)"),
+        Fault(Cause.HOT, "up 71 °C"),
+        Fault(Cause.VOLTAGE_LOW, "up 9.9 V"),
+    ]
+    assert _bus((0.0, GOOD_BUS)).faults(0.6, SERVOS, SAFETY) == [Fault(Cause.BUS_DEAD, "silent for 600 ms")]
+
+
 CYCLE_S = 1.0 / 64.0  # no rounding
 
 
@@ -99,7 +198,6 @@ def test_reports_of_servos_that_follow_nobody_are_counted_in_a_row() -> None:
     assert _watched([off, off])[0].checked().disarmed_run == 0
 
 
-SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 BUS_S = 0.02
 Current = Callable[[int], float | None]
 

@@ -260,8 +260,7 @@ def test_faults_of_the_servos_stop_them_too(bench: Bench) -> None:
     bench.turn()
     assert bench.mode is Mode.STOPPED
     assert bench.robot.calls[-1] == "stop"
-    assert bench.pilot.view.latched is not None
-    assert bench.pilot.view.latched.cause is Cause.SERVO_ALERT
+    assert bench.latched is Cause.SERVO_ALERT
 
 
 def test_a_bus_process_that_is_gone_is_started_again_by_switching_on(bench: Bench) -> None:
@@ -330,8 +329,7 @@ def test_commands_that_the_gate_rejects_again_and_again_end_autonomy(bench: Benc
     assert bench.mode is Mode.HOLD
     bench.seconds(0.4)
     assert bench.mode is Mode.ADVISORY
-    assert bench.pilot.view.latched is not None
-    assert bench.pilot.view.latched.cause is Cause.COMMANDS_REJECTED
+    assert bench.latched is Cause.COMMANDS_REJECTED
 
 
 def test_a_joint_at_its_end_is_told_to_him_who_drives_it(bench: Bench) -> None:
@@ -408,8 +406,7 @@ def test_advice_that_is_no_number_is_neither_driven_nor_shown(bench: Bench, monk
     assert bench.shown is None
     bench.turn(20)
     assert bench.mode is Mode.ADVISORY
-    assert bench.pilot.view.latched is not None
-    assert bench.pilot.view.latched.cause is Cause.NOT_FINITE_REPEATED
+    assert bench.latched is Cause.NOT_FINITE_REPEATED
     assert abs(bench.robot.motion.motion.bend - bend) < 0.1
 
 
@@ -829,8 +826,7 @@ def test_a_jump_of_the_clock_with_the_servos_on_is_told_and_must_be_acknowledged
     bench.turn(5)
     view = bench.pilot.view
     assert (view.mode, view.servos_on) == (Mode.ADVISORY, False)
-    assert view.latched is not None
-    assert view.latched.cause is Cause.CLOCK
+    assert bench.latched is Cause.CLOCK
     assert Cause.CLOCK in bench.alerts()
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
@@ -18,6 +19,13 @@ from core.control.servo_requests import RETRY_S, ReleaseEvent, ReleaseState, Tor
 from core.devices import DeviceError
 from tests.core.pilot_bench import WELL, Bench
 
+_NOT_PROVEN = "torque of up is not proven to be off: cut the servos' power"
+
+
+def _releasing_config(is_enabled: bool = True) -> Config:
+    config = Config()
+    return config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": is_enabled})})
+
 
 @pytest.fixture
 def bench() -> Iterator[Bench]:
@@ -26,7 +34,60 @@ def bench() -> Iterator[Bench]:
     bench.pilot.close()
 
 
-def test_zeroing_restarting_and_letting_go_need_switching_on_afterwards(bench: Bench) -> None:
+@pytest.fixture
+def releasing() -> Iterator[Bench]:
+    """A bench whose STOP also switches the torque off."""
+    bench = Bench(_releasing_config())
+    yield bench
+    bench.pilot.close()
+
+
+@contextmanager
+def slow(bench: Bench, call: str) -> Iterator[Callable[[], None]]:
+    """Makes the first `call` of the robot last until the end of the block; gives a function that waits until it has begun."""
+    begun, end, plain = threading.Event(), threading.Event(), getattr(bench.robot, call)
+
+    def slowly() -> None:
+        plain()
+        if not begun.is_set():
+            begun.set()
+            assert end.wait(10.0)
+
+    def wait() -> None:
+        assert begun.wait(10.0)
+
+    setattr(bench.robot, call, slowly)
+    try:
+        yield wait
+    finally:
+        end.set()
+
+
+def _fail(bench: Bench, call: str, message: str) -> None:
+    """Makes a call of the robot fail after it was counted."""
+
+    def failing() -> None:
+        bench.robot.calls.append(call.replace("_", " "))
+        raise DeviceError(message)
+
+    setattr(bench.robot, call, failing)
+
+
+def _lose_the_bus(bench: Bench) -> None:
+    _fail(bench, "connect", "the servo port is not there")
+    bench.robot.failure = "the servo bus process ended (killed by SIGKILL)"
+
+
+def _offs(bench: Bench) -> tuple[int, bool]:
+    """How often the torque was switched off, and whether it is a fault that this is not proven."""
+    is_fault = any(fault.cause is Cause.TORQUE_ON for fault in bench.pilot.view.active)
+    return bench.robot.calls.count("torque off"), is_fault
+
+
+# ---- requests
+
+
+def test_zeroing_restarting_and_torque_off_need_switching_on_afterwards(bench: Bench) -> None:
     for request, call in (
         (bench.pilot.zero, "zero"),
         (lambda: bench.pilot.reboot(3), "reboot 3"),
@@ -44,48 +105,31 @@ def test_zeroing_restarting_and_letting_go_need_switching_on_afterwards(bench: B
 
 
 @pytest.mark.parametrize("during", ["disarm", "arm"])
-def test_letting_the_wires_go_is_never_lost_behind_what_is_under_way(bench: Bench, during: str) -> None:
-    """Checking seven servos on a bad line takes seconds; who changes his mind meanwhile finds the servos without torque."""
-    under_way, go_on, plain = threading.Event(), threading.Event(), getattr(bench.robot, during)
-
-    def slow() -> None:
-        plain()
-        if not under_way.is_set():
-            under_way.set()
-            assert go_on.wait(10.0)
-
-    setattr(bench.robot, during, slow)
-    assert bench.pilot.switch_on()
-    assert under_way.wait(10.0)
-    assert bench.pilot.torque_off()
-    go_on.set()
+def test_a_torque_off_is_never_lost_behind_what_is_under_way(bench: Bench, during: str) -> None:
+    with slow(bench, during) as wait:
+        assert bench.pilot.switch_on()
+        wait()
+        assert bench.pilot.torque_off()
     bench.done().turn(2)
     assert bench.robot.calls[-2:] == ["disarm", "torque off"]
     assert not bench.pilot.view.servos_on
     assert bench.robot.calls.count("arm") == (during == "arm")
 
 
-def test_while_the_servos_are_busy_other_requests_are_refused_aloud(bench: Bench) -> None:
-    under_way, go_on = threading.Event(), threading.Event()
-
-    def slow() -> None:
-        under_way.set()
-        assert go_on.wait(10.0)
-
-    bench.robot.arm = slow  # type: ignore[method-assign]
-    assert bench.pilot.switch_on()
-    assert under_way.wait(10.0)
-    for request in (bench.pilot.zero, bench.pilot.switch_on, lambda: bench.pilot.reboot(3)):
-        assert not request()
-        (alert,) = bench.pilot.news().alerts
-        assert (alert.key, alert.detail) == (Hindrance.SERVOS_BUSY, "checking the servos")
-    go_on.set()
+def test_while_the_servos_are_busy_other_requests_are_refused_with_an_alert(bench: Bench) -> None:
+    with slow(bench, "arm") as wait:
+        assert bench.pilot.switch_on()
+        wait()
+        for request in (bench.pilot.zero, bench.pilot.switch_on, lambda: bench.pilot.reboot(3)):
+            assert not request()
+            (alert,) = bench.pilot.news().alerts
+            assert (alert.key, alert.detail) == (Hindrance.SERVOS_BUSY, "checking the servos")
     assert bench.done().turn(2).pilot.view.servos_on
     assert "zero" not in bench.robot.calls
 
 
 @pytest.mark.parametrize("call", ["disarm", "acknowledge", "arm"])
-def test_stop_while_the_servos_are_being_switched_on_is_not_undone(bench: Bench, call: str) -> None:
+def test_a_stop_while_the_servos_are_being_switched_on_is_not_undone(bench: Bench, call: str) -> None:
     bench.seconds(0.2)
     before = getattr(bench.robot, call)
 
@@ -108,7 +152,7 @@ def test_stop_while_the_servos_are_being_switched_on_is_not_undone(bench: Bench,
     assert bench.pilot.view.servos_on
 
 
-def test_servo_requests_wait_until_nobody_may_be_driving(bench: Bench) -> None:
+def test_servo_requests_are_refused_while_armed(bench: Bench) -> None:
     bench.armed()
     count = len(bench.robot.calls)
     for request in (bench.pilot.switch_on, bench.pilot.zero, bench.pilot.torque_off):
@@ -120,255 +164,9 @@ def test_servo_requests_wait_until_nobody_may_be_driving(bench: Bench) -> None:
     assert bench.mode is Mode.ARMED
 
 
-def test_a_torque_off_that_waits_when_the_program_ends_is_still_done(bench: Bench) -> None:
-    """Asked for while the servos were being checked; it was dropped, and the wires stayed under tension."""
-    go_on, entered = threading.Event(), threading.Event()
-
-    def arm() -> None:
-        entered.set()
-        go_on.wait(5.0)
-
-    bench.seconds(0.2)
-    bench.robot.arm = arm  # type: ignore[method-assign]
-    bench.pilot.switch_on()
-    assert entered.wait(5.0)
-    bench.pilot.torque_off()
-    bench.pilot.close()
-    go_on.set()
-    assert bench.robot.calls.count("torque off") == 1
-
-
-def test_a_torque_off_that_is_done_is_not_done_again_at_the_end(bench: Bench) -> None:
-    bench.seconds(0.2)
-    bench.pilot.torque_off()
-    bench.done().pilot.close()
-    assert bench.robot.calls.count("torque off") == 1
-
-
-def test_servos_that_were_switched_on_after_a_torque_off_in_vain_keep_their_torque_at_the_end(bench: Bench) -> None:
-    """The wires went slack when the window was closed, though the operator had switched the servos on and driven since."""
-    bench.seconds(0.2)
-    plain = bench.robot.torque_off
-
-    def in_vain() -> None:
-        plain()
-        raise DeviceError("torque of up is not proven to be off: cut the servos' power")
-
-    bench.robot.torque_off = in_vain  # type: ignore[method-assign]
-    bench.pilot.torque_off()
-    bench.done().turn()
-    bench.pilot.ask(Act.ACKNOWLEDGE)
-    bench.on()
-    assert bench.pilot.view.servos_on
-    bench.pilot.close()
-    assert bench.robot.calls.count("torque off") == 1
-
-
-def test_a_hold_that_fails_does_not_keep_the_torque_on(bench: Bench) -> None:
-    """The servos were to hold first; where that failed the bus process never heard of the torque-off, and owed none."""
-    bench.seconds(0.2)
-
-    def lost() -> None:
-        raise DeviceError("servo port is lost")
-
-    bench.robot.disarm = lost  # type: ignore[method-assign]
-    bench.pilot.torque_off()
-    bench.done()
-    assert "torque off" in bench.robot.calls
-
-
-def test_a_torque_off_needs_no_bus_process_that_lives(bench: Bench) -> None:
-    bench.seconds(0.2)
-    bench.robot.failure = "the servo bus process ended"
-    bench.pilot.torque_off()
-    bench.done()
-    assert bench.robot.calls[-2:] == ["connect", "torque off"]
-
-
-def test_a_torque_off_needs_not_all_servos_to_connect(bench: Bench) -> None:
-    """The bus process was gone and a servo was missing: connecting failed, and six servos went on pulling."""
-    bench.seconds(0.2)
-    bench.robot.failure = "the servo bus process ended"
-
-    def connect() -> None:
-        bench.robot.calls.append("connect")
-        raise DeviceError("servo up (id 3) does not answer")
-
-    bench.robot.connect = connect  # type: ignore[method-assign]
-    bench.alerts()
-    bench.pilot.torque_off()
-    bench.done()
-    bench.turn()
-    assert bench.robot.calls[-2:] == ["connect", "torque off"]
-    assert Note.TORQUE_OFF in bench.alerts()
-    bench.turn()
-    assert Note.TORQUE_OFF not in bench.alerts()
-
-
-def _letting_go(bench: Bench) -> bool:
-    return any(fault.cause is Cause.TORQUE_ON for fault in bench.pilot.view.active)
-
-
-def _lose_the_bus(bench: Bench) -> None:
-    def connect() -> None:
-        raise DeviceError("the servo port is not there")
-
-    bench.robot.connect = connect  # type: ignore[method-assign]
-    bench.robot.failure = "the servo bus process ended (killed by SIGKILL)"
-
-
-@pytest.mark.parametrize("is_wanted", [True, False])
-def test_a_stop_lets_go_also_where_the_bus_process_is_gone(is_wanted: bool) -> None:
-    """The debt lived in the process that was gone: all servos went on pulling, and nobody was told."""
-    config = Config()
-    bench = Bench(config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": is_wanted})}))
-    bench.on()
-    _lose_the_bus(bench)
-    bench.turn(2)
-    assert not _letting_go(bench), "nobody has pressed STOP"
-    bench.pilot.ask(Act.STOP)
-    bench.turn(2)
-    assert _letting_go(bench) is is_wanted
-    bench.done().turn(3)
-    assert bench.robot.calls.count("torque off") == int(is_wanted)
-    assert (Note.TORQUE_OFF in bench.alerts()) is is_wanted
-    assert not _letting_go(bench)
-    bench.seconds(11.0).done()
-    assert bench.robot.calls.count("torque off") == int(is_wanted), "once is enough"
-    bench.pilot.close()
-
-
-@pytest.fixture
-def slackening() -> Iterator[Bench]:
-    """A bench whose STOP also switches the torque off."""
-    config = Config()
-    bench = Bench(config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": True})}))
-    yield bench
-    bench.pilot.close()
-
-
-def test_what_a_stop_owes_is_tried_until_the_servos_have_let_go_or_are_switched_on(slackening: Bench) -> None:
-    bench = slackening
-    plain = bench.robot.torque_off
-
-    def in_vain() -> None:
-        plain()
-        raise DeviceError("torque of up is not proven to be off: cut the servos' power")
-
-    bench.on()
-    _lose_the_bus(bench)
-    bench.robot.torque_off = in_vain  # type: ignore[method-assign]
-    bench.pilot.ask(Act.STOP)
-    bench.turn(3).done().seconds(9.0).done()
-    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (1, True)
-    bench.seconds(1.5).done()
-    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (2, True)
-    bench.pilot.ask(Act.STOP)
-    bench.turn(2).done()
-    assert bench.robot.calls.count("torque off") == 3, "another STOP need not wait"
-    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
-    bench.turn().done().seconds(11.0).done()
-    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (4, True), "still not proven"
-    bench.robot.failure = None
-    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
-    bench.turn().on()
-    view = bench.pilot.view
-    assert (view.servos_on, view.latched, view.permitted) == (True, None, Source.OPERATOR), "the operator has switched them on"
-    bench.seconds(11.0).done()
-    assert (bench.robot.calls.count("torque off"), _letting_go(bench)) == (4, False)
-
-
-def test_a_stop_that_the_bus_process_has_paid_is_owed_no_more(slackening: Bench) -> None:
-    """It may pay before the pilot's turn hears of the STOP, and of a second press it takes no notice."""
-    bench = slackening
-    bench.on()
-    bench.pilot.ask(Act.STOP)
-    bench.robot.bus = replace(WELL, torque_off=True)
-    bench.turn()
-    bench.robot.bus = WELL
-    bench.turn().pilot.ask(Act.STOP)
-    bench.turn(3)
-    bench.robot.failure = "the servo bus process ended"
-    bench.turn(3).done()
-    assert not _letting_go(bench)
-    assert "torque off" not in bench.robot.calls
-    bench.robot.failure = None
-    bench.pilot.ask(Act.ACKNOWLEDGE)
-    bench.turn().on()
-    assert bench.pilot.view.servos_on
-    _lose_the_bus(bench)
-    bench.pilot.ask(Act.STOP)
-    bench.turn(3).done().turn()
-    assert "torque off" in bench.robot.calls, "it was on in between"
-
-
-def test_what_a_stop_owes_is_paid_at_the_end(slackening: Bench) -> None:
-    """Pressed when nothing is heard from the bus any more, but nobody knows it yet: no turn has heard of it before the end."""
-    slackening.on()
-    slackening.pilot.ask(Act.STOP)
-    slackening.pilot.close()
-    assert slackening.robot.calls.count("torque off") == 1
-
-
-@pytest.mark.parametrize("is_stopped", [False, True])
-def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_twice(slackening: Bench, is_stopped: bool) -> None:
-    entered, go_on = threading.Event(), threading.Event()
-    plain = slackening.robot.torque_off
-
-    def slow() -> None:
-        entered.set()
-        go_on.wait(5.0)
-        plain()
-
-    slackening.robot.torque_off = slow  # type: ignore[method-assign]
-    slackening.seconds(0.2).pilot.torque_off()
-    assert entered.wait(5.0)
-    if is_stopped:  # and owes one, too
-        slackening.pilot.ask(Act.STOP)
-    threading.Timer(0.1, go_on.set).start()
-    slackening.pilot.close()
-    assert slackening.robot.calls.count("torque off") == 1
-
-
-def test_a_stop_that_was_taken_over_from_the_rig_before_is_owed_too() -> None:
-    config = Config()
-    config = config.model_copy(update={"servos": config.servos.model_copy(update={"torque_off_on_stop": True})})
-    bench = Bench(config, LeftOver(Fault(Cause.STOP_PRESSED), True))
-    _lose_the_bus(bench)
-    bench.turn(3).done().turn()
-    assert "torque off" in bench.robot.calls
-    bench.pilot.close()
-
-
-def test_what_became_of_a_torque_off_is_told(bench: Bench) -> None:
-    bench.on()
-    bench.alerts()
-    bench.robot.bus = replace(WELL, torque_off=True)
-    bench.turn()
-    bench.robot.bus = replace(WELL, torque_problem="torque of up is not proven to be off: cut the servos' power")
-    bench.turn()
-    assert {Note.TORQUE_OFF, Cause.TORQUE_ON} <= set(bench.alerts())
-
-
-@pytest.mark.parametrize("is_on", [True, False])
-def test_torque_that_is_not_proven_to_be_off_is_told_though_the_servos_follow_nobody(bench: Bench, is_on: bool) -> None:
-    """After a STOP they follow nobody: that is when it matters."""
-    bench.seconds(0.2)
-    if is_on:
-        bench.on()
-    bench.pilot.ask(Act.STOP)
-    bench.turn(2)
-    bench.alerts()
-    bench.robot.bus = replace(WELL, armed=False, torque_problem="torque of up is not proven to be off: cut the servos' power")
-    bench.turn(2)
-    assert Cause.TORQUE_ON in bench.alerts()
-
-
-@pytest.mark.parametrize(
-    "before", [{"watchdog_tripped": True}, {"torque_problem": "torque of up is not proven to be off: cut the servos' power"}]
-)
-def test_what_arming_has_mended_is_no_fault_of_the_servos_that_were_switched_on(bench: Bench, before: dict[str, object]) -> None:
-    """Arming is answered a moment before the first report since: in that turn the last one from before disarmed them again."""
+@pytest.mark.parametrize("before", [{"watchdog_tripped": True}, {"torque_problem": _NOT_PROVEN}])
+def test_what_arming_has_repaired_is_no_fault_of_the_servos_that_were_switched_on(bench: Bench, before: dict[str, object]) -> None:
+    """Arming is answered before the first report since: in that turn the last report from before must not disarm again."""
     bench.seconds(0.2)
     bench.robot.bus = replace(WELL, armed=False, **before)  # type: ignore[arg-type]
     bench.turn(2)
@@ -379,35 +177,198 @@ def test_what_arming_has_mended_is_no_fault_of_the_servos_that_were_switched_on(
     assert bench.pilot.view.latched is None
     bench.robot.bus = replace(WELL, **before)  # type: ignore[arg-type]
     bench.turn()
-    assert bench.pilot.view.latched is not None, "what is said of them afterwards counts"
+    assert bench.pilot.view.latched is not None, "a later report counts"
 
 
-def test_an_unexpected_error_of_a_request_is_told(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_unexpected_error_of_a_request_is_reported(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
     def broken() -> None:
         raise OSError(24, "Too many open files")
 
     bench.robot.arm = broken  # type: ignore[method-assign]
     bench.on()
     assert not bench.pilot.view.servos_on
-    details = [alert.detail for alert in bench.pilot.news().alerts if alert.key is Cause.SERVOS_WRONG]
-    assert len(details) == 1
-    assert "Too many open files" in details[0]
+    (detail,) = [alert.detail for alert in bench.pilot.news().alerts if alert.key is Cause.SERVOS_WRONG]
+    assert "Too many open files" in detail
     assert "Traceback" in caplog.text
 
 
 def test_a_request_that_takes_long_is_no_silent_bus(bench: Bench) -> None:
     bench.seconds(0.2)
-    go_on = threading.Event()
-    bench.robot.arm = lambda: go_on.wait(5.0)  # type: ignore[method-assign,assignment,return-value]
     bench.robot.bus = None
-    bench.pilot.switch_on()
-    bench.seconds(2.0)
-    assert bench.pilot.view.busy == "checking the servos"
-    go_on.set()
+    with slow(bench, "arm"):
+        bench.pilot.switch_on()
+        bench.seconds(2.0)
+        assert bench.pilot.view.busy == "checking the servos"
     bench.done().robot.bus = WELL
     bench.turn(3)
     assert bench.pilot.view.servos_on
     assert bench.pilot.view.latched is None
+
+
+# ---- torque off
+
+
+def test_a_torque_off_that_waits_when_the_program_ends_is_still_done(bench: Bench) -> None:
+    bench.seconds(0.2)
+    with slow(bench, "arm") as wait:
+        bench.pilot.switch_on()
+        wait()
+        bench.pilot.torque_off()
+        bench.pilot.close()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_a_torque_off_that_is_done_is_not_done_again_at_the_end(bench: Bench) -> None:
+    bench.seconds(0.2)
+    bench.pilot.torque_off()
+    bench.done().pilot.close()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_servos_that_were_switched_on_after_a_failed_torque_off_keep_their_torque_at_the_end(bench: Bench) -> None:
+    bench.seconds(0.2)
+    _fail(bench, "torque_off", _NOT_PROVEN)
+    bench.pilot.torque_off()
+    bench.done().turn()
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.on()
+    assert bench.pilot.view.servos_on
+    bench.pilot.close()
+    assert bench.robot.calls.count("torque off") == 1
+
+
+def test_a_hold_that_fails_does_not_keep_the_torque_on(bench: Bench) -> None:
+    bench.seconds(0.2)
+    _fail(bench, "disarm", "servo port is lost")
+    bench.pilot.torque_off()
+    bench.done()
+    assert "torque off" in bench.robot.calls
+
+
+@pytest.mark.parametrize("connects", [True, False])
+def test_a_torque_off_needs_neither_a_living_bus_process_nor_all_servos_to_connect(bench: Bench, connects: bool) -> None:
+    bench.seconds(0.2)
+    bench.robot.failure = "the servo bus process ended"
+    if not connects:
+        _fail(bench, "connect", "servo up (id 3) does not answer")
+    bench.alerts()
+    bench.pilot.torque_off()
+    bench.done().turn()
+    assert bench.robot.calls[-2:] == ["connect", "torque off"]
+    assert (Note.TORQUE_OFF in bench.alerts()) is not connects, "a connected robot reports it"
+    bench.turn()
+    assert Note.TORQUE_OFF not in bench.alerts()
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_the_result_of_a_torque_off_is_reported_also_while_the_servos_are_off(bench: Bench, is_on: bool) -> None:
+    bench.seconds(0.2)
+    if is_on:
+        bench.on()
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2).alerts()
+    bench.robot.bus = replace(WELL, armed=False, torque_off=True)
+    bench.turn()
+    bench.robot.bus = replace(WELL, armed=False, torque_problem=_NOT_PROVEN)
+    bench.turn()
+    assert {Note.TORQUE_OFF, Cause.TORQUE_ON} <= set(bench.alerts())
+
+
+# ---- torque off after a stop
+
+
+@pytest.mark.parametrize("is_enabled", [True, False])
+def test_a_stop_switches_the_torque_off_also_where_the_bus_process_is_gone(is_enabled: bool) -> None:
+    bench = Bench(_releasing_config(is_enabled))
+    bench.on()
+    _lose_the_bus(bench)
+    bench.turn(2)
+    assert _offs(bench) == (0, False), "STOP was not pressed"
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2)
+    assert _offs(bench)[1] is is_enabled
+    bench.done().turn(3)
+    assert (Note.TORQUE_OFF in bench.alerts()) is is_enabled
+    assert _offs(bench) == (int(is_enabled), False)
+    bench.seconds(11.0).done()
+    assert _offs(bench) == (int(is_enabled), False), "once is enough"
+    bench.pilot.close()
+
+
+def test_the_torque_off_of_a_stop_is_retried_until_it_is_confirmed_or_the_servos_are_switched_on(releasing: Bench) -> None:
+    bench = releasing
+    bench.on()
+    _lose_the_bus(bench)
+    _fail(bench, "torque_off", _NOT_PROVEN)
+    bench.pilot.ask(Act.STOP)
+    bench.turn(3).done().seconds(9.0).done()
+    assert _offs(bench) == (1, True)
+    bench.seconds(1.5).done()
+    assert _offs(bench) == (2, True)
+    bench.pilot.ask(Act.STOP)
+    bench.turn(2).done()
+    assert _offs(bench)[0] == 3, "another STOP need not wait"
+    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().done().seconds(11.0).done()
+    assert _offs(bench) == (4, True), "still not proven"
+    bench.robot.failure = None
+    bench.turn().pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().on()
+    view = bench.pilot.view
+    assert (view.servos_on, view.latched, view.permitted) == (True, None, Source.OPERATOR), "the operator has switched them on"
+    bench.seconds(11.0).done()
+    assert _offs(bench) == (4, False)
+
+
+def test_a_torque_off_that_the_bus_process_has_confirmed_is_not_repeated(releasing: Bench) -> None:
+    """It may confirm before the pilot's turn handles the STOP, and ignores a second press."""
+    bench = releasing
+    bench.on()
+    bench.pilot.ask(Act.STOP)
+    bench.robot.bus = replace(WELL, torque_off=True)
+    bench.turn()
+    bench.robot.bus = WELL
+    bench.turn().pilot.ask(Act.STOP)
+    bench.turn(3)
+    bench.robot.failure = "the servo bus process ended"
+    bench.turn(3).done()
+    assert _offs(bench) == (0, False)
+    bench.robot.failure = None
+    bench.pilot.ask(Act.ACKNOWLEDGE)
+    bench.turn().on()
+    assert bench.pilot.view.servos_on
+    _lose_the_bus(bench)
+    bench.pilot.ask(Act.STOP)
+    bench.turn(3).done().turn()
+    assert _offs(bench)[0] == 1, "it was on in between"
+
+
+def test_a_stop_that_no_turn_has_handled_switches_the_torque_off_at_the_end(releasing: Bench) -> None:
+    releasing.on()
+    releasing.pilot.ask(Act.STOP)
+    releasing.pilot.close()
+    assert releasing.robot.calls.count("torque off") == 1
+
+
+@pytest.mark.parametrize("is_stopped", [False, True])
+def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_twice(releasing: Bench, is_stopped: bool) -> None:
+    with slow(releasing, "torque_off") as wait:
+        releasing.seconds(0.2).pilot.torque_off()
+        wait()
+        if is_stopped:  # which requests one, too
+            releasing.pilot.ask(Act.STOP)
+        closing = threading.Thread(target=releasing.pilot.close)
+        closing.start()
+    closing.join(10.0)
+    assert releasing.robot.calls.count("torque off") == 1
+
+
+def test_a_stop_that_was_taken_over_from_the_rig_before_switches_the_torque_off_too() -> None:
+    bench = Bench(_releasing_config(), LeftOver(Fault(Cause.STOP_PRESSED), True))
+    _lose_the_bus(bench)
+    bench.turn(3).done().turn()
+    assert "torque off" in bench.robot.calls
+    bench.pilot.close()
 
 
 _REQUEST, _LOST, _CONFIRM, _SWITCH_ON, _CANCEL = ReleaseEvent
