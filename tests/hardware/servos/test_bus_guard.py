@@ -1,10 +1,9 @@
-"""What the bus process decides, without a process: the slot, one order's step, jams, and faults 21 to 28 of the safety rules."""
+"""What the bus process decides, without a process: messages, one order's step, and faults 21 to 28 of the safety rules."""
 
 from __future__ import annotations
 
 import math
-import mmap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -16,49 +15,17 @@ from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import Rejection, RejectReason, Source
 from core.types import Command
-from hardware.processes import SharedSlot
 from hardware.servos.bus_guard import BusGuard, OneStep
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
 from hardware.servos.dynamixel_port import NotReady
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
-from hardware.servos.tracking import Jam, JamMonitor
 from tools.lockstep import LockStepServos
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 CYCLE_S = 0.02
 
 
-# --- the slot --------------------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def memory() -> Iterator[mmap.mmap]:
-    with mmap.mmap(-1, SharedSlot.size(16)) as memory:
-        yield memory
-
-
-def test_the_newest_value_wins(memory: mmap.mmap) -> None:
-    writer, reader = SharedSlot(memory, 0, 16), SharedSlot(memory, 0, 16)
-    assert reader.newest() is None
-    for text in (b"one", b"two", b"three", b""):
-        writer.put(text)
-    assert reader.newest() == (4, b"")
-    assert reader.newest() == (4, b"")
-    writer.put(b"x" * 16)
-    assert reader.newest() == (5, b"x" * 16)
-    with pytest.raises(ValueError, match="17 bytes"):
-        writer.put(b"x" * 17)
-
-
-@given(st.integers(0, 31), st.integers(1, 255))
-def test_a_half_written_value_is_none_and_the_one_before_stands(at: int, flip: int) -> None:
-    """Whatever byte of the newest half is not as it should be. (16 bytes of head, 16 of data, the newest in the first half.)"""
-    with mmap.mmap(-1, SharedSlot.size(16)) as memory:
-        writer = SharedSlot(memory, 0, 16)
-        writer.put(b"before" + bytes(10))
-        writer.put(b"after" + bytes(11))
-        memory[at] ^= flip
-        assert SharedSlot(memory, 0, 16).newest() == (1, b"before" + bytes(10))
+# --- messages -------------------------------------------------------------------------------------------------------------------
 
 
 def test_orders_and_heartbeats_come_over_whole() -> None:
@@ -94,34 +61,6 @@ def test_one_order_moves_a_joint_by_one_step_at_most() -> None:
     further = (0.9, -0.9, 0.0, 0.0, 11.5, 1.5, 0.0)
     assert step.bounded(further, (1.0, "a"), moved) == (0.6, -0.6, 0.0, 0.0, 11.0, 1.0, 0.0)
     assert step.bounded(further, (1.02, "a"), moved) == further
-
-
-# --- jams ------------------------------------------------------------------------------------------------------------------------
-
-
-def test_a_joint_that_stands_though_its_goal_is_far_is_jammed() -> None:
-    """Far: more than half of the tendon's step of 0.6 mm, for 0.2 s."""
-    watch, goals, at = JamMonitor(SERVOS.joints, 0.2), (0.4,) + (0.0,) * 6, (0.0,) * 7
-    seen = [watch.update(goals, at, n * CYCLE_S) for n in range(12)]
-    assert seen[:10] == [None] * 10
-    assert seen[10] == Jam(SERVOS.joints[0], 0.4, 0.2)
-
-
-@pytest.mark.parametrize(
-    "path",
-    [
-        lambda t: (0.29, 0.0),
-        lambda t: (5.0 * t + 0.4, 5.0 * t),
-        lambda t: (0.4 if t % 0.2 < 0.1 else 0.0, 0.0),
-        lambda t: (0.4 if t % 0.2 < 0.1 else -0.4, 0.0),
-    ],
-    ids=["near", "lags but moves", "far now and then", "to and fro"],
-)
-def test_no_jam(path: Callable[[float], tuple[float, float]]) -> None:
-    watch = JamMonitor(SERVOS.joints, 0.2)
-    for n in range(100):
-        goal, at = path(n * CYCLE_S)
-        assert watch.update((goal,) + (0.0,) * 6, (at,) + (0.0,) * 6, n * CYCLE_S) is None
 
 
 # --- the guard -------------------------------------------------------------------------------------------------------------------

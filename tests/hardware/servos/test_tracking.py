@@ -7,6 +7,7 @@ by the test.
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 
 import pytest
 
@@ -18,12 +19,13 @@ from hardware.servos import registers
 from hardware.servos.bus_guard import BusGuard
 from hardware.servos.bus_ipc import BusOrder, Heartbeat
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
-from hardware.servos.tracking import TrackingMonitor, drift_limit_mm
+from hardware.servos.tracking import Jam, JamMonitor, TrackingMonitor, drift_limit_mm
 from hardware.twin.servos.device import _ACCELERATION_TICKS_S2, _VELOCITY_TICKS_S, MotorGoal, ServoMotor
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 RIGHT, ADVANCE = 0, 4
 FORWARD = Command(advance_mm_s=20.0)
+CYCLE_S = 0.02
 
 
 class Motors:
@@ -112,6 +114,34 @@ class Motors:
         assert self.guard.stopped
         assert self.guard.latched.cause is Cause.TRACKING
         assert text in self.guard.latched.detail
+
+
+# --- jams ------------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_joint_that_stands_though_its_goal_is_far_is_jammed() -> None:
+    """Far: more than half of the tendon's step of 0.6 mm, for 0.2 s."""
+    watch, goals, at = JamMonitor(SERVOS.joints, 0.2), (0.4,) + (0.0,) * 6, (0.0,) * 7
+    seen = [watch.update(goals, at, n * CYCLE_S) for n in range(12)]
+    assert seen[:10] == [None] * 10
+    assert seen[10] == Jam(SERVOS.joints[0], 0.4, 0.2)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        lambda t: (0.29, 0.0),
+        lambda t: (5.0 * t + 0.4, 5.0 * t),
+        lambda t: (0.4 if t % 0.2 < 0.1 else 0.0, 0.0),
+        lambda t: (0.4 if t % 0.2 < 0.1 else -0.4, 0.0),
+    ],
+    ids=["near", "lags but moves", "far now and then", "to and fro"],
+)
+def test_no_jam(path: Callable[[float], tuple[float, float]]) -> None:
+    watch = JamMonitor(SERVOS.joints, 0.2)
+    for n in range(100):
+        goal, at = path(n * CYCLE_S)
+        assert watch.update((goal,) + (0.0,) * 6, (at,) + (0.0,) * 6, n * CYCLE_S) is None
 
 
 # --- what ends the motion --------------------------------------------------------------------------------------------------------
