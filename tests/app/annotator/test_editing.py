@@ -57,7 +57,6 @@ def test_the_line_reaches_to_the_cursor_while_it_is_drawn() -> None:
     click(made, (240.0, 100.0))
     assert made.stretch((300.0, 100.0), SCALE)
     pose = made.drawing.readout.pose
-    assert pose is not None
     assert pose.theta_deg == pytest.approx(0.0)
     assert made.annotation.robot == ((240.0, 100.0),), "nothing is drawn yet"
     assert made.unstretch()
@@ -127,7 +126,6 @@ def test_the_brush_paints_and_erases() -> None:
     for erase, radius_px, count in ((False, 10.0, 2), (True, 14.0, 1)):
         made.begin_stroke((300.0, 300.0), erase=erase)
         edit = made.end_stroke(radius_px)
-        assert edit is not None
         assert [mask.target for mask in edit[1].masks] == [MaskTarget.VESSEL] * count
 
 

@@ -142,8 +142,6 @@ def test_an_image_in_at_most_twelve_events_with_the_angle_of_the_method(rater: R
     (one,) = rater.kept()
     placed = measure_lines(one.content, SIZE, PerceptionConfig()).pose
     asked = measure_lines(Annotation(ROBOT, VESSEL), SIZE, PerceptionConfig()).pose
-    assert placed is not None
-    assert asked is not None
     assert one.theta_deg == pytest.approx(placed.theta_deg, abs=1e-9)
     # clicks lie on whole screen pixels, up to 0.45 image pixels off: 40 px turn by about a degree then
     assert one.theta_deg == pytest.approx(asked.theta_deg, abs=math.degrees(2 * 0.45 / 40))
@@ -385,7 +383,6 @@ def test_the_algorithms_answer_is_shown_and_taken_over_on_demand(rater: Rater) -
     box = MaskPolygon(MaskTarget.VESSEL, ((100.0, 100.0), (300.0, 100.0), (300.0, 300.0)))
     pose = measure_lines(Annotation(ROBOT, VESSEL), SIZE, PerceptionConfig()).pose
     item = rater.model.item
-    assert item is not None
     rater.model._proposals[item.image.sha256] = Proposal(Annotation(ROBOT, VESSEL, PoseState.B, masks=(box,)), pose, 0.8)
     assert rater.canvas.editor.drawing.proposal is None
     rater.press(Key.Key_H)
@@ -425,7 +422,6 @@ def test_an_answer_that_comes_after_it_was_switched_off_is_not_shown(rater: Rate
 
 def test_without_an_answer_of_the_algorithm_it_says_why(rater: Rater) -> None:
     item = rater.model.item
-    assert item is not None
     blank = Frame(0, 0.0, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     rater.model._proposals[item.image.sha256] = proposal_of(Pipeline(TrueMasks(), PerceptionConfig()).perceive_single(blank))
     rater.press(Key.Key_H)

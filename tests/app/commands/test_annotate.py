@@ -69,16 +69,15 @@ def annotate(folder: Path, study: str = "", raters: tuple[str, ...] = ("ann", "b
                     bent = 190.0 + 12 * k + place + repeat
                     content = Annotation(((250.0, 180.0), (300.0, bent)), ((200.0, 200.0), (400.0, 200.0)), masks=BOXES)
                     measured = measure_lines(content, image.record.size, Config().perception)
-                    assert measured.pose is not None
                     save(store, image, replace(content, state=measured.pose.state), ItemKey(image.sha256, study, rater, repeat))
 
 
 def run(folder: Path, **more: object) -> int:
-    return run_annotate(AnnotateOptions(paths=(folder,), **more))  # type: ignore[arg-type]
+    return run_annotate(AnnotateOptions(paths=(folder,), **more))
 
 
 def queue(folder: Path, **more: object) -> list[tuple[str, int, ImageView]]:
-    options = StudyOptions(**more)  # type: ignore[arg-type]
+    options = StudyOptions(**more)
     with AnnotationStore(folder / DEFAULT_NAME) as store:
         images, _ = find_images(sorted(folder.glob("*.png")), store)
         return [
@@ -224,8 +223,8 @@ def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path
     with AnnotationStore(folder / DEFAULT_NAME) as store:
         store.keep_look(store.annotations()[0].key, 0)
     nothing = {"as_json": False, "model": None, "preset": None, "config_path": None, "like_paper": None, "seed": 0}
-    run_evaluate(None, tmp_path / "table.csv", tmp_path / "by_table", **nothing)  # type: ignore[arg-type]
-    run_evaluate(folder, None, tmp_path / "by_folder", **nothing)  # type: ignore[arg-type]
+    run_evaluate(None, tmp_path / "table.csv", tmp_path / "by_table", **nothing)
+    run_evaluate(folder, None, tmp_path / "by_folder", **nothing)
     first, second = (json.loads((tmp_path / name / "metrics.json").read_text()) for name in ("by_table", "by_folder"))
     assert (first["angle"], first["state"], first["manual"]) == (second["angle"], second["state"], second["manual"])
     assert second["source"]["kind"] == "annotated by hand"
@@ -372,7 +371,6 @@ def test_worst_first_looks_at_disagreement_too(folder: Path) -> None:
         images, _ = find_images([folder / last], store)
         content = Annotation(((300.0, 100.0), (300.0, 200.0)), ((280.0, 190.0), (340.0, 215.0)), PoseState.D)
         measured = measure_lines(content, images[0].record.size, Config().perception)
-        assert measured.pose is not None
         assert measured.pose.theta_deg > 60
         save(store, images[0], content, ItemKey(images[0].sha256, "", "ann"))
     assert [name for name, _, _ in queue(folder, order="worst")].index(last) < 2

@@ -8,6 +8,7 @@ import pytest
 from app.player.course import Course, JumpKind, PlayClock, clock_text, course_of, event_line, neighbour, places_of
 from core.session.manifest import Event, EventKind
 from core.session.reader import Timeline
+from tests.app.hand_clock import Clock
 
 
 def course(times_s: list[float], states: list[int] | None = None, rows: list[int] | None = None) -> Course:
@@ -87,18 +88,8 @@ def test_events_in_words() -> None:
     assert event_line(Event(0.0, EventKind.ARM)) == "arm"
 
 
-class Wall:
-    """A clock that is set by hand."""
-
-    def __init__(self) -> None:
-        self.now_s = 50.0
-
-    def __call__(self) -> float:
-        return self.now_s
-
-
 def test_playing_follows_the_clock_at_its_speed_and_ends() -> None:
-    wall, shown = Wall(), course([k / 10 for k in range(21)])
+    wall, shown = Clock(), course([k / 10 for k in range(21)])
     clock = PlayClock(wall)
     assert not clock.advance(shown, 2.0)
     clock.play()
@@ -122,7 +113,7 @@ def test_speeds_go_from_a_tenth_to_eight() -> None:
 
 
 def test_a_long_gap_is_passed_over_and_told() -> None:
-    wall, shown = Wall(), course([0.0, 0.1, 0.2, 60.2, 60.3])
+    wall, shown = Clock(), course([0.0, 0.1, 0.2, 60.2, 60.3])
     clock = PlayClock(wall)
     clock.play()
     wall.now_s += 0.6
@@ -137,7 +128,7 @@ def test_a_long_gap_is_passed_over_and_told() -> None:
 
 
 def test_a_seek_while_playing_starts_from_there() -> None:
-    wall, shown = Wall(), course([k / 10 for k in range(100)])
+    wall, shown = Clock(), course([k / 10 for k in range(100)])
     clock = PlayClock(wall)
     clock.play()
     wall.now_s += 3.0

@@ -1,14 +1,18 @@
-"""What the player keeps of a session in memory."""
+"""The player's decoder: decoded frames are bounded in memory, and damaged rows are made drawable."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.player import decoder
-from app.player.decoder import FrameDecoder
+from app.player.decoder import FrameDecoder, drawable
 from core.session.reader import SessionReader
+from core.types import Tick
 from tests.core.session_data import SIZE, record, tick_of
 
 PICTURE_BYTES = SIZE[0] * SIZE[1] * 3
@@ -31,3 +35,31 @@ def test_kept_pictures_are_bounded_by_bytes_too(
         assert list(thread._kept) == list(range(30 - kept, 30))
         assert thread._kept_bytes == kept * PICTURE_BYTES
         assert thread._ahead_count(decoded) == ahead
+
+
+def far(tick: Tick) -> Tick:
+    path = tick.scene.path
+    return replace(tick, scene=replace(tick.scene, path=replace(path, points=path.points * 1e30)))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        far,
+        lambda tick: replace(tick, scene=replace(tick.scene, scale=1e-30, scale_xy=None)),
+        lambda tick: replace(tick, scene=replace(tick.scene, centerline=replace(tick.scene.centerline, piece=np.zeros((0, 2))))),
+    ],
+)
+def test_absurd_geometry_is_not_drawn(damage: Callable[[Tick], Tick]) -> None:
+    """Lines to the end of the world would take seconds to paint."""
+    sound = tick_of(0, 0.0, full=True)
+    assert drawable(sound).scene.path is not None
+    shown = drawable(damage(sound))
+    assert (shown.scene.path, shown.scene.vessel_graph, shown.scene.masks, shown.scene.scale) == (None, None, None, 1.0)
+    assert shown.scene.pose is sound.scene.pose
+
+
+def test_an_absurd_advice_is_not_drawn() -> None:
+    sound = tick_of(0, 0.0, full=True)
+    assert sound.advice is not None
+    assert drawable(replace(sound, advice=replace(sound.advice, advance_mm_s=1e12))).advice is None

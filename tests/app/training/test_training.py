@@ -71,7 +71,6 @@ def test_it_trains_in_a_process_shows_how_it_goes_and_installs_the_model(small_m
     assert [point[0] for point in state.curve] == [2, 4, 6, 8, 10, 12]
     assert state.held_out[0].step == 0
     assert state.held_out[-1].step == 12
-    assert state.frames is not None
     assert (state.frames.train_count, state.frames.held_out_count) == (8, 2)
     before, after = state.held_out[0].pictures, state.held_out[-1].pictures
     assert [Path(path).name for path in before] == ["frame_04_before.png", "frame_05_before.png"]
@@ -104,7 +103,6 @@ def test_a_training_whose_window_has_gone_ends_and_keeps_what_it_learnt(small_mo
     job.start(TrainingRequest("own_1", small_model, 5000, remember=2))
     qtbot.waitUntil(lambda: job.state.step >= 2 or not job.state.is_busy, timeout=LONG_MS)
     child = job._child
-    assert child is not None
     job.close()
     qtbot.waitUntil(lambda: not child.is_running, timeout=LONG_MS)
     assert read_model_info(model_folder("own_1")).training["steps_done"] < 5000
@@ -222,7 +220,6 @@ def test_models_are_listed_with_what_is_known_of_them() -> None:
         "Dice vessel 0.80 → 0.91, robot 0.70 → 0.82 on 4 held-out pictures, confidence not calibrated"
     )
     info = models["own_1"].info
-    assert info is not None
     assert figures_line(info.model_copy(update={"figures": {}})) == "not measured, confidence not calibrated"
 
 
@@ -294,7 +291,6 @@ def test_the_annotator_window_trains_on_its_own_open_file(qtbot: QtBot, tmp_path
         window.start()
         window.train()
         dialog = window._training
-        assert dialog is not None
         dialog.start.click()
         qtbot.waitUntil(lambda: not dialog.is_busy, timeout=LONG_MS)
         assert "3 images have both a vessel and a robot mask, and training needs 6" in dialog.line
