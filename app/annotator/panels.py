@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen
 from PySide6.QtWidgets import (
     QAbstractButton,
     QButtonGroup,
@@ -25,6 +25,7 @@ from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import STATE_TITLE, side, tip
 from app.ui.theme import ON_PICTURE
+from app.widgets.painting import CENTER, NONE, Painted, PaintedWidget, draw_box, draw_text
 from app.widgets.state_badge import paint_state
 from core.annotation.model import Annotation, Readout, Status
 
@@ -110,7 +111,7 @@ class AnnotationBar(QWidget):
             chip.toggle()
 
 
-class _Chip(QAbstractButton):
+class _Chip(Painted, QAbstractButton):
     """Key cap, colour and name; filled when on, outlined when off."""
 
     def __init__(self, key: str, label: str, role: str, tip: str) -> None:
@@ -127,28 +128,20 @@ class _Chip(QAbstractButton):
     def sizeHint(self) -> QSize:
         return QSize(50 + QFontMetrics(theme.semi_bold(12)).horizontalAdvance(self.text()), 30)
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         on, is_enabled = self.isChecked(), self.isEnabled()
-        frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
         edge = theme.SKY if on else theme.TEXT_FAINT if self.underMouse() and is_enabled else theme.LINE
-        painter.setPen(QPen(QColor(edge), 1.4 if on else 1.0))
-        painter.setBrush(QColor(theme.RAISED) if on else QColor(theme.WINDOW))
-        painter.drawRoundedRect(frame, 6, 6)
+        frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
+        draw_box(painter, frame, 6, theme.RAISED if on else theme.WINDOW, edge, 1.4 if on else 1.0)
         painter.setOpacity(1.0 if is_enabled else 0.45)
-        painter.setPen(QColor(theme.TEXT_DIM if on else theme.TEXT_FAINT))
-        painter.setFont(theme.semi_bold(11))
-        painter.drawText(QRectF(9, 0, 12, self.height()), Qt.AlignmentFlag.AlignCenter, self._key)
+        key_colour = theme.TEXT_DIM if on else theme.TEXT_FAINT
+        draw_text(painter, QRectF(9, 0, 12, self.height()), self._key, theme.semi_bold(11), key_colour, CENTER)
         name = getattr(ON_PICTURE, self._role) if self._role in _DRAWN else theme.of(self._role)
         is_illegible = theme.contrast(name, theme.RAISED) < _LEGIBLE_CONTRAST  # a pale colour on a light chip
-        painter.setPen(QPen(QColor(theme.TEXT_FAINT if is_illegible else name), 1.5))
-        painter.setBrush(QColor(name) if on else Qt.BrushStyle.NoBrush)
-        painter.drawRoundedRect(QRectF(27, self.height() / 2 - 4, 8, 8), 2, 2)
-        painter.setPen(QColor(theme.TEXT if on else theme.TEXT_DIM))
-        painter.setFont(theme.semi_bold(12))
-        painter.drawText(QRectF(41, 0, self.width() - 45, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
-        painter.end()
+        swatch = QRectF(27, self.height() / 2 - 4, 8, 8)
+        draw_box(painter, swatch, 2, name if on else None, theme.TEXT_FAINT if is_illegible else name, 1.5)
+        room = QRectF(41, 0, self.width() - 45, self.height())
+        draw_text(painter, room, self.text(), theme.semi_bold(12), theme.TEXT if on else theme.TEXT_DIM)
 
 
 class AnnotationHeader(QWidget):
@@ -252,25 +245,16 @@ class _QueueRow(QStyledItemDelegate):
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if is_current:
-            painter.setPen(QPen(QColor(theme.SKY), 1.2))
-            painter.setBrush(QColor(theme.RAISED))
-            painter.drawRoundedRect(box, 5, 5)
-        painter.setFont(theme.font(12))
-        painter.setPen(QColor(theme.TEXT_FAINT))
-        painter.drawText(box.adjusted(6, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, str(index.row() + 1))
-        text_font = theme.semi_bold(13) if is_current else theme.font(13)
-        painter.setFont(text_font)
-        painter.setPen(QColor(theme.TEXT if is_current or status is Status.NEW else theme.TEXT_DIM))
-        room = box.width() - 44 - 52
-        painter.drawText(box.adjusted(44, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, theme.elide(text_font, index.data(), int(room)))
+            draw_box(painter, box, 5, theme.RAISED, theme.SKY, 1.2)
+        draw_text(painter, box.adjusted(6, 0, 0, 0), str(index.row() + 1), theme.font(12), theme.TEXT_FAINT)
+        name_font = theme.semi_bold(13) if is_current else theme.font(13)
+        name_colour = theme.TEXT if is_current or status is Status.NEW else theme.TEXT_DIM
+        draw_text(painter, box.adjusted(44, 0, -52, 0), index.data(), name_font, name_colour, elided=True)
         right = box.right() - 8
         if has_masks:
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(theme.colour(theme.VESSEL, 0.8))
-            painter.drawRoundedRect(QRectF(right - 36, box.center().y() - 5, 10, 10), 3, 3)
-        painter.setFont(theme.bold(14))
-        painter.setPen(QColor(theme.of(_ROLE[status])))
-        painter.drawText(QRectF(right - 18, box.top(), 18, box.height()), Qt.AlignmentFlag.AlignCenter, _MARK[status])
+            draw_box(painter, QRectF(right - 36, box.center().y() - 5, 10, 10), 3, theme.colour(theme.VESSEL, 0.8))
+        sign = QRectF(right - 18, box.top(), 18, box.height())
+        draw_text(painter, sign, _MARK[status], theme.bold(14), theme.of(_ROLE[status]), CENTER)
         painter.restore()
 
 
@@ -315,13 +299,10 @@ class QueueList(QWidget):
         self._view.setFocus()
 
 
-class _ProgressBar(QWidget):
+class _ProgressBar(PaintedWidget):
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(tr("Progress"), height=34)
         self._finished, self._count = 0, 0
-        self.setFixedHeight(34)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(tr("Progress"))
 
     @property
     def text(self) -> str:
@@ -334,41 +315,30 @@ class _ProgressBar(QWidget):
         self.setAccessibleDescription(self.text)
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setFont(theme.semi_bold(14))
-        painter.setPen(QColor(theme.TEXT))
-        painter.drawText(QRectF(0, 0, self.width(), 20), Qt.AlignmentFlag.AlignVCenter, self.text)
-        painter.setPen(Qt.PenStyle.NoPen)
-        for share, name in ((1.0, theme.LINE), (self._finished / max(self._count, 1), theme.ALLOWED)):
-            painter.setBrush(QColor(name))
+    def paint(self, painter: QPainter) -> None:
+        draw_text(painter, QRectF(0, 0, self.width(), 20), self.text, theme.semi_bold(14), theme.TEXT)
+        for share, colour in ((1.0, theme.LINE), (self._finished / max(self._count, 1), theme.ALLOWED)):
             if share > 0:
-                painter.drawRoundedRect(QRectF(0, 25, self.width() * share, 6), 3, 3)
-        painter.end()
+                draw_box(painter, QRectF(0, 25, self.width() * share, 6), 3, colour)
 
 
-_DASH = "\N{EN DASH}"
 _HEIGHT = 232
 
 
-class AnnotationReadout(QWidget):
+class AnnotationReadout(PaintedWidget):
     """Shows one annotation with its readout; without both lines it says what is still to be drawn."""
 
     def __init__(self) -> None:
-        super().__init__()
+        tool_tip = tip("theta", "d_head", "d_tail", "crossed", "lines_used", "state")
+        super().__init__(tr("Readout"), tool_tip, hint=(320, _HEIGHT), height=_HEIGHT)
         self._annotation = Annotation()
         self._readout = Readout()
         self._is_preview = False
-        self.setFixedHeight(_HEIGHT)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName(tr("Readout"))
-        self.setToolTip(tip("theta", "d_head", "d_tail", "crossed", "lines_used", "state"))
 
     @property
     def angle_text(self) -> str:
         pose = self._readout.pose
-        return _DASH if pose is None else f"{pose.theta_deg:.1f}°"
+        return NONE if pose is None else f"{pose.theta_deg:.1f}°"
 
     @property
     def state_text(self) -> str:
@@ -395,36 +365,26 @@ class AnnotationReadout(QWidget):
             return tr("The lines say {state}, by the rule", state=pose.state.value)
         return tr("The lines say the same")
 
-    def sizeHint(self) -> QSize:
-        return QSize(320, _HEIGHT)
-
     def show_annotation(self, annotation: Annotation, readout: Readout, *, is_preview: bool = False) -> None:
         """`is_preview`: a point is still moving."""
         self._annotation, self._readout, self._is_preview = annotation, readout, is_preview
         self.setAccessibleDescription(f"{tr('theta')} {self.angle_text}; {self.state_text}; {self.advice_text}")
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    def paint(self, painter: QPainter) -> None:
         self._paint_angle(painter)
         self._paint_distances(painter)
         self._paint_state(painter)
-        painter.end()
 
     def _paint_angle(self, painter: QPainter) -> None:
-        pose, left = self._readout.pose, self.width() * 0.62
-        flags = Qt.AlignmentFlag.AlignVCenter
-        painter.setPen(QColor(theme.THETA if pose is not None else theme.TEXT_FAINT))
-        painter.setFont(theme.bold(58 if pose is not None else 34))
-        painter.drawText(QRectF(0, 0, left, 72), Qt.AlignmentFlag.AlignLeft | flags, self.angle_text)
-        painter.setFont(theme.semi_bold(14))
-        painter.setPen(QColor(theme.TEXT if pose is not None else theme.TEXT_FAINT))
+        pose, left, width = self._readout.pose, self.width() * 0.62, self.width() * 0.38
+        angle_font, colour = theme.bold(58 if pose is not None else 34), theme.THETA if pose is not None else theme.TEXT_FAINT
+        draw_text(painter, QRectF(0, 0, left, 72), self.angle_text, angle_font, colour)
         turn = side(pose.theta_signed_deg) if pose is not None and pose.theta_deg >= 0.05 else ""
-        painter.drawText(QRectF(left, 14, self.width() - left, 20), flags, f"\N{GREEK SMALL LETTER THETA} {turn}")
-        painter.setFont(theme.font(12))
-        painter.setPen(QColor(theme.TEXT_DIM))
-        painter.drawText(QRectF(left, 36, self.width() - left, 18), flags, tr("moving") if self._is_preview else "")
+        turn_colour, text = theme.TEXT if pose is not None else theme.TEXT_FAINT, f"\N{GREEK SMALL LETTER THETA} {turn}"
+        draw_text(painter, QRectF(left, 14, width, 20), text, theme.semi_bold(14), turn_colour)
+        moving = tr("moving") if self._is_preview else ""
+        draw_text(painter, QRectF(left, 36, width, 18), moving, theme.font(12), theme.TEXT_DIM)
 
     def _paint_distances(self, painter: QPainter) -> None:
         """Distances, and the arc lengths that the vectors are fitted to: shorter ones are less certain."""
@@ -432,41 +392,35 @@ class AnnotationReadout(QWidget):
         robot_px, vessel_px = round(readout.robot_length_px), round(readout.vessel_length_px)
         lengths = f"{robot_px} + {vessel_px} px" if vessel_px else f"{robot_px} px"
         cells = (
-            ("d_head", f"{pose.d_head_px:.1f} px" if pose else _DASH, theme.D_HEAD),
-            ("d_tail", f"{pose.d_tail_px:.1f} px" if pose else _DASH, theme.D_TAIL),
-            (tr("crossed"), (tr("yes") if pose.crossed else tr("no")) if pose else _DASH, theme.TEXT),
-            (tr("lines used"), lengths if readout.robot_vector is not None else _DASH, theme.TEXT),
+            ("d_head", f"{pose.d_head_px:.1f} px" if pose else NONE, theme.D_HEAD),
+            ("d_tail", f"{pose.d_tail_px:.1f} px" if pose else NONE, theme.D_TAIL),
+            (tr("crossed"), (tr("yes") if pose.crossed else tr("no")) if pose else NONE, theme.TEXT),
+            (tr("lines used"), lengths if readout.robot_vector is not None else NONE, theme.TEXT),
         )
         width = self.width() / len(cells)
         for place, (name, value, colour) in enumerate(cells):
-            painter.setFont(theme.font(12))
-            painter.setPen(QColor(theme.TEXT_DIM))
-            painter.drawText(QRectF(place * width, 80, width, 16), Qt.AlignmentFlag.AlignVCenter, name)
-            painter.setFont(theme.fitted(theme.semi_bold(15), value, int(width - 4)))
-            painter.setPen(QColor(colour if pose or place == 3 else theme.TEXT_FAINT))
-            painter.drawText(QRectF(place * width, 98, width, 20), Qt.AlignmentFlag.AlignVCenter, value)
+            value_font = theme.fitted(theme.semi_bold(15), value, int(width - 4))
+            value_colour = colour if pose or place == 3 else theme.TEXT_FAINT
+            draw_text(painter, QRectF(place * width, 80, width, 16), name, theme.font(12), theme.TEXT_DIM)
+            draw_text(painter, QRectF(place * width, 98, width, 20), value, value_font, value_colour)
 
     def _paint_state(self, painter: QPainter) -> None:
         annotation, pose = self._annotation, self._readout.pose
         painter.setPen(QPen(QColor(theme.LINE), 1))
         painter.drawLine(QPointF(0, 131), QPointF(self.width(), 131))
-        box = QRectF(2, 146, 62, 62)
-        shown = None if annotation.cannot_tell else annotation.state
+        box, shown = QRectF(2, 146, 62, 62), None if annotation.cannot_tell else annotation.state
         if annotation.cannot_tell:
             painter.setPen(QPen(QColor(theme.TEXT_DIM), 2, Qt.PenStyle.DashLine))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawEllipse(box.adjusted(3, 3, -3, -3))
-            painter.setFont(theme.bold(30))
-            painter.setPen(QColor(theme.TEXT))
-            painter.drawText(box, Qt.AlignmentFlag.AlignCenter, "?")
+            draw_text(painter, box, "?", theme.bold(30), theme.TEXT, CENTER)
         else:
             paint_state(painter, box, shown)
-        left = 80.0
-        painter.setFont(theme.bold(20))
-        painter.setPen(QColor(theme.TEXT if shown or annotation.cannot_tell else theme.TEXT_DIM))
-        painter.drawText(QRectF(left, 148, self.width() - left, 26), Qt.AlignmentFlag.AlignVCenter, self.state_text)
+        left, width = 80.0, self.width() - 80.0
+        colour = theme.TEXT if shown or annotation.cannot_tell else theme.TEXT_DIM
+        draw_text(painter, QRectF(left, 148, width, 26), self.state_text, theme.bold(20), colour)
         differs = shown is not None and pose is not None and pose.state is not shown
         painter.setFont(theme.font(13))
         painter.setPen(QColor(theme.ORANGE if differs else theme.TEXT_DIM))
         flags = int(Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
-        painter.drawText(QRectF(left, 178, self.width() - left, 52), flags, self.advice_text)
+        painter.drawText(QRectF(left, 178, width, 52), flags, self.advice_text)

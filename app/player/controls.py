@@ -7,8 +7,18 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QRectF, QSignalBlocker, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QValidator
+from PySide6.QtCore import (
+    QAbstractListModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPointF,
+    QRectF,
+    QSignalBlocker,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen, QValidator
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
@@ -18,7 +28,6 @@ from PySide6.QtWidgets import (
     QListView,
     QProgressBar,
     QPushButton,
-    QSizePolicy,
     QSlider,
     QSpinBox,
     QStyle,
@@ -33,6 +42,7 @@ from app.player.timeline import paint_mark
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.widgets.basics import name_list
+from app.widgets.painting import CENTER, RIGHT, PaintedWidget, draw_box, draw_text
 from core.session.manifest import Event, Manifest
 
 _TYPED = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:[.,]\d*)?|[.,]\d+)(?: *(ms|s))?")
@@ -326,23 +336,13 @@ class _EventDelegate(QStyledItemDelegate):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if option.state & QStyle.StateFlag.State_Selected:  # type: ignore[attr-defined]
             painter.fillRect(room, QColor(theme.RAISED))
-        painter.setFont(theme.font(12))
-        painter.setPen(QColor(theme.TEXT_FAINT))
-        right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-        painter.drawText(QRectF(room.left(), room.top(), _TIME_WIDTH - 14, room.height()), right, model.time_text(event))
+        time_room = QRectF(room.left(), room.top(), _TIME_WIDTH - 14, room.height())
+        draw_text(painter, time_room, model.time_text(event), theme.font(12), theme.TEXT_FAINT, RIGHT)
         look = MARK_LOOK.get(event.kind)
         if look is not None:
-            middle = room.topLeft()
-            middle.setX(middle.x() + _TIME_WIDTH + 2)
-            middle.setY(room.center().y())
-            paint_mark(painter, middle, look.shape, look.colour)
-        text_font = theme.font(13)
-        painter.setFont(text_font)
-        painter.setPen(QColor(theme.TEXT))
-        left = room.left() + _TIME_WIDTH + 16
-        width = room.right() - left - 4
-        text = theme.elide(text_font, event_line(event), int(width))
-        painter.drawText(QRectF(left, room.top(), width, room.height()), Qt.AlignmentFlag.AlignVCenter, text)
+            paint_mark(painter, QPointF(room.left() + _TIME_WIDTH + 2, room.center().y()), look.shape, look.colour)
+        text_room = room.adjusted(_TIME_WIDTH + 16, 0, -4, 0)
+        draw_text(painter, text_room, event_line(event), theme.font(13), theme.TEXT, elided=True)
         painter.restore()
 
 
@@ -350,16 +350,14 @@ _KNOWN = ("SIM", "LIVE", "PLAYBACK")
 _HEIGHT = 34
 
 
-class RecordedPlate(QWidget):
+class RecordedPlate(PaintedWidget):
     """What was recorded, SIM or LIVE, on which rig, when: an outlined word, not filled as the banner of a live rig."""
 
     def __init__(self, manifest: Manifest | None, name: str) -> None:
-        super().__init__()
+        super().__init__(hint=(420, _HEIGHT), height=_HEIGHT)
         self._kind = manifest.kind if manifest is not None else "UNKNOWN"
         self._manifest, self._name = manifest, name
         self._note = ""
-        self.setFixedHeight(_HEIGHT)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.show_written(False)
 
     def show_written(self, is_written: bool) -> None:
@@ -373,28 +371,15 @@ class RecordedPlate(QWidget):
     def text(self) -> str:
         return tr("recorded {kind}, {note}", kind=tr_text(self._kind), note=self._note)
 
-    def sizeHint(self) -> QSize:
-        return QSize(420, _HEIGHT)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        colour = QColor(theme.of(self._kind if self._kind in _KNOWN else "FAULT"))
+    def paint(self, painter: QPainter) -> None:
+        colour = theme.of(self._kind if self._kind in _KNOWN else "FAULT")
         word, word_font = tr("recorded {kind}", kind=tr_text(self._kind)), theme.bold(14)
         plate = QRectF(1, 3, QFontMetrics(word_font).horizontalAdvance(word) + 24, _HEIGHT - 6)
-        painter.setPen(QPen(colour, 2, Qt.PenStyle.DashLine))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawRoundedRect(plate, 6, 6)
-        painter.setFont(word_font)
-        painter.setPen(colour)
-        painter.drawText(plate, Qt.AlignmentFlag.AlignCenter, word)
-        note_font = theme.font(theme.Size.BODY)
-        painter.setFont(note_font)
-        painter.setPen(QColor(theme.TEXT_DIM))
+        draw_box(painter, plate, 6, None, QPen(QColor(colour), 2, Qt.PenStyle.DashLine))
+        draw_text(painter, plate, word, word_font, colour, CENTER)
         left = plate.right() + 12
         room = QRectF(left, 0, max(0.0, self.width() - left), self.height())
-        painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, theme.elide(note_font, self._note, int(room.width())))
-        painter.end()
+        draw_text(painter, room, self._note, theme.font(theme.Size.BODY), theme.TEXT_DIM, elided=True)
 
 
 def _note(manifest: Manifest | None, name: str, *, is_written: bool) -> str:

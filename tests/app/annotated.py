@@ -1,4 +1,4 @@
-"""Annotation files made without hands: masks, and lines where they are asked for."""
+"""Annotation files made by the program: masks, and lines on request."""
 
 from __future__ import annotations
 

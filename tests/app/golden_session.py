@@ -1,4 +1,4 @@
-"""Makes the golden session that guards against regressions: ``python -m tests.app.golden_session`` writes it anew.
+"""Makes the golden session that guards against regressions: ``python -m tests.app.golden_session`` rewrites it.
 
 Twenty frames of the twin, a third of a second apart, of a robot that wanders towards the operator's target. The rows tell what
 perception says of the pictures as they come out of the video, so that a replay must say the same. Made again only when perception

@@ -1,11 +1,9 @@
-"""A clock that the test turns."""
+"""A clock that a test sets."""
 
 from __future__ import annotations
 
 
 class Clock:
-    """Seconds that pass when the test says so."""
-
     def __init__(self) -> None:
         self.now_s = 100.0
 

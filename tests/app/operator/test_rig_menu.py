@@ -28,7 +28,7 @@ from hardware.cameras.kinds import FoundCamera
 from hardware.inputs.gamepad import GamepadState
 from hardware.rig import FoundDevices
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
-from tests.app.rig_wizard.test_rig_wizard import StillCamera
+from tests.app.rig_wizard.test_wizard import StillCamera
 
 KNOWN = CalibrationConfig(
     made_utc=datetime.now(UTC).replace(microsecond=0),

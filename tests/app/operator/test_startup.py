@@ -24,7 +24,7 @@ from core.devices import DeviceError
 from hardware.calibration.bench import CalibrationBench
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
-from tests.app.rig_wizard.test_rig_wizard import StillCamera
+from tests.app.rig_wizard.test_wizard import StillCamera
 
 DRIVING = DriveView(0.0, Mode.AUTONOMOUS, Source.PROGRAM, servos_on=True, deadman=True)
 AT_REST = DriveView(0.0)

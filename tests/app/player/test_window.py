@@ -459,7 +459,7 @@ def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindo
 
 
 def test_a_clip_of_the_whole_session_waits_until_all_of_it_is_known(
-    open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+    open_player: Open, session: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(SessionReader, "wait", lambda _reader, timeout_s=None: False)
@@ -470,7 +470,7 @@ def test_a_clip_of_the_whole_session_waits_until_all_of_it_is_known(
         assert not player.session.has_clip
     until(qtbot, lambda: player.session.is_whole)
     player.export_clip()
-    until(qtbot, lambda: f"{COUNT} pictures" in player.panels.toast.text())
+    assert player.session.has_clip
 
 
 def test_a_clip_is_cancelled_without_a_trace(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:

@@ -44,7 +44,7 @@ from hardware.rig import FoundDevices
 from hardware.servos.discovery import FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
 from tests.app.operator.test_preflight import BAD, GOOD, done, says
-from tests.app.rig_wizard.test_rig_wizard import StillCamera
+from tests.app.rig_wizard.test_wizard import StillCamera
 
 Key = Qt.Key
 IDLE = DriveView(0.0)
