@@ -27,7 +27,7 @@ from app.widgets.painting import (
 )
 from core.config.models import JogConfig
 from core.config.safety import ServosConfig
-from core.control.motion import JogSpeeds, hand_speeds
+from core.control.motion import hand_speeds
 from core.types import RobotStatus
 
 
@@ -120,16 +120,6 @@ class JogReadout(PaintedWidget):
         draw_text(painter, room, self.speeds, label, colour, smallest_px=_SMALLEST_PX, elided=True)
 
 
-def speeds_in_words(speeds: JogSpeeds) -> str:
-    bend, pitch = f"{speeds.bend_mm_s:.3g}", f"{speeds.pitch_mm_s:.3g}"
-    return tr(
-        "feed {feed:.3g}, sheath {sheath:.3g}, wires {wires} mm/s",
-        feed=speeds.advance_mm_s,
-        sheath=speeds.delivery_mm_s,
-        wires=bend if bend == pitch else f"{bend}/{pitch}",
-    )
-
-
 _FED = mark("{motion}: hold to move, release to stop; {speed:.3g} mm/s")
 _PULLED = mark("{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s")
 
@@ -199,7 +189,15 @@ class JogPanel(QWidget):
         if self._rig is None:
             return
         speeds = hand_speeds(*self._rig, self._speed.currentData())
-        self._readout.show_speeds(speeds_in_words(speeds))
+        bend, pitch = f"{speeds.bend_mm_s:.3g}", f"{speeds.pitch_mm_s:.3g}"
+        self._readout.show_speeds(
+            tr(
+                "feed {feed:.3g}, sheath {sheath:.3g}, wires {wires} mm/s",
+                feed=speeds.advance_mm_s,
+                sheath=speeds.delivery_mm_s,
+                wires=bend if bend == pitch else f"{bend}/{pitch}",
+            )
+        )
         for text, speed_mm_s, motions in (
             (_FED, speeds.advance_mm_s, (Motion.ADVANCE, Motion.RETRACT)),
             (_FED, speeds.delivery_mm_s, (Motion.DELIVER, Motion.WITHDRAW)),

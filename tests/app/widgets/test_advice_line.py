@@ -1,4 +1,4 @@
-"""The advice, or why there is none."""
+"""The advice, or why it is missing."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def test_a_click_dismisses_one_and_the_next_in_line_takes_its_place(qtbot: QtBot
     assert strip.isHidden()
 
 
-def test_a_double_click_dismisses_one_alert_and_not_the_next_that_nobody_has_read(qtbot: QtBot, strip: AlertStrip) -> None:
+def test_a_double_click_dismisses_one_alert_and_not_the_next(qtbot: QtBot, strip: AlertStrip) -> None:
     strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.TRACKING)])
     qtbot.mouseClick(strip._rows[0], LEFT)
     qtbot.mouseDClick(strip._rows[0], LEFT)
@@ -244,7 +244,7 @@ def test_sounds_are_told_apart_by_rhythm() -> None:
     ("player", "arguments"),
     [("pw-play", []), ("paplay", []), ("aplay", ["-q"]), ("afplay", [])],
 )
-def test_whatever_player_there_is_gets_the_file(
+def test_any_installed_player_gets_the_file(
     qtbot: QtBot, install: Install, make_sounds: Callable[..., AlertSounds], player: str, arguments: list[str]
 ) -> None:
     notes = install(player)

@@ -76,7 +76,7 @@ def test_badge_names_the_mode_and_who_drives(own: Own, view: DriveView | None, m
     assert badge.who == who_drives(view)
 
 
-def test_without_a_rig_nobody_knows_whether_there_is_something_to_drive(own: Own, bar: ModeBar) -> None:
+def test_without_a_rig_badge_and_bar_say_that_they_wait(own: Own, bar: ModeBar) -> None:
     badge = own(ModeBadge())
     assert badge.who == "waiting for the rig"
     badge.show_view(None)
@@ -307,7 +307,7 @@ def test_every_press_of_any_button_counts(qtbot: QtBot, bar: ModeBar, button: Qt
     assert heard.count("stop") >= 4
 
 
-def test_stop_works_by_keyboard_and_when_somebody_disabled_it(qtbot: QtBot, bar: ModeBar) -> None:
+def test_stop_works_by_keyboard_and_when_disabled(qtbot: QtBot, bar: ModeBar) -> None:
     heard = asked(bar)
     bar.stop.click()
     bar.setEnabled(False)
@@ -340,7 +340,7 @@ def move(widget: QWidget, place: QPointF) -> None:
     QApplication.sendEvent(widget, event)
 
 
-def test_a_trembling_hand_holds_but_leaving_the_window_lets_go(qtbot: QtBot, bar: ModeBar, holds: list[bool]) -> None:
+def test_a_small_movement_holds_and_leaving_the_window_lets_go(qtbot: QtBot, bar: ModeBar, holds: list[bool]) -> None:
     qtbot.mousePress(bar.deadman, LEFT)
     move(bar.deadman, QPointF(-20, 5))
     assert holds == [True]
@@ -361,7 +361,7 @@ def test_a_trembling_hand_holds_but_leaving_the_window_lets_go(qtbot: QtBot, bar
     ],
     ids=["bar hidden", "field hidden", "no robot", "focus lost", "dialog", "other application", "grab lost"],
 )
-def test_whatever_may_swallow_the_release_is_one(qtbot: QtBot, bar: ModeBar, holds: list[bool], lose: object) -> None:
+def test_an_event_that_may_swallow_the_release_counts_as_one(qtbot: QtBot, bar: ModeBar, holds: list[bool], lose: object) -> None:
     qtbot.mousePress(bar.deadman, LEFT)
     lose(bar)  # type: ignore[operator]
     assert holds == [True, False]

@@ -61,7 +61,7 @@ def test_badge_says_how_sure_it_is_and_leaves_the_shape_of_an_unsure_state_open(
     assert 0 < _share_of(badge, theme.STATE_COLOUR[PoseState.D]) < filled / 3
     badge.show_scene(make_scene(refusal=Refusal(Reason.NO_ROBOT)))
     assert (badge.is_unsure, badge.sureness) == (False, "")
-    assert _shown(badge, 0.52) == (False, "52 % sure"), "after a refusal it begins anew"
+    assert _shown(badge, 0.52) == (False, "52 % sure"), "a refusal resets it"
 
 
 def test_the_limit_decides_whether_a_badge_is_unsure_and_nothing_that_was_before(own: Own) -> None:
