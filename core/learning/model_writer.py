@@ -1,23 +1,17 @@
-"""Writing a model: whole or not at all, and what was there before stays until the new one is complete.
+"""Writing a model folder, whole or not at all: what was there before stays until the new one is complete.
 
-What a model on disk is, and how it is read and checked, is ``model_file``'s.
-
-Networks as ONNX files: as they are, and in eight bits.
-
-Weights of convolutions kept in half precision: half the bytes on disk, and nothing that a picture could show.
-
-They are rounded before anything is written, so that all files of a model hold the same network. A network in eight bits loses
-nothing at all: its weights lie on a grid of 127 steps, which half precision meets within a thirtieth of a step.
-
-New eight-bit copies of a model's networks, without training: after a better way to make them was found, or for another rig.
+Weights of convolutions are kept in half precision: half the bytes on disk, and no visible difference. They are rounded before
+anything is written, so that all files of a model hold the same network. ``model_file`` reads and checks what is written here.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import shutil
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from copy import deepcopy
@@ -28,6 +22,7 @@ from core.config.models import SegmentationConfig
 from core.files import sync_folder
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import (
+    HALF_SUFFIX,
     INFO,
     ONNX,
     ONNX_INT8,
@@ -49,10 +44,13 @@ from core.perception.tip_refinement import Planes, refine_tips
 from core.types import Image
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from core.learning.quantization import EightBitUNet
     from core.perception.unet import DualUNet
+
+_INFO_SCRATCH = f".{INFO}.new"
+_PLANES = {"image": "RGB and the first look's vessel and robot, uint8 (1, H, W, 5), working pixels, values 0..255"}
+_MOST_WINDOWS = 160
+"""More of them say no more about the ranges of a tip refinement."""
 
 
 def rounded(network: DualUNet) -> DualUNet:
@@ -64,55 +62,22 @@ def rounded(network: DualUNet) -> DualUNet:
     return copy
 
 
-def halved(state: dict[str, Tensor]) -> dict[str, Tensor]:
-    """A network's state, its convolutions' weights in half precision; ``load_state_dict`` takes it as it is."""
-    return {
+def weights_sha256(network: DualUNet) -> str:
+    """Digest of the weights as safetensors, the convolutions' in half precision, as files of format 1 have them."""
+    from safetensors.torch import save
+
+    state = {
         name: (tensor.half() if tensor.is_floating_point() and tensor.dim() > 1 else tensor).cpu().contiguous()
-        for name, tensor in state.items()
+        for name, tensor in network.state_dict().items()
     }
-
-
-def halve_onnx(path: Path) -> None:
-    """Keep the weights of an ONNX file in half precision; what computes with them is told to make float32 of them first."""
-    import numpy as np
-    import onnx
-    from onnx import TensorProto, helper, numpy_helper
-
-    model = onnx.load(str(path))
-    graph = model.graph
-    weights = [one for one in graph.initializer if one.data_type == TensorProto.FLOAT and len(one.dims) > 1]
-    for place, weight in enumerate(weights):
-        half = numpy_helper.from_array(numpy_helper.to_array(weight).astype(np.float16), f"{weight.name}.half")
-        graph.initializer.remove(weight)
-        graph.initializer.append(half)
-        graph.node.insert(place, helper.make_node("Cast", [half.name], [weight.name], to=TensorProto.FLOAT))
-    onnx.save(model, str(path))
-
-
-def whole_strides(images: Sequence[Image], stride: int) -> list[Image]:
-    """The pictures cropped to whole strides: padding would teach ranges edges that no camera shows. Smaller ones are left out."""
-    cuts = (image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride] for image in images)
-    return [cut for cut in cuts if cut.size]
-
-
-def export_eight_bit(network: DualUNet, examples: Sequence[Image], path: Path) -> None:
-    """Export a copy that has learnt its ranges and rounding from the `examples`, which are ``whole_strides`` of pictures."""
-    import torch
-
-    from core.learning.quantization import EightBitUNet
-
-    eight_bit = EightBitUNet(network.eval()).eval()
-    eight_bit.learn(torch.from_numpy(image.transpose(2, 0, 1)[None].copy()).float() / 255 for image in examples)
-    export_onnx(eight_bit, network.shape.stride, path)
+    return hashlib.sha256(save(state)).hexdigest()
 
 
 def export_onnx(network: DualUNet | EightBitUNet, stride: int, path: Path) -> None:
     """Export with free height and width (multiples of `stride`); pre- and post-processing are inside the graph.
 
-    Weights are kept in half precision.
+    Weights keep their names, so that training can begin with them: the normalisations are not folded into the convolutions.
     """
-    import warnings
-
     import torch
 
     from core.perception.unet import Probabilities
@@ -131,13 +96,62 @@ def export_onnx(network: DualUNet | EightBitUNet, stride: int, path: Path) -> No
             dynamic_axes={"image": {1: "height", 2: "width"}, "probabilities": {2: "height", 3: "width"}},
             opset_version=17,
             dynamo=False,
+            training=torch.onnx.TrainingMode.PRESERVE,
         )
     network.train(was_training)
-    halve_onnx(path)
+    pack_weights(path)
 
 
-_INFO_SCRATCH = f".{INFO}.new"
-_PLANES = {"image": "RGB and the first look's vessel and robot, uint8 (1, H, W, 5), working pixels, values 0..255"}
+def pack_weights(path: Path) -> None:
+    """Store the weights of an ONNX file in few bytes, and what makes float32 of them first.
+
+    Those that are rounded to eight bits in the graph are stored so, as whole numbers of steps, the others in half precision.
+    """
+    import numpy as np
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+
+    model = onnx.load(str(path))
+    graph = model.graph
+    initializers = {one.name: one for one in graph.initializer}
+    quantizers = {node.input[0]: node for node in graph.node if node.op_type == "QuantizeLinear"}
+    before: list[onnx.NodeProto] = []
+    for name, weight in initializers.items():
+        if weight.data_type != TensorProto.FLOAT or len(weight.dims) < 2:
+            continue
+        values = numpy_helper.to_array(weight)
+        graph.initializer.remove(weight)
+        if (node := quantizers.get(name)) is None:
+            graph.initializer.append(numpy_helper.from_array(values.astype(np.float16), name + HALF_SUFFIX))
+            before.append(helper.make_node("Cast", [name + HALF_SUFFIX], [name], to=TensorProto.FLOAT))
+            continue
+        axis = next(attribute.i for attribute in node.attribute if attribute.name == "axis")
+        step = numpy_helper.to_array(initializers[node.input[1]]).reshape([-1 if k == axis else 1 for k in range(values.ndim)])
+        whole = np.clip(np.rint(values / step), -128, 127).astype(np.int8)
+        graph.initializer.extend([numpy_helper.from_array(whole, f"{name}.int8"), numpy_helper.from_array(step, f"{name}.step")])
+        # Multiplied and quantised again by the graph: with DequantizeLinear alone OpenVINO rounds otherwise.
+        before.append(helper.make_node("Cast", [f"{name}.int8"], [f"{name}.whole"], to=TensorProto.FLOAT))
+        before.append(helper.make_node("Mul", [f"{name}.whole", f"{name}.step"], [name]))
+    for place, made in enumerate(before):
+        graph.node.insert(place, made)
+    onnx.save(model, str(path))
+
+
+def whole_strides(images: Sequence[Image], stride: int) -> list[Image]:
+    """The pictures cropped to whole strides: padding would teach ranges edges that no camera shows. Smaller ones are left out."""
+    cuts = (image[: image.shape[0] // stride * stride, : image.shape[1] // stride * stride] for image in images)
+    return [cut for cut in cuts if cut.size]
+
+
+def export_eight_bit(network: DualUNet, examples: Sequence[Image], path: Path) -> None:
+    """Export a copy that learns its ranges and rounding from the `examples`, which are ``whole_strides`` of pictures."""
+    import torch
+
+    from core.learning.quantization import EightBitUNet
+
+    eight_bit = EightBitUNet(network.eval()).eval()
+    eight_bit.learn(torch.from_numpy(image.transpose(2, 0, 1)[None].copy()).float() / 255 for image in examples)
+    export_onnx(eight_bit, network.shape.stride, path)
 
 
 def save_model(
@@ -149,33 +163,30 @@ def save_model(
     examples: Sequence[Image] = (),
     second_look: Path | None = None,
 ) -> ModelInfo:
-    """Write weights, ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
+    """Write ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
 
-    Weights are kept in half precision (``half_precision``).
-
-    From `examples`, typical RGB images at working size, an eight-bit copy learns ranges and rounding; without them there is none.
-    `second_look` is the folder of a second look's network that comes along as it is.
+    Parameters
+    ----------
+    examples : typical RGB images at working size, from which an eight-bit copy learns ranges and rounding; none: there is no copy.
+    second_look : folder of a tip refinement's network that is copied into the new one.
 
     Raises
     ------
     ModelError
         The folder is something else than a model, or cannot be written.
     """
-    from safetensors.torch import save
-
     with _put_in_place(folder) as scratch:
         network = rounded(network)
-        (scratch / WEIGHTS).write_bytes(save(halved(network.state_dict())))
         export_onnx(network, network.shape.stride, scratch / ONNX)
         cuts = whole_strides(examples, network.shape.stride)
         if cuts:
             export_eight_bit(network, cuts, scratch / ONNX_INT8)
         info = ModelInfo(
-            format=1,
+            format=2,
             name=folder.resolve().name,
             shape=network.shape.to_json(),
             stride=network.shape.stride,
-            weights_sha256=sha256_of(scratch / WEIGHTS),
+            weights_sha256=weights_sha256(network),
             onnx_sha256=sha256_of(scratch / ONNX),
             onnx_int8_sha256=sha256_of(scratch / ONNX_INT8) if cuts else None,
             second_look_sha256=read_model_info(second_look, verify=()).weights_sha256 if second_look is not None else None,
@@ -190,88 +201,18 @@ def save_model(
     return info
 
 
-@contextmanager
-def _put_in_place(folder: Path) -> Iterator[Path]:
-    """An empty folder that takes the model's place in the end; whatever goes wrong leaves that as it was. Raises ModelError."""
-    check_can_write(folder)
-    folder = folder.resolve()
-    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-    try:
-        yield scratch
-        scratch.chmod(0o755)
-        _force_to_disk(scratch)
-        _put(scratch, folder)
-    except OSError as error:
-        places = [Path(os.fsdecode(name)) for name in (error.filename, error.filename2) if name is not None]
-        if places and not any(place in (scratch, folder) or scratch in place.parents for place in places):
-            raise  # a file that is read is at fault
-        reason = error.strerror or str(error)
-        raise ModelError(f"{folder}: cannot be written ({reason}); make room, or choose another folder") from None
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
-
-
-def _force_to_disk(scratch: Path) -> None:
-    """The older model is deleted for the new one, which has to be there when the power goes a moment later, too."""
-    for path in (*scratch.rglob("*"), scratch):
-        if path.is_dir():
-            with suppress(OSError):  # some file systems cannot, as in whole_file
-                sync_folder(path)
-        else:
-            with path.open("rb") as file:
-                os.fsync(file.fileno())
-
-
-def _put(scratch: Path, folder: Path) -> None:
-    """Move a whole model to its place; where that fails, the one that was there before is there again.
-
-    What else lay in the old one's folder, somebody's notes or frames, lies in the new one's then.
-    """
-    aside = scratch.with_name(scratch.name + ".old")
-    # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
-    if folder.exists():
-        os.replace(folder, aside)
-    try:
-        os.replace(scratch, folder)
-    except BaseException:
-        if aside.exists():
-            os.replace(aside, folder)
-        raise
-    with suppress(OSError):
-        sync_folder(folder.parent)
-    if aside.exists():
-        _carry_over(aside, folder)
-        shutil.rmtree(aside, ignore_errors=True)
-
-
-def _carry_over(old: Path, new: Path) -> None:
-    """Move what is not the model's own to its new folder; what cannot be moved stays where it is, and is told."""
-    own = {WEIGHTS, ONNX, ONNX_INT8, INFO, _INFO_SCRATCH}
-    try:
-        for entry in list(old.iterdir()):
-            if entry.name == SECOND_LOOK and entry.is_dir() and not entry.is_symlink():
-                _carry_over(entry, new / SECOND_LOOK)
-            elif entry.name not in own:
-                new.mkdir(exist_ok=True)
-                os.replace(entry, new / entry.name)
-    except OSError as error:
-        raise ModelError(f"{old}: holds what lay in the older model's folder and cannot be moved ({error.strerror})") from None
-
-
 def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs: Any) -> None:
-    """Write `folder`: the model in `base` with `network` for its second look. The rest of the arguments are ``save_model``'s.
+    """Write `folder`: the model in `base` with `network` for its tip refinement. The rest of the arguments are ``save_model``'s.
 
-    What was measured of `base`, figures and calibrations, is not true of the new model and left out; but Dice on held-out frames
-    and the kinds of pictures that it knows are its network's alone, and stay.
+    Figures and calibrations of `base` do not hold for the new model and are left out; Dice on held-out frames and the kinds of
+    pictures that it knows are its own network's alone, and stay.
     """
     with _put_in_place(folder) as scratch:
         _copy(base, scratch)
-        save_model(network, scratch / SECOND_LOOK, **kwargs)
+        near = save_model(network, scratch / SECOND_LOOK, **kwargs)
         figures = read_model_info(scratch, verify=()).figures
-        held_out = figures if figures.get("held_out") else {}
-        near_sha256 = sha256_of(scratch / SECOND_LOOK / WEIGHTS)
-        changes: dict[str, Any] = {"calibration": None, "calibration_mirrored": None, "figures": held_out}
-        _update(scratch, {"name": folder.resolve().name, "second_look_sha256": near_sha256} | changes)
+        changes = {"figures": figures if figures.get("held_out") else {}, "calibration": None, "calibration_mirrored": None}
+        _update(scratch, {"name": folder.resolve().name, "second_look_sha256": near.weights_sha256} | changes)
 
 
 @contextmanager
@@ -294,27 +235,74 @@ def changed(folder: Path) -> Iterator[Path]:
         yield scratch
 
 
+@contextmanager
+def _put_in_place(folder: Path) -> Iterator[Path]:
+    """An empty folder that takes the model's place in the end; whatever goes wrong leaves that as it was. Raises ModelError."""
+    check_can_write(folder)
+    folder = folder.resolve()
+    scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        yield scratch
+        scratch.chmod(0o755)
+        # The older model is deleted for this one, which has to survive a power cut a moment later.
+        for path in (*scratch.rglob("*"), scratch):
+            if path.is_dir():
+                with suppress(OSError):  # some file systems cannot
+                    sync_folder(path)
+            else:
+                with path.open("rb") as file:
+                    os.fsync(file.fileno())
+        _replace(folder, scratch)
+    except OSError as error:
+        places = [Path(os.fsdecode(name)) for name in (error.filename, error.filename2) if name is not None]
+        if places and not any(place in (scratch, folder) or scratch in place.parents for place in places):
+            raise  # a file that is read is at fault
+        reason = error.strerror or str(error)
+        raise ModelError(f"{folder}: cannot be written ({reason}); make room, or choose another folder") from None
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _replace(folder: Path, scratch: Path) -> None:
+    """Move a whole model to its place; where that fails, the one that was there before is there again.
+
+    Other files in the old one's folder, notes or frames, are moved into the new one's.
+    """
+    aside = scratch.with_name(scratch.name + ".old")
+    # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
+    if folder.exists():
+        os.replace(folder, aside)
+    try:
+        os.replace(scratch, folder)
+    except BaseException:
+        if aside.exists():
+            os.replace(aside, folder)
+        raise
+    with suppress(OSError):
+        sync_folder(folder.parent)
+    if aside.exists():
+        _carry_over(aside, folder)
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _carry_over(old: Path, new: Path) -> None:
+    """Move what is not the model's own to its new folder; raises ModelError for what cannot be moved and stays where it is."""
+    try:
+        for entry in list(old.iterdir()):
+            if entry.name == SECOND_LOOK and entry.is_dir() and not entry.is_symlink():
+                _carry_over(entry, new / SECOND_LOOK)
+            elif entry.name not in (WEIGHTS, ONNX, ONNX_INT8, INFO, _INFO_SCRATCH):
+                new.mkdir(exist_ok=True)
+                os.replace(entry, new / entry.name)
+    except OSError as error:
+        raise ModelError(f"{old}: holds what lay in the older model's folder and cannot be moved ({error.strerror})") from None
+
+
 def _copy(folder: Path, to: Path) -> None:
-    """A model's own files, but not their modes: a model that is read only may be worked on elsewhere."""
+    """Copy a model's own files, but not their modes: a read-only model may be worked on elsewhere."""
     for name in (WEIGHTS, ONNX, ONNX_INT8, INFO):
         if (folder / name).is_file():
             shutil.copyfile(folder / name, to / name)
-
-
-def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
-    """Make the eight-bit copy of a model's network anew from `examples`, as ``save_model`` does; its figures are no longer true.
-
-    Raises
-    ------
-    ModelError
-        The model is damaged, or there is no picture of the network's stride or more among the examples.
-    """
-    network = load_network(folder)[0]
-    cuts = whole_strides(examples, network.shape.stride)
-    if not cuts:
-        raise ModelError("nothing to make an eight-bit copy from; give pictures that can be read and show a robot")
-    export_eight_bit(network, cuts, folder / ONNX_INT8)
-    _update(folder, {"onnx_int8_sha256": sha256_of(folder / ONNX_INT8), "figures": {}})
 
 
 def check_can_write(folder: Path) -> None:
@@ -341,7 +329,7 @@ def check_can_change(name: str) -> None:
 
 
 def check_outside(out: Path, models: Sequence[Path]) -> None:
-    """Raise ModelError when `out` lies within one of these models: what is read there would be changed, or go with it one day."""
+    """Raise ModelError when `out` lies within one of these models, which are read for it."""
     place = Path(os.path.realpath(out))
     if any(Path(os.path.realpath(folder)) in place.parents for folder in models):
         raise ModelError(f"{place}: lies within a model that is read for it; choose another --out")
@@ -360,10 +348,12 @@ def write_calibration(
     second_looks: int = 1,
     familiarity: OutOfDistributionReference | None = None,
 ) -> None:
-    """Store how evidence becomes confidence in the manifest of a model, atomically. Figures measured before are no longer true.
+    """Store a calibration of the confidence in the manifest of a model, atomically; figures measured before are dropped.
 
-    `mirrored` is for masks averaged over all orientations of a picture, looked at closely `second_looks` times; None: the same.
-    `familiarity` is what kind of pictures the model knows; None: nobody has looked.
+    Parameters
+    ----------
+    mirrored : for masks averaged over all orientations of a picture, refined `second_looks` times; None: the same.
+    familiarity : the kinds of pictures that the model knows; None: not known.
     """
     changes: dict[str, Any] = {
         "calibration": calibration,
@@ -388,30 +378,42 @@ def _update(folder: Path, changes: dict[str, Any]) -> None:
         raise ModelError(f"{folder / INFO}: cannot be written ({error.strerror}); copy the model to a folder of your own") from None
 
 
-_MOST_WINDOWS = 160
-"""More of them say no more about the second look's ranges."""
+def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
+    """Replace the eight-bit copy of a model's network by one made from `examples`; figures measured before are dropped.
+
+    Raises
+    ------
+    ModelError
+        The model is damaged, or there is no picture of the network's stride or more among the examples.
+    """
+    network = load_network(folder)[0]
+    cuts = whole_strides(examples, network.shape.stride)
+    if not cuts:
+        raise ModelError("nothing to make an eight-bit copy from; give pictures that can be read and show a robot")
+    export_eight_bit(network, cuts, folder / ONNX_INT8)
+    _update(folder, {"onnx_int8_sha256": sha256_of(folder / ONNX_INT8), "figures": {}})
 
 
-class _Listening(Segmenter):
-    """A second look's network that keeps what it was asked about."""
+class _RecordingSegmenter(Segmenter):
+    """A tip refinement's network that keeps its inputs."""
 
     def __init__(self, near: Segmenter) -> None:
         self._near = near
-        self.asked: list[Planes] = []
+        self.inputs: list[Planes] = []
 
     @property
     def engine(self) -> str:
         return self._near.engine
 
     def __call__(self, image: Planes) -> tuple[Probability, Probability]:
-        self.asked.append(image)
+        self.inputs.append(image)
         return self._near(image)
 
 
 def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable[[float], None] = lambda share: None) -> None:
-    """Make the eight-bit copies of the model in `folder` anew, from what its networks see of RGB `images` at working size.
+    """Replace the eight-bit copies of a model by ones made from what its networks see of RGB `images` at working size.
 
-    What its confidence meant is no longer quite true. `on_progress` is told which share is done, 0..1.
+    Its calibration does not hold any more. `on_progress` is given the share that is done, 0..1.
 
     Raises
     ------
@@ -421,15 +423,15 @@ def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable
     # In fp32: the copies that are there may be damaged, or the reason for new ones.
     config = SegmentationConfig(model=str(folder), precision="fp32")
     near, where = open_second_look(config), second_look_of(folder)
-    asked: list[Planes] = []
+    inputs: list[Planes] = []
     if near is not None:
-        first, listening = open_segmenter(config), _Listening(near)
+        first, recording = open_segmenter(config), _RecordingSegmenter(near)
         for done, image in enumerate(images):
-            refine_tips(image, first(image), listening)
+            refine_tips(image, first(image), recording)
             on_progress(0.2 * done / len(images))
-        asked = listening.asked[:: max(1, math.ceil(len(listening.asked) / _MOST_WINDOWS))]
+        inputs = recording.inputs[:: max(1, math.ceil(len(recording.inputs) / _MOST_WINDOWS))]
     write_eight_bit(folder, images)
     on_progress(0.6)
     if where is not None:
-        write_eight_bit(where, asked)
+        write_eight_bit(where, inputs)
     on_progress(1.0)

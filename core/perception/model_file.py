@@ -1,8 +1,9 @@
-"""A model on disk: ``weights.safetensors``, ``network.onnx``, perhaps ``network_int8.onnx``, and ``model.json`` with their SHA-256.
+"""A model on disk: ``network.onnx``, perhaps ``network_int8.onnx``, and ``model.json`` with their SHA-256.
 
-The network of its tip refinement (``core/perception/tip_refinement.py``), if it has one, is a model of its own in a folder within.
+The network of its tip refinement (``tip_refinement.py``), if it has one, is a model of its own in a folder within.
 
-Nothing is loaded before its hash agrees, and nothing is ever unpickled: a cut, bit-flipped or foreign file is one clear error.
+``network.onnx`` holds the weights by name, so that training begins with them. Folders of format 1 keep them in
+``weights.safetensors``. Nothing is loaded before its hash agrees, and nothing is ever unpickled.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ if TYPE_CHECKING:
 
 WEIGHTS, ONNX, ONNX_INT8, INFO = "weights.safetensors", "network.onnx", "network_int8.onnx", "model.json"
 SECOND_LOOK = "second_look"
-"""The folder within a model that holds the network of its second look, where it has one."""
+"""The folder within a model that holds the network of its tip refinement, where it has one."""
+ONNX_PREFIX, HALF_SUFFIX = "network.", ".half"
+"""Weights of ``network.onnx`` are called as in the torch network, with this prefix; with this suffix where in half precision."""
 MODELS = RESOURCES / "models"
 
 
@@ -37,14 +40,17 @@ class ModelError(UserError):
 class ModelInfo(BaseModel):
     """What ``model.json`` says. Image height and width must be multiples of ``stride``; ``figures`` are measured.
 
-    ``second_look_sha256`` is of the weights of its second look; None: it has none, or is older than this entry.
-    ``mirrored_second_looks`` is how often a picture seen in all orientations was looked at closely for ``calibration_mirrored``, 1
-    in a manifest older than this entry. Perception looks as often: a confidence is true of no other way of looking.
+    Attributes
+    ----------
+    weights_sha256 : of the weights as safetensors in half precision, whichever file they are in.
+    second_look_sha256 : ``weights_sha256`` of its tip refinement; None: it has none, or is older than this entry.
+    mirrored_second_looks : how often a picture seen in all orientations was refined for ``calibration_mirrored``, 1 in a manifest
+        older than this entry. Perception refines as often: a confidence holds for no other number.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    format: int = Field(1, ge=1, le=1)
+    format: int = Field(1, ge=1, le=2)
     name: str
     shape: dict[str, Any]
     stride: int = Field(ge=1, le=256)
@@ -63,8 +69,14 @@ class ModelInfo(BaseModel):
 
     @property
     def planes(self) -> int:
-        """Of its input: 3 of a picture, 5 with a first look's probabilities."""
+        """Of its input: 3 of a picture, 5 with probabilities."""
         return int(self.shape.get("inputs", 3))
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files beside ``model.json``."""
+        eight_bit = (ONNX_INT8,) if self.onnx_int8_sha256 is not None else ()
+        return (WEIGHTS, ONNX, *eight_bit) if self.format == 1 else (ONNX, *eight_bit)
 
     @model_validator(mode="after")
     def _check_shape(self) -> Self:
@@ -104,12 +116,12 @@ def model_folder(name: str) -> Path:
 
 
 def models_in(place: Path) -> list[Path]:
-    """Folders of models, by name; those that are being made (``_put_in_place``) are none yet."""
+    """Folders of models, by name; without those that are being made."""
     return sorted(path.parent for path in place.glob(f"*/{INFO}") if not path.parent.name.startswith("."))
 
 
-def read_model_info(folder: Path, *, verify: tuple[str, ...] = (WEIGHTS, ONNX)) -> ModelInfo:
-    """Read ``model.json`` and check the hashes of the files named in `verify`; raises ModelError."""
+def read_model_info(folder: Path, *, verify: Sequence[str] | None = None) -> ModelInfo:
+    """Read ``model.json`` and check the files named in `verify`, by default all but the eight-bit copy; raises ModelError."""
     path = folder / INFO
     try:
         info = ModelInfo.model_validate_json(path.read_bytes())
@@ -120,7 +132,7 @@ def read_model_info(folder: Path, *, verify: tuple[str, ...] = (WEIGHTS, ONNX)) 
         key = ".".join(str(part) for part in first["loc"])
         reason = first["msg"].removeprefix("Value error, ")
         raise ModelError(f"{path}: damaged ({key + ': ' if key else ''}{reason}); restore the model folder") from None
-    check_files(info, folder, verify)
+    check_files(info, folder, [name for name in info.files if name != ONNX_INT8] if verify is None else verify)
     return info
 
 
@@ -142,13 +154,13 @@ def check_files(info: ModelInfo, folder: Path, names: Sequence[str]) -> None:
 def trained_without(folder: Path) -> tuple[str, ...]:
     """The families of looks that none of its networks was trained with, as their ``model.json`` say. Raises ModelError."""
     networks = [folder, *([near] if (near := second_look_of(folder)) is not None else [])]
-    told = [read_model_info(one, verify=()).training.get("without") for one in networks]
-    left_out = [[str(look) for look in looks] if isinstance(looks, list) else [] for looks in told]
+    without = [read_model_info(one, verify=()).training.get("without") for one in networks]
+    left_out = [[str(look) for look in looks] if isinstance(looks, list) else [] for looks in without]
     return tuple(look for look in left_out[0] if all(look in others for others in left_out))
 
 
 def second_look_of(folder: Path) -> Path | None:
-    """The folder of a model's second look, None when it has none; ModelError when it is gone or not the one it belongs to."""
+    """The folder of a model's tip refinement, None when it has none; ModelError when it is gone or of another model."""
     expected = read_model_info(folder, verify=()).second_look_sha256
     near = folder / SECOND_LOOK
     if not (near / INFO).is_file():
@@ -169,25 +181,46 @@ def check_model(name: str) -> None:
 
 
 def check_all_files(folder: Path) -> list[str]:
-    """The files of one network, all of them whole. Raises ModelError."""
+    """The names of the files of one network, all of them whole. Raises ModelError."""
     info = read_model_info(folder, verify=())
-    files = [WEIGHTS, ONNX, *([ONNX_INT8] if info.onnx_int8_sha256 is not None else [])]
-    check_files(info, folder, files)
-    return [INFO, *files]
+    check_files(info, folder, info.files)
+    return [INFO, *info.files]
 
 
 def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
     """The torch network in evaluation mode with its weights; raises ModelError."""
+    from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
     from safetensors import SafetensorError
     from safetensors.torch import load
 
     from core.perception.unet import DualUNet, UNetShape
 
-    info = read_model_info(folder, verify=(WEIGHTS,))
+    info = read_model_info(folder, verify=())
+    name = WEIGHTS if info.format == 1 else ONNX
+    check_files(info, folder, (name,))
     try:
         network = DualUNet(UNetShape.from_json(info.shape))
-        network.load_state_dict(load((folder / WEIGHTS).read_bytes()))
-    except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
+        data = (folder / name).read_bytes()
+        state = load(data) if info.format == 1 else _state_of_onnx(data)
+        missing, unexpected = network.load_state_dict(state, strict=False)
+        # ONNX leaves out how many batches the normalisation has seen, which nothing uses.
+        wrong = [*unexpected, *(key for key in missing if not key.endswith("num_batches_tracked"))]
+        if wrong:
+            raise ValueError(f"weights {wrong[0]}")
+    except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError, DecodeError) as error:
         reason = str(error).splitlines()[0]
-        raise ModelError(f"{folder / WEIGHTS}: does not fit the shape in {INFO} ({reason}); restore the model folder") from None
+        raise ModelError(f"{folder / name}: does not fit the shape in {INFO} ({reason}); restore the model folder") from None
     return network.eval(), info
+
+
+def _state_of_onnx(data: bytes) -> dict[str, Any]:
+    """The initializers of an ONNX file as tensors, under the names that they have in the torch network."""
+    import onnx
+    import torch
+    from onnx import numpy_helper
+
+    state = {}
+    for one in onnx.load_model_from_string(data).graph.initializer:
+        name = one.name.removeprefix(ONNX_PREFIX).removesuffix(HALF_SUFFIX)
+        state[name] = torch.from_numpy(numpy_helper.to_array(one).copy()).float()
+    return state

@@ -20,7 +20,7 @@ from core.evaluation.confidence import CalibrationError
 from core.files import read_image
 from core.learning.dataset import DatasetError
 from core.perception.inference import OpenVinoSegmenter
-from core.perception.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, WEIGHTS, ModelError, read_model_info, sha256_of
+from core.perception.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, ModelError, read_model_info, sha256_of
 from core.perception.pipeline import open_calibrated
 from core.perception.quality import BASIC_FEATURES
 from core.perception.tip_refinement import MAX_PASSES
@@ -98,7 +98,7 @@ def test_eight_bit_copies_are_made_anew_with_the_calibration(frames: Path, model
     olds, near_before = (read_model_info(folder) for folder in (model, model / SECOND_LOOK))
     calibrate(frames, str(model), eight_bit=True)
     for folder, older in ((model, olds), (model / SECOND_LOOK, near_before)):
-        newer = read_model_info(folder, verify=(WEIGHTS, ONNX, ONNX_INT8))
+        newer = read_model_info(folder, verify=(ONNX, ONNX_INT8))
         assert newer.onnx_int8_sha256 not in (None, older.onnx_int8_sha256), "its eight-bit copy is another one, from two frames"
         assert newer.weights_sha256 == older.weights_sha256
     assert not list(model.parent.glob(".older-*")), "nothing is left of the copy that it was worked on in"
@@ -171,7 +171,7 @@ def test_a_damaged_network_is_said_before_the_work(frames: Path, model: Path) ->
     assert _files(model) == before
 
 
-@pytest.mark.parametrize("name", [WEIGHTS, f"{SECOND_LOOK}/{ONNX}"])
+@pytest.mark.parametrize("name", [ONNX_INT8, f"{SECOND_LOOK}/{ONNX}"])
 def test_any_damaged_file_is_said_before_the_work(frames: Path, model: Path, name: str, looked_at: list[object]) -> None:
     """It would be said in the end otherwise, when the manifest is written."""
     (model / name).write_bytes(b"cut")

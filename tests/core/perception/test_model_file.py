@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import save
 
 from core.config.models import SegmentationConfig
 from core.learning.model_writer import changed, rounded, save_model, save_with_second_look, write_figures
@@ -17,7 +18,6 @@ from core.perception.model_file import (
     INFO,
     MODELS,
     ONNX,
-    ONNX_INT8,
     SECOND_LOOK,
     WEIGHTS,
     ModelError,
@@ -65,10 +65,10 @@ def test_results_are_not_overwritten_by_the_next_call(model: Path) -> None:
     np.testing.assert_array_equal(first, kept)
 
 
-@pytest.mark.parametrize("name", [WEIGHTS, ONNX])
+@pytest.mark.parametrize("engine", [OpenVinoSegmenter, TorchSegmenter])
 @pytest.mark.parametrize("damage", ["cut", "flip", "missing", "empty"])
-def test_a_damaged_file_is_one_clear_error(model: Path, name: str, damage: str) -> None:
-    path = model / name
+def test_a_damaged_file_is_one_clear_error(model: Path, engine: type, damage: str) -> None:
+    path = model / ONNX
     data = bytearray(path.read_bytes())
     if damage == "missing":
         path.unlink()
@@ -76,8 +76,8 @@ def test_a_damaged_file_is_one_clear_error(model: Path, name: str, damage: str) 
         data[len(data) // 2] ^= 1
         path.write_bytes({"cut": data[: len(data) // 2], "flip": data, "empty": b""}[damage])
     with pytest.raises(ModelError, match="restore the model folder") as caught:
-        OpenVinoSegmenter(model, 1) if name == ONNX else TorchSegmenter(model, 1)
-    assert name in str(caught.value)
+        engine(model, 1)
+    assert ONNX in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -89,7 +89,7 @@ def test_a_damaged_manifest_is_one_clear_error(model: Path, text: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", [WEIGHTS, ONNX, f"{SECOND_LOOK}/{WEIGHTS}", f"{SECOND_LOOK}/{ONNX}"])
+@pytest.mark.parametrize("name", [ONNX, f"{SECOND_LOOK}/{ONNX}"])
 def test_a_model_is_checked_whole_before_anything_begins_with_it(model: Path, tmp_path: Path, name: str) -> None:
     near = DualUNet(UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 5, 2)).eval()
     save_with_second_look(model, near, tmp_path / "both", training={}, figures={})
@@ -127,6 +127,24 @@ def test_weights_survive_the_round_trip(model: Path) -> None:
     assert info.stride == 32
     for name, tensor in loaded.state_dict().items():
         torch.testing.assert_close(tensor, original[name])
+
+
+def test_a_folder_of_format_1_has_its_weights_in_a_file_of_their_own(model: Path, tmp_path: Path) -> None:
+    network, info = load_network(model)
+    half = {name: tensor.half() if tensor.dim() > 1 else tensor for name, tensor in network.state_dict().items()}
+    (model / WEIGHTS).write_bytes(save(half))
+    changes = {"format": 1, "weights_sha256": sha256_of(model / WEIGHTS)}
+    (model / INFO).write_text(info.model_copy(update=changes).model_dump_json())
+    check_model(str(model))
+    old = load_network(model)[0].state_dict()
+    assert all(torch.equal(old[name], tensor) for name, tensor in network.state_dict().items())
+    near = with_prior_planes(network)
+    save_with_second_look(model, near, tmp_path / "both", training={}, figures={})
+    check_model(str(tmp_path / "both"))
+    write_figures(tmp_path / "both", {"robot_dice": 0.5})
+    (tmp_path / "both" / WEIGHTS).write_bytes(b"cut")
+    with pytest.raises(ModelError, match=f"{WEIGHTS}: SHA-256 differs"):
+        check_model(str(tmp_path / "both"))
 
 
 def test_figures_are_added_without_touching_the_rest(model: Path) -> None:
@@ -169,7 +187,7 @@ def test_a_shipped_models_files_are_those_of_its_manifest(manifest: Path) -> Non
     """One that is left over from other weights would never be used, nor its absence be seen."""
     info = read_model_info(manifest.parent, verify=())
     there = {path.name for path in manifest.parent.iterdir() if path.is_file()}
-    assert there == {INFO, WEIGHTS, ONNX} | ({ONNX_INT8} if info.onnx_int8_sha256 is not None else set())
+    assert there == {INFO, *info.files}
     check_files(info, manifest.parent, sorted(there - {INFO}))
     assert all(path.stat().st_size <= 12_000_000 for path in manifest.parent.iterdir() if path.is_file())
 
@@ -192,7 +210,7 @@ def test_what_else_lies_in_a_models_folder_outlives_the_model(model: Path) -> No
 def test_a_full_disk_is_one_clear_error_and_the_old_model_stays(model: Path) -> None:
     import resource
 
-    before, limits = (model / WEIGHTS).read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    before, limits = (model / ONNX).read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
     try:
         with pytest.raises(ModelError, match=r"tiny: cannot be written \(.*too large.*\); make room, or choose another folder"):
@@ -201,7 +219,7 @@ def test_a_full_disk_is_one_clear_error_and_the_old_model_stays(model: Path) -> 
             pass
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert (model / WEIGHTS).read_bytes() == before
+    assert (model / ONNX).read_bytes() == before
     assert [path.name for path in model.parent.iterdir()] == [model.name]
 
 
@@ -244,7 +262,7 @@ def test_a_new_model_is_on_the_disk_before_the_old_one_goes(model: Path, monkeyp
     monkeypatch.setattr(os, "replace", renames)
     monkeypatch.setattr(shutil, "rmtree", removes)
     save_model(DualUNet(TINY).eval(), model, training={}, figures={})
-    assert {f"on disk: {name}" for name in (WEIGHTS, ONNX, INFO)} <= set(done[: done.index("aside")])
+    assert {f"on disk: {name}" for name in (ONNX, INFO)} <= set(done[: done.index("aside")])
     assert done[done.index("moved") :] == ["moved", f"on disk: {model.parent.name}", "old one deleted"]
 
 

@@ -19,7 +19,7 @@ from core.learning.dataset import Sample, write_mask, write_png
 from core.learning.model_writer import save_model, save_with_second_look
 from core.learning.training_plan import TrainingPlan
 from core.perception.inference import OpenVinoSegmenter, open_second_look
-from core.perception.model_file import INFO, SECOND_LOOK, WEIGHTS, ModelError, read_model_info
+from core.perception.model_file import INFO, ONNX, SECOND_LOOK, ModelError, read_model_info
 from core.perception.segmentation import MARGIN_PX, Segmenter, window_around
 from core.perception.tip_refinement import MAX_PASSES, WINDOW_PX, Planes, TipRefinement, find_tips, stack_planes
 from core.perception.unet import DualUNet, UNetShape, with_prior_planes
@@ -325,7 +325,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_model_is_kept_with_its_second_look(model: Path) -> None:
     info = read_model_info(model)
     assert (info.name, info.figures, info.calibration) == ("near", {}, None), "what was measured without it is not true of it"
-    assert (model / WEIGHTS).read_bytes() == (model.with_name("base") / WEIGHTS).read_bytes()
+    assert (model / ONNX).read_bytes() == (model.with_name("base") / ONNX).read_bytes()
     second = read_model_info(model / SECOND_LOOK)
     assert second.training == {"steps_done": 3}
     assert second.shape["inputs"] == 5
