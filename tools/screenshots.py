@@ -41,7 +41,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
-from app.commands.evaluate import LikePaper, run_evaluate
+from app.commands.evaluate import evaluate
 from app.commands.options import ConfigOption
 from app.commands.synth import make_set
 from app.operator.preflight import PreflightModel
@@ -857,17 +857,7 @@ def study_figures(studio: Studio) -> None:
     labelled, result = studio.folder / "labelled", studio.folder / "result"
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         make_set(labelled, _STUDY_FRAMES, _STUDY_SEED)
-        run_evaluate(
-            labelled,
-            None,
-            result,
-            as_json=True,
-            model=None,
-            preset=None,
-            config_path=None,
-            like_paper=LikePaper(1.5),
-            seed=0,
-        )
+        evaluate(result, labelled, as_json=True, like_paper=True)
     figures = [QSvgRenderer(str(path)) for path in sorted(result.rglob("*.svg"))]
     scale = _FIGURE_WIDTH / max(figure.defaultSize().width() for figure in figures)
     sizes = [figure.defaultSize() * scale for figure in figures]

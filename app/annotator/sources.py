@@ -20,7 +20,6 @@ import av
 import av.error
 import numpy as np
 
-from app.commands.perceive import expand, is_video
 from app.commands.progress import progress_bar
 from core.annotation.model import AnnotationError
 from core.annotation.store import DEFAULT_NAME, AnnotationStore, FoundImage, StoredAnnotation, find_images, image_sha256
@@ -29,6 +28,7 @@ from core.learning.dataset import write_png
 from core.session.reader import Take, is_of_session, session_video, times_of
 from core.session.video import NoPictures, decoded, is_avi, open_video, pictures_of, upright
 from core.types import Image
+from hardware.cameras.picture_files import expand, is_video
 
 
 @dataclass(frozen=True, slots=True)

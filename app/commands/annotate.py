@@ -1,9 +1,4 @@
-"""``annotate``: ground truth by hand, alone or as a study of several raters; agreement, export, import.
-
-Which pictures the window of ``annotate`` shows a rater, in which order: those of a study as it was begun, or every one once.
-
-What goes out of an annotation file and comes into it: ``annotate --export``, ``--import``, ``--join`` and ``--salvage``.
-"""
+"""``annotate``: ground truth by hand, alone or as a study of several raters; agreement, export, import, joining, salvage."""
 
 from __future__ import annotations
 
@@ -44,7 +39,11 @@ if TYPE_CHECKING:
     from app.annotator.model import QueueEntry
 
 
+EXPORTS = ("dataset", "csv", "coco")
 _DISAGREEMENT_DEG = 30.0
+"""A disagreement of so much takes all certainty from an image, half as much half of it."""
+_KEPT = (("loupe", "L"), ("masks", "K"))
+"""Switches of the window that keep their state, and their keys."""
 
 
 def queue_of(
@@ -75,7 +74,7 @@ def queue_of(
         if order is QueueOrder.RANDOM:
             queue = tasks(StudySettings(tuple(listed), seed=options.seed or 0), rater)
         else:
-            queue = [Task(sha256) for sha256 in queue_order(listed, order, _sureness(store, images, order, config))]
+            queue = [Task(sha256) for sha256 in queue_order(listed, order, _certainty(store, images, order, config))]
     return [QueueEntry(here[t.sha256], ItemKey(t.sha256, options.name, rater, t.repeat), t.view) for t in queue]
 
 
@@ -89,12 +88,12 @@ def _order(name: str | None, default: QueueOrder) -> QueueOrder:
 
 
 def _settings(store: AnnotationStore, images: Sequence[FoundImage], options: StudyOptions, config: Config) -> StudySettings:
-    """The settings that the study was begun with; what the command line says must not contradict them."""
+    """The settings that the study was begun with; raises AnnotationError for options that contradict them."""
     kept = store.study_settings(options.name)
     if kept is None:
         order = _order(options.order, QueueOrder.RANDOM)
         views = repeat_views(options.repeats or 2, mirror=options.mirror, turn=options.turn)
-        listed = queue_order([image.sha256 for image in images], order, _sureness(store, images, order, config))
+        listed = queue_order([image.sha256 for image in images], order, _certainty(store, images, order, config))
         settings = StudySettings(listed, views, order, options.seed or 0)
         store.begin_study(options.name, settings.to_json())
         return settings
@@ -114,11 +113,8 @@ def _settings(store: AnnotationStore, images: Sequence[FoundImage], options: Stu
     return settings
 
 
-def _sureness(store: AnnotationStore, images: Sequence[FoundImage], order: QueueOrder, config: Config) -> dict[str, float] | None:
-    """How sure the algorithm is of each image (0: refused), for the order "worst".
-
-    Where a rater has measured already, a disagreement takes away from it: half at 15 degrees, everything from 30 degrees on.
-    """
+def _certainty(store: AnnotationStore, images: Sequence[FoundImage], order: QueueOrder, config: Config) -> dict[str, float] | None:
+    """How certain the algorithm is of each image (0: refused), for the order "worst"; disagreement with a rater lowers it."""
     if order is not QueueOrder.WORST:
         return None
     from core.files import read_image
@@ -128,18 +124,15 @@ def _sureness(store: AnnotationStore, images: Sequence[FoundImage], order: Queue
         one.key.sha256: one.theta_deg for one in store.annotations() if one.theta_deg is not None and not one.content.cannot_tell
     }
     pipeline = open_pipeline(config.perception)
-    sureness = {}
+    certainty = {}
     with progress_bar() as bar:
         for image in bar.track(images, description="asking the algorithm"):
             pose = pipeline.perceive_single(Frame(0, 0.0, read_image(image.path))).pose
-            sureness[image.sha256] = 0.0
+            certainty[image.sha256] = 0.0
             if pose is not None:
                 differs_deg = abs(pose.theta_deg - measured.get(image.sha256, pose.theta_deg))
-                sureness[image.sha256] = pose.confidence * max(0.0, 1.0 - differs_deg / _DISAGREEMENT_DEG)
-    return sureness
-
-
-EXPORTS = ("dataset", "csv", "coco")
+                certainty[image.sha256] = pose.confidence * max(0.0, 1.0 - differs_deg / _DISAGREEMENT_DEG)
+    return certainty
 
 
 def export_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
@@ -153,17 +146,17 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
     assert options.out is not None
     annotations, images = read_annotated(store_path, paths, options.frames)
-    asked, everybodys = options.study.asked, annotations
+    asked, of_all = options.study.asked, annotations
     if asked is not None:
-        annotations = [one for one in everybodys if one.key.study == asked]
+        annotations = [one for one in of_all if one.key.study == asked]
     annotations = of_rater(annotations, options.study.rater)
     if options.export == "dataset":
         if asked and not annotations:
             raise AnnotationError(f"{store_path}: nobody has answered in study {asked!r}")
-        # A study is blind, so that masks are drawn outside it: its angles and states are chosen, not its masks.
+        # A study is blind, so masks are drawn outside it: it contributes angles and states, not masks.
         drawn, measured = annotations, None
         if asked is not None:
-            drawn, measured = of_rater(everybodys, options.study.rater), finished(annotations)
+            drawn, measured = of_rater(of_all, options.study.rater), finished(annotations)
         count, problems = export_training_set(drawn, images, options.out, measured=measured)
         print_warnings(problems)
         sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
@@ -208,7 +201,7 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         for one in imported:
             key = ItemKey(one.image.sha256, options.study.name, rater)
             history = store.history(key)
-            old = existing.get(key, history.current)  # whose record is damaged, his journal still has
+            old = existing.get(key, history.current)  # where the record is damaged, the journal still has it
             content = merged(old, one.content)
             entry = history.edit(f"import {one.source.name}", content)
             if entry is None or content == old:
@@ -226,7 +219,7 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
 
 def join_annotations(store_path: Path, options: AnnotateOptions) -> int:
-    """``--join``: what other raters have answered in files of their own; raises AnnotationError, and changes nothing then."""
+    """``--join``: answers of other raters in files of their own; raises AnnotationError, and changes nothing then."""
     from core.annotation.merge import join
 
     names: dict[str, str] = {}
@@ -252,7 +245,7 @@ def join_annotations(store_path: Path, options: AnnotateOptions) -> int:
 
 
 def salvage_annotations(store_path: Path, out: Path | None) -> int:
-    """``--salvage``: what can be read of a damaged file, in a new one. Raises AnnotationError."""
+    """``--salvage``: copy what can be read of a damaged file into a new one. Raises AnnotationError."""
     from core.annotation.merge import salvage
 
     target = out or store_path.with_name(f"salvaged_{store_path.name}")
@@ -260,10 +253,6 @@ def salvage_annotations(store_path: Path, out: Path | None) -> int:
     print_warnings(problems)
     sys.stderr.write(f"{kept} annotations saved into {target}; the damaged file is as it was\n")
     return 0
-
-
-_KEPT = (("loupe", "L"), ("masks", "K"))
-"""Switches of the window that are as they were left, and their keys."""
 
 
 def annotate(
@@ -336,9 +325,9 @@ def run_annotate(options: AnnotateOptions) -> int:
         raise AnnotationError("--export needs --out: a folder for dataset, a file for csv and coco")
     if options.as_json and not options.report:
         raise AnnotationError("--json is for --report; leave it out")
-    config = _config(options)
+    config = load_config(options.config_path, overrides=choose_model(options.model))
     given = options.paths or (Path(),)
-    store_path = options.store or _store_of(given)
+    store_path = options.store or (given[0] if given[0].suffix == ".sqlite" else default_store(given))
     paths = tuple(path.parent if path.suffix == ".sqlite" else path for path in given)
     if options.salvage:
         return salvage_annotations(store_path, options.out)
@@ -351,15 +340,6 @@ def run_annotate(options: AnnotateOptions) -> int:
     if options.imports:
         return import_annotations(store_path, paths, options, config)
     return _window(store_path, paths, options, config)
-
-
-def _config(options: AnnotateOptions) -> Config:
-    return load_config(options.config_path, overrides=choose_model(options.model))
-
-
-def _store_of(paths: Sequence[Path]) -> Path:
-    """A path that is an annotation file itself, or the file beside the images."""
-    return paths[0] if paths[0].suffix == ".sqlite" else default_store(paths)
 
 
 def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:

@@ -19,8 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption, check_masks
-from app.commands.perceive import LeftOut
-from app.commands.progress import progress_bar
+from app.commands.progress import LeftOut, progress_bar
 from core.config.models import Config, TwinConfig, choose_model, load_config
 from core.devices import UserError
 from core.types import Frame, Image, Scene
@@ -220,7 +219,7 @@ def measure_accuracy(folder: Path, config: Config, *, as_json: bool, store: bool
             interrupted = True
     if interrupted and not scores:
         raise KeyboardInterrupt
-    left_out.tell(len(scores))
+    left_out.print_note(len(scores))
     confident_from = config.perception.quality.confident_from
     figures = summarise(scores, confident_from) | describe_confidence(scores) | {"stricter_gates": describe_gates(scores)}
     if left_out:

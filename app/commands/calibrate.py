@@ -16,8 +16,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from app.commands.options import ConfigOption
-from app.commands.perceive import LeftOut
-from app.commands.progress import progress_bar
+from app.commands.progress import LeftOut, progress_bar
 from core.config.models import PerceptionConfig, load_config
 from core.perception.quality import ConfidenceCalibration
 from core.types import Image
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 
 _EXAMPLES = 80
-"""At most so many frames tell the eight-bit networks' ranges, and how to round their weights."""
+"""Frames from which eight-bit networks learn ranges and rounding, at most."""
 
 
 def calibrate(
@@ -110,7 +109,7 @@ def _calibrated(
         tables.append((f"mirrored {mirrored}: {len(pairs)} answers of {folder.name}", (calibration, right, auroc)))
     looked = signatures_in(pictures, open_segmenter(config.segmentation), config, left_out.add) if scores else iter(())
     signed = [one for one in bar.track(looked, total=len(pictures), description="kinds of pictures") if one is not None]
-    left_out.tell(len(pictures) - len(left_out) if scores else 0)
+    left_out.print_note(len(pictures) - len(left_out) if scores else 0)
     known, signatures = [picture for picture, _ in signed], np.array([signature for _, signature in signed])
     familiarity = fit_out_of_distribution(known, signatures, config.working_size_px, described | {"knows": list(frames.knows)})
     again = open_calibrated(config, recalibrating=True)[1].segment

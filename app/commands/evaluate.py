@@ -7,7 +7,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,8 +16,7 @@ import typer
 from app.annotator.comparison import print_agreement
 from app.commands.evaluation_report import print_tables, render_report
 from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption, ProgressOption
-from app.commands.perceive import LeftOut
-from app.commands.progress import check_no_input, progress_bar, progress_writer, report_progress
+from app.commands.progress import LeftOut, check_no_input, progress_bar, progress_writer, report_progress
 from core.annotation.agreement_report import write_measures
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.config.models import Config, choose_model, load_config
@@ -29,32 +28,14 @@ from core.files import name_as_text, name_of, write_atomic
 from core.types import Frame
 
 
-@dataclass(frozen=True, slots=True)
-class LikePaper:
-    """A study built like the paper's: its share of states, two manual measures with an error of so many degrees (SD)."""
-
-    manual_sd_deg: float
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Study:
-    """What is to be evaluated, where it comes from, and what is to be said about it."""
+    """Rows to be evaluated, where they come from, and notes for the reader."""
 
     rows: list[Measurement]
     source: dict[str, Any]
     notes: list[str]
     agreement: dict[str, Any] | None = None
-    interrupted: bool = False
-
-
-@dataclass(slots=True)
-class _Perceived:
-    """Rows, how often which reason was given on images with a pose, and where the network ran."""
-
-    engine: str
-    rows: list[Measurement] = field(default_factory=list)
-    reasons: Counter[str] = field(default_factory=Counter)
-    left_out: LeftOut = field(default_factory=LeftOut)
     interrupted: bool = False
 
 
@@ -90,77 +71,49 @@ def evaluate(
         raise UserError("--json and --progress-json both write to standard output: give one of them")
     if progress_json:
         report_progress()
-    run_evaluate(
-        labelled,
-        csv,
-        out,
-        as_json=as_json,
-        model=model,
-        preset=preset,
-        config_path=config,
-        like_paper=LikePaper(1.5 if manual_sd is None else manual_sd) if like_paper else None,
-        seed=seed,
-        study_name=study,
-    )
-
-
-def run_evaluate(
-    folder: Path | None,
-    csv: Path | None,
-    out: Path,
-    *,
-    as_json: bool,
-    model: str | None,
-    preset: str | None,
-    config_path: Path | None,
-    like_paper: LikePaper | None,
-    seed: int,
-    study_name: str | None = None,
-) -> None:
-    """Evaluate a table, a labelled set or images annotated by hand (one study of them) into `out`; raises UserError.
-
-    An interruption (Ctrl-C) evaluates what was perceived until then.
-    """
-    if (folder is None) == (csv is None):
+    if (labelled is None) == (csv is None):
         raise EvaluationError("give either a labelled set (evaluate DIR) or a table (evaluate --csv FILE)")
-    if study_name is not None and (csv is not None or like_paper is not None):
+    if study is not None and (csv is not None or like_paper):
         raise EvaluationError("--study needs images annotated by hand (evaluate DIR), not --csv or --like-paper")
     if csv is not None:
-        if like_paper is not None or model is not None or preset is not None or config_path is not None:
+        if like_paper or model is not None or preset is not None or config is not None:
             raise EvaluationError("--like-paper, --model, --preset and --config need a labelled set (evaluate DIR), not --csv")
         for name in _written_names():
             check_no_input(out / name, [csv], "--out")
-        study = _Study(read_measurements(csv), {"kind": "table of measures", "name": name_as_text(csv.name)}, [])
-        _make_folder(out)
+        found = _Study(read_measurements(csv), {"kind": "table of measures", "name": name_as_text(csv.name)}, [])
+        _make_out(out)
     else:
-        assert folder is not None
-        annotations = _annotation_file(folder, study_name)
-        if annotations is not None and like_paper is not None:
+        assert labelled is not None
+        annotations = _annotation_file(labelled, study)
+        if annotations is not None and like_paper:
             raise EvaluationError("--like-paper needs a labelled set with its truth, not annotations by hand")
-        if annotations is None and study_name is not None:
-            raise EvaluationError(f"{folder}: has no annotation file; begin the study with: annotate {folder} --study {study_name}")
-        truth = _read_set(folder) if annotations is None else []
-        _make_folder(out)
-        config = load_config(config_path, preset, choose_model(model))
+        if annotations is None and study is not None:
+            raise EvaluationError(f"{labelled}: has no annotation file; begin the study with: annotate {labelled} --study {study}")
+        truth = _read_set(labelled) if annotations is None else []
+        _make_out(out)
+        settings = load_config(config, preset, choose_model(model))
         if annotations is not None:
-            as_recorded = config_path is None and preset is None
-            study = _perceive_annotated(annotations, config, preset, model, study_name, seed, as_recorded=as_recorded)
+            recorded = _recorded(annotations.parent, settings, model) if config is None and preset is None else None
+            settings, notes = recorded or (settings, [])
+            found = _perceive_annotated(annotations, settings, study, seed, notes)
         else:
-            study = _perceive_set(folder, truth, config, preset, like_paper, seed)
-    metrics: dict[str, Any] = {"source": study.source, "seed": seed} | evaluation.evaluate(study.rows, seed)
+            manual_sd_deg = 1.5 if manual_sd is None else manual_sd
+            found = _perceive_set(labelled, truth, settings, manual_sd_deg if like_paper else None, seed)
+        found.source["preset"] = preset
+    metrics: dict[str, Any] = {"source": found.source, "seed": seed} | evaluation.evaluate(found.rows, seed)
     if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
         raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
-    metrics["notes"] = study.notes + metrics["notes"]
+    metrics["notes"] = found.notes + metrics["notes"]
     metrics["paper"] = PAPER
-    if study.agreement is not None:
-        _take_within(metrics, study.agreement["within"])
-        metrics["agreement"] = {key: value for key, value in study.agreement.items() if key != "measures"}
-    if like_paper is not None:
+    if found.agreement is not None:
+        _insert_repeatability(metrics, found.agreement["within"])
+        metrics["agreement"] = {key: value for key, value in found.agreement.items() if key != "measures"}
+    if like_paper:
         metrics["against_paper"] = against_paper(metrics)
     try:
-        _write(out, study.rows, metrics)
-        if study.agreement is not None:
-            write_measures(out / "raters.csv", study.agreement["measures"])
+        _write(out, found.rows, metrics)
+        if found.agreement is not None:
+            write_measures(out / "raters.csv", found.agreement["measures"])
     except OSError as error:
         raise EvaluationError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
     if (writer := progress_writer()) is not None:
@@ -169,15 +122,15 @@ def run_evaluate(
         sys.stdout.write(json.dumps(metrics, allow_nan=False) + "\n")
     else:
         print_tables(metrics)
-        if study.agreement is not None:
-            print_agreement(study.agreement, within=False)  # stands among the angles
+        if found.agreement is not None:
+            print_agreement(found.agreement, within=False)  # stands among the angles
         sys.stderr.write(f"report and figures are in {out}\n")
-    if study.interrupted:
+    if found.interrupted:
         raise KeyboardInterrupt
 
 
-def _take_within(metrics: dict[str, Any], within: dict[str, Any]) -> None:
-    """The SD of one manual measure is that of each rater's own repeats, where there are any: the columns are means over raters."""
+def _insert_repeatability(metrics: dict[str, Any], within: dict[str, Any]) -> None:
+    """Take the SD of one manual measure from the raters' own repeats, where there are any: the columns are means over raters."""
     manual = metrics["manual"]
     if within["n"] > 1:
         manual["repeatability_sd_deg"], manual["ci95"]["repeatability_sd_deg"] = within["sd_deg"], within["ci95"]
@@ -187,8 +140,8 @@ def _take_within(metrics: dict[str, Any], within: dict[str, Any]) -> None:
         )
 
 
-def _make_folder(out: Path) -> None:
-    """Before the work, so that nobody waits for results that cannot be kept."""
+def _make_out(out: Path) -> None:
+    """Make the folder before the work; raises EvaluationError."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -198,7 +151,7 @@ def _make_folder(out: Path) -> None:
 
 
 def _written_names() -> list[str]:
-    """All that ``--out`` gets, or loses because an earlier evaluation wrote it."""
+    """All files that are written to ``--out``, or removed there because an earlier evaluation wrote them."""
     from app.commands.figures import ENDINGS, FIGURES
 
     drawn = [f"{name}{ending}" for name in FIGURES for ending in ENDINGS]
@@ -208,10 +161,10 @@ def _written_names() -> list[str]:
 def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
     from app.commands.figures import ENDINGS, FIGURES, draw_figures, drawn
 
-    told = json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_atomic(out / "metrics.json", told.encode())
+    text = json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_atomic(out / "metrics.json", text.encode())
     write_measurements(out / "measurements.csv", rows)
-    (out / "raters.csv").unlink(missing_ok=True)  # of an earlier evaluation, as figures below; it would belie this one
+    (out / "raters.csv").unlink(missing_ok=True)  # of an earlier evaluation, as figures below
     figures = {
         name: {ending: drawn(figure, ending) for ending in ENDINGS}
         for name, figure in draw_figures(angle_pairs(rows), metrics).items()
@@ -237,34 +190,22 @@ def _annotation_file(given: Path, study: str | None) -> Path | None:
     return own if own.is_file() and (study is not None or not (given / "truth.jsonl").is_file()) else None
 
 
-def _perceive_annotated(
-    annotations: Path, config: Config, preset: str | None, model: str | None, study: str | None, seed: int, *, as_recorded: bool
-) -> _Study:
-    """Images that were annotated by hand, against the algorithm; those of a session as it was set in the session."""
+def _perceive_annotated(annotations: Path, config: Config, study: str | None, seed: int, notes: list[str]) -> _Study:
+    """Images that were annotated by hand, against the algorithm."""
     from app.annotator.comparison import comparable_answers, compare_with_algorithm, rater_agreement
     from app.annotator.sources import read_annotated
 
     answers, images = read_annotated(annotations, _places_of(annotations))
-    notes = []
-    recorded = _recorded(annotations.parent, config, model) if as_recorded else None
-    if recorded is not None:
-        config, told = recorded
-        notes += told
-    notes += _how_answered(annotations, answers, images, study)
-    done, told = comparable_answers(answers, images, config, study, str(annotations))
-    notes += told
+    notes = notes + _answer_notes(annotations, answers, images, study)
+    done, more = comparable_answers(answers, images, config, study, str(annotations))
     rows, reasons, engine, missed = compare_with_algorithm(done, images, config)
-    source: dict[str, Any] = {
-        "kind": "annotated by hand",
-        "name": name_as_text(name_of(annotations.parent)),
-        "model": config.perception.segmentation.model,
-    }
+    source: dict[str, Any] = {"kind": "annotated by hand", "name": name_as_text(name_of(annotations.parent))}
+    source |= {"model": config.perception.segmentation.model, "preset": None, "engine": engine, "refused": reasons, "study": study}
+    notes += more
     unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
     notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
     notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
-    agreement = rater_agreement(done, images, seed)
-    source |= {"preset": preset, "engine": engine, "refused": reasons, "study": study}
-    return _Study(rows, source, notes, agreement, interrupted=missed > 0)
+    return _Study(rows, source, notes, rater_agreement(done, images, seed), interrupted=missed > 0)
 
 
 def _places_of(annotations: Path) -> list[Path]:
@@ -279,10 +220,10 @@ def _places_of(annotations: Path) -> list[Path]:
     return [*own, *sorted(elsewhere)]
 
 
-def _how_answered(
+def _answer_notes(
     annotations: Path, answers: Sequence[StoredAnnotation], images: Sequence[FoundImage], study: str | None
 ) -> list[str]:
-    """What a reader must know of the manual answers: which are not among the figures, and which know the algorithm's own."""
+    """Notes on manual answers that are not among the figures, or that know the algorithm's own."""
     from core.annotation.agreement_report import choose_study, undecided
     from core.annotation.store import AnnotationStore
 
@@ -320,7 +261,7 @@ def _recorded(folder: Path, config: Config, model: str | None) -> tuple[Config, 
         return None
     try:
         manifest = read_manifest(folder)
-    except SessionError:  # damaged: then as now
+    except SessionError:  # damaged: evaluated with the present settings
         return None
     as_recorded, notes = replay_config(manifest, ReplayOptions(folder, model))
     if not notes:
@@ -355,7 +296,7 @@ def _read_set(folder: Path) -> list[_Truth]:
     found = []
     for sample in samples:
         row = truth[sample.stem]
-        if row.get("reason") == UNMEASURED:  # drawn to train on: nobody has said that it has no pose
+        if row.get("reason") == UNMEASURED:  # drawn to train on; it may have a pose
             continue
         theta, state = row.get("theta_deg"), row.get("state")
         angle, state = (float(theta), str(state)) if theta is not None and state is not None else (None, None)
@@ -366,66 +307,63 @@ def _read_set(folder: Path) -> list[_Truth]:
     return found
 
 
-def _perceive_set(
-    folder: Path, truth: list[_Truth], config: Config, preset: str | None, like_paper: LikePaper | None, seed: int
-) -> _Study:
-    """Perceive each image by itself; the truth (or two noisy measures of it) stands for the manual measure."""
+def _perceive_set(folder: Path, truth: list[_Truth], config: Config, manual_sd_deg: float | None, seed: int) -> _Study:
+    """Perceive each image by itself; the truth stands for the manual measure.
+
+    With `manual_sd_deg` it is a study like the paper's: its share of states, and two manual measures with an error of this SD.
+    After an interruption (Ctrl-C) the images until then are evaluated.
+    """
+    from core.files import ImageError, read_image
+    from core.perception.pipeline import open_pipeline
+
     notes: list[str] = []
     source: dict[str, Any] = {"kind": "labelled set", "name": name_as_text(name_of(folder))}
     measured: dict[str, tuple[float, float | None]] = {t.stem: (t.theta_deg, None) for t in truth if t.theta_deg is not None}
-    if like_paper is not None:
+    if manual_sd_deg is not None:
         states = {t.stem: t.state for t in truth if t.state is not None}
         chosen = choose_images(states, seed)
         if not chosen:
             raise EvaluationError(f"{folder}: has no image of the states B, C and D, which the paper's test consists of")
         truth = [t for t in truth if t.stem in set(chosen)]
         angles = [t.theta_deg for t in truth if t.theta_deg is not None]
-        measured = dict(zip([t.stem for t in truth], measure_twice(angles, like_paper.manual_sd_deg, seed), strict=True))
+        measured = dict(zip([t.stem for t in truth], measure_twice(angles, manual_sd_deg, seed), strict=True))
         wanted, having = wanted_images(), Counter(t.state for t in truth)
-        source |= {"kind": "study like the paper's", "wanted": wanted, "manual_sd_deg": like_paper.manual_sd_deg}
+        source |= {"kind": "study like the paper's", "wanted": wanted, "manual_sd_deg": manual_sd_deg}
         notes += [f"The set has {having[s]} of the {n} wanted images of state {s}." for s, n in wanted.items() if having[s] < n]
         notes.append(
             f"Built like the paper's test: {len(truth)} images drawn with seed {seed}; each manual angle is the true one with a "
-            f"normal error of {like_paper.manual_sd_deg:g}° (SD), the manual state is the true one."
+            f"normal error of {manual_sd_deg:g}° (SD), the manual state is the true one."
         )
-    done = _perceive(truth, measured, config)
-    rows, reasons = done.rows, dict(sorted(done.reasons.items()))
-    source |= {"model": config.perception.segmentation.model, "preset": preset, "engine": done.engine, "refused": reasons}
-    if done.interrupted:
-        notes.append(f"Interrupted after {len(rows)} of {len(truth)} images.")
-    if done.left_out:
-        notes.append(f"{len(done.left_out)} images could not be read and are left out.")
-    poseless = [row for row in rows if row.state is None]
-    if poseless:
-        answered = sum(row.algorithm_state is not None for row in poseless)
-        notes.append(f"{len(poseless)} images show no pose to measure (the algorithm answered {answered} of them).")
-    return _Study(rows, source, notes, interrupted=done.interrupted)
-
-
-def _perceive(truth: list[_Truth], measured: dict[str, tuple[float, float | None]], config: Config) -> _Perceived:
-    """Each image by itself; an interruption (Ctrl-C) keeps what was done until then."""
-    from core.files import ImageError, read_image
-    from core.perception.pipeline import open_pipeline
-
     pipeline = open_pipeline(config.perception)
-    done = _Perceived(pipeline.engine)
+    rows: list[Measurement] = []
+    reasons: Counter[str] = Counter()
+    left_out, interrupted = LeftOut(), False
     with progress_bar() as bar:
         try:
             for one in bar.track(truth, description="images"):
                 try:
                     image = read_image(one.image)
                 except ImageError as error:
-                    done.left_out.add(error)
+                    left_out.add(error)
                     continue
-                scene = pipeline.perceive_single(Frame(len(done.rows), 0.0, image))
+                scene = pipeline.perceive_single(Frame(len(rows), 0.0, image))
                 angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
                 first, second = measured.get(one.stem, (None, None))
-                done.rows.append(Measurement(name_as_text(one.stem), first, second, one.state, angle, state, one.group))
+                rows.append(Measurement(name_as_text(one.stem), first, second, one.state, angle, state, one.group))
                 if scene.refusal is not None and one.state is not None:
-                    done.reasons[scene.refusal.reason.value] += 1
+                    reasons[scene.refusal.reason.value] += 1
         except KeyboardInterrupt:
-            if not done.rows:
+            if not rows:
                 raise
-            done.interrupted = True
-    done.left_out.tell(len(done.rows))
-    return done
+            interrupted = True
+            notes.append(f"Interrupted after {len(rows)} of {len(truth)} images.")
+    left_out.print_note(len(rows))
+    model = config.perception.segmentation.model
+    source |= {"model": model, "preset": None, "engine": pipeline.engine, "refused": dict(sorted(reasons.items()))}
+    if left_out:
+        notes.append(f"{len(left_out)} images could not be read and are left out.")
+    poseless = [row for row in rows if row.state is None]
+    if poseless:
+        answered = sum(row.algorithm_state is not None for row in poseless)
+        notes.append(f"{len(poseless)} images show no pose to measure (the algorithm answered {answered} of them).")
+    return _Study(rows, source, notes, interrupted=interrupted)

@@ -1,4 +1,4 @@
-"""What an evaluation shows: the rows of its tables, on the terminal and in ``report.html``."""
+"""Tables of an evaluation, on the terminal and in ``report.html``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from core.evaluation.metrics import RESAMPLES
 from core.evaluation.paper import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureFormat, FigureKind, Verdict, verdict
 
 _NAMED = 8
-"""So many figures that are not bettered are named; the tables and ``against_paper`` in metrics.json have them all."""
+"""Figures that are not bettered are named up to this number; the tables have them all."""
 _AVERAGES = {"macro": "Macro average", "weighted": "Weighted average"}
 
 
@@ -98,7 +98,7 @@ def print_tables(metrics: Mapping[str, Any]) -> None:
 
 
 def _table(first: str, *others: str) -> Table:
-    """Without lines: the widest one fits into eighty columns."""
+    """Without lines, so that the widest one fits into eighty columns."""
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
     table.add_column(first, no_wrap=True)
     for heading in others:
@@ -147,7 +147,7 @@ def render_page(template: str, **values: Any) -> str:
 
 
 def _drawn(intervals: Mapping[str, Any]) -> str:
-    """What is said of the intervals in a sentence: images of one group are alike."""
+    """A sentence on the intervals: images of one group are alike."""
     groups = intervals["groups"]
     if intervals["drawn"] == "groups":
         return f"Whole groups (sessions or phantoms; {groups} of them) are drawn, since images of one are alike."

@@ -1,20 +1,12 @@
-"""The figures of an evaluation, for a paper: error distribution, Bland-Altman, scatter, confusion matrix, as SVG and PDF.
+"""Figures for a paper, as SVG and PDF: of an evaluation, of a replay, and of a campaign of trials.
 
-In SVG text is drawn as outlines, so that a figure looks the same everywhere; the mean line is red and the limits of agreement are
-green and dashed, as in the paper.
-
-How all figures for paper look: colours, type, lines; the same figure always gives the same file.
-
-The figure of a replay: theta and state before and after over time, how much theta and head moved, and the table of states.
-
-The figures of a campaign of trials: how path, force, time and offset spread, and where the head went.
+In SVG text is drawn as outlines, so that a figure looks the same everywhere; the same figure always gives the same file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -41,6 +33,20 @@ from core.types import PoseState
 from hardware.twin.phantoms import make_phantom
 
 INK, GREY, PALE, BLUE = "#1A1D21", "#6B727C", "#E4E7EB", "#0B5C94"
+GREEN, VERMILLION, ORANGE = ON_PICTURE.GREEN, ON_PICTURE.VERMILLION, ON_PICTURE.ORANGE  # the paper is always white
+_MEAN, _LIMIT = VERMILLION, GREEN
+"""Mean and limits of agreement, as in the paper."""
+_SIZE_IN = (3.46, 2.75)
+"""One column of a journal's page: 88 mm."""
+FIGURES = ("error_distribution", "bland_altman", "scatter", "confusion")
+ENDINGS = (".svg", ".pdf")
+_DATELESS: dict[str, dict[str, Any]] = {".svg": {"Date": None, "Creator": None}, ".pdf": {"CreationDate": None}}
+_MOST_POINTS = 3000
+"""Points of a curve: an hour has a hundred thousand frames, several per printed dot."""
+_LUMEN, _WALL = "#EEF1F4", "#C3CAD3"
+_MOST_N = 0.5
+"""Largest force that is allowed, and the end of the colour scale."""
+_FORCE = LinearSegmentedColormap.from_list("force", [BLUE, ORANGE, VERMILLION])
 _STYLE: Any = {
     "font.family": ["Inter", "DejaVu Sans"],
     "font.size": 7.5,
@@ -73,24 +79,17 @@ def styled() -> AbstractContextManager[None]:
     return mpl.rc_context(_STYLE)
 
 
-GREEN, VERMILLION = ON_PICTURE.GREEN, ON_PICTURE.VERMILLION  # on white paper, always
-_MEAN, _LIMIT = VERMILLION, GREEN
-_SIZE_IN = (3.46, 2.75)
-"""One column of a journal's page: 88 mm."""
-FIGURES = ("error_distribution", "bland_altman", "scatter", "confusion")
-ENDINGS = (".svg", ".pdf")
-_DATELESS: dict[str, dict[str, Any]] = {".svg": {"Date": None, "Creator": None}, ".pdf": {"CreationDate": None}}
-
-
 def draw_figures(pairs: AnglePairs, metrics: dict[str, Any]) -> dict[str, Figure]:
     """The figures there is something to draw for, by name."""
     figures: dict[str, Figure] = {}
     with styled():
         if len(pairs.manual_deg):
             for name, draw in (("error_distribution", error_distribution), ("bland_altman", bland_altman), ("scatter", scatter)):
-                figures[name] = _on_axes(partial(draw, pairs=pairs, angle=metrics["angle"]))
+                figures[name] = _new_figure(_SIZE_IN)
+                draw(figures[name].add_subplot(), pairs, metrics["angle"])
         if metrics["state"]["n"]:
-            figures["confusion"] = _on_axes(lambda axes: confusion(axes, metrics["state"]), (2.75, 2.65))
+            figures["confusion"] = _new_figure((2.75, 2.65))
+            confusion(figures["confusion"].add_subplot(), metrics["state"])
     return figures
 
 
@@ -104,15 +103,14 @@ def drawn(figure: Figure, ending: str) -> bytes:
 
 def save_figure(figure: Figure, path: Path) -> None:
     """``drawn`` to `path`, by its ending; raises OSError."""
-    # Drawn before: a disk that is full makes the PDF's writer fail in ways of its own.
+    # Drawn before writing: on a full disk the PDF's writer fails in ways of its own.
     write_atomic(path, drawn(figure, path.suffix))
 
 
-def _on_axes(draw: Callable[[Axes], None], size_in: tuple[float, float] = _SIZE_IN) -> Figure:
-    # A figure by itself: pyplot would keep it alive and could open a window.
+def _new_figure(size_in: tuple[float, float]) -> Figure:
+    # Without pyplot, which would keep the figure alive and could open a window.
     figure = Figure(figsize=size_in, layout="constrained")
     FigureCanvasAgg(figure)
-    draw(figure.add_subplot())
     return figure
 
 
@@ -230,10 +228,6 @@ def _round_step(rough: float) -> float:
     return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * (1 - 1e-9)))
 
 
-REPLAY_FIGURE_VERMILLION = ON_PICTURE.VERMILLION  # on white paper, always
-_MOST_POINTS = 3000
-"""An hour has a hundred thousand frames; nobody sees more than a few per printed dot."""
-
 _Floats = NDArray[np.float64]
 
 
@@ -241,8 +235,7 @@ def draw_replay(changes: Sequence[Change], matrix: list[list[int]], name: str) -
     """Two columns of a journal's page. `matrix` is that of ``summarise``; `name` the session's."""
     time_s = np.array([change.time_s for change in changes])
     with styled():
-        figure = Figure(figsize=(7.2, 4.4), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = _new_figure((7.2, 4.4))
         grid = figure.add_gridspec(4, 2, width_ratios=(3.1, 1.0), height_ratios=(2.6, 0.5, 1.3, 1.3))
         theta, band, moved, shifted = (figure.add_subplot(grid[row, 0]) for row in range(4))
         _draw_theta(theta, changes, time_s)
@@ -302,12 +295,12 @@ def _draw_states(axes: Axes, changes: Sequence[Change], time_s: _Floats) -> None
 
 
 def _draw_change(axes: Axes, time_s: _Floats, values: _Floats, label: str) -> None:
-    """The largest of each few frames: a peak of one frame must not be thinned away."""
+    """The largest of each few frames: a peak of one frame is not thinned away."""
     size = _thinned(len(values)).step
     full = np.abs(np.pad(values, (0, -len(values) % size), constant_values=np.nan)).reshape(-1, size)
     highest = np.max(np.nan_to_num(full, nan=-1.0), axis=1)
     highest[highest < 0.0] = np.nan
-    axes.plot(time_s[::size], highest, color=REPLAY_FIGURE_VERMILLION, lw=0.8, marker=".", ms=1.5)
+    axes.plot(time_s[::size], highest, color=VERMILLION, lw=0.8, marker=".", ms=1.5)
     axes.set_ylabel(label)
     axes.set_ylim(bottom=0.0)
 
@@ -330,27 +323,18 @@ def _draw_matrix(axes: Axes, matrix: list[list[int]]) -> None:
         spine.set_visible(False)
 
 
-TRIAL_GREEN, ORANGE, TRIAL_FIGURES_VERMILLION = (
-    ON_PICTURE.GREEN,
-    ON_PICTURE.ORANGE,
-    ON_PICTURE.VERMILLION,
-)  # on white paper, always
 Rows = Sequence[Mapping[str, Any]]
-_LUMEN, _WALL = "#EEF1F4", "#C3CAD3"
-_MOST_N = 0.5
-_FORCE = LinearSegmentedColormap.from_list("force", [BLUE, ORANGE, TRIAL_FIGURES_VERMILLION])
 
 
 def draw_spreads(by_policy: Mapping[str, Rows]) -> Figure:
     """One dot per trial and policy: path ratio, largest and 95th-percentile force, time, offset; bars are medians."""
     with styled():
-        figure = Figure(figsize=(7.2, 2.5), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = _new_figure((7.2, 2.5))
         panels: list[Axes] = list(figure.subplots(1, 4))
         for axes, (label, limit, values) in zip(panels, _panels(by_policy), strict=True):
             _dots(axes, values)
             if limit is not None:
-                axes.axhline(limit, color=TRIAL_FIGURES_VERMILLION, lw=0.9, ls="--", zorder=1)
+                axes.axhline(limit, color=VERMILLION, lw=0.9, ls="--", zorder=1)
             axes.set_title(label, fontsize=7.5, loc="left")
             axes.set_ylim(bottom=0.0)
             axes.set_xticks(range(len(values)), list(values))
@@ -384,18 +368,15 @@ def _dots(axes: Axes, values: Mapping[str, list[tuple[float, bool]]]) -> None:
         # Spread sideways by rank, so that the picture is the same every time.
         x = place + 0.44 * ((np.argsort(np.argsort(numbers, kind="stable")) * 0.618) % 1.0 - 0.5)
         axes.scatter(x[reached], numbers[reached], s=9, color=BLUE, linewidths=0, alpha=0.7, zorder=2)
-        axes.scatter(
-            x[~reached], numbers[~reached], s=10, facecolors="none", edgecolors=TRIAL_FIGURES_VERMILLION, linewidths=0.9, zorder=2
-        )
+        axes.scatter(x[~reached], numbers[~reached], s=10, facecolors="none", edgecolors=VERMILLION, linewidths=0.9, zorder=2)
         axes.plot([place - 0.3, place + 0.3], [np.median(numbers)] * 2, color=INK, lw=1.4, zorder=3)
 
 
 def draw_track(row: Mapping[str, Any]) -> Figure:
-    """The head's way over the phantom, coloured by contact force up to 0.5 N; a ring is the target, a cross the end of the way."""
+    """The head's track over the phantom, coloured by contact force up to 0.5 N; a ring is the target, a cross the end."""
     graph = make_phantom(row["phantom"]).graph
     with styled():
-        figure = Figure(figsize=(3.4, 2.6), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = _new_figure((3.4, 2.6))
         axes = figure.add_subplot()
         for margin, colour in ((0.5, _WALL), (0.0, _LUMEN)):
             for edge in graph.edges:
@@ -404,7 +385,7 @@ def draw_track(row: Mapping[str, Any]) -> Figure:
                 axes.fill(outline[:, 0], outline[:, 1], color=colour, lw=0, zorder=1 if margin else 2)
         for edge in graph.edges:
             axes.plot(edge.points[:, 0], edge.points[:, 1], color=GREY, lw=0.4, ls=(0, (4, 3)), zorder=3)
-        _draw_way(figure, axes, row)
+        _draw_head_track(figure, axes, row)
         axes.set_aspect("equal")
         axes.invert_yaxis()
         axes.set_axis_off()
@@ -412,7 +393,7 @@ def draw_track(row: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def _draw_way(figure: Figure, axes: Axes, row: Mapping[str, Any]) -> None:
+def _draw_head_track(figure: Figure, axes: Axes, row: Mapping[str, Any]) -> None:
     track = row["track"]
     points = np.column_stack([track["x_mm"], track["y_mm"]])
     if len(points) > 1:
@@ -425,4 +406,4 @@ def _draw_way(figure: Figure, axes: Axes, row: Mapping[str, Any]) -> None:
         bar.outline.set_edgecolor(PALE)
     if len(points):
         axes.plot(*points[-1], marker="x", color=INK, ms=5, zorder=5)
-    axes.plot(*row["target_mm"], marker="o", mfc="none", mec=TRIAL_GREEN, mew=1.4, ms=8, zorder=5)
+    axes.plot(*row["target_mm"], marker="o", mfc="none", mec=GREEN, mew=1.4, ms=8, zorder=5)

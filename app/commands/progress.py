@@ -193,3 +193,36 @@ def check_no_session(folder: Path, option: str) -> None:
     """Raise UserError when `folder`, given by `option`, is a recorded session, whose files must stay as they are."""
     if any((folder / name).is_file() for name in (MANIFEST, FRAMES, EVENTS)) or any(folder.glob("video_*.mkv")):
         raise UserError(f"{folder}: is a recorded session, which {option} would damage; choose another folder")
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for results; raises UserError where it cannot be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".write-probe"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
+
+
+class LeftOut:
+    """Frames of a set that cannot be read: one damaged picture does not end a night's run. The same problem counts once."""
+
+    def __init__(self) -> None:
+        self._problems: dict[str, None] = {}
+
+    def __len__(self) -> int:
+        return len(self._problems)
+
+    def add(self, error: UserError) -> None:
+        self._problems[str(error)] = None
+
+    def print_note(self, done: int) -> None:
+        """On standard error; raises UserError where nothing at all was `done`."""
+        if not self._problems:
+            return
+        first = next(iter(self._problems))
+        if not done:
+            raise UserError(f"none of {len(self)} frames could be read; the first: {first}")
+        sys.stderr.write(f"note: {len(self)} of {len(self) + done} frames could not be read and are left out; the first: {first}\n")

@@ -1,11 +1,4 @@
-"""``replay``: perceive recorded sessions again, with another model or configuration, and show what changed.
-
-One recorded session perceived again, with the recorded targets, by itself or in a worker.
-
-``replay`` of many sessions: over processes or a Dask cluster, with all their frames in sum.
-
-What ``replay`` prints: frames before and after in sum, the table of states, and the frames that changed most.
-"""
+"""``replay``: perceive recorded sessions again, with another model or configuration, and show what changed."""
 
 from __future__ import annotations
 
@@ -27,8 +20,7 @@ from rich.table import Table
 from rich.text import Text
 
 from app.commands.options import ConfigOption, PresetOption, SchedulerOption
-from app.commands.perceive import _make_folder
-from app.commands.progress import Interrupt, LineOutput, check_apart, check_no_input, check_no_session, progress_bar
+from app.commands.progress import Interrupt, LineOutput, check_apart, check_no_input, check_no_session, make_folder, progress_bar
 from app.commands.workers import over_cluster, over_processes
 from app.ui.texts import signed_degrees
 from core.config.models import Config, choose_model, load_config, merge
@@ -42,20 +34,22 @@ from core.session.reader import SessionReader, check_is_session
 from core.types import Frame, Scene
 
 if TYPE_CHECKING:
-    from core.control.engine import Perceive
     from core.perception.pipeline import Pipeline
 
 
 MOST_SHOWN = 20
-"""So many of the frames that changed most."""
+"""Frames that changed most, and runs of lost and gained poses, that are shown."""
+_WRITTEN = ("replay.json", "changes.jsonl", "replay.svg", "replay.pdf")
+"""Files of ``--out``."""
+_DASH = "\N{EN DASH}"
 
 Watch = Callable[[int], AbstractContextManager[Callable[[], bool]]]
-"""Around the frames of a session, of which there are so many; asked before each whether to go on."""
+"""A context around so many frames of a session; its value is asked before each frame whether to go on."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayOptions:
-    """How to perceive a session again; None: not given. ``threads`` are the network's; None: as configured."""
+    """How to perceive a session again; None: not given. ``threads``: of the network; None: as configured."""
 
     session: Path
     model: str | None = None
@@ -67,29 +61,25 @@ class ReplayOptions:
 
     @property
     def overrides(self) -> dict[str, Any]:
-        """Of a configuration, by what wins over it."""
+        """Settings that override a configuration's."""
         overrides = choose_model(self.model)
         if self.threads is not None:
             overrides.setdefault("perception", {}).setdefault("segmentation", {})["threads"] = self.threads
         return overrides
 
 
-@dataclass(frozen=True, slots=True)
-class SessionReplay:
-    """What came of a session: all its frames, and the object of ``--json`` that tells them in sum."""
-
-    changes: list[Change]
-    result: dict[str, Any]
-    interrupted: bool = False
-
-
 @dataclass(slots=True)
-class _Replayed:
+class SessionReplay:
+    """The frames of a session before and after; ``result`` is the object of ``--json``. ``problem``: why there are no frames."""
+
+    session: Path
     changes: list[Change] = field(default_factory=list)
+    result: dict[str, Any] = field(default_factory=dict)
     no_row: int = 0
     no_picture: int = 0
     ended: str = "all frames"
     interrupted: bool = False
+    problem: str = ""
 
 
 @contextmanager
@@ -109,32 +99,45 @@ def replay_session(options: ReplayOptions, watch: Watch = unwatched) -> SessionR
         with LineOutput(options.jsonl) if options.jsonl is not None else nullcontext() as lines:
             done = replay_frames(reader, pipeline, lines, watch)
         problems = list(reader.problems)
-    if done.interrupted and not done.changes:
-        raise KeyboardInterrupt
+        before = dict(reader.manifest.model) if reader.manifest is not None else {}
     if not done.changes:
+        if done.interrupted:
+            raise KeyboardInterrupt
         first = f"; the first: {problems[0]}" if problems else ""
         raise SessionError(f"{options.session}: no frame that could be perceived again{first}")
-    before = dict(reader.manifest.model) if reader.manifest is not None else {}
-    return SessionReplay(done.changes, _result(options, done, before, after, notes, problems), done.interrupted)
+    done.result = {
+        "session": name_as_text(options.session),
+        "ended": done.ended,
+        "before": {"name": before.get("name"), "sha256": before.get("sha256")},
+        "after": after | {"preset": options.preset, "config": name_as_text(options.config_path) if options.config_path else None},
+        **ReplayTally.of(done.changes).to_json(),
+        "without_picture": done.no_picture,
+        "without_row": done.no_row,
+        "notes": notes,
+        "problems": problems,
+    }
+    if options.diff:
+        done.result["changed_most"] = [change_to_json(change) for change in changed_most(done.changes, MOST_SHOWN)]
+    return done
 
 
-class _Opened(threading.local):
-    """The last perception of this thread: loading the network takes over a second, and sessions are recorded alike."""
+class _LastPipeline(threading.local):
+    """The last pipeline of this thread: loading the network takes over a second, and sessions are recorded alike."""
 
     key = ""
     pipeline: Pipeline | None = None
 
 
-_opened = _Opened()
+_last = _LastPipeline()
 
 
 def _pipeline_for(config: Config) -> Pipeline:
     from core.perception.pipeline import open_pipeline
 
     key = config.perception.model_dump_json()
-    if _opened.pipeline is None or _opened.key != key:
-        _opened.pipeline, _opened.key = open_pipeline(config.perception), key
-    return _opened.pipeline
+    if _last.pipeline is None or _last.key != key:
+        _last.pipeline, _last.key = open_pipeline(config.perception), key
+    return _last.pipeline
 
 
 def replay_config(manifest: Manifest | None, options: ReplayOptions) -> tuple[Config, list[str]]:
@@ -158,17 +161,18 @@ def replay_config(manifest: Manifest | None, options: ReplayOptions) -> tuple[Co
 
 
 def model_of(config: Config) -> dict[str, Any]:
+    """Name and digests of the configured model."""
     name = config.perception.segmentation.model
     info = read_model_info(model_folder(name), verify=())
     return {"name": name, "sha256": info.weights_sha256, "second_look_sha256": info.second_look_sha256}
 
 
 def model_note(manifest: Manifest | None, config: Config, after: dict[str, Any]) -> list[str]:
-    """What must be known to read the figures: the same name may be another model, and the same model never sees the same pixels."""
+    """Notes on the figures: the same name may be another model, and the same model never gets the same pixels."""
     if manifest is None:
         return []
     before = manifest.model
-    # Recordings from before the second look was noted say nothing of it.
+    # Older recordings do not name the tip refinement.
     same_near = "second_look_sha256" not in before or before["second_look_sha256"] == after["second_look_sha256"]
     same_weights = before.get("sha256") == after["sha256"] and same_near
     if before.get("name") == after["name"] and not same_weights:
@@ -182,13 +186,19 @@ def model_note(manifest: Manifest | None, config: Config, after: dict[str, Any])
 
 def replay_frames(
     reader: SessionReader, pipeline: Pipeline, lines: LineOutput | None = None, watch: Watch = unwatched
-) -> _Replayed:
-    """All frames once more with the recorded targets, as a stream where they were one; whoever ends it keeps what is done."""
-    done = _Replayed()
+) -> SessionReplay:
+    """Perceive all frames with the recorded targets, as a stream where they were one, until `watch` ends it."""
+    done = SessionReplay(reader.folder)
     targets = RecordedTargets(reader.events)
     first_s: float | None = None
-    perceive = pipeline if _was_stream(reader.manifest) else pipeline.perceive_single
-    _warm_up(reader, pipeline, perceive)
+    rig = reader.manifest.config.get("rig") if reader.manifest is not None else None
+    is_stream = not (isinstance(rig, dict) and rig.get("camera") == "image_folder")
+    perceive = pipeline if is_stream else pipeline.perceive_single
+    # The first picture waits for the network's first run, which would spoil the latency.
+    pipeline.warm_up()
+    if len(reader) and (frame := reader.frame(0)) is not None:
+        perceive(frame)
+    pipeline.reset()
     with watch(len(reader)) as may_go_on:
         for place in range(len(reader)):
             if not may_go_on():
@@ -217,45 +227,6 @@ def replay_frames(
     return done
 
 
-def _was_stream(manifest: Manifest | None) -> bool:
-    """Whether the frames follow each other; the pictures of a folder have nothing to do with each other, and were perceived so."""
-    rig = manifest.config.get("rig") if manifest is not None else None
-    return not (isinstance(rig, dict) and rig.get("camera") == "image_folder")
-
-
-def _warm_up(reader: SessionReader, pipeline: Pipeline, perceive: Perceive) -> None:
-    """The first picture waits for the network's first run, which would spoil the latency."""
-    pipeline.warm_up()
-    frame = reader.frame(0) if len(reader) else None
-    if frame is not None:
-        perceive(frame)
-    pipeline.reset()
-
-
-def _result(
-    options: ReplayOptions,
-    done: _Replayed,
-    before: dict[str, Any],
-    after: dict[str, Any],
-    notes: list[str],
-    problems: list[str],
-) -> dict[str, Any]:
-    result = {
-        "session": name_as_text(options.session),
-        "ended": done.ended,
-        "before": {"name": before.get("name"), "sha256": before.get("sha256")},
-        "after": after | {"preset": options.preset, "config": name_as_text(options.config_path) if options.config_path else None},
-        **ReplayTally.of(done.changes).to_json(),
-        "without_picture": done.no_picture,
-        "without_row": done.no_row,
-        "notes": notes,
-        "problems": problems,
-    }
-    if options.diff:
-        result["changed_most"] = [change_to_json(change) for change in changed_most(done.changes, MOST_SHOWN)]
-    return result
-
-
 def change_to_json(change: Change) -> dict[str, Any]:
     """One frame before and after, as plain JSON values."""
     both = {"before": change.before, "after": change.after}
@@ -281,11 +252,6 @@ def change_to_json(change: Change) -> dict[str, Any]:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None else round(float(value), 4)
-
-
-_CHANGES = "changes.jsonl"
-_WRITTEN = ("replay.json", _CHANGES, "replay.svg", "replay.pdf")
-"""What ``--out`` gets."""
 
 
 def replay(
@@ -317,7 +283,7 @@ def replay(
 
 
 def run_replay(options: ReplayOptions, out: Path | None = None, *, as_json: bool = False) -> None:
-    """Replay one session and tell; raises UserError, and KeyboardInterrupt once all is told."""
+    """Replay one session and print the results; raises UserError, and KeyboardInterrupt at the end."""
     check_is_session(options.session)
     if out is not None:
         prepare_out(out)
@@ -329,7 +295,15 @@ def run_replay(options: ReplayOptions, out: Path | None = None, *, as_json: bool
     done = replay_session(options, _watched)
     if out is not None:
         write_replay(out, name_as_text(name_of(options.session)), done.changes, done.result)
-    _tell(done.result, done.changes, with_diff=options.diff, as_json=as_json)
+    result = done.result
+    if as_json:
+        sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
+    else:
+        print_replay(result, done.changes, with_diff=options.diff)
+    for note in result["notes"]:
+        sys.stderr.write(f"note: {note}\n")
+    if result["without_picture"] or result["without_row"]:
+        sys.stderr.write(f"note: {result['without_picture']} pictures and {result['without_row']} rows are lost\n")
     if out is not None:
         sys.stderr.write(f"figures and frames are in {out}\n")
     if done.interrupted:
@@ -338,7 +312,7 @@ def run_replay(options: ReplayOptions, out: Path | None = None, *, as_json: bool
 
 @contextmanager
 def _watched(count: int) -> Iterator[Callable[[], bool]]:
-    """A bar, and Ctrl-C keeps what is done."""
+    """A ``Watch`` with a bar, which Ctrl-C ends."""
     with Interrupt() as interrupt, progress_bar() as bar:
         task = bar.add_task("frames", total=count)
 
@@ -355,7 +329,7 @@ def prepare_out(out: Path) -> None:
     if (out / "replay.json").is_file() and not (out / MANIFEST).exists():
         (out / FRAMES).unlink(missing_ok=True)  # what earlier versions wrote there made the folder look like a session
     check_no_session(out, "--out")
-    _make_folder(out)
+    make_folder(out)
 
 
 def write_replay(out: Path, name: str, changes: Sequence[Change], result: dict[str, Any]) -> None:
@@ -364,7 +338,7 @@ def write_replay(out: Path, name: str, changes: Sequence[Change], result: dict[s
 
     try:
         (out / "replay.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        with (out / _CHANGES).open("w", encoding="utf-8") as file:
+        with (out / "changes.jsonl").open("w", encoding="utf-8") as file:
             file.writelines(json.dumps(change_to_json(change), allow_nan=False) + "\n" for change in changes)
         figure = draw_replay(changes, result["states"]["matrix"], name)
         for ending in (".svg", ".pdf"):
@@ -373,33 +347,9 @@ def write_replay(out: Path, name: str, changes: Sequence[Change], result: dict[s
         raise UserError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
 
 
-def _tell(result: dict[str, Any], changes: Sequence[Change], *, with_diff: bool, as_json: bool) -> None:
-
-    if as_json:
-        sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
-    else:
-        print_replay(result, changes, with_diff=with_diff, count=MOST_SHOWN)
-    for note in result["notes"]:
-        sys.stderr.write(f"note: {note}\n")
-    if result["without_picture"] or result["without_row"]:
-        sys.stderr.write(f"note: {result['without_picture']} pictures and {result['without_row']} rows are lost\n")
-
-
-_SUMS = "replays.json"
-
-
-@dataclass(frozen=True, slots=True)
-class _Outcome:
-    """What came of a session: its frames, or in one line why there are none."""
-
-    session: Path
-    done: SessionReplay | None
-    problem: str = ""
-
-
 @dataclass(slots=True)
 class _Sums:
-    """Of the sessions so far; of their frames only those that changed most."""
+    """Results of the sessions so far; of their frames only those that changed most. ``broken``: the error that ended it."""
 
     results: dict[Path, dict[str, Any]] = field(default_factory=dict)
     problems: dict[Path, str] = field(default_factory=dict)
@@ -407,30 +357,22 @@ class _Sums:
     worst: list[tuple[str, Change]] = field(default_factory=list)
     interrupted: bool = False
     broken: UserError | None = None
-    """What ended it before its time: a worker, the cluster, a full disk."""
 
-    def add(self, outcome: _Outcome) -> None:
-        """A session that could not be perceived again is told, and the others go on."""
-        done = outcome.done
-        if done is None:
-            self.problems[outcome.session] = outcome.problem
+    def add(self, done: SessionReplay) -> None:
+        """Add a session, or its problem."""
+        if done.problem:
+            self.problems[done.session] = done.problem
             return
-        self.results[outcome.session] = done.result
+        self.results[done.session] = done.result
         self.interrupted = self.interrupted or done.interrupted
         self.tally += ReplayTally.of(done.changes)
-        name = name_as_text(name_of(outcome.session))
+        name = name_as_text(name_of(done.session))
         found = [*self.worst, *((name, change) for change in changed_most(done.changes, MOST_SHOWN))]
         self.worst = sorted(found, key=lambda one: -one[1].size_deg)[:MOST_SHOWN]
 
 
 def sessions_in(paths: Sequence[Path]) -> list[Path]:
-    """Each path that is a session, and the sessions in each that is a folder of them, by name; each once.
-
-    Raises
-    ------
-    SessionError
-        A path is neither.
-    """
+    """Each path that is a session, and the sessions in each that is a folder of them, by name; raises SessionError."""
     found: dict[Path, Path] = {}
     for path in paths:
         try:
@@ -457,24 +399,24 @@ def _is_session(path: Path) -> bool:
 def run_replays(
     sessions: Sequence[Path], options: ReplayOptions, out: Path | None, *, workers: int, scheduler: str | None, as_json: bool
 ) -> None:
-    """Replay them all and tell; raises UserError, and KeyboardInterrupt once all that was done is told.
-
-    Parameters
-    ----------
-    options : for each of them; its session says nothing.
-    """
+    """Replay all sessions with the other options and print the results; raises UserError, and KeyboardInterrupt at the end."""
     if options.jsonl is not None:
         raise UserError("--jsonl is for one session: give --out, which takes the frames of each")
     if options.model is not None or options.config_path is not None or options.preset is not None:
         check_model(load_config(options.config_path, options.preset, options.overrides).perception.segmentation.model)
     if out is not None:
-        _prepare(out, sessions)
+        name, count = Counter(map(name_of, sessions)).most_common(1)[0]
+        if count > 1:
+            name = name_as_text(name)
+            raise UserError(f"{count} sessions are called {name}, and --out has one folder for each name: replay them one by one")
+        for folder in (*(out / name_of(session) for session in sessions), out):
+            prepare_out(folder)
     if workers > 1 or scheduler is not None:  # one thread each: workers must not fight for the cores
         options = replace(options, threads=1)
     sums = _Sums()
     _run(sums, [session.absolute() for session in sessions], options, out, workers, scheduler)
     if sums.results:
-        _tell_campaign(sums, len(sessions), out, with_diff=options.diff, as_json=as_json)
+        _print_campaign(sums, len(sessions), out, with_diff=options.diff, as_json=as_json)
     if sums.broken is not None:
         raise sums.broken
     if sums.interrupted:
@@ -482,18 +424,6 @@ def run_replays(
     if not sums.results:
         first = next(iter(sums.problems.values()))
         raise SessionError(f"none of {len(sessions)} sessions could be perceived again; the first: {first}")
-
-
-def _prepare(out: Path, sessions: Sequence[Path]) -> None:
-    """Each session has a folder in it, by its name."""
-    name, count = Counter(map(name_of, sessions)).most_common(1)[0]
-    if count > 1:
-        raise UserError(
-            f"{count} sessions are called {name_as_text(name)}, and --out has one folder for each name: replay them one by one"
-        )
-    for session in sessions:
-        prepare_out(out / name_of(session))
-    prepare_out(out)
 
 
 def _run(sums: _Sums, sessions: list[Path], options: ReplayOptions, out: Path | None, workers: int, scheduler: str | None) -> None:
@@ -513,17 +443,17 @@ def _run(sums: _Sums, sessions: list[Path], options: ReplayOptions, out: Path | 
 
                 yield may_go_on
 
-            outcomes: Iterator[_Outcome] = (replay_one(options, session, watch) for session in sessions)
+            replays: Iterator[SessionReplay] = (replay_one(options, session, watch) for session in sessions)
         elif scheduler is not None:
-            outcomes = over_cluster(scheduler, partial(replay_one, options), sessions)
+            replays = over_cluster(scheduler, partial(replay_one, options), sessions)
         else:
-            outcomes = over_processes(min(workers, len(sessions)), partial(replay_one, options), sessions)
+            replays = over_processes(min(workers, len(sessions)), partial(replay_one, options), sessions)
         try:
-            for outcome in outcomes:
-                if outcome.done is not None and out is not None:
-                    name = name_of(outcome.session)
-                    write_replay(out / name, name_as_text(name), outcome.done.changes, outcome.done.result)
-                sums.add(outcome)
+            for done in replays:
+                if not done.problem and out is not None:
+                    name = name_of(done.session)
+                    write_replay(out / name, name_as_text(name), done.changes, done.result)
+                sums.add(done)
                 bar.advance(task)
                 if sums.interrupted:
                     return
@@ -533,15 +463,15 @@ def _run(sums: _Sums, sessions: list[Path], options: ReplayOptions, out: Path | 
             sums.broken = error
 
 
-def replay_one(options: ReplayOptions, session: Path, watch: Watch = unwatched) -> _Outcome:
-    """One session, in this thread. A path must lead to it on each machine of a cluster."""
+def replay_one(options: ReplayOptions, session: Path, watch: Watch = unwatched) -> SessionReplay:
+    """One session, in this thread; its problem where it cannot be perceived again."""
     try:
-        return _Outcome(session, replay_session(replace(options, session=session), watch))
+        return replay_session(replace(options, session=session), watch)
     except UserError as error:
-        return _Outcome(session, None, str(error))
+        return SessionReplay(session, problem=str(error))
 
 
-def _tell_campaign(sums: _Sums, count: int, out: Path | None, *, with_diff: bool, as_json: bool) -> None:
+def _print_campaign(sums: _Sums, count: int, out: Path | None, *, with_diff: bool, as_json: bool) -> None:
     results = [sums.results[session] for session in sorted(sums.results)]
     done = len(sums.results) + len(sums.problems)
     total: dict[str, Any] = {
@@ -555,9 +485,9 @@ def _tell_campaign(sums: _Sums, count: int, out: Path | None, *, with_diff: bool
     if out is not None:
         try:
             text = json.dumps({"all": total, "each": results}, indent=1, allow_nan=False)
-            (out / _SUMS).write_text(text + "\n", encoding="utf-8")
+            (out / "replays.json").write_text(text + "\n", encoding="utf-8")
         except OSError as error:
-            raise UserError(f"{out / _SUMS}: cannot be written ({error.strerror or error})") from None
+            raise UserError(f"{out / 'replays.json'}: cannot be written ({error.strerror or error})") from None
     if as_json:
         sys.stdout.writelines(json.dumps(line, allow_nan=False) + "\n" for line in [*results, total])
     else:
@@ -571,26 +501,25 @@ def _tell_campaign(sums: _Sums, count: int, out: Path | None, *, with_diff: bool
         sys.stderr.write(f"figures and frames of each are in {out}\n")
 
 
-_MOST_RUNS = 20
-_DASH = "\N{EN DASH}"
-
-
-def print_replay(result: dict[str, Any], changes: Sequence[Change], *, with_diff: bool, count: int) -> None:
-    """On standard output."""
+def print_replay(result: dict[str, Any], changes: Sequence[Change], *, with_diff: bool) -> None:
+    """Tables of one session on standard output."""
     console = Console(markup=False, emoji=False)
-    console.print(_sums(result))
-    console.print(_states(result["states"]["matrix"]))
-    if with_diff:
-        console.print(_frames(changed_most(changes, count), count))
-        _print_runs(console, changes)
+    console.print(_sums(result), _states(result["states"]["matrix"]), sep="\n")
+    if not with_diff:
+        return
+    console.print(_frames(changed_most(changes, MOST_SHOWN), MOST_SHOWN))
+    found = runs(changes)
+    for run in found[:MOST_SHOWN]:
+        rows = f"row {run.first}" if run.frames == 1 else f"rows {run.first} to {run.last}"
+        console.print(f"{run.kind} at {rows}: {run.reason}", soft_wrap=True)
+    if len(found) > MOST_SHOWN:
+        console.print(f"and {len(found) - MOST_SHOWN} more places where a pose was lost or gained", soft_wrap=True)
 
 
 def print_replays(results: Sequence[dict[str, Any]], total: dict[str, Any], worst: Sequence[tuple[str, Change]] | None) -> None:
-    """Of many sessions, and of all of them in sum, on standard output. `worst`: frames that changed most, by session."""
+    """Tables of many sessions and their sum on standard output. `worst`: frames that changed most, by session."""
     console = Console(markup=False, emoji=False)
-    console.print(_sessions(results))
-    console.print(_sums(total))
-    console.print(_states(total["states"]["matrix"]))
+    console.print(_sessions(results), _sums(total), _states(total["states"]["matrix"]), sep="\n")
     if worst is not None:
         console.print(_frames([change for _, change in worst], len(worst), [name for name, _ in worst]))
 
@@ -658,17 +587,10 @@ def _frames(worst: Sequence[Change], count: int, sessions: Sequence[str] | None 
     table = Table(title=title if worst else "No frame changed")
     if sessions is not None:
         table.add_column("session", overflow="fold")
-    for heading, is_number in (
-        ("row", True),
-        ("time (s)", True),
-        ("theta before", True),
-        ("after", True),
-        ("change", True),
-        ("head shift (px)", True),
-        ("state", False),
-        ("reason", False),
-    ):
-        table.add_column(heading, justify="right" if is_number else "left")
+    for heading in ("row", "time (s)", "theta before", "after", "change", "head shift (px)"):
+        table.add_column(heading, justify="right")
+    table.add_column("state")
+    table.add_column("reason")
     for place, change in enumerate(worst):
         told_by = change.before if change.before.reason is not None else change.after
         table.add_row(
@@ -687,12 +609,3 @@ def _frames(worst: Sequence[Change], count: int, sessions: Sequence[str] | None 
 
 def _theta(side: FrameResult) -> str:
     return _DASH if side.theta_signed_deg is None else signed_degrees(side.theta_signed_deg, 1)
-
-
-def _print_runs(console: Console, changes: Sequence[Change]) -> None:
-    found = runs(changes)
-    for run in found[:_MOST_RUNS]:
-        rows = f"row {run.first}" if run.frames == 1 else f"rows {run.first} to {run.last}"
-        console.print(f"{run.kind} at {rows}: {run.reason}", soft_wrap=True)
-    if len(found) > _MOST_RUNS:
-        console.print(f"and {len(found) - _MOST_RUNS} more places where a pose was lost or gained", soft_wrap=True)

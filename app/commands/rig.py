@@ -76,8 +76,8 @@ def show(name: RigName, as_json: JsonOption = False) -> None:
 
 def _print_rig(path: Path, found: RigFile, notes: list[str] | None = None, *, as_json: bool) -> None:
     if as_json:
-        told = {"path": str(path)} | ({} if notes is None else {"notes": notes})
-        sys.stdout.write(json.dumps({**told, **found.model_dump(mode="json")}) + "\n")
+        result = {"path": str(path)} | ({} if notes is None else {"notes": notes})
+        sys.stdout.write(json.dumps({**result, **found.model_dump(mode="json")}) + "\n")
     else:
         lines = [f"{found.name} ({path})", rig_line(found), *calibration_lines(found), *(notes or [])]
         sys.stdout.write("\n".join(lines) + "\n")

@@ -1,6 +1,6 @@
-"""Work over processes of this machine: ``--workers``.
+"""Work over processes of this machine (``--workers``) or the machines of a Dask cluster (``--scheduler ADDRESS``).
 
-Work on the machines of a Dask cluster: ``--scheduler ADDRESS``. Each of them has LumenPilot's folder, at the same state.
+Each machine of a cluster has LumenPilot's folder, in the same version.
 """
 
 from __future__ import annotations
@@ -31,13 +31,7 @@ class WorkerEnded(UserError):
 
 
 def over_processes(workers: int, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
-    """Results as they come, of so many processes with one thread each. What runs when the iterator is closed is ended.
-
-    Raises
-    ------
-    WorkerEnded
-        A process was ended from outside.
-    """
+    """Results as they come, of so many processes with one thread each; closing the iterator ends them. Raises WorkerEnded."""
     # Spawned, not forked: physics, OpenCV and OpenVINO own threads that a fork would cut off.
     context = multiprocessing.get_context("spawn")
     with _one_thread_each(), ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
@@ -50,12 +44,12 @@ def over_processes(workers: int, function: Callable[[Task], Result], tasks: Sequ
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
             for worker in multiprocessing.active_children():
-                worker.terminate()  # nothing runs any more unless it was interrupted
+                worker.terminate()  # only after an interruption one still runs
 
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Numeric libraries read their number of threads once, at import: it must be in the environment that a worker inherits."""
+    """Numeric libraries read their number of threads at import, from the environment that a worker inherits."""
     before = os.environ.get("OMP_NUM_THREADS")
     os.environ["OMP_NUM_THREADS"] = "1"
     try:
@@ -75,8 +69,8 @@ def _start_worker() -> None:
 
 
 _ROOT = Path(__file__).resolve().parents[2]
-_STATE = ("app/**/*.py", "core/**/*.py", "hardware/**/*.py", "resources/models/**/*.safetensors")
-"""What decides of a trial or a frame: the code, and the weights that a model's name stands for."""
+_STATE = ("app/**/*.py", "core/**/*.py", "hardware/**/*.py", "resources/models/**/*.onnx")
+"""What a trial or a frame depends on: the code, and the networks of the models."""
 _TIMEOUT = "10s"
 _START = "in LumenPilot's folder: .venv/bin/python -m dask worker {address} --nworkers 2 --nthreads 1"
 
@@ -89,17 +83,17 @@ class ClusterError(UserError):
 
 
 def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
-    """Results as they come. What has not begun when the iterator is closed is cancelled.
+    """Results as they come; closing the iterator cancels what has not begun.
 
     Raises
     ------
     ClusterError
         No scheduler answers, it has no workers, or a worker cannot run this code or has other code.
     """
-    if not _PORT.search(address):  # of this the client makes its own error, and waits for it as for an answer
+    if not _PORT.search(address):  # the client would wait as for an answer
         raise ClusterError(f"--scheduler {address}: says no port; give it as HOST:PORT, as the scheduler tells it")
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told here, in one line
-    distributed = importlib.import_module("distributed")  # a second that only who asks for it pays
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are one line of ours
+    distributed = importlib.import_module("distributed")  # takes a second
     try:
         client = distributed.Client(address, timeout=_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -114,7 +108,7 @@ def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequen
         try:
             for future in distributed.as_completed(futures, loop=client.loop):
                 result = future.result()
-                future.release()  # or its worker would keep it until the last one is done
+                future.release()  # or its worker would keep it to the end
                 yield result
         except distributed.KilledWorker:
             raise ClusterError(
@@ -128,7 +122,7 @@ def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequen
 
 
 def _check_workers(client: Any, address: str) -> None:
-    """Without workers a campaign would wait for ever, and with another version's its figures would be of two programs."""
+    """Raise ClusterError without workers, or with one of another version, whose results would not compare."""
     start = _START.format(address=address)
     if not client.scheduler_info(n_workers=-1)["workers"]:
         raise ClusterError(f"--scheduler {address}: has no workers; start some, {start}")
@@ -154,9 +148,9 @@ def _check_workers(client: Any, address: str) -> None:
 
 @cache
 def code_of_worker() -> str:
-    """What this process runs: SHA-256 of the program's files and models, as they were when it was asked first."""
-    told = hashlib.sha256()
+    """SHA-256 of the program's files and models, as they were at the first call in this process."""
+    digest = hashlib.sha256()
     for pattern in _STATE:
         for path in sorted(_ROOT.glob(pattern)):
-            told.update(f"{path.relative_to(_ROOT).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
-    return told.hexdigest()
+            digest.update(f"{path.relative_to(_ROOT).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()

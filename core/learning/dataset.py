@@ -1,8 +1,6 @@
 """Labelled frames on disk: ``images/<stem>.png``, ``masks/<stem>_vessel.png``, ``masks/<stem>_robot.png``, ``truth.jsonl``.
 
 ``synth`` writes this layout and ``train --data`` reads it; truth is optional for training.
-
-Decoded frames, kept in memory as far as they fit: decoding one costs more than cutting a window out of it.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ from core.types import Image, Mask
 WORKING_SIZE_PX = 640
 """Longer side at which networks are trained: the default of ``perception.working_size_px``."""
 UNMEASURED = "not measured by hand"
-"""The `reason` of a frame with masks whose pose nobody has told: it may well have one."""
+"""The `reason` of a frame with masks whose pose was not measured: it may well have one."""
 IMAGE_ENDINGS = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
 
@@ -63,7 +61,7 @@ class Sample:
 
 
 def _mask_of(path: Path) -> Mask:
-    """A mask as it is written: grey, 255 inside. Raises ImageError, and DatasetError for one that means something else."""
+    """A mask: grey, 255 inside. Raises ImageError, and DatasetError for one in which other values mean something."""
     pixels = read_image(path)
     mask = np.asarray(pixels[:, :, 0] > 127)
     if pixels.any() and not mask.any():
@@ -110,7 +108,7 @@ _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
 class _TruthRow(BaseModel):
-    """What every row of ``truth.jsonl`` has to be like; it may say much more."""
+    """What every row of ``truth.jsonl`` must satisfy; other keys are allowed."""
 
     stem: Annotated[str, Field(strict=True)]
     seed: int | str | None = None
@@ -139,10 +137,10 @@ _WANTED = {
     "head_xy": "must be two finite numbers, or null",
     "tail_xy": "must be two finite numbers, or null",
 }
-"""What a row's values have to be; all others are finite numbers, or null."""
+"""Texts of errors about values; all others must be finite numbers, or null."""
 
 POSE_KEYS = ("theta_deg", "theta_signed_deg", "head_xy")
-"""What the accuracy of a frame is measured by, where its truth has a state."""
+"""Keys that the accuracy of a frame is measured with, where its truth has a state."""
 
 
 def read_truth(folder: Path) -> dict[str, dict[str, Any]]:
@@ -181,9 +179,9 @@ def find_labelled(folder: Path, needed: Sequence[str] = ()) -> tuple[list[Sample
     Raises DatasetError when a frame has no truth, or one with a state lacks a `needed` key.
     """
     samples, truth = find_samples([folder]), read_truth(folder)
-    untold = [sample.stem for sample in samples if sample.stem not in truth]
-    if untold:
-        share = f"{len(untold)} of {len(samples)} frames lack a truth (the first: {untold[0]})"
+    without = [sample.stem for sample in samples if sample.stem not in truth]
+    if without:
+        share = f"{len(without)} of {len(samples)} frames lack a truth (the first: {without[0]})"
         raise DatasetError(f"{folder}: {share}; write the set again with synth")
     for row in (truth[sample.stem] for sample in samples):
         missing = [key for key in needed if row.get(key) is None] if row.get("state") is not None else []
@@ -201,9 +199,9 @@ def leave_out_looks(folder: Path, samples: Sequence[Sample], looks: Sequence[str
         truth = read_truth(folder)
     except DatasetError as error:
         raise DatasetError(f"{error} (--without needs the looks that it names)") from None
-    untold = next((sample.stem for sample in samples if truth.get(sample.stem, {}).get("family") is None), None)
-    if untold is not None:
-        raise DatasetError(f"{folder}: truth.jsonl names no family of looks for frame {untold}; leave --without out")
+    unknown = next((sample.stem for sample in samples if truth.get(sample.stem, {}).get("family") is None), None)
+    if unknown is not None:
+        raise DatasetError(f"{folder}: truth.jsonl names no family of looks for frame {unknown}; leave --without out")
     kept = [sample for sample in samples if truth[sample.stem]["family"] not in looks]
     if not kept:
         raise DatasetError(f"{folder}: every frame is of a look that is left out ({', '.join(looks)}); name fewer with --without")
@@ -211,7 +209,7 @@ def leave_out_looks(folder: Path, samples: Sequence[Sample], looks: Sequence[str
 
 
 def write_mask(path: Path, mask: Mask) -> None:
-    """A mask as 0/255 PNG; raises OSError when it cannot be written (OpenCV alone would only return False)."""
+    """A mask as 0/255 PNG; raises OSError when it cannot be written."""
     write_atomic(path, mask_png(mask))
 
 
@@ -242,12 +240,9 @@ _FRAME_BYTES = WORKING_SIZE_PX**2 * 13 // 4
 
 
 class KeptFrames:
-    """Labelled frames at working size, and arrays that belong to them.
+    """Labelled frames at working size, and arrays that belong to them, kept in memory as far as they fit: decoding is slow.
 
-    Parameters
-    ----------
-    count : how many frames there will be. Arrays besides are kept only where the frames leave room for them: they are quicker to
-        make anew.
+    `count` is the number of frames. Arrays are kept only where the frames leave room: they are quicker to make again.
     """
 
     def __init__(self, count: int) -> None:
@@ -283,7 +278,7 @@ class KeptFrames:
 
 
 def _free_memory() -> float:
-    """Bytes that are free, or a modest guess where the system does not tell."""
+    """Bytes that are free, or 4 GB where the system does not say."""
     try:
         return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, ValueError, OSError):

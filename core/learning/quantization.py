@@ -1,10 +1,9 @@
-"""Eight-bit copy of a trained network: what runs on processors, in a third of the time of fp32 (docs/method.md).
+"""Eight-bit copy of a trained network, which takes a third of the time of fp32 on processors (docs/method.md).
 
-Weights (in seven of the eight bits) get one step size per output channel, activations one per tensor, chosen from what a few
-training frames make of them (B. Jacob et al., "Quantization and training of neural networks for efficient
-integer-arithmetic-only inference", CVPR 2018). Weights are not rounded each to its nearest step: what one of them loses by it, the
-others that see the same pixels make good (E. Frantar et al., "GPTQ: accurate post-training quantization for generative pre-trained
-transformers", ICLR 2023), and what is lost on average goes into the bias. The copy is an ordinary torch module whose fake
+Weights (in seven of the eight bits) get one step size per output channel, activations one per tensor, chosen on a few training
+frames (B. Jacob et al., "Quantization and training of neural networks for efficient integer-arithmetic-only inference", CVPR 2018).
+The rounding error of a weight is compensated by the other weights of its row (E. Frantar et al., "GPTQ: accurate post-training
+quantization for generative pre-trained transformers", ICLR 2023), its mean by the bias. The copy is a torch module whose fake
 quantisation exports as ONNX QuantizeLinear / DequantizeLinear pairs, which OpenVINO computes in int8.
 """
 
@@ -27,17 +26,17 @@ silently where two full steps meet two full activations (2 * 255 * 127 > 32767);
 _KEPT_SHARE = 0.9999
 """Share of the activations that the range covers; the few beyond it are clipped so that all others get finer steps."""
 _PLACES = 512
-"""Of each example, at which a convolution's inputs are looked at to choose how its weights are rounded."""
+"""Pixels of each example whose inputs are used to choose how a convolution's weights are rounded."""
 _DAMPING = 0.01
-"""Share of the inputs' mean variance that is added to each: what a few examples say of rare inputs is not to be relied on."""
+"""Share of the inputs' mean variance that is added to each: a few examples say little of rare inputs."""
 _AT_ONCE = 64
-"""Weights of a row that are rounded before the rest of the row hears of what was lost by them."""
+"""Weights of a row that are rounded before the rest of the row is corrected."""
 _PIXEL_STEP = 4.0 / 255
-"""One of 255 levels as the network sees it. Its zero lies between two levels; the copy's has to lie on one."""
+"""One of 255 levels of the network's input. Its zero lies between two levels; the copy's has to lie on one."""
 
 
 class _Steps(nn.Module):
-    """An activation in 256 steps. While ``learning`` it lets everything through and widens its range to what it sees."""
+    """An activation in 256 steps. While ``learning`` it passes values on and widens its range to them."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,7 +56,7 @@ class _Steps(nn.Module):
 
 
 class _Moments:
-    """Mean and covariance of what a convolution's weights are multiplied with, from random places of the examples."""
+    """Mean and covariance of a convolution's inputs, from random places of the examples."""
 
     def __init__(self) -> None:
         self._count = 0
@@ -66,7 +65,7 @@ class _Moments:
         self._random = torch.Generator().manual_seed(0)
 
     def choose(self, number: int) -> Tensor:
-        """Which of so many places are looked at."""
+        """Which of so many places are used."""
         return torch.randperm(number, generator=self._random)[:_PLACES]
 
     def add(self, inputs: Tensor) -> None:
@@ -80,15 +79,15 @@ class _Moments:
         return self._sum / self._count  # type: ignore[no-any-return]
 
     def products(self, *, centred: bool) -> Tensor:
-        """Mean products (K, K) of any two inputs, or of what they differ by from their means."""
+        """Mean products (K, K) of any two inputs, or of their differences from their means."""
         mean = self.mean()
         products: Tensor = self._products / self._count
         return products - mean[:, None] * mean[None, :] if centred else products
 
 
 def _rounded(weight: Tensor, scale: Tensor, products: Tensor) -> Tensor:
-    """Rows of weights (N, K) in whole steps of `scale` (N,) that do most nearly the same to inputs of such mean products (K, K)."""
-    # Those whose inputs vary most first: the others make good what their rounding loses.
+    """Rows of weights (N, K) in whole steps of `scale` (N,) with the least change for inputs of such mean products (K, K)."""
+    # Those whose inputs vary most first: the others compensate their rounding errors.
     order = products.diagonal().argsort(descending=True, stable=True)
     damped = products[order][:, order]
     damped += torch.eye(len(order), dtype=damped.dtype) * (_DAMPING * damped.diagonal().mean()).clamp_min(1e-12)
@@ -130,12 +129,11 @@ class _Conv(nn.Module):
         self.moments: _Moments | None = None
 
     def round_weights(self) -> None:
-        """Round the weights by what was seen of their inputs, and put what is lost on average into the bias."""
+        """Round the weights by the moments of their inputs, and put the mean error into the bias."""
         if self.moments is None:
             return
         weight, channels = self.conv.weight.detach(), self.scale.numel()
-        # A plain convolution's bias makes good what a row loses on average. A transposed one has a row for each of four pixels, and
-        # one bias for all of them.
+        # A plain convolution's bias compensates the mean error of a row. A transposed one has rows for four pixels and one bias.
         rows = weight.permute(1, 2, 3, 0).reshape(-1, weight.shape[0]) if self.channel else weight.reshape(channels, -1)
         whole = _rounded(rows, self.scale.repeat_interleave(len(rows) // channels), self.moments.products(centred=not self.channel))
         lost = ((rows - whole).double() @ self.moments.mean()).reshape(channels, -1).mean(1)
@@ -145,8 +143,8 @@ class _Conv(nn.Module):
         self.conv.bias.data += lost.to(self.conv.bias.dtype)
         self.moments = None
 
-    def _see(self, x: Tensor) -> None:
-        """Take in what the weights are multiplied with at some pixels of `x` (N, C, H, W); only these are taken apart."""
+    def _add_moments(self, x: Tensor) -> None:
+        """Add the inputs of the weights at some pixels of `x` (N, C, H, W) to the moments."""
         assert self.moments is not None
         number, _, height, width = x.shape
         chosen = self.moments.choose(number * height * width)
@@ -162,7 +160,7 @@ class _Conv(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         weight = self.conv.weight
         if self.moments is not None:
-            self._see(x)
+            self._add_moments(x)
         else:
             weight = torch.fake_quantize_per_channel_affine(weight, self.scale, self.zero, self.channel, -128, 127)  # type: ignore[arg-type]
         if isinstance(self.conv, nn.ConvTranspose2d):
@@ -179,7 +177,7 @@ def _block(layers: nn.Module) -> list[_Conv]:
 
 
 class _Chain(nn.Module):
-    """Convolutions with steps between them; the last one's output is stepped by whoever uses it."""
+    """Convolutions with steps between them; the last one's output is quantised by its user."""
 
     def __init__(self, convolutions: list[_Conv]) -> None:
         super().__init__()
@@ -203,12 +201,12 @@ class EightBitUNet(nn.Module):
         self.input_steps = _Steps()
         self.input_steps.low, self.input_steps.high = -128 * _PIXEL_STEP, 127 * _PIXEL_STEP
         self.encoder = nn.ModuleList([_Chain(_block(block)) for block in network.encoder])
-        # One range for everything that meets at a level: what the skip connection and both up-samplings bring is concatenated.
+        # One range per level: the skip connection and both up-samplings are concatenated.
         self.level_steps = nn.ModuleList([_Steps() for _ in network.encoder])
         self.decoders = nn.ModuleList([_EightBitDecoder(decoder) for decoder in (network.vessel, network.robot)])
         first: Any = self.encoder[0]
         first = first.convolutions[0].conv
-        # Half a level, by which the input's zero was moved. At the picture's edges, padded with zeros, that is a bit too much.
+        # Half a level, by which the input's zero was moved. At the picture's edges, padded with zeros, it is slightly too much.
         first.bias.data += 0.5 * _PIXEL_STEP * first.weight.detach().sum(dim=(1, 2, 3))
 
     def learn(self, images: Iterable[Tensor]) -> None:

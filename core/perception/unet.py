@@ -2,8 +2,8 @@
 
 One encoder with four down-samplings, and for each task a decoder of its own with four up-samplings and skip connections. Two things
 are ours, chosen by measurement (docs/method.md): ``fold`` rearranges blocks of fold x fold pixels into channels before the
-first convolution and back after the last one, so that the network works on a quarter of the positions and yet tells every pixel
-apart; and the decoders may be narrower than the encoder. ``UNetShape(base=64, fold=1)`` with equal decoders is the paper's network.
+first convolution and back after the last one, so that the network works on a quarter of the positions and yet distinguishes
+every pixel; and the decoders may be narrower than the encoder. ``UNetShape.of_base(64)`` is the paper's network.
 """
 
 from __future__ import annotations

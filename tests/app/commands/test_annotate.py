@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from app.annotator.sources import AnnotateOptions, StudyOptions
-from app.commands.annotate import _config, queue_of, run_annotate
-from app.commands.evaluate import run_evaluate
+from app.commands.annotate import queue_of, run_annotate
+from app.commands.evaluate import evaluate
 from core.annotation.model import Annotation, History, ImageView, MaskPolygon, MaskTarget, measure_lines
 from core.annotation.store import DEFAULT_NAME, AnnotationStore, FoundImage, ItemKey, find_images
 from core.config.models import Config, TwinConfig
@@ -222,9 +222,8 @@ def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path
     assert all(row.angle_1 is not None and row.angle_2 is not None and row.state is not None for row in rows)
     with AnnotationStore(folder / DEFAULT_NAME) as store:
         store.keep_look(store.annotations()[0].key, 0)
-    nothing = {"as_json": False, "model": None, "preset": None, "config_path": None, "like_paper": None, "seed": 0}
-    run_evaluate(None, tmp_path / "table.csv", tmp_path / "by_table", **nothing)
-    run_evaluate(folder, None, tmp_path / "by_folder", **nothing)
+    evaluate(tmp_path / "by_table", csv=tmp_path / "table.csv")
+    evaluate(tmp_path / "by_folder", folder)
     first, second = (json.loads((tmp_path / name / "metrics.json").read_text()) for name in ("by_table", "by_folder"))
     assert (first["angle"], first["state"], first["manual"]) == (second["angle"], second["state"], second["manual"])
     assert second["source"]["kind"] == "annotated by hand"
@@ -314,7 +313,7 @@ def test_raters_files_may_be_joined_into_a_new_one(folder: Path, tmp_path: Path)
 
 def test_an_empty_name_is_no_model() -> None:
     with pytest.raises(UserError, match=r"segmentation\.model"):
-        _config(AnnotateOptions(paths=(), model=""))
+        run_annotate(AnnotateOptions(paths=(), model=""))
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from app.commands.evaluate import LikePaper, run_evaluate
+from app.commands import evaluate as command
 from app.commands.figures import save_figure
 from core.config.models import TwinConfig
 from core.devices import UserError
@@ -38,8 +38,7 @@ FIGURES = {"error_distribution", "bland_altman", "scatter", "confusion"}
 
 
 def evaluate(folder: Path | None = None, csv: Path | None = None, *, out: Path, **more: object) -> dict:
-    options = {"as_json": False, "model": None, "preset": None, "config_path": None, "like_paper": None, "seed": 0}
-    run_evaluate(folder, csv, out, **(options | more))  # type: ignore[arg-type]
+    command.evaluate(out, folder, csv, **more)  # type: ignore[arg-type]
     return json.loads((out / "metrics.json").read_text(encoding="utf-8"))
 
 
@@ -245,7 +244,7 @@ def test_what_cannot_be_evaluated_says_so(paper_csv: Path, tmp_path: Path) -> No
         ({"csv": paper_csv, "out": tmp_path / "taken" / "in"}, "cannot be made"),
         ({"out": out}, "give either"),
         ({"folder": tmp_path, "csv": paper_csv, "out": out}, "give either"),
-        ({"csv": paper_csv, "out": out, "like_paper": LikePaper(1.5)}, "need a labelled set"),
+        ({"csv": paper_csv, "out": out, "like_paper": True}, "need a labelled set"),
         ({"csv": paper_csv, "out": out, "model": "default"}, "need a labelled set"),
         ({"folder": tmp_path / "folder", "out": out}, "not a labelled set"),
         ({"folder": tmp_path / "nowhere", "out": out}, "no such folder"),
@@ -313,7 +312,7 @@ def test_a_labelled_set_is_perceived_and_its_truth_is_the_manual_measure(labelle
 
 
 def test_a_study_like_the_papers(labelled: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = evaluate(labelled, out=tmp_path / "out", like_paper=LikePaper(2.0), seed=7)
+    found = evaluate(labelled, out=tmp_path / "out", like_paper=True, manual_sd=2.0, seed=7)
     rows = read_measurements(tmp_path / "out" / "measurements.csv")
     assert [row.state for row in rows] == ["B", "C", "D", "C"]
     assert all(row.angle_1 != row.angle_2 for row in rows)
@@ -381,7 +380,7 @@ def test_a_set_with_a_hole_is_one_clear_line(labelled: Path, tmp_path: Path) -> 
             evaluate(broken, out=tmp_path / "out")
     (broken / "truth.jsonl").write_text('{"stem": "a", "theta_deg": 3, "state": "A"}\n')
     with pytest.raises(UserError, match="no image of the states B, C and D"):
-        evaluate(broken, out=tmp_path / "out", like_paper=LikePaper(1.5))
+        evaluate(broken, out=tmp_path / "out", like_paper=True)
 
 
 def test_the_window_does_not_load_matplotlib_or_scikit_learn() -> None:
@@ -403,7 +402,7 @@ def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys
     out = tmp_path / "out"
     with pytest.raises(UserError, match=r"holds several studies.*choose one with --study NAME"):
         evaluate(tmp_path, out=out)
-    metrics = evaluate(tmp_path, out=out, study_name="main")
+    metrics = evaluate(tmp_path, out=out, study="main")
     agreement = metrics["agreement"]
     assert agreement["within"]["n"] == 2
     assert metrics["manual"]["repeatability_sd_deg"] == agreement["within"]["sd_deg"] == pytest.approx(0.0, abs=1e-6)
@@ -430,7 +429,7 @@ def test_images_of_other_folders_are_found_where_they_were_annotated(tmp_path: P
     store = images[0].parent / "annotations.lumenpilot.sqlite"
     for rater, tilts in (("al", [0.0, 10.0, 5.0, 2.0]), ("bo", [2.0, 12.0, 9.0, 6.0])):
         measure(store, images, tilts, study="main", rater=rater)
-    metrics = evaluate(store.parent, out=tmp_path / "out", study_name="main")
+    metrics = evaluate(store.parent, out=tmp_path / "out", study="main")
     assert not any("not where they were" in note for note in metrics["notes"])
     assert metrics["agreement"]["annotations"] == 8
     rows = read_measurements(tmp_path / "out" / "measurements.csv")
@@ -446,7 +445,7 @@ def test_raters_are_compared_on_the_images_that_are_here_only(tmp_path: Path) ->
     for repeat, tilts in ((1, [0.0, 10.0, 5.0]), (2, [0.0, 10.0, 25.0])):
         measure(store, images, tilts, study="main", rater="al", repeat=repeat)
     images[2].unlink()
-    metrics = evaluate(tmp_path, out=tmp_path / "out", study_name="main")
+    metrics = evaluate(tmp_path, out=tmp_path / "out", study="main")
     assert "Of the annotated images 1 are not where they were; they are in none of the figures." in metrics["notes"]
     within = metrics["agreement"]["within"]
     assert (within["n"], within["sd_deg"]) == (2, pytest.approx(0.0, abs=1e-6))
@@ -497,10 +496,10 @@ def test_an_interrupted_evaluation_of_annotated_images_keeps_what_was_perceived(
 
 def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match="--study needs images annotated by hand"):
-        evaluate(csv=paper_csv, out=tmp_path / "out", study_name="main")
+        evaluate(csv=paper_csv, out=tmp_path / "out", study="main")
     (tmp_path / "empty").mkdir()
     with pytest.raises(UserError, match="begin the study with: annotate"):
-        evaluate(tmp_path / "empty", out=tmp_path / "out", study_name="main")
+        evaluate(tmp_path / "empty", out=tmp_path / "out", study="main")
 
 
 def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
@@ -510,7 +509,7 @@ def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
     measure(tmp_path / "annotations.lumenpilot.sqlite", images, [0.0, 10.0, 5.0], study="main")
     images[2].unlink()
     (tmp_path / "truth.jsonl").write_text("")
-    result = evaluate(tmp_path, out=tmp_path / "out", study_name="main")
+    result = evaluate(tmp_path, out=tmp_path / "out", study="main")
     assert result["source"]["kind"] == "annotated by hand"
     assert result["notes"][0] == "Of the annotated images 1 are not where they were; they are in none of the figures."
     with pytest.raises(UserError, match="not a labelled set"):

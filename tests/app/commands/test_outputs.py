@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.cli import app
-from app.commands.perceive import Outputs, _check_keeps_inputs, _written_names, run_perceive
+from app.commands.perceive import check_keeps_inputs, written_names
 from app.commands.progress import check_no_input, is_same
 from app.commands.session import export, info
 from app.commands.train import TrainOptions, run_train
@@ -50,25 +50,25 @@ def labelled(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("outputs", "why"),
     [
-        (Outputs(Path("images/a.png"), None, None), "is an input, which --jsonl would overwrite"),
-        (Outputs(None, Path("masks"), None), "is a mask of the set, which --masks would overwrite"),
-        (Outputs(None, None, Path("images")), "a_overlay.png: is an input, which --overlay"),
+        (("--jsonl", "images/a.png"), "is an input, which --jsonl would overwrite"),
+        (("--masks", "masks"), "is a mask of the set, which --masks would overwrite"),
+        (("--overlay", "images"), "a_overlay.png: is an input, which --overlay"),
     ],
 )
 def test_perceive_does_not_write_over_its_pictures(
-    labelled: Path, outputs: Outputs, why: str, monkeypatch: pytest.MonkeyPatch
+    labelled: Path, outputs: tuple[str, str], why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(labelled)
     before = contents(labelled)
     with pytest.raises(UserError, match=why):
-        run_perceive([Path("images")], outputs, targets_path=None, model=None, preset=None, config_path=None)
+        call("perceive", "images", *outputs)
     assert contents(labelled) == before
 
 
 def test_first_masks_may_lie_beside_their_pictures(labelled: Path) -> None:
     shutil.rmtree(labelled / "masks")
     files = [labelled / "images" / "a.png"]
-    _check_keeps_inputs(labelled / "masks", files, "--masks", _written_names(files, ("_vessel.png", "_robot.png")))
+    check_keeps_inputs(labelled / "masks", files, "--masks", written_names(files, ("_vessel.png", "_robot.png")))
 
 
 @pytest.mark.parametrize("given", [".", "a.png", "{tmp}/linked", "{tmp}/linked/a.png", "{tmp}/a.png"])

@@ -1,13 +1,16 @@
 """Scores of frames against their truth, and their sums, with values counted by hand."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from core.evaluation.accuracy import FrameScore, score_frame, summarise, summarise_looks
+from core.evaluation.accuracy import FrameScore, difficulty, score_frame, summarise, summarise_looks
 from core.evaluation.confidence import describe_confidence, describe_gates
-from core.learning.dataset import DatasetError
+from core.learning.dataset import DatasetError, find_samples
 from core.types import Masks, Pose, PoseState, Reason, Refusal, RobotPath, Scene
 from tests.core.drawing import art
+from tests.core.learning.toy_set import toy_set
 
 VESSEL = art("""
 ####
@@ -204,3 +207,10 @@ def test_looks_that_training_left_out_have_a_mean_of_their_own() -> None:
     assert left_out["robot_dice"] == pytest.approx(0.3)
     assert "mean_over_looks_left_out" not in summarise_looks(scores[:3], {"a": "red", "b": "red", "c": "blue"})
     assert "mean_over_looks" not in summarise_looks(scores[:1], {"a": "red"}, ["red"])
+
+
+def test_difficulty_is_what_a_model_loses(tmp_path: Path) -> None:
+    sample = find_samples([toy_set(tmp_path / "set", 1)])[0]
+    _, vessel, robot = (part.astype(np.float32) for part in sample.load(640))
+    assert difficulty(sample, lambda _: (vessel, robot)) == pytest.approx(0.02)  # type: ignore[arg-type]
+    assert difficulty(sample, lambda _: (vessel, np.zeros_like(robot))) == pytest.approx(1.0)  # type: ignore[arg-type]

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from app.commands.perceive import own_stems, pictures
 from core.devices import DamagedStream
 from core.types import Frame
 from hardware.cameras.files import VideoFile
+from hardware.cameras.picture_files import own_stems, pictures
 from tests.core.session_data import record, tick_of
 
 
