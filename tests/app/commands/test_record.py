@@ -228,7 +228,7 @@ def test_a_camera_that_is_gone_at_the_end_is_an_error_that_names_what_was_record
         record_flaky(FlakyEngine((0.3, 99.0)), 0.8)
     manifest = read_manifest(only_session(tmp_path))
     assert (manifest.closed, manifest.ended) == (True, LOST)
-    assert manifest.counts.frames > 3
+    assert manifest.counts.frames > 0
 
 
 def test_one_that_comes_back_is_waited_for_and_its_absence_is_told(
