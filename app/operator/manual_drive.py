@@ -278,7 +278,7 @@ class JogKeys(HeldInput):
 
 
 def _key_of(event: QKeyEvent) -> Qt.Key:
-    """By its letter; where that is none of the Latin ones, by the place of the keyboard where theirs would be."""
+    """The key by its letter, or for another alphabet by the place that a Latin letter has on the keyboard."""
     key = Qt.Key(event.key())
     return _BY_PLACE.get(event.nativeScanCode(), key) if _FIRST_LETTER <= key < _FIRST_OTHER_KEY else key
 

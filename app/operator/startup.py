@@ -69,7 +69,7 @@ def run_window(
     check_display()
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     file = settings_of_windows(config_path)
-    is_own = config_path is None and not until_first_frame  # what is measured does not depend on who measures
+    is_own = config_path is None and not until_first_frame  # a measurement does not depend on the user's settings
     config, kind = rig_config(rig, config_path, source, file.data if is_own else None)
     ahead = start_ahead(config)  # before all that is slow to load here
 

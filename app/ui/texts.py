@@ -31,7 +31,7 @@ class StepWords:
 
 
 class OperatorStep(Enum):
-    """A request of the operator that has a button; STOP is none: it is always there."""
+    """A request of the operator that has a button. STOP is not one of them: it is always there."""
 
     SERVOS_ON = StepWords(
         mark("Servos on"), "F3", mark("Check all servos and switch their torque on: then you can move the robot by hand")

@@ -142,7 +142,7 @@ def current() -> Scheme:
 
 
 def of(role: str) -> str:
-    """The colour of a role (``"SKY"``) in the scheme in use; a colour that is none ("#12AB00") is itself."""
+    """The colour of a role (``"SKY"``) in the scheme in use; a colour ("#12AB00") is itself."""
     return str(getattr(_current, role)) if role in _ROLES else role
 
 

@@ -27,6 +27,7 @@ from core.config.schema import JOINTS, FieldKind, settings_by_key, value_at
 from core.config.section import plain_message
 from core.devices import UserError
 from core.files import write_atomic
+from core.messages import message
 
 UNKNOWN = "unknown key, kept but not used"
 _TOO_MUCH = "too much is wrong"
@@ -63,10 +64,17 @@ def read_settings(path: Path, *, may_move: bool = True) -> SettingsFile:
     except FileNotFoundError:
         return SettingsFile(path, {}, None)
     except OSError as error:
-        return SettingsFile(path, {}, None, (f"{path}: cannot be read ({error.strerror}); the defaults are used",))
+        return SettingsFile(
+            path, {}, None, (message("{path}: cannot be read ({why}); the defaults are used", path=path, why=error.strerror),)
+        )
     except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
-        why = f"is no TOML ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
-        return SettingsFile(path, {}, None, (_move_aside(path, why) if may_move else f"{path}: {why}; the defaults are used",))
+        why = message("is no TOML ({why})", why=str(error).splitlines()[0] if str(error) else type(error).__name__)
+        return SettingsFile(
+            path,
+            {},
+            None,
+            (_move_aside(path, why) if may_move else message("{path}: {why}; the defaults are used", path=path, why=why),),
+        )
     data, problems = usable_part(data)
     return SettingsFile(path, data, text, tuple(f"{path}: {problem}" for problem in problems))
 
@@ -113,8 +121,10 @@ def _move_aside(path: Path, why: str) -> str:
     try:
         path.rename(aside)
     except OSError as error:
-        return f"{path}: {why}, and cannot be set aside ({error.strerror}); the defaults are used"
-    return f"{path}: {why}; it is kept as {aside.name}, and the defaults are used"
+        return message(
+            "{path}: {why}, and cannot be set aside ({trouble}); the defaults are used", path=path, why=why, trouble=error.strerror
+        )
+    return message("{path}: {why}; it is kept as {name}, and the defaults are used", path=path, why=why, name=aside.name)
 
 
 _HEAD = "# LumenPilot's settings: only what differs from the defaults. Every key, its range and its meaning: core/config/models.py."
@@ -147,7 +157,9 @@ def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
             note = _kept(path, "had values that are not allowed")
         write_atomic(path, text.encode("utf-8"), durable=True)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be written ({error.strerror}); nothing was changed") from None
+        raise ConfigError(
+            message("{path}: cannot be written ({why}); nothing was changed", path=path, why=error.strerror)
+        ) from None
     return note
 
 
@@ -200,7 +212,7 @@ def _kept(path: Path, why: str) -> str:
     """Copy the old file beside itself."""
     aside = aside_name(path)
     shutil.copy2(path, aside)
-    return f"{path.name} {why}: the old one is kept as {aside.name}"
+    return message("{name} {why}: the old one is kept as {kept}", name=path.name, why=why, kept=aside.name)
 
 
 def _says(text: str, config: Config, unknown: set[str]) -> bool:
@@ -358,7 +370,7 @@ class Profiles:
     def load(self, profile: Profile) -> SettingsFile:
         """Its settings. Raises ProfileError when the file is gone; other problems are among ``SettingsFile.problems``."""
         if not profile.path.is_file():
-            raise ProfileError(f"profile {profile.name}: it is no longer there ({profile.path})")
+            raise ProfileError(message("profile {name}: it is no longer there ({path})", name=profile.name, path=profile.path))
         return read_settings(profile.path)
 
     def save(self, name: str, config: Config) -> tuple[Profile, str]:
@@ -371,7 +383,7 @@ class Profiles:
         """
         name = check_name(name)
         if any(profile.is_preset and profile.name.casefold() == name.casefold() for profile in self.all()):
-            raise ProfileError(f"profile {name}: a preset has this name; choose another one")
+            raise ProfileError(message("profile {name}: a preset has this name; choose another one", name=name))
         profile = Profile(name, self._folder / f"{name}{_ENDING}")
         try:
             return profile, write_settings(profile.path, config)
@@ -381,13 +393,15 @@ class Profiles:
     def delete(self, profile: Profile) -> None:
         """Delete one of the user's. Raises ProfileError."""
         if profile.is_preset:
-            raise ProfileError(f"profile {profile.name}: it comes with the program and cannot be deleted")
+            raise ProfileError(message("profile {name}: it comes with the program and cannot be deleted", name=profile.name))
         try:
             profile.path.unlink()
         except FileNotFoundError:
             pass
         except OSError as error:
-            raise ProfileError(f"profile {profile.name}: cannot be deleted ({error.strerror})") from None
+            raise ProfileError(
+                message("profile {name}: cannot be deleted ({why})", name=profile.name, why=error.strerror)
+            ) from None
 
     def exists(self, name: str) -> bool:
         """Whether the user has one of this name."""

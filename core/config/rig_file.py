@@ -25,6 +25,7 @@ from core.config.safety import ServosConfig
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
 from core.files import write_atomic
+from core.messages import message
 
 FORMAT = 1
 RESERVED = ("twin", "realsense", "webcam")
@@ -87,7 +88,7 @@ def check_rig_name(name: str) -> str:
     if not _NAME.match(name):
         raise ValueError("a rig's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit")
     if name.casefold() in RESERVED or name.casefold().endswith(".older"):
-        raise ValueError(f"a rig cannot be called {name}: choose another name")
+        raise ValueError(message("a rig cannot be called {name}: choose another name", name=name))
     return name
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import VectorConfig
+from core.messages import message
 from core.perception.vectors import is_walled_off, project
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
 
@@ -77,7 +78,7 @@ def route_or_reason(graph: VesselGraph, start: Point, target: Point, vessel: Mas
         return "no vessel was found"
     beside_px, *_ = there
     if beside_px > OFF_VESSEL_PX:
-        return f"the target is {beside_px:.0f} px beside the vessel"
+        return message("the target is {a:.0f} px beside the vessel", a=beside_px)
     return plan_route(graph, start, target, vessel) or "no vessel that was found leads there"
 
 

@@ -150,12 +150,6 @@ def test_what_somebody_else_wrote_first_is_kept_beside(at: Bench) -> None:
     assert "meanwhile" not in at.window.panels.toast.text()
 
 
-def test_choosing_a_language_tells_too_that_what_somebody_else_wrote_is_kept_beside(at: Bench) -> None:
-    at.path.write_text("[window]\npictures_folder = 'mine'\n", encoding="utf-8")
-    at.desk.choose_language("zh")
-    assert "was changed meanwhile" in at.window.panels.toast.text()
-
-
 def test_what_is_saved_stays_and_is_written(at: Bench) -> None:
     at.edit(D_ALLOW, "9")
     assert at.desk.dialog is not None
