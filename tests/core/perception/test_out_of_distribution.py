@@ -300,13 +300,6 @@ def test_in_a_stream_a_rig_at_the_limit_does_not_come_and_go() -> None:
         assert (alone.perceive_single(Frame(0, 0.0, IMAGE)).refusal is not None) == wanted, "single pictures know of no others"
 
 
-def test_the_limit_is_a_setting() -> None:
-    novelty = FAMILIARITY.novelty(OTHER)
-    for limit, wanted in ((novelty - 0.01, Reason.UNLIKE_TRAINING), (novelty + 0.01, None)):
-        assert perceived(Kind(OTHER), PerceptionConfig.model_validate({"quality": {"max_novelty": limit}})) is wanted
-    assert perceived(Kind(OTHER), PerceptionConfig.model_validate({"quality": {"enabled": False}})) is None
-
-
 def test_what_a_model_knows_is_kept_in_its_manifest_and_used(model: Path) -> None:
     segment = OpenVinoSegmenter(model, 1)
     seen = np.array([segment.segment_signed([image])[0][2] for image in pictures(LEAST)])

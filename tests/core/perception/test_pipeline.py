@@ -10,7 +10,7 @@ from core.perception import quality
 from core.perception.inference import OpenVinoSegmenter
 from core.perception.model_file import ModelInfo
 from core.perception.pipeline import CalibratedSegmenter, NoPerception, Pipeline, open_pipeline
-from core.perception.quality import BASIC_FEATURES, ConfidenceFeatures
+from core.perception.quality import ConfidenceFeatures
 from core.perception.segmentation import OrientationAverage, Segmenter, to_working
 from core.perception.tracking import TURN_S
 from core.types import Frame, Image, Masks, Points, PoseState, Reason, Scene
@@ -142,12 +142,6 @@ def test_an_answer_that_hangs_on_that_number_is_told_by_its_swing(network: Drawn
     assert len(network.shapes) == 1, "the network is not asked again"
 
 
-def test_without_being_asked_nobody_looks_for_swings(pipeline: Pipeline) -> None:
-    scene = pipeline.perceive_single(frame())
-    assert scene.evidence is not None
-    assert len(scene.evidence) == len(BASIC_FEATURES)
-
-
 def test_an_answer_that_is_lost_counts_as_the_largest_swing() -> None:
     same, lost = (
         quality.threshold_sensitivity(((10.0, 10.0), 5.0), [((10.0, 10.0), 5.0)]),
@@ -163,17 +157,6 @@ def test_edges_are_drawn_wider_and_narrower_all_four_ways() -> None:
     masks = Masks(shares >= 0.5, shares >= 0.5, shares, shares)
     edges = [tuple(round(float(shares[p >= 0.5].min()), 2) for p in ways) for ways in quality.shifted_probabilities(masks)]
     assert sorted(edges) == [(0.34, 0.34), (0.34, 0.67), (0.67, 0.34), (0.67, 0.67)]
-
-
-def test_in_a_stream_what_is_known_to_be_no_robot_does_not_shake_an_answer(network: DrawnNetwork) -> None:
-    text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
-    pipeline = Pipeline(network, CONFIG)
-    pipeline._stream = CalibratedSegmenter(network, sensitivity=True)
-    for k, x in enumerate(range(270, 416, 5)):
-        network.draw(VESSEL[VESSEL[:, 0] <= x], text)
-        scene = pipeline(frame(k * FRAME_S))
-        assert scene.evidence is not None
-        assert scene.evidence[-1] < np.log1p(3.0), f"at column {x}"
 
 
 def test_in_a_stream_what_is_known_to_be_no_robot_does_not_lower_the_confidence(network: DrawnNetwork) -> None:
@@ -558,15 +541,6 @@ def test_all_eight_orientations_are_asked_about_and_turned_back() -> None:
     assert turned.engine == "copies, 8 orientations"
 
 
-def test_single_pictures_may_be_looked_at_more_often_than_a_stream() -> None:
-    network = _LooksLeft()
-    pipeline = Pipeline(network, CONFIG, single=CalibratedSegmenter(OrientationAverage(network)))
-    pipeline(frame())
-    assert network.calls == 1
-    pipeline.perceive_single(frame())
-    assert network.calls == 9
-
-
 @pytest.mark.parametrize(("mirrored", "stream", "single"), [("pictures", 1, 8), ("always", 8, 8), ("never", 1, 1)])
 def test_the_configuration_says_what_is_seen_in_all_orientations(
     mirrored: str, stream: int, single: int, monkeypatch: pytest.MonkeyPatch
@@ -672,13 +646,6 @@ def test_the_end_at_the_insertion_port_is_the_tail(
     assert scene.path.entry_on_border
 
 
-def test_half_a_port_is_none(network: DrawnNetwork) -> None:
-    path = CONFIG.path.model_copy(update={"port_x_share": 0.5})
-    found = Pipeline(network, CONFIG.model_copy(update={"path": path})).perceive_single(frame())
-    assert found.path is not None
-    assert found.path.head[0] == pytest.approx(300, abs=1.5)
-
-
 def test_in_a_stream_text_beneath_the_vessel_does_not_become_the_robots_end(network: DrawnNetwork) -> None:
     """The robot comes nearer to a piece that lies still, until it could be what a gap parts from it."""
     text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
@@ -691,21 +658,6 @@ def test_in_a_stream_text_beneath_the_vessel_does_not_become_the_robots_end(netw
             refused[lookalike_px] += scene.pose is None or scene.path is None or abs(scene.path.head[0] - x) > 5.0
     assert refused[0.0] > 10
     assert refused[CONFIG.tracking.lookalike_px] == 0
-
-
-def test_in_a_stream_one_bad_frame_does_not_make_text_the_robots_end(pipeline: Pipeline, network: DrawnNetwork) -> None:
-    """A reflection cuts the robot short, when it has come so near to the text that nobody could tell it any more."""
-    text = VESSEL[(VESSEL[:, 0] >= 420) & (VESSEL[:, 0] <= 450)]
-    for k, x in enumerate([*range(270, 416, 5), *[415] * 30]):
-        is_cut = k == 28
-        network.draw(VESSEL[VESSEL[:, 0] <= (x - 100 if is_cut else x)], text)
-        scene = pipeline(frame(k * FRAME_S))
-        if is_cut:
-            assert reason(scene) is Reason.HEAD_JUMP
-        elif x > 340:
-            assert scene.pose is not None
-            assert scene.path is not None
-            assert scene.path.head[0] == pytest.approx(x, abs=5.0)
 
 
 def scene_of(width: int, height: int) -> Scene:
@@ -726,9 +678,3 @@ def test_the_pictures_corners_map_onto_each_other(width: int, height: int) -> No
     for corner, source in zip(corners.tolist(), expected, strict=True):
         assert scene.to_source(tuple(corner)) == pytest.approx(source, abs=0.01)
         assert scene.to_working(tuple(source)) == pytest.approx(corner, abs=0.01)
-
-
-def test_one_scale_is_enough_where_both_are_the_same() -> None:
-    scene = Scene(0, 0.0, (1280, 960), 0.5)
-    assert scene.to_source((10.0, 20.0)) == (20.5, 40.5)
-    assert scene.to_working((20.5, 40.5)) == (10.0, 20.0)

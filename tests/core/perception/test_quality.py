@@ -59,28 +59,6 @@ def test_images_that_show_nothing(kind: str, reason: Reason | None) -> None:
     assert (refusal.reason if refusal else None) is reason
 
 
-def test_brightness_is_the_sorted_values_percentile() -> None:
-    image = np.random.default_rng(0).integers(0, 9, (480, 640, 3), np.uint8)
-    image[:8] += 200
-    seen = image[::4, ::4]
-    for share, by_hand in ((0.99, np.sort(seen.max(axis=2), axis=None)), (0.01, np.sort(seen.min(axis=2), axis=None))):
-        values = seen.max(axis=2) if share > 0.5 else seen.min(axis=2)
-        assert quality._level(values, share) == by_hand[int(share * (by_hand.size - 1))]
-    assert quality._level(np.full((1, 1), 255, np.uint8), 0.99) == 255.0
-
-
-@pytest.mark.parametrize("size", [1, 2, 16, 17, 300, 76_800])
-def test_the_steepest_steps_are_found_without_sorting_all(size: int) -> None:
-    rng = np.random.default_rng(size)
-    kinds = rng.gamma(0.5, 20.0, size), np.zeros(size), rng.integers(0, 3, size), np.sort(rng.gamma(0.3, 50.0, size))
-    at_the_far_end = np.zeros(size)
-    at_the_far_end[1::16] = 9.0  # where the sample does not look
-    for values in (*kinds, at_the_far_end):
-        steps = values.astype(np.float32)
-        place = int(0.995 * (size - 1))
-        assert quality._nth_largest(steps, size - place) == np.sort(steps)[place]
-
-
 @pytest.mark.parametrize("scale_px", [1.0, 2.0, 4.0])
 def test_wall_blur_is_the_width_of_the_doubt_at_a_wall(scale_px: float) -> None:
     beside = np.abs(np.arange(300.0) - 150.0) - 40.0

@@ -10,8 +10,8 @@ from core import geometry
 from core.config.models import PathConfig, PerceptionConfig, QualityConfig, load_config
 from core.perception import robot_path, segmentation, skeleton
 from core.perception.head_tail import PreviousPath
-from core.perception.robot_path import PathCandidate, consistency, explore, score, smoothness
-from core.perception.skeleton import PixelGraph, trace
+from core.perception.robot_path import consistency, explore, score, smoothness
+from core.perception.skeleton import trace
 from core.perception.vectors import fit_robot_vector
 from core.perception.vessel_graph import build_graph
 from core.types import Mask, Masks, Point, Points, Reason, Refusal, RobotPath, VesselGraph
@@ -92,22 +92,6 @@ def test_head_and_direction_of_any_robot_in_any_direction(radius: float, angle_d
     assert true is not None
     cosine = float(np.dot(found.direction, true.direction))
     assert np.degrees(np.arccos(min(cosine, 1.0))) < 1.0
-
-
-def test_a_long_thick_robot_is_no_matter() -> None:
-    corners = [(-20, 60), (560, 60), (560, 180), (80, 180), (80, 300), (560, 300), (560, 420), (80, 420)]
-    serpentine = geometry.smooth(geometry.resample(np.array(corners, np.float64), 2.0), 12.0)
-    path = path_of(probability(depth(serpentine, 25.0)))
-    assert path.head == pytest.approx((80, 420), abs=3.0)
-    assert path.radius_px == pytest.approx(25, abs=1.5)
-
-
-def test_an_intermediate_break_is_bridged() -> None:
-    robot = without(probability(depth(S_CURVE, 4.0)), (200, 235, 12))
-    path = path_of(robot)
-    assert path.head == pytest.approx(HEAD, abs=0.8)
-    assert off(path, S_CURVE) < 3.0
-    assert path.bridged_px == pytest.approx(24, abs=6)
 
 
 def test_several_breaks_are_bridged() -> None:
@@ -274,14 +258,6 @@ def test_a_doubtful_line_ahead_of_the_head_may_be_its_end() -> None:
     assert reason_of(with_line(ahead, 0.9), vessel=vessel) is Reason.GAP_TOO_LONG
 
 
-def test_a_robot_that_is_hardly_seen_in_the_vessel_makes_nothing_else_doubtful() -> None:
-    """Outside the vessel it is seen well, which says nothing of the line."""
-    faint = np.where(VESSELS >= 0.5, 0.85, 1.0) * probability(depth(S_CURVE, 4.0))
-    vessel = np.where(np.arange(SIZE[0]) < 150, probability(depth(GLINT, 30.0)), VESSELS)
-    robot = np.maximum(faint, 0.9 * probability(depth(GLINT, 3.0)))
-    assert reason_of(robot, vessel=vessel) is Reason.SEVERAL_ROBOTS
-
-
 def test_of_lines_that_all_come_in_from_nowhere_none_is_known_to_be_no_robot() -> None:
     """An opaque fitting hides where the robot comes in: one of them is it."""
     line, other = curve((160, 240), (300, 250), (420, 215)), curve((150, 410), (330, 420), (560, 395))
@@ -344,32 +320,6 @@ def test_a_mesh_is_not_searched_for_a_robot(monkeypatch: pytest.MonkeyPatch) -> 
     assert isinstance(refusal, Refusal)
     assert refusal.reason is Reason.AMBIGUOUS_PATH
     assert "mesh" in refusal.detail
-
-
-def test_hundreds_of_pieces_are_not_even_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot_path, "find_components", lambda *_: pytest.fail("sorted"))
-    specks = np.zeros((SIZE[1], SIZE[0]), np.float32)
-    for x in range(20, 620, 36):
-        for y in range(20, 460, 36):
-            cv2.line(specks, (x, y), (x + 14, y + 3 * (x % 5)), 1.0, 5)
-    refusal = perceive(specks)
-    assert isinstance(refusal, Refusal)
-    assert refusal.reason is Reason.AMBIGUOUS_PATH
-    assert "mesh" in refusal.detail
-
-
-def test_all_starts_of_a_frame_share_one_budget(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = []
-    explore = robot_path.explore
-
-    def counted(graph: PixelGraph, start: int, config: PathConfig, budget: int) -> list[PathCandidate]:
-        given.append(budget)
-        return explore(graph, start, config, budget)
-
-    monkeypatch.setattr(robot_path, "explore", counted)
-    perceive(mesh(100, until_px=400))
-    assert len(given) > 8
-    assert sum(given) <= 20 * CONFIG.path.max_candidates
 
 
 def test_an_empty_image() -> None:
@@ -455,20 +405,9 @@ def test_the_papers_absolute_cosine_is_blind_to_a_hairpin_and_ours_is_not() -> N
     assert smoothness(HAIRPIN, "signed") == pytest.approx((1 - 1 + 1) / 3)
 
 
-def test_one_px_steps_only_know_multiples_of_45_degrees() -> None:
-    slope = np.column_stack([np.arange(61), np.arange(61) // 3]).astype(float)  # 18 degrees, as pixels
-    literal = PathConfig(weight_length=0, weight_smoothness=1, weight_consistency=0, step_px=1, cosine="absolute")
-    assert score(slope, 1.0, literal) < 0.85
-    assert score(slope, 1.0, literal.model_copy(update={"step_px": 8.0})) > 0.995
-
-
 def test_the_score_is_the_papers_weighted_sum() -> None:
     config = PathConfig(weight_length=-0.2, weight_smoothness=2.0, weight_consistency=0.5, step_px=1.0, cosine="absolute")
     assert score(CORNER, 0.5, config) == pytest.approx(-0.2 * 0.5 + 2.0 * 0.0 + 0.5 * math.cos(math.radians(45)))
-
-
-def test_a_closed_path_has_no_overall_direction() -> None:
-    assert consistency(HAIRPIN, "signed") == 0.0
 
 
 def drawn_skeleton(*lines: tuple[int, int, int, int]) -> Mask:

@@ -150,13 +150,6 @@ def test_another_brightness_of_all_of_it_is_no_change(pipeline: Pipeline, networ
     assert network.shown == [WHOLE, WINDOW]
 
 
-def test_noise_is_no_change() -> None:
-    rng = np.random.default_rng(0)
-    image = picture(300)
-    noisy = np.clip(image + rng.normal(0, 20, image.shape), 0, 255).astype(np.uint8)
-    assert not has_changed(cells_of(image), cells_of(noisy), (200, 100, 256, 256))
-
-
 def grainy(image: Image, seed: int, levels: float = 16.0) -> Image:
     """With noise whose grain is some pixels wide, as in an X-ray: as many levels of it do not average out over a cell."""
     grain = cv2.GaussianBlur(np.random.default_rng(seed).normal(0, 1, image.shape[:2]), (0, 0), 1.6)
@@ -409,12 +402,6 @@ def test_the_robot_does_not_change_the_vessel_under_it() -> None:
     assert (mean == 0.5).all()
 
 
-def test_a_reset_begins_anew(averaging: Pipeline) -> None:
-    first = whole_looks(averaging, 2.5)[0]
-    averaging.reset()
-    assert middle_of(whole_looks(averaging, 0.1, start_s=2.5)[0]) == middle_of(first)
-
-
 def test_a_look_that_is_broken_does_not_count(averaging: Pipeline, biased: Biased) -> None:
     whole_looks(averaging, 0.5)
     biased.is_broken = True
@@ -425,43 +412,11 @@ def test_a_look_that_is_broken_does_not_count(averaging: Pipeline, biased: Biase
     assert all(scene.pose is not None for scene in whole_looks(averaging, 4.0, start_s=0.7))
 
 
-@pytest.mark.parametrize(
-    "tracking",
-    [
-        TrackingConfig(window_px=0),
-        TrackingConfig(window_px=640),
-        TrackingConfig(refresh_s=0.0),
-        TrackingConfig(enabled=False),
-    ],
-)
-def test_who_looks_at_all_of_every_picture_sees_it_as_it_is(biased: Biased, tracking: TrackingConfig) -> None:
-    """One orientation after the other would make the head tremble."""
-    averaging = Pipeline(biased, PerceptionConfig(tracking=tracking), roi=CalibratedSegmenter(biased))
-    for step in range(5):
-        averaging(Frame(step, 0.05 * step, picture(300)))
-    assert [np.array_equal(image, picture(300)) for image in biased.pictures] == [True] * 5
-
-
-def test_pictures_without_an_answer_are_seen_as_they_are(averaging: Pipeline, biased: Biased) -> None:
-    whole_looks(averaging, 2.5)
-    biased.pictures.clear()
-    without = picture(-100)
-    for step in range(4):
-        averaging(Frame(step, 2.5 + 0.1 * step, without))
-    assert [np.array_equal(image, without) for image in biased.pictures[1:]] == [True] * 3, "after the one that tells it"
-
-
 def test_who_looks_in_all_orientations_at_once_need_not_do_so_in_turn(biased: Biased) -> None:
     averaging = Pipeline(biased, CONFIG, roi=CalibratedSegmenter(biased, all_orientations=True))
     scenes = whole_looks(averaging, 4.0)
     shown = [image for image in biased.pictures if image.shape == WHOLE]
     assert [np.array_equal(image, going_on(scene.captured_s)) for image, scene in zip(shown, scenes, strict=True)] == [True] * 4
-
-
-def test_single_pictures_are_seen_as_they_are(averaging: Pipeline, biased: Biased) -> None:
-    whole_looks(averaging, 0.3)
-    averaging.perceive_single(Frame(9, 1.0, picture(300)))
-    np.testing.assert_array_equal(biased.pictures[-1], picture(300))
 
 
 STILL = np.zeros((1, 1, 3), np.float32)

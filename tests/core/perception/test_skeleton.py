@@ -72,29 +72,6 @@ def test_thinning_is_scikit_images_pixel_for_pixel(seed: int, sigma: float, shar
     assert np.array_equal(thin(mask), skeletonize(mask))
 
 
-def test_a_tangle_of_noise_is_thinned_and_no_more() -> None:
-    comb = np.zeros((480, 640), np.float32)
-    comb[200:206] = 1.0
-    comb[180:226, 10::6] = 1.0  # some hundred teeth to each side
-    masks = masks_of(everywhere(), comb)
-    assert picture(thin_masks(masks, PerceptionConfig()).robot) == picture(thin(masks.robot))
-
-
-def test_half_size_thinning_finds_the_same_middle() -> None:
-    mask = probability(depth(curve((-20, 200), (200, 260), (420, 180), (660, 300)), 15.0)) > 0.5
-    half, full = np.argwhere(thin_half_size(mask)), np.argwhere(thin(mask))
-    gaps = np.array([np.hypot(*(full - place).T).min() for place in half])
-    assert np.percentile(gaps, 95) <= 2.0
-    assert topology(thin_half_size(mask)) == (1, 0)
-
-
-def test_a_thin_vessel_is_thinned_at_full_size() -> None:
-    mask = np.zeros((100, 200), bool)
-    mask[50:54, 10:190] = True
-    assert topology(thin_half_size(mask)) == (1, 0)
-    assert thin_half_size(mask).sum() > 150
-
-
 @pytest.mark.parametrize("shift_px", [0.0, 0.5])
 def test_a_narrow_branch_of_a_wide_vessel_is_not_lost_at_half_size(shift_px: float) -> None:
     trunk = depth(np.array([[-20.0, 240.0], [660.0, 240.0]]), 22.0)
@@ -317,12 +294,6 @@ def test_the_input_is_not_written_to() -> None:
     assert (broken == before).all()
 
 
-def test_noise_with_hundreds_of_ends_is_left_as_it_is() -> None:
-    many = rows(*((row, first, first + 9) for row in range(2, 60, 6) for first in range(0, 150, 15)))
-    assert repaired(many, GapConfig()).bridges == ()
-    assert repaired(many[:30], GapConfig()).bridges != ()
-
-
 def test_a_line_is_one_chain_between_two_ends() -> None:
     graph = trace(
         art("""
@@ -406,25 +377,6 @@ def test_a_ring_and_a_ring_on_a_stick() -> None:
     )
     assert sorted(stick.degrees().tolist()) == [1, 3]
     assert sorted(len(chain.points) for chain in stick.chains) == [5, 13]
-
-
-def test_a_lone_pixel_is_a_node_without_chains() -> None:
-    graph = trace(
-        art("""
-...
-.#.
-...
-""")
-    )
-    assert graph.nodes.tolist() == [[1, 1]]
-    assert graph.chains == ()
-    assert graph.degrees().tolist() == [0]
-
-
-def test_nothing() -> None:
-    graph = trace(np.zeros((5, 7), bool))
-    assert graph.nodes.shape == (0, 2)
-    assert graph.degrees().tolist() == []
 
 
 def test_a_path_longer_than_any_recursion_limit() -> None:

@@ -100,11 +100,6 @@ def test_where_nothing_is_a_robot_the_likeliest_place_is_looked_at() -> None:
     assert find_tips(faint * 0.1) == []
 
 
-def test_noise_is_not_looked_at_end_by_end() -> None:
-    noise = (np.random.default_rng(0).random(SIZE) > 0.5).astype(np.float32)
-    assert len(find_tips(noise)) <= 200
-
-
 @pytest.mark.parametrize(
     ("place", "expected"), [((320, 240), (240, 160, 160, 160)), ((3, 470), (0, 320, 160, 160)), ((639, 0), (480, 0, 160, 160))]
 )

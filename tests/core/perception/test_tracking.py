@@ -80,14 +80,6 @@ def test_a_piece_that_stays_while_the_robot_moves_on_is_none(stream: Stream) -> 
     assert np.array_equal(stream.advance(111, 125, TEXT), _stretch((0, 125)))
 
 
-def test_it_is_enough_to_have_seen_it_now_and_then(stream: Stream) -> None:
-    stream.see(_stretch((0, 120)), 120)
-    stream.see(_stretch((0, 120), TEXT), None)  # and no answer to that frame
-    stream.advance(121, 138)
-    stream.see(_stretch((0, 138), TEXT), None)
-    assert np.array_equal(stream.see(_stretch((0, 138), (TEXT[0] + 1, TEXT[1] - 2)), 138), _stretch((0, 138)))
-
-
 def test_a_tip_that_shows_beyond_a_fitting_is_robot(stream: Stream) -> None:
     """The end that is seen stays at the fitting, and the tip moves."""
     for tip_x in range(260, 330):
@@ -204,13 +196,6 @@ def test_what_was_not_looked_at_was_not_seen_to_stay(stream: Stream) -> None:
         assert np.array_equal(stream.see(mask, x), mask)
 
 
-def test_a_slow_change_of_light_is_followed(stream: Stream) -> None:
-    stream.advance(100, 120, TEXT)
-    for x in range(121, 221):
-        stream.board = stream.board - 0.5
-        assert np.array_equal(stream.see(_stretch((0, x), TEXT), x), _stretch((0, x)))
-
-
 def test_what_was_not_seen_for_long_is_forgotten(stream: Stream) -> None:
     stream.advance(100, 160, TEXT)
     stream.see(_stretch((0, 160)), 160, after_s=21.0)
@@ -245,14 +230,6 @@ def test_it_can_be_switched_off() -> None:
     mask = _stretch((0, 160), TEXT)
     stream.advance(100, 160, TEXT)
     assert stream.see(mask, 160) is mask
-
-
-def test_nothing_is_copied_where_there_is_no_such_piece(stream: Stream) -> None:
-    mask = _stretch((0, 160))
-    stream.advance(100, 160)
-    assert stream.see(mask, 160) is mask
-    nothing = _stretch()
-    assert stream.see(nothing, None) is nothing
 
 
 CONFIG = TrackingConfig(route_gap_px=40.0, route_reach_px=30.0)
@@ -335,25 +312,6 @@ def test_a_way_that_was_found_for_a_moment_only_holds_over_nothing() -> None:
     assert isinstance(memory.update(WHY, head, TARGET, cut, 0.6), Route), "found for half a second, but for moments"
 
 
-def test_finds_long_apart_are_no_lasting(memory: RouteMemory) -> None:
-    memory.reset()
-    for at_s in (1.0, 3.0, 5.0):
-        memory.update(_route(120.0), (120.0, 100.0), TARGET, _vessel(), at_s)
-        assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel(), at_s + 0.1) == WHY
-
-
-def test_parts_outside_the_picture_are_gaps(memory: RouteMemory) -> None:
-    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel()[:, :330], 0.0) == WHY
-    assert isinstance(memory.update(WHY, (120.0, 100.0), TARGET, _vessel()[:, :360], 0.0), Route)
-
-
-def test_at_its_end_the_destination_is_reached(memory: RouteMemory) -> None:
-    left = memory.update(WHY, (390.0, 100.0), TARGET, _vessel(), 0.0)
-    assert isinstance(left, Route)
-    assert left.length_px == 0.0
-    assert left.points == pytest.approx(np.array([TARGET]))
-
-
 def test_what_a_frame_found_that_was_not_believed_is_not_kept(memory: RouteMemory) -> None:
     memory.settle(is_believed=True)
     elsewhere = Route(np.linspace((120.0, 190.0), TARGET, 50), 280.0, TARGET)
@@ -363,18 +321,6 @@ def test_what_a_frame_found_that_was_not_believed_is_not_kept(memory: RouteMemor
     left = memory.update(WHY, (120.0, 100.0), TARGET, _vessel((200, 235)), 0.2)
     assert isinstance(left, Route)
     assert left.length_px == pytest.approx(260.0, abs=2.0)
-
-
-def test_a_way_that_was_forgotten_does_not_come_back_with_a_frame_that_was_not_believed(memory: RouteMemory) -> None:
-    memory.settle(is_believed=True)
-    assert memory.update(WHY, (120.0, 100.0), (300.0, 100.0), _vessel(), 0.1) == WHY, "another destination"
-    memory.settle(is_believed=False)
-    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel((200, 212)), 0.2) == WHY
-
-
-def test_forgotten_is_forgotten(memory: RouteMemory) -> None:
-    memory.reset()
-    assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY
 
 
 @pytest.mark.parametrize("other", [DETOUR, SHORT_CUT], ids=["detour", "short cut"])
@@ -417,11 +363,3 @@ def test_round_a_loop_the_way_does_not_change_from_frame_to_frame() -> None:
     for step in range(60, 80):
         told = memory.update(BELOW, head, TARGET, vessel, step / 30)
     assert told is BELOW, "what lasts is true"
-
-
-def test_other_ways_that_contradict_each_other_are_not_taken(memory: RouteMemory) -> None:
-    head, cut = (120.0, 100.0), _vessel((200, 212))
-    for step in range(40):
-        told = memory.update((DETOUR, SHORT_CUT)[step % 2], head, TARGET, cut, 0.1 + step / 30)
-        assert isinstance(told, Route)
-        assert told.length_px == pytest.approx(260.0, abs=2.0)

@@ -4,7 +4,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core import geometry
-from core.perception import compiled
 from core.perception.vectors import RadiusMap, fit_line, fit_robot_vector, fit_vessel_vector, is_walled_off, project
 from core.types import Centerline, Mask, Point, Points
 
@@ -94,7 +93,6 @@ def test_the_fit_turns_and_moves_with_the_path(angle: float, shift: tuple[float,
 
 
 AT = np.array([[60.0, 100.0], [80.0, 100.0], [100.0, 100.0]])
-DOWN = np.tile([0.0, 1.0], (3, 1))
 
 
 def tube(half_width: float) -> np.ndarray:
@@ -103,53 +101,10 @@ def tube(half_width: float) -> np.ndarray:
     return np.clip(0.5 + 0.25 * (half_width - np.abs(rows - 100.0)), 0.0, 1.0).astype(np.float32)
 
 
-@pytest.mark.parametrize("half_width", [3.0, 7.3, 12.5, 20.8])
-def test_a_wall_is_found_to_a_fraction_of_a_pixel_even_where_it_was_expected_elsewhere(half_width: float) -> None:
-    for off in (-3.0, 0.0, 3.0):
-        found = compiled.wall_distances(tube(half_width), AT, DOWN, np.full(3, half_width + off), 4)[0]
-        np.testing.assert_allclose(found, half_width, atol=0.02)
-
-
-def test_of_a_mask_it_lies_between_the_last_pixel_inside_and_the_first_outside() -> None:
-    mask = (tube(9.0) >= 0.5).astype(np.float32)
-    np.testing.assert_allclose(compiled.wall_distances(mask, AT, DOWN, np.full(3, 9.0), 4)[0], 9.5, atol=0.01)
-
-
-def test_where_there_is_no_wall_there_is_no_distance() -> None:
-    level = tube(9.0)
-    level[:, 75:85] = 1.0  # an opening
-    found = compiled.wall_distances(level, AT, DOWN, np.full(3, 9.0), 4)[0]
-    assert np.isnan(found[:, 1]).all()
-    assert np.isfinite(found[:, [0, 2]]).all()
-
-
-def test_the_walls_of_both_sides_are_told_apart() -> None:
-    right, left = compiled.wall_distances(tube(9.0), AT + [0.0, 2.0], DOWN, np.full(3, 9.0), 4)[0]
-    np.testing.assert_allclose(right, 7.0, atol=0.02)
-    np.testing.assert_allclose(left, 11.0, atol=0.02)
-
-
-def test_a_place_outside_the_lumen_has_none_either() -> None:
-    assert np.isnan(compiled.wall_distances(tube(9.0), AT + [0.0, 20.0], DOWN, np.full(3, 9.0), 4)[0]).all()
-
-
 def test_the_rough_radius_is_right_to_a_pixel_wherever_the_mask_has_a_wall() -> None:
     radius = RadiusMap(tube(12.0) >= 0.5)
     assert radius.at(AT) == pytest.approx(12.0, abs=1.0)
     assert RadiusMap(np.ones((48, 64), bool)).at(np.array([[30.0, 20.0]]))[0] <= 65.0
-
-
-def test_a_soft_wall_is_told_from_a_sharp_one() -> None:
-    rows = np.abs(np.arange(200.0)[:, None] - 100.0) + np.zeros((1, 200))
-    slopes = []
-    for steepness in (0.05, 0.2, 2.0):
-        level = (1.0 / (1.0 + np.exp(-4.0 * steepness * (12.0 - rows)))).astype(np.float32)
-        found, slope = compiled.wall_distances(level, AT, DOWN, np.full(3, 12.0), 4)
-        np.testing.assert_allclose(found, 12.0, atol=0.05)
-        slopes.append(float(slope[0, 0]))
-    assert slopes == sorted(slopes)
-    assert slopes[0] == pytest.approx(0.05, rel=0.2)
-    assert slopes[2] > 4 * slopes[0]
 
 
 # ---- one lumen, or two side by side ----

@@ -42,15 +42,6 @@ def test_one_vessel_is_one_edge_to_a_fraction_of_a_pixel() -> None:
     assert {round(x) for x in (edge.points[0, 0], edge.points[-1, 0])} == {0, SIZE[0] - 1}  # to the image border
 
 
-def test_edges_end_in_their_nodes() -> None:
-    graph = perceived((BENT, 17.0), (curve((200, 210), (260, 330), (280, 420)), 11.0))
-    assert degrees(graph) == [1, 1, 1, 3]
-    for edge in graph.edges:
-        np.testing.assert_allclose(edge.points[0], graph.nodes[edge.start])
-        np.testing.assert_allclose(edge.points[-1], graph.nodes[edge.end])
-        assert len(edge.points) == len(edge.radius)
-
-
 def test_a_loop_with_one_junction_starts_and_ends_there() -> None:
     arcs = [np.linspace(start, start + 1.2 * np.pi, 200) for start in (0.0, np.pi)]
     ring = [np.column_stack([330 + 110 * np.cos(angle), 240 + 110 * np.sin(angle)]) for angle in arcs]
@@ -89,13 +80,6 @@ def test_a_trunk_runs_straight_through_a_junction_and_the_branch_straight_into_i
 def arc(first_deg: float, last_deg: float) -> Points:
     angle = np.radians(np.linspace(first_deg, last_deg, 200))
     return np.column_stack([320 + 110 * np.cos(angle), 240 + 110 * np.sin(angle)])
-
-
-def test_a_loop_stays_a_loop() -> None:
-    way_in, way_out = np.array([[-20.0, 240.0], [215.0, 240.0]]), np.array([[425.0, 240.0], [660.0, 240.0]])
-    graph = perceived((arc(-10, 190), 14.0), (arc(170, 370), 14.0), (way_in, 14.0), (way_out, 14.0))
-    assert degrees(graph) == [1, 1, 3, 3]
-    assert len(graph.edges) == 4
 
 
 def test_the_radius_near_a_junction_does_not_depend_on_the_branchs_other_end() -> None:
