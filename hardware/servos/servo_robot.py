@@ -77,7 +77,7 @@ class ServoRobot:
 
     @property
     def failure(self) -> str | None:
-        """One line when the bus process is gone though nobody closed it, or when it could not be started again."""
+        """One line when the bus process is gone without ``close``, or when it could not be started again."""
         client = self._client
         return client.failure if client is not None else self._not_connected
 
