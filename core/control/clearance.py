@@ -21,7 +21,7 @@ from core import geometry
 from core.perception.vectors import fit_robot_vector
 from core.types import Advice, Points, Scene
 
-BREACH_PX = 3.0
+_BREACH_PX = 3.0
 """Depth in the wall that is more than an error of the picture."""
 _BREACH_BAND_PX = 1.5
 """Hysteresis of a breach."""
@@ -41,11 +41,6 @@ class Clearance:
     room_px: float
     share: float
     room_mm: float | None = None
-
-    @property
-    def breach(self) -> bool:
-        """More than an error of the picture; ``BreachWatch`` waits until that lasts."""
-        return self.room_px < -BREACH_PX
 
 
 def clearance_of(scene: Scene, pixels_per_mm: float | None = None) -> Clearance | None:
@@ -71,7 +66,7 @@ class BreachWatch:
 
     def update(self, clearance: Clearance | None, time_s: float) -> bool:
         """Update with every scene, at its capture; None (not known) resets."""
-        if clearance is None or clearance.room_px > -BREACH_PX + (_BREACH_BAND_PX if self._is_reported else 0.0):
+        if clearance is None or clearance.room_px > -_BREACH_PX + (_BREACH_BAND_PX if self._is_reported else 0.0):
             self._since_s, self._is_reported = None, False
             return False
         if self._since_s is None or time_s < self._since_s:

@@ -81,7 +81,10 @@ class Engine:
             if self.pilot is not None:
                 self.pilot.worker_alive()
             return None
-        self._count(frame)
+        if self._last_index is not None:
+            self._dropped += max(0, frame.index - self._last_index - 1)
+        self._last_index = frame.index
+        self._times.append(frame.captured_s)
         with self._lock:
             target = self._target
         if self.pilot is not None:
@@ -99,7 +102,8 @@ class Engine:
         else:
             advice = self.pilot.update_scene(frame, scene, status, has_target=has_target)
             sent = self.pilot.view.sent
-        return Tick(frame, scene, advice, sent, status, self._dropped, self._rate())
+        span_s = self._times[-1] - self._times[0]
+        return Tick(frame, scene, advice, sent, status, self._dropped, (len(self._times) - 1) / span_s if span_s > 0.0 else 0.0)
 
     def _read(self, timeout_s: float) -> Frame | None:
         before_s = time.monotonic()
@@ -163,14 +167,3 @@ class Engine:
         if self.pilot is not None:
             self.pilot.frame_late()
         return True
-
-    def _count(self, frame: Frame) -> None:
-        if self._last_index is not None:
-            self._dropped += max(0, frame.index - self._last_index - 1)
-        self._last_index = frame.index
-        self._times.append(frame.captured_s)
-
-    def _rate(self) -> float:
-        if len(self._times) < 2 or self._times[-1] <= self._times[0]:
-            return 0.0
-        return (len(self._times) - 1) / (self._times[-1] - self._times[0])

@@ -66,21 +66,13 @@ class RequestRefused:
 
 
 @dataclass(frozen=True, slots=True)
-class Latched:
-    """The first cause of a disarm or stop; it stays until acknowledged."""
-
-    fault: Fault
-    since_s: float
-
-
-@dataclass(frozen=True, slots=True)
 class SupervisorState:
-    """State of the supervisor; a fresh one is disarmed, with nothing known."""
+    """State of the supervisor; a fresh one is disarmed, with nothing known. ``latched``: first cause, until it is acknowledged."""
 
     mode: Mode = Mode.ADVISORY
     health: Health = field(default_factory=Health)
     time_s: float | None = None
-    latched: Latched | None = None
+    latched: Fault | None = None
     active: tuple[Fault, ...] = ()
     hold_since_s: float = 0.0
     well_since_s: float | None = None
@@ -95,13 +87,12 @@ class Decision:
     """Result of a tick.
 
     ``permitted`` is the source whose commands the gate may let through. ``blanked`` is why no advice may be shown.
-    ``writes_blocked``: after one last hold nothing is written to the bus. ``raised`` are the faults that were not active before.
+    ``raised`` are the faults that were not active before.
     """
 
     mode: Mode
     permitted: Source | None
     blanked: Fault | None
-    writes_blocked: bool
     hold_expired: bool
     latched: Fault | None
     active: tuple[Fault, ...]

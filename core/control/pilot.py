@@ -34,7 +34,7 @@ from core.control.health import (
     ServosBusy,
     ServosChecked,
 )
-from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Latched, Mode, SupervisorState
+from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, combined
 from core.control.policies import Policy
 from core.control.robot import GuardedRobot, SentMotion
@@ -151,7 +151,7 @@ class Pilot:
         self._state = SupervisorState()
         if left_over is not None:
             mode = Mode.STOPPED if left_over.stopped else Mode.ADVISORY
-            self._state = SupervisorState(mode=mode, latched=Latched(left_over.fault, clock()))
+            self._state = SupervisorState(mode=mode, latched=left_over.fault)
         self._permitted: Source | None = None
         self._busy_s = -math.inf
         self._jogging, self._following = JogIntegrator(config.hand), AdviceController(config.policy.drive)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol, get_args
 
 import numpy as np
@@ -51,26 +52,14 @@ class Policy(Protocol):
     def reset(self) -> None: ...
 
 
-class Table:
-    """The paper's state table."""
+class Memoryless:
+    """A policy that depends on the scene alone."""
 
-    def __init__(self, config: Config) -> None:
-        self._config = config.advice
-
-    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
-        return table_policy(scene, self._config)
-
-    def reset(self) -> None: ...
-
-
-class Push:
-    """Baseline: straight on at moderate speed without steering."""
-
-    def __init__(self, config: Config) -> None:
-        self._advice = Advice(Speed.MODERATE, config.advice.moderate_mm_s, 0.0, "straight on")
+    def __init__(self, advise: Callable[[Scene], Advice | None]) -> None:
+        self._advise = advise
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
-        return self._advice
+        return self._advise(scene)
 
     def reset(self) -> None: ...
 
@@ -121,9 +110,10 @@ def make_policy(name: PolicyName, config: Config, seed: int = 0) -> Policy:
     if name == "pursuit":
         policy = Pursuit(config.policy.pursuit, config.advice)
     elif name == "table":
-        policy = Table(config)
-    elif name == "push":
-        policy = Push(config)
+        policy = Memoryless(lambda scene: table_policy(scene, config.advice))
+    elif name == "push":  # baseline: straight on at moderate speed, whatever the picture shows
+        straight_on = Advice(Speed.MODERATE, config.advice.moderate_mm_s, 0.0, "straight on")
+        policy = Memoryless(lambda _: straight_on)
     else:
         policy = RandomOperator(config, seed)
     return StopsAtTarget(policy, config.policy.pursuit.arrive_px)

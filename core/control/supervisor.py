@@ -32,7 +32,6 @@ from core.control.modes import (
     Decision,
     Event,
     Hindrance,
-    Latched,
     Mode,
     RequestRefused,
     SupervisorState,
@@ -58,7 +57,7 @@ def supervise(
     state = _react(replace(state, health=health, active=(*stop, *clock, *active)), in_use, now_s, safety)
     refused = []
     if Act.ACKNOWLEDGE in acts and state.latched is not None:
-        refused.append(RequestRefused(Act.ACKNOWLEDGE, (state.latched.fault.cause,)))
+        refused.append(RequestRefused(Act.ACKNOWLEDGE, (state.latched.cause,)))
     state, denied = _handle_requests(state, acts, now_s, safety)
     return state, _decide(state, before, (*refused, *denied), now_s, safety)
 
@@ -117,9 +116,9 @@ def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyCon
         told = (fault for fault in faults if fault.cause.area is Area.SERVOS or (in_use and fault.cause is Cause.CLOCK))
         disarm = worst(tuple(told), Reaction.DISARM)
     if stop is not None:
-        state, recheck = _leave(state, Mode.STOPPED, stop, now_s), True
+        state, recheck = _leave(state, Mode.STOPPED, stop), True
     elif disarm is not None and state.mode is not Mode.STOPPED:
-        state = _leave(state, Mode.ADVISORY, disarm, now_s)
+        state = _leave(state, Mode.ADVISORY, disarm)
     elif state.mode is Mode.AUTONOMOUS and any(fault.holds for fault in faults):
         # soon after the last one it is the same hold, or one with a fault that comes and goes would never expire
         again = state.resumed_s is not None and now_s - state.resumed_s < safety.hold_repeat_s
@@ -143,9 +142,9 @@ def _note_unwell(state: SupervisorState, now_s: float) -> SupervisorState:
     return state
 
 
-def _leave(state: SupervisorState, mode: Mode, fault: Fault, now_s: float) -> SupervisorState:
+def _leave(state: SupervisorState, mode: Mode, fault: Fault) -> SupervisorState:
     """Out of autonomy; the first cause is kept."""
-    return replace(state, mode=mode, health=state.health.disarmed(), latched=state.latched or Latched(fault, now_s))
+    return replace(state, mode=mode, health=state.health.disarmed(), latched=state.latched or fault)
 
 
 def _clear_hold(state: SupervisorState, now_s: float, safety: SafetyConfig) -> SupervisorState:
@@ -246,9 +245,8 @@ def _decide(
         mode=state.mode,
         permitted=_permitted(state),
         blanked=first_fault(blank),
-        writes_blocked=state.mode is Mode.STOPPED,
         hold_expired=_hold_expired(state, now_s, safety),
-        latched=state.latched.fault if state.latched is not None else None,
+        latched=state.latched,
         active=state.active,
         raised=tuple(fault for fault in state.active if fault.cause not in known),
         refused=refused,
@@ -262,6 +260,6 @@ def _permitted(state: SupervisorState) -> Source | None:
         return Source.PROGRAM
     causes = [fault.cause for fault in state.active if fault.holds]
     if state.latched is not None:
-        causes.append(state.latched.fault.cause)
+        causes.append(state.latched.cause)
     by_hand = state.mode in {Mode.ADVISORY, Mode.ARMED}
     return Source.OPERATOR if by_hand and all(cause.area is not Area.SERVOS for cause in causes) else None

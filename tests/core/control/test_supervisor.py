@@ -116,7 +116,6 @@ def test_every_event_in_every_mode(name: str, before: Mode, benches: dict[Mode, 
     after = TABLE[name][MODES.index(before)]
     assert decision.mode is after
     assert bench.state.mode is after
-    assert decision.writes_blocked == (after is S)
     assert (decision.latched is not None) == (bench.state.latched is not None)
     if after in {S, H}:
         assert decision.permitted is None
@@ -809,15 +808,13 @@ def test_a_hand_over_out_of_a_hold_names_the_deadman_once() -> None:
 def test_the_first_cause_stays_until_acknowledged(benches: dict[Mode, Bench]) -> None:
     bench = benches[U].copy()
     bench.tick(Fault(Cause.SEVERAL_ROBOTS, "two"))
-    began_s = bench.now_s
     bench.tick(Fault(Cause.HOT))
     decision = bench.tick(Act.STOP)
     assert decision.mode is S
     assert decision.latched == Fault(Cause.SEVERAL_ROBOTS, "two")
     assert bench.state.latched is not None
-    assert bench.state.latched.since_s == began_s
     bench.run(3.0)
-    assert bench.state.latched.fault.cause is Cause.SEVERAL_ROBOTS
+    assert bench.state.latched.cause is Cause.SEVERAL_ROBOTS
     assert bench.tick(Act.ACKNOWLEDGE).latched is None
 
 
