@@ -9,14 +9,12 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen
 from PySide6.QtWidgets import (
     QAbstractButton,
     QButtonGroup,
-    QHBoxLayout,
     QLabel,
     QListView,
     QSizePolicy,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,6 +23,7 @@ from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import STATE_TITLE, side, tip
 from app.ui.theme import ON_PICTURE
+from app.widgets.basics import column, line
 from app.widgets.painting import CENTER, NONE, Painted, PaintedWidget, draw_box, draw_text
 from app.widgets.state_badge import paint_state
 from core.annotation.model import Annotation, Readout, Status
@@ -49,9 +48,7 @@ class AnnotationBar(QWidget):
 
     def __init__(self, *, blind: bool) -> None:
         super().__init__()
-        row = QHBoxLayout()
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(5)
+        row = line(spacing=5)
         self._blind = blind
         self._tools: dict[Tool, _Chip] = {}
         group = QButtonGroup(self)
@@ -75,11 +72,7 @@ class AnnotationBar(QWidget):
         self._hint = QLabel()
         self._hint.setObjectName("card_note")
         self._hint.setMinimumWidth(10)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(5)
-        column.addLayout(row)
-        column.addWidget(self._hint)
+        self.setLayout(column(row, self._hint, spacing=5))
         self.show_tool(Tool.ROBOT, brush_on=False)
 
     @property
@@ -157,12 +150,7 @@ class AnnotationHeader(QWidget):
         theme.set_sheet(self._who, "color: @TEXT_DIM; font-size: 13px;")
         self._saved = QLabel()
         self._saved.setAccessibleName(tr("State of the file"))
-        row = QHBoxLayout(self)
-        row.setContentsMargins(4, 2, 4, 0)
-        row.setSpacing(18)
-        row.addWidget(self._title, 1)
-        row.addWidget(self._who)
-        row.addWidget(self._saved)
+        self.setLayout(line((self._title, 1), self._who, self._saved, spacing=18, margins=(4, 2, 4, 0)))
         self.show_saved(True)
 
     @property
@@ -280,11 +268,7 @@ class QueueList(QWidget):
         self._view.clicked.connect(lambda index: self.chosen.emit(index.row()))
         self._progress = _ProgressBar()
         self.show_progress = self._progress.show_progress
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(6)
-        column.addWidget(self._progress)
-        column.addWidget(self._view, 1)
+        self.setLayout(column(self._progress, (self._view, 1), spacing=6))
 
     @property
     def progress_text(self) -> str:

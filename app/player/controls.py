@@ -22,7 +22,6 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen, QValidator
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QListView,
@@ -33,7 +32,6 @@ from PySide6.QtWidgets import (
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -41,7 +39,7 @@ from app.player.course import LISTED, MARK_LOOK, SPEEDS, JumpKind, clock_text, e
 from app.player.timeline import paint_mark
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.widgets.basics import name_list
+from app.widgets.basics import column, line, name_list
 from app.widgets.painting import CENTER, RIGHT, PaintedWidget, draw_box, draw_text
 from core.session.manifest import Event, Manifest
 
@@ -216,9 +214,7 @@ class PlayerBar(QWidget):
         return button
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(5)
+        row = line(spacing=5)
         step, jump = self.step_requested.emit, self.jump_requested.emit
         before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), partial(step, -1))
         after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), partial(step, 1))
@@ -232,18 +228,8 @@ class PlayerBar(QWidget):
         row.addStretch(1)
         for right in (self.progress, self.cancel, self.clip, self.note, self.snapshot):
             row.addWidget(right)
-        top = QHBoxLayout()
-        top.setContentsMargins(0, 0, 0, 0)
-        top.setSpacing(8)
-        top.addWidget(self.slider, 1)
-        top.addWidget(self.position)
-        top.addWidget(self.length)
-        top.addWidget(self.frame)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(5)
-        column.addLayout(top)
-        column.addLayout(row)
+        top = line((self.slider, 1), self.position, self.length, self.frame, spacing=8)
+        self.setLayout(column(top, row, spacing=5))
         self.clip.setFixedWidth(QFontMetrics(theme.font(14)).horizontalAdvance("Clip 0000.0 s") + 18)
         self.frame.setMinimumWidth(150)
         self.frame.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)

@@ -25,7 +25,7 @@ from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import pictures_folder
 from app.ui.theme import ON_PICTURE
 from app.ui.window_base import WindowFrame
-from app.widgets.basics import Card, card_note, column, holder
+from app.widgets.basics import Card, card_note, column, holder, line
 from app.widgets.command_panel import Provenance, ProvenanceTable
 from app.widgets.live_view import HeadLoupe, LiveView
 from app.widgets.messages import Notice, NoticeKind, Toast
@@ -175,30 +175,20 @@ class PlayerPanels(ScenePanels):
         self.toast = Toast(self.live)
 
     def _header(self) -> QHBoxLayout:
-        header = QHBoxLayout()
-        header.setSpacing(14)
-        header.addWidget(self.banner)
-        header.addWidget(self.plate, 1)
-        header.addWidget(self._mode_note)
-        header.addWidget(self.mode)
-        return header
+        return line(self.banner, (self.plate, 1), self._mode_note, self.mode, spacing=14)
 
     def _lay_out_pictures(self) -> QWidget:
         """The recorded picture, and beside it what a replay saw in it."""
         if self.other is None:
             return self.live
         self.other.setAccessibleName(tr("The same picture perceived again"))
-        both = QHBoxLayout()
-        both.setSpacing(6)
         for view in (self.live, self.other):
             view.setMinimumSize(300, 225)
-            both.addWidget(view, 1)
         _CornerLabel(tr("PERCEIVED AGAIN"), self.other)
         theme.set_sheet(self.compared, "color: @TEXT; font-size: 14px;")
         self.compared.setAccessibleName(tr("Recorded against perceived again"))
-        pictures = column((self.compared, 0), spacing=4)
-        pictures.insertLayout(0, both, 1)
-        return holder(pictures)
+        both = line((self.live, 1), (self.other, 1), spacing=6)
+        return holder(column((both, 1), self.compared, spacing=4))
 
     def _right_side(self) -> QVBoxLayout:
         self.pages.addTab(self.events, tr("Events"))

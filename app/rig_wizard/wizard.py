@@ -11,13 +11,11 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QFrame,
-    QHBoxLayout,
     QLineEdit,
     QListWidget,
     QListWidgetItem,
     QPlainTextEdit,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -30,7 +28,7 @@ from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import calibration_lines, rig_line
 from app.ui.window_base import is_asked_to_end
-from app.widgets.basics import Card, StillWheel, takes_enter
+from app.widgets.basics import Card, StillWheel, column, line, takes_enter
 from app.widgets.messages import QuestionStrip
 from app.widgets.mode_bar import StopButton
 from core.config.rig_file import RigFile, RigFileError, write_rig
@@ -235,26 +233,14 @@ class RigWizard(QDialog):
             self.steps.addItem(item)
             self.stack.addWidget(page)
         self.stack.setFixedWidth(_CONTROLS_PX)
-        middle = QHBoxLayout()
-        middle.setSpacing(theme.GAP)
-        middle.addWidget(self.steps)
-        middle.addWidget(Card("", self.stack))
-        middle.addWidget(self.picture, 1)
-        foot = QHBoxLayout()
-        foot.setSpacing(theme.GAP)
-        foot.addWidget(self.stop_button)
-        foot.addWidget(self.line, 1)
-        foot.addWidget(self.question, 1)
+        middle = line(self.steps, Card("", self.stack), (self.picture, 1))
+        foot = line(self.stop_button, (self.line, 1), (self.question, 1))
         for part in (self.cancel_button, self.back_button, self.next_button):
             foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
-        for line in (self.line, self.question):
-            line.setMinimumHeight(44)
+        for message in (self.line, self.question):
+            message.setMinimumHeight(44)
         self.question.hide()
-        column = QVBoxLayout(self)
-        column.setContentsMargins(14, 12, 14, 12)
-        column.setSpacing(theme.GAP)
-        column.addLayout(middle, 1)
-        column.addLayout(foot)
+        self.setLayout(column((middle, 1), foot, margins=(14, 12, 14, 12)))
 
     def _go(self, index: int) -> None:
         self.page.leave()

@@ -26,7 +26,7 @@ from app.operator.models import installed_models
 from app.training.model import STEPS, Collect, TrainingJob, TrainingPhase, TrainingRequest, TrainingState, name_problem
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.widgets.basics import Card, takes_enter
+from app.widgets.basics import Card, column, line, takes_enter
 
 
 class TrainingCurves(QWidget):
@@ -42,13 +42,9 @@ class TrainingCurves(QWidget):
                 "hand, 1 at best. What counts are the held-out pictures: when they get no better any more, it has learnt enough."
             )
         )
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(theme.GAP)
         self._loss_plot, self._dice_plot = self._plot(tr("loss")), self._plot("Dice")
         self._dice_plot.setYRange(0.0, 1.0, padding=0.05)
-        for plot in (self._loss_plot, self._dice_plot):
-            row.addWidget(plot, 1)
+        self.setLayout(line((self._loss_plot, 1), (self._dice_plot, 1)))
         self._loss = self._loss_plot.plot(pen=_pen(theme.TEXT, 1.8))
         self._lines, self._dots = {}, {}
         legend = self._dice_plot.addLegend(offset=(-6, -6), labelTextColor=theme.TEXT_DIM, verSpacing=-4)
@@ -220,15 +216,8 @@ class TrainingDialog(QDialog):
         foot.addWidget(self._bar, 1, Qt.AlignmentFlag.AlignVCenter)
         foot.addWidget(self.stop)
         foot.addWidget(self.hide_button)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(16, 12, 16, 12)
-        column.setSpacing(theme.GAP)
-        column.addWidget(heading)
-        column.addLayout(self._form())
-        column.addWidget(Card("", self.curves), 4)
-        column.addWidget(Card("", self.pictures), 6)
-        column.addWidget(self._line)
-        column.addLayout(foot)
+        cards = (Card("", self.curves), 4), (Card("", self.pictures), 6)
+        self.setLayout(column(heading, self._form(), *cards, self._line, foot, margins=(16, 12, 16, 12)))
         self.job.changed.connect(self._on_changed)
         self._on_changed(self.job.state)
 
