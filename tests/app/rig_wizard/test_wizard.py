@@ -93,7 +93,7 @@ def _open_camera(wizard: RigWizard, qtbot: QtBot) -> None:
 
 
 def _idle(wizard: RigWizard, qtbot: QtBot) -> None:
-    until(qtbot, lambda: not wizard.model.is_busy)
+    qtbot.waitUntil(lambda: not wizard.model.is_busy, timeout=60_000)  # looking for the board takes seconds on a busy machine
 
 
 def _to(wizard: RigWizard, page: object) -> None:
