@@ -18,13 +18,13 @@ STILL_HEAD_PX = 15.0
 """An end this near to the last frame's head is that head; also at the image border, if it came there from within the picture, or
 the robot's other end lies at an end of the vessel."""
 ALONG_PX, ALONG_STEP_PX, ALONG_SHARE = 30.0, 10.0, 0.5
-"""A robot lies along an earlier path if this share of the shorter of both is no farther from it than a lumen is wide."""
+"""A robot lies along an earlier path if this share of the shorter of both is no further from it than a lumen is wide."""
 NEAR_PX = 20
 """Half side of the area around an end in which the robot may meet the border."""
 OUTSIDE_LEAD_PX = 10.0
-"""The end that runs this much farther outside the vessel than the other is the tail."""
+"""The end that runs this much further outside the vessel than the other is the tail."""
 NEARER_BY = 0.6
-"""An end is at the vessel's end only if the other end is clearly farther from one: this share or less of its distance."""
+"""An end is at the vessel's end only if the other end is clearly further from one: this share or less of its distance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +85,7 @@ def tail_first(points: Points, around: Surroundings) -> Points:
     """The path ordered from tail to head.
 
     The first clear answer counts: the one end at border or port (unless it is a head that has just arrived there); the last frame's
-    tail and head, or the direction of the path before a gap; the end farther outside the vessel; the one end at an end of the
+    tail and head, or the direction of the path before a gap; the end further outside the vessel; the one end at an end of the
     vessel; the thicker end; and at last the end nearer to an end of the vessel.
     """
     for looks_like_tail, margin in (

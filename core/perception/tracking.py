@@ -70,7 +70,7 @@ def recall(tracked: TrackedPath | None, captured_s: float, config: TrackingConfi
 
 
 def check_jump(path: RobotPath, tracked: TrackedPath | None, captured_s: float, config: TrackingConfig) -> Refusal | None:
-    """HEAD_JUMP, when the head is farther from its last place than the robot can have moved.
+    """HEAD_JUMP, when the head is further from its last place than the robot can have moved.
 
     The refused path must not be tracked: then a wrong one is lost with the next frame, and a right one is accepted as soon as the
     tracked path is too old.
@@ -242,7 +242,7 @@ _CHECK_S, _COMPARED_S = 0.1, 0.5
 
 
 class StaticArtefacts:
-    """Working pixels (h, w) that are segmented as robot and are none.
+    """Working pixels (h, w) that are segmented as robot and are not.
 
     An artefact stays in place while the robot's end moves on. A part of the robot that a fitting separates from the rest does not:
     it moves with the robot, while the visible end stays at the fitting. A known artefact must not become robot when the robot comes
@@ -377,7 +377,7 @@ class StaticArtefacts:
         return kept, left
 
     def _artefact_in(self, component: _Component, image: Image, captured_s: float) -> Mask | None:
-        """A component's known pixels, within its box, with their edge; None for none.
+        """A component's known pixels, within its box, with their edge; None where there are none.
 
         Where the robot has reached something of its own colour the two cannot be told apart: there all is robot.
         """
