@@ -213,9 +213,9 @@ class Scene:
     """The result of perception for one frame. Exactly one of ``pose`` and ``refusal`` is set.
 
     ``scale`` is working pixels per source pixel along the longer side, and ``scale_xy`` in x and y, which differ by the rounding to
-    whole pixels (None: both are ``scale``); ``source_size`` is (width, height) of the frame. Stages that were not reached are None.
+    whole pixels (None: both are ``scale``); ``source_size`` is (width, height) of the frame. None: a stage was not reached.
     ``latency_ms`` maps stage name to milliseconds, with "total". ``route_problem`` says why there is no way to the target.
-    ``window`` is the part of the working image that was looked at anew in a stream; None: all of it. ``novelty`` is how far the
+    ``window`` is the part of the working image that was perceived again in a stream; None: all of it. ``novelty`` is how far the
     picture is from those that the model knows, 1 at the limit; None: the model was not taught which, or only a window was seen.
     """
 

@@ -67,7 +67,7 @@ def read_settings(path: Path, *, may_move: bool = True) -> SettingsFile:
         return SettingsFile(
             path, {}, None, (message("{path}: cannot be read ({why}); the defaults are used", path=path, why=error.strerror),)
         )
-    except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
+    except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is another ValueError
         why = message("is no TOML ({why})", why=str(error).splitlines()[0] if str(error) else type(error).__name__)
         return SettingsFile(
             path,
@@ -194,7 +194,7 @@ def changed_keys(first: Config, second: Config) -> tuple[str, ...]:
 
 
 def _old_text(path: Path, seen: str | None) -> tuple[str, str]:
-    """The file's text, empty where there is none that can be edited, and a line when it had to be kept aside."""
+    """The file's text, empty where it cannot be edited, and a line when it had to be kept aside."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:
@@ -408,7 +408,7 @@ class Profiles:
         return (self._folder / f"{name.strip()}{_ENDING}").is_file()
 
     def matching(self, config: Config) -> Profile | None:
-        """The first profile with exactly this configuration; None when there is none."""
+        """The first profile with exactly this configuration, or None."""
         for profile in self.all():
             try:
                 if load_config(profile.path) == config:

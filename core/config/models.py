@@ -431,7 +431,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not a text file in UTF-8") from None
-    except ValueError as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
+    except ValueError as error:  # not TOMLDecodeError alone: a number of 5000 digits is another ValueError
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
     except RecursionError:
         raise ConfigError(f"{path}: not valid TOML: nested too deeply") from None
@@ -452,7 +452,7 @@ def choose_model(model: str | None) -> dict[str, Any]:
 
 
 def _field_range(location: tuple[Any, ...]) -> str:
-    """The allowed range of a setting as text, so that one error line shows both ends; "" when there is none."""
+    """The allowed range of a setting as text, so that one error line shows both ends; "" without one."""
     model: Any = Config
     for part in location[:-1]:
         fields = getattr(model, "model_fields", {})

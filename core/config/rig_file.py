@@ -69,7 +69,7 @@ class RigFile(ConfigSection):
 
 @dataclass(frozen=True, slots=True)
 class ListedRig:
-    """A rig file in the folder; ``rig`` is None when it cannot be used, and ``problem`` says why."""
+    """A rig file in the folder; ``rig``: None when it cannot be used; ``problem`` says why."""
 
     name: str
     path: Path
@@ -158,7 +158,7 @@ def read_rig(path: Path) -> RigFile:
         raise RigFileError(f"{path}: too large for a rig file")
     try:
         content = tomllib.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is none
+    except (ValueError, RecursionError) as error:  # not TOMLDecodeError alone: a number of 5000 digits is another ValueError
         raise RigFileError(
             f"{path}: no TOML ({' '.join(str(error).split())}); the file is kept: mend it, or calibrate anew"
         ) from None

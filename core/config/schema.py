@@ -192,7 +192,7 @@ _AT_START = {"rig", "record", "pedal", "gamepad"}
 
 
 def value_at(data: Any, key: str) -> Any:
-    """The value at a dotted path of nested dictionaries and lists. Raises KeyError when there is none."""
+    """The value at a dotted path of nested dictionaries and lists. Raises KeyError."""
     for part in key.split("."):
         if isinstance(data, list) and part.isdecimal() and int(part) < len(data):
             data = data[int(part)]

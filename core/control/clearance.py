@@ -35,7 +35,7 @@ _LEAST_FREE_PX = 1.0
 class Clearance:
     """``room_px`` from the surface of the head to the wall, in working px; negative: the head seems to reach into the wall.
 
-    ``share`` of the room at this place: 1 on the centerline, 0 at the wall. ``room_mm`` is None when the scale is not known.
+    ``share`` of the room at this place: 1 on the centerline, 0 at the wall. ``room_mm``: None without a scale.
     """
 
     room_px: float
@@ -99,7 +99,7 @@ _END_PX = 16.0
 _SHORTEST_PX = 16.0
 """Least length of a prediction, so that the direction of a slow move is seen, too."""
 _STRAIGHT_DEG = 0.5
-"""A turn below this is none."""
+"""A smaller turn does not count."""
 _STEP_PX = 2.0
 """Spacing of the points of a prediction."""
 

@@ -33,7 +33,7 @@ class DriveView:
     servos_on : checked, torque on, following the permitted source.
     busy : what the servos are doing that takes time ("checking the servos"), else empty.
     asked, asked_s : the operator's motion, and when it last was not rest (None: never).
-    advice : the policy's; None when there is none or it is blanked.
+    advice : the policy's; None without one, or when it is blanked.
     blanked : why there is no advice, in plain words, when a fault blanks it.
     commanded : what the program asks of the robot while it drives; None when it does not drive.
     sent, sent_by : the motion that left the gate last, and its source; None: a hold, or nothing yet.

@@ -193,7 +193,7 @@ class Fault:
 
 
 def first_fault(faults: Iterable[Fault]) -> Fault | None:
-    """The fault that comes first in the table; None when there are none."""
+    """The fault that comes first in the table; None without faults."""
     return min(faults, key=lambda fault: CAUSES.index(fault.cause), default=None)
 
 

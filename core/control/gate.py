@@ -261,7 +261,7 @@ def gate_step(
     Parameters
     ----------
     state : as returned by the last tick.
-    request, measurement : the newest ones; None when there is none yet.
+    request, measurement : the newest ones, or None.
     permitted : the source that the supervisor permits now.
     now_s : monotonic clock of the frames and commands.
 

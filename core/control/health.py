@@ -339,7 +339,7 @@ _BROKEN = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """State of all parts after the reports so far. ``servo_problems`` is None while the servos are not checked."""
+    """State of all parts after the reports so far. ``servo_problems``: None while the servos are not checked."""
 
     frames: FrameMonitor = field(default_factory=FrameMonitor)
     bus: BusMonitor = field(default_factory=BusMonitor)

@@ -120,7 +120,7 @@ def _goal(points: Points, head: Point, distance_px: float) -> Point:
 
 
 def _in_sight(points: Points, head: Point, heading: Point, vessel: Mask, least_px: float) -> float | None:
-    """Arc length of the way's first place ahead of the head to which a straight line stays in the lumen; None: there is none."""
+    """Arc length of the way's first place ahead of the head to which a straight line stays in the lumen, or None."""
     line = geometry.resample(points, 2.0)
     for position, (x, y) in zip(geometry.arc_length(line), line.tolist(), strict=True):
         away_px = math.hypot(x - head[0], y - head[1])

@@ -48,7 +48,7 @@ class WallContactMonitor:
         self._average_n: float | None = None
 
     def rises(self, contact_n: float | None, fed_mm: float) -> bool:
-        """Update with a frame `fed_mm` after the last; `contact_n` is None where the rig does not measure it."""
+        """Update with a frame `fed_mm` after the last; `contact_n`: None where the rig does not measure it."""
         if contact_n is None:
             return False
         before_n = contact_n if self._average_n is None else self._average_n
@@ -69,7 +69,7 @@ class ContactLimit:
         self._raised_at_px: float | None = None
 
     def exceeded(self, contact_n: float | None, rises: bool, left_px: float | None) -> bool:
-        """Whether to back off; `contact_n` is None where the rig does not measure it, `rises` is ``WallContactMonitor.rises``."""
+        """Whether to back off; `contact_n`: None where the rig does not measure it, `rises` is ``WallContactMonitor.rises``."""
         if self._raised_at_px is not None and left_px is not None and left_px < self._raised_at_px - _PAST_PX:
             self._limit_n, self._raised_at_px = self._config.contact_back_off_n, None
         if contact_n is None or contact_n <= self._limit_n or not (rises or contact_n > self._config.contact_limit_n):

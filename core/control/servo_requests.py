@@ -130,7 +130,7 @@ class ServoRequests:
 
     @property
     def busy(self) -> str:
-        """The request in progress; "" when there is none."""
+        """The request in progress, or ""."""
         with self._lock:
             return self._waiting[0] if self._waiting else ""
 

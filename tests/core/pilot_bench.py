@@ -61,7 +61,7 @@ class Robot:
         self.motion = SentMotion(self.motion.cycle + 1, 0.0, still)
 
     def beat(self, permitted: Source | None) -> None:
-        assert self.ordered in {None, permitted}, "an order of somebody who may not drive"
+        assert self.ordered in {None, permitted}, "a command of a source that may not drive"
         self.permitted = permitted
 
     def stop(self) -> None:

@@ -455,12 +455,12 @@ def test_the_end_itself_is_reached_exactly_and_never_passed() -> None:
     [
         (0.3, 0.5, 0.0, 0.5, None),
         (0.5, 0.7, 0.0, 0.6, Limit.STEP),  # the servo lags by half a millimetre
-        (0.6, 0.8, 0.0, 0.6, Limit.STEP),  # stuck: no farther than one step
+        (0.6, 0.8, 0.0, 0.6, Limit.STEP),  # stuck: no further than one step
         (-0.5, -0.7, 0.0, -0.6, Limit.STEP),
         (0.6, 0.6, -0.1, 0.5, Limit.STEP),  # pushed back: the goal follows
         (-0.6, -0.6, 0.1, -0.5, Limit.STEP),
         (0.6, 0.6, -0.19, 0.41, Limit.STEP),
-        (0.6, 0.6, -0.21, None, None),  # farther than full speed brings the goal back: off course
+        (0.6, 0.6, -0.21, None, None),  # further than full speed brings the goal back: off course
     ],
 )
 def test_never_farther_than_one_step_from_the_measured_position(
@@ -530,7 +530,7 @@ def _delivered(
 @pytest.mark.parametrize(
     ("asked", "last", "at", "moved", "limits"),
     [
-        ((-0.4, -0.4), (20.0, 120.0), None, (-0.4, -0.4), {}),  # one was zeroed anew: it is the same catheter all the same
+        ((-0.4, -0.4), (20.0, 120.0), None, (-0.4, -0.4), {}),  # one was zeroed again: it is the same catheter all the same
         # near an end at a quarter of the speed, both, whichever of them is near it
         ((-0.4, -0.4), (-4.0, 96.0), None, (-0.1, -0.1), {"delivery_1": Limit.MARGIN, "delivery_2": Limit.TOGETHER}),
         ((-0.4, -0.4), (96.0, -4.0), None, (-0.1, -0.1), {"delivery_1": Limit.TOGETHER, "delivery_2": Limit.MARGIN}),

@@ -369,7 +369,7 @@ def _heard(script: str) -> Deadman:
         ("A-D", True),
         ("-AD", True),  # the release may be from before
         ("-DAD", False),  # down since before arming
-        ("AD", False),  # down at the first word: nobody knows since when
+        ("AD", False),  # down at the first word: unknown since when
         ("A?D", False),  # what it could not tell is no release
         ("-DA?D", False),
         ("-DA???D", False),
@@ -377,7 +377,7 @@ def _heard(script: str) -> Deadman:
         ("-DA-D", True),  # let go and pressed again
         ("-DA?-D", True),
         ("A-?D", True),  # the release was told, whatever came between
-        ("A-D?D", True),  # held all the time, as far as anybody knows
+        ("A-D?D", True),  # held all the time, as far as is known
         ("A-D??DDD", True),
         ("A-D_______D", True),  # 0.5 s
         ("A-D________D", False),  # and more: as at the start

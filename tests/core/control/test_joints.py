@@ -118,7 +118,7 @@ def test_the_slower_delivery_joint_sets_the_speed_of_both() -> None:
     ("name", "change", "bend", "tendons"),
     [
         ("right", {"high_mm": 1.3}, 1.0, (1.3, -0.7)),  # the puller ends first
-        ("left", {"low_mm": -1.2}, 1.0, (1.8, -1.2)),  # the other cannot let go farther
+        ("left", {"low_mm": -1.2}, 1.0, (1.8, -1.2)),  # the other cannot let go further
         ("left", {"high_mm": 1.3}, -1.0, (-0.7, 1.3)),
         ("right", {"low_mm": -1.2}, -1.0, (-1.2, 1.8)),
     ],

@@ -209,7 +209,7 @@ def test_a_policy_remembers_through_a_hold_and_forgets_at_the_next_hand_over(ben
 
 
 def test_a_policy_forgets_when_it_is_handed_over_to_out_of_a_hold_that_has_expired(bench: Bench) -> None:
-    """Whoever asks for it again wants it to try again: one that has given up would else give up at once."""
+    """Another hand-over is another try: a policy that has given up would else give up at once."""
     bench.handed_over().turn(3)
     bench.held = False
     bench.seconds(2.0)
@@ -678,7 +678,7 @@ def test_a_late_frame_is_counted_and_told_and_changes_nothing(bench: Bench) -> N
     assert bench.alerts() == {Cause.OUT_OF_ORDER}
 
 
-# ---- a robot that nobody can drive, though its servos are on
+# ---- a robot that cannot be driven, though its servos are on
 
 
 OUTSIDE = Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at -7.00 mm (-5 to 400 mm)")
@@ -687,7 +687,7 @@ OUTSIDE = Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at -7.00 mm 
 def test_a_robot_that_keeps_all_back_is_told_to_who_moves_the_controls_and_nobody_is_shown_as_driving(bench: Bench) -> None:
     bench.robot.keeps_back = OUTSIDE
     bench.on().alerts()
-    assert bench.seconds(0.2).alerts() == set()  # nobody has tried
+    assert bench.seconds(0.2).alerts() == set()  # no command was given
     assert bench.pilot.view.servos_on
     assert bench.pilot.view.permitted is None
     bench.jog = Jog(advance=1.0)

@@ -75,7 +75,7 @@ class WatchedRobot(Robot):
 
     def arm(self) -> None:
         if self.locked:  # in the requests' thread: the machine asks for it later
-            self.offences.append("the servos are switched on again after a STOP that nobody has acknowledged")
+            self.offences.append("the servos are switched on again after a STOP without an acknowledgement")
         super().arm()
         self._happens("arm")
 
@@ -389,7 +389,7 @@ class PilotMachine:
             assert not touched, "the operator's input wins in the same turn"
             held = [source for source, at_s in self.pressed_s.items() if at_s >= self.armed_s - CLOSE and source not in self.unsure]
             ages_s = [now_s - self.said_s[source] for source in held]
-            assert min(ages_s, default=math.inf) <= HELD_S + CLOSE, "the program drives and nobody holds the deadman"
+            assert min(ages_s, default=math.inf) <= HELD_S + CLOSE, "the program drives and the deadman is not held"
             advice = self.policy.given
             whole = advice is None or math.isfinite(advice.advance_mm_s + advice.steer_deg)
             assert whole or command.advance_mm_s == 0.0, "broken advice is driven"

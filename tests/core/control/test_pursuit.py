@@ -110,7 +110,7 @@ def test_contact_backs_off_for_a_while() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     pursuit(scene_at(STRAIGHT, (100, 100), (380, 100)), status(0.0))
     speeds, insertion_mm = [], 50.0
-    for k in range(1, 12):  # he who is advised does so; longer, and this head that never moves would be stuck
+    for k in range(1, 12):  # the advice is followed; longer, and this head that never moves would be stuck
         scene = scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)
         advice = advise(pursuit, scene, status(0.3 if k == 1 else 0.0, insertion_mm))
         speeds.append(advice.advance_mm_s)
@@ -554,5 +554,5 @@ def test_the_contact_limit_rises_where_the_head_presses_and_falls_back_farther_o
     assert not limit.exceeded(0.29, True, 290.0)
     assert limit.exceeded(0.39, True, 290.0)  # now 0.4, and never more
     assert limit.exceeded(0.41, False, 290.0)
-    assert limit.exceeded(0.21, True, 200.0)  # 90 px farther on
+    assert limit.exceeded(0.21, True, 200.0)  # 90 px further on
     assert not limit.exceeded(None, False, 100.0)

@@ -461,7 +461,7 @@ def test_a_hand_over_needs_a_destination_ahead(route: RouteState, reason: Hindra
 
 @pytest.mark.parametrize("mode", [R, U, H])
 def test_nobody_stays_armed_when_the_servos_are_unchecked(mode: Mode) -> None:
-    """Asked for in ADVISORY, begun when the operator had armed already: then it could be handed over to servos that nobody knew."""
+    """Asked for in ADVISORY, begun when the operator had armed already: then it could be handed over to unchecked servos."""
     bench = Bench().in_mode(mode)
     decision = bench.tick(ServosOff())
     assert (decision.mode, decision.permitted, decision.latched) == (V, None, None)
