@@ -1,15 +1,12 @@
-"""The named phantoms. Each has a character of its own; coordinates are board millimetres (x right, y down).
+"""Named and random phantoms: smooth channels through waypoints, with branches that leave (and rejoin) them at given angles.
 
-Draws vessel graphs: smooth channels through waypoints, with branches that leave (and rejoin) them at given angles. All in mm.
-
-Random phantoms of wide variety, the same for the same seed.
-
-Is a phantom fit for the bench? Its channels keep apart, stay on the board, and a robot can follow them.
+Lengths and coordinates are board millimetres (x right, y down). ``faults`` checks that channels keep apart and lie on the board,
+and that a robot can follow them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,7 +40,7 @@ class Channel:
 
 
 class Sketch:
-    """A vessel graph in the making.
+    """Builds a vessel graph channel by channel.
 
     A channel that carries on past a junction stays one spline, so the graph is C1 (in fact C2) along through-branches.
     """
@@ -164,7 +161,7 @@ def faults(phantom: Phantom) -> list[str]:
     """What is wrong with `phantom`, one line each; empty when it is fit.
 
     A bend as tight as the lumen allows brings points 2 * (radius + gap) apart within half a turn, pi/2 times that along the way;
-    two branches that leave a junction at 35 degrees keep their gap after 3.5 times that. Points farther apart than these along the
+    two branches that leave a junction at 35 degrees keep their gap after 3.5 times that. Points that are further apart along the
     graph must have a wall between them.
     """
     return [*_off_board(phantom), *_too_tight(phantom), *_sharp_turns(phantom), *_overlaps(phantom)]
@@ -189,7 +186,7 @@ def node_distances_mm(phantom: Phantom) -> NDArray[np.float64]:
     distance = np.full((count, count), np.inf)
     np.fill_diagonal(distance, 0.0)
     for edge in phantom.graph.edges:
-        length = edge_length_mm(edge)
+        length = float(np.linalg.norm(np.diff(edge.points, axis=0), axis=1).sum())
         distance[edge.start, edge.end] = min(distance[edge.start, edge.end], length)
         distance[edge.end, edge.start] = distance[edge.start, edge.end]
     for via in range(count):
@@ -197,26 +194,18 @@ def node_distances_mm(phantom: Phantom) -> NDArray[np.float64]:
     return distance
 
 
-def edge_length_mm(edge: GraphEdge) -> float:
-    return float(np.linalg.norm(np.diff(edge.points, axis=0), axis=1).sum())
-
-
 def _off_board(phantom: Phantom) -> list[str]:
     """Lumen may leave the board only within reach of an end that lies at the edge."""
     graph, found = phantom.graph, []
-    open_ends = [graph.nodes[node] for node in (phantom.port, *phantom.targets) if _edge_distance(graph.nodes[node][None])[0] < 1.0]
+    open_ends = [graph.nodes[node] for node in (phantom.port, *phantom.targets) if _margin(graph.nodes[node][None])[0] < 1.0]
     for number, edge in enumerate(graph.edges):
-        outside = _edge_distance(edge.points) < edge.radius + 1.0
+        outside = _margin(edge.points) < edge.radius + 1.0
         for end in open_ends:
             outside &= np.linalg.norm(edge.points - end, axis=1) > 2.0 * edge.radius + 4.0
         if outside.any():
             x, y = edge.points[np.argmax(outside)]
             found.append(f"edge {number} leaves the board at ({x:.0f}, {y:.0f})")
     return found
-
-
-def _edge_distance(points: Points) -> NDArray[np.float64]:
-    return np.asarray(np.minimum(points, np.asarray(BOARD_MM) - points).min(axis=1))
 
 
 def _too_tight(phantom: Phantom) -> list[str]:
@@ -287,8 +276,8 @@ _STYLES = {"single": 0.2, "tree": 0.5, "loop": 0.15, "parallel": 0.15}
 
 
 @dataclass(frozen=True, slots=True)
-class _Manner:
-    """How the channels of one phantom look."""
+class _ChannelStyle:
+    """Shape of the channels of one phantom."""
 
     wander: float
     """Spread of curvature (1/mm)."""
@@ -299,7 +288,7 @@ class _Manner:
 def random_phantom(seed: int) -> Phantom:
     """A phantom drawn at random: topology, port side, curvature, radii, stenoses and aneurysms; 1 to 6 ends.
 
-    Drawings that ``phantom_check.faults`` finds unfit are thrown away and drawn again, so every seed gives a usable phantom.
+    Phantoms with ``faults`` are drawn again, so every seed gives a usable phantom.
     """
     rng = np.random.default_rng([seed, 20111])
     while True:
@@ -317,11 +306,13 @@ def random_phantom(seed: int) -> Phantom:
 def _draw(rng: np.random.Generator) -> Sketch | None:
     style = str(rng.choice(list(_STYLES), p=list(_STYLES.values())))
     wander = rng.uniform(0.004, 0.03 if style in ("single", "tree") else 0.012)
-    manner = _Manner(wander, 1 / rng.uniform(11.0, 18.0), rng.uniform(4.2, 8.0 if style in ("single", "tree") else 5.5))
+    channel_style = _ChannelStyle(
+        wander, 1 / rng.uniform(11.0, 18.0), rng.uniform(4.2, 8.0 if style in ("single", "tree") else 5.5)
+    )
     sketch = Sketch()
     start, heading = _port(rng)
     length = rng.uniform(110.0, 270.0 if style == "single" else 210.0)
-    main = _grown(rng, sketch, start, heading, length, manner, manner.radius_mm, inlet_mm=_INLET_MM)
+    main = _grow_channel(rng, sketch, start, heading, length, channel_style, channel_style.radius_mm, inlet_mm=_INLET_MM)
     if main is None:
         return None
     sketch.add(main)
@@ -331,7 +322,7 @@ def _draw(rng: np.random.Generator) -> Sketch | None:
             return None
     branches = {"single": 0, "tree": int(rng.integers(1, 6)), "loop": int(rng.integers(0, 3)), "parallel": 0}[style]
     for _ in range(branches):
-        _add_branch(rng, sketch, manner)
+        _add_branch(rng, sketch, channel_style)
     return sketch if style != "tree" or len(sketch.channels) > 1 else None
 
 
@@ -343,13 +334,13 @@ def _port(rng: np.random.Generator) -> tuple[NDArray[np.float64], float]:
     return np.array(places[side]), side * np.pi / 2 + lean
 
 
-def _grown(
+def _grow_channel(
     rng: np.random.Generator,
     sketch: Sketch,
     start: NDArray[np.float64],
     heading: float,
     length_mm: float,
-    manner: _Manner,
+    channel_style: _ChannelStyle,
     radius_mm: float,
     inlet_mm: float,
 ) -> Channel | None:
@@ -363,11 +354,11 @@ def _grown(
     path, curvature, wanted = [start], 0.0, 0.0
     for step in range(int(length_mm / _STEP_MM)):
         travelled = step * _STEP_MM
-        wanted = 0.96 * wanted + rng.normal(0.0, manner.wander * 0.28)
+        wanted = 0.96 * wanted + rng.normal(0.0, channel_style.wander * 0.28)
         if travelled >= inlet_mm:
             own = np.array(path[: max(0, len(path) - int(3.4 * radius_mm) - 8)][::2]).reshape(-1, 2)
             others = np.concatenate([taken, np.column_stack([own, np.full(len(own), radius_mm)])])
-            choices = np.clip(curvature + np.linspace(-0.02, 0.02, 9), -manner.max_curvature, manner.max_curvature)
+            choices = np.clip(curvature + np.linspace(-0.02, 0.02, 9), -channel_style.max_curvature, channel_style.max_curvature)
             costs = _costs(path[-1], heading, choices, wanted, radius_mm, others, open_end)
             best = int(np.argmin(costs))
             if costs[best] > 50.0:
@@ -385,7 +376,7 @@ def _grown(
 
 
 def _margin(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distance of points (..., 2) to the board's edge, negative outside."""
+    """Distance of points (..., 2) to the edge of the board, negative outside."""
     return np.asarray(np.minimum(points, np.asarray(BOARD_MM) - points).min(axis=-1))
 
 
@@ -421,7 +412,7 @@ def _radii(rng: np.random.Generator, count: int, start_mm: float) -> NDArray[np.
     return np.clip(radii, 3.4, 9.0)
 
 
-def _add_branch(rng: np.random.Generator, sketch: Sketch, manner: _Manner) -> None:
+def _add_branch(rng: np.random.Generator, sketch: Sketch, channel_style: _ChannelStyle) -> None:
     """A branch from a random place of a random channel, if there is room for one."""
     parent_number = int(rng.integers(len(sketch.channels)))
     parent = sketch.channels[parent_number]
@@ -434,13 +425,15 @@ def _add_branch(rng: np.random.Generator, sketch: Sketch, manner: _Manner) -> No
     tangent = parent.tangent(index)
     heading = float(np.arctan2(tangent[1], tangent[0]) + np.radians(angle_deg))
     radius_mm = max(3.5, float(parent.radius[index]) * rng.uniform(0.68, 0.95))
-    channel = _grown(rng, sketch, parent.points[index], heading, rng.uniform(50.0, 130.0), manner, radius_mm, inlet_mm=0.0)
+    channel = _grow_channel(
+        rng, sketch, parent.points[index], heading, rng.uniform(50.0, 130.0), channel_style, radius_mm, inlet_mm=0.0
+    )
     if channel is not None:
         sketch.join(sketch.add(channel), 0, parent_number, index)
 
 
 def _add_bypass(rng: np.random.Generator, sketch: Sketch, side: float, rejoins: bool) -> bool:
-    """A channel beside the first one, which it leaves and (if `rejoins`) meets again."""
+    """Add a channel beside the first one, which it leaves and (if `rejoins`) meets again; False when there is no room."""
     main = sketch.channels[0]
     count = len(main.points)
     low = int(count * rng.uniform(0.16, 0.3))
@@ -459,113 +452,89 @@ def _add_bypass(rng: np.random.Generator, sketch: Sketch, side: float, rejoins: 
     return True
 
 
-def _s_curve() -> Sketch:
-    sketch = Sketch()
-    sketch.run(
+@dataclass(frozen=True, slots=True)
+class _Branch:
+    """A branch of a named phantom: arguments of ``Sketch.branch``."""
+
+    parent: int
+    near: tuple[float, float]
+    angle_deg: float
+    waypoints: Waypoints
+    radii: Sequence[float]
+    rejoin: tuple[int, tuple[float, float], float] | None = None
+
+
+# Waypoints and radii of the trunk (channel 0), then the branches (channels 1, 2, ...).
+_NAMED: dict[str, tuple[Waypoints, Sequence[float], tuple[_Branch, ...]]] = {
+    "s_curve": (
         [(-1, 34), (24, 33), (66, 28), (98, 52), (104, 88), (130, 119), (166, 112), (178, 84), (170, 60)],
         [6.0, 6.0, 5.2, 4.6, 5.6, 6.2, 5.0, 4.2, 4.0],
-    )
-    return sketch
-
-
-def _y_branch() -> Sketch:
-    sketch = Sketch()
-    stem = sketch.run([(96, 151), (97, 128), (102, 100), (92, 72), (66, 44), (48, 16)], [7.0, 7.0, 6.6, 6.0, 4.8, 4.2])
-    sketch.branch(stem, (101, 95), 40.0, [(120, 70), (141, 44), (166, 30)], [6.0, 5.0, 4.6, 3.8])
-    return sketch
-
-
-def _tree() -> Sketch:
+        (),
+    ),
+    "y_branch": (
+        [(96, 151), (97, 128), (102, 100), (92, 72), (66, 44), (48, 16)],
+        [7.0, 7.0, 6.6, 6.0, 4.8, 4.2],
+        (_Branch(0, (101, 95), 40.0, [(120, 70), (141, 44), (166, 30)], [6.0, 5.0, 4.6, 3.8]),),
+    ),
     # A narrow trunk: in a wide one the bent tip finds no wall to lean on, the shaft goes straight on and misses the branches.
-    sketch = Sketch()
-    trunk = sketch.run(
-        [(-1, 78), (22, 78), (56, 76), (92, 80), (124, 69), (154, 72), (186, 64)], [5.0, 4.8, 4.6, 4.6, 4.4, 4.2, 3.8]
-    )
-    upper = sketch.branch(trunk, (42, 77), -36.0, [(66, 54), (86, 32), (116, 18)], [5.0, 4.8, 4.4, 3.9])
-    sketch.branch(upper, (74, 45), 42.0, [(98, 44), (128, 42), (158, 32)], [4.6, 4.2, 4.0, 3.7])
-    lower = sketch.branch(trunk, (84, 80), 34.0, [(106, 96), (121, 117), (134, 138)], [4.8, 4.4, 4.2, 3.7])
-    sketch.branch(lower, (108, 98), -36.0, [(128, 106), (154, 106), (180, 98)], [4.6, 4.2, 4.0, 3.8])
-    return sketch
-
-
-def _aortic_arch() -> Sketch:
-    sketch = Sketch()
-    aorta = sketch.run(
+    "tree": (
+        [(-1, 78), (22, 78), (56, 76), (92, 80), (124, 69), (154, 72), (186, 64)],
+        [5.0, 4.8, 4.6, 4.6, 4.4, 4.2, 3.8],
+        (
+            _Branch(0, (42, 77), -36.0, [(66, 54), (86, 32), (116, 18)], [5.0, 4.8, 4.4, 3.9]),
+            _Branch(1, (74, 45), 42.0, [(98, 44), (128, 42), (158, 32)], [4.6, 4.2, 4.0, 3.7]),
+            _Branch(0, (84, 80), 34.0, [(106, 96), (121, 117), (134, 138)], [4.8, 4.4, 4.2, 3.7]),
+            _Branch(3, (108, 98), -36.0, [(128, 106), (154, 106), (180, 98)], [4.6, 4.2, 4.0, 3.8]),
+        ),
+    ),
+    "aortic_arch": (
         [(146, 151), (146, 128), (144, 104), (134, 76), (108, 60), (80, 68), (64, 92), (60, 122)],
         [9.0, 9.0, 9.4, 10.0, 10.4, 10.6, 11.0, 11.6],
-    )
-    sketch.branch(aorta, (133, 75), 50.0, [(140, 44), (152, 26), (156, 9)], [4.6, 4.4, 4.2, 4.0])
-    sketch.branch(aorta, (110, 60), 62.0, [(106, 34), (112, 10)], [4.4, 4.2, 3.9])
-    innominate = sketch.branch(aorta, (86, 64), 62.0, [(68, 42), (66, 24), (70, 9)], [5.6, 5.2, 4.4, 4.0])
-    sketch.branch(innominate, (70, 44), -48.0, [(44, 33), (18, 29)], [4.4, 4.2, 3.8])
-    return sketch
-
-
-def _tortuous() -> Sketch:
-    sketch = Sketch()
-    sketch.run(
+        (
+            _Branch(0, (133, 75), 50.0, [(140, 44), (152, 26), (156, 9)], [4.6, 4.4, 4.2, 4.0]),
+            _Branch(0, (110, 60), 62.0, [(106, 34), (112, 10)], [4.4, 4.2, 3.9]),
+            _Branch(0, (86, 64), 62.0, [(68, 42), (66, 24), (70, 9)], [5.6, 5.2, 4.4, 4.0]),
+            _Branch(3, (70, 44), -48.0, [(44, 33), (18, 29)], [4.4, 4.2, 3.8]),
+        ),
+    ),
+    "tortuous": (
         [(-1, 104), (22, 103), (42, 88), (52, 64), (70, 50), (88, 63), (94, 90), (110, 105), (126, 92), (130, 64), (145, 48),
          (161, 62), (166, 88), (182, 100)],
         [5.4, 5.4, 5.0, 4.4, 5.0, 4.6, 4.0, 4.8, 4.4, 3.8, 4.8, 4.4, 4.0, 3.8],
-    )  # fmt: skip
-    return sketch
-
-
-def _cerebral_siphon() -> Sketch:
-    sketch = Sketch()
-    carotid = sketch.run(
+        (),
+    ),
+    "cerebral_siphon": (
         [(58, 151), (58, 128), (64, 102), (86, 92), (106, 98), (123, 90), (120, 72), (104, 62), (106, 46), (124, 40), (152, 44),
          (184, 36)],
         [5.0, 5.0, 4.8, 4.6, 4.5, 4.4, 4.4, 4.6, 5.0, 4.6, 4.0, 3.6],
-    )  # fmt: skip
-    sketch.branch(carotid, (112, 42), -52.0, [(116, 22), (98, 12), (72, 20), (52, 14)], [3.9, 3.8, 3.7, 3.6, 3.5])
-    sketch.branch(carotid, (149, 43), 40.0, [(166, 61), (184, 72)], [4.0, 3.8, 3.6])
-    return sketch
-
-
-def _parallel_channels() -> Sketch:
-    sketch = Sketch()
-    middle = sketch.run([(-1, 75), (22, 75), (60, 75), (120, 77), (170, 73), (201, 75)], [7.0, 7.0, 5.0, 4.4, 4.8, 5.0])
-    sketch.branch(middle, (26, 75), -40.0, [(46, 54), (78, 45), (128, 47), (172, 44), (201, 45)], [5.4, 5.2, 5.0, 4.2, 4.6, 4.8])
-    sketch.branch(middle, (40, 75), 42.0, [(60, 94), (86, 104), (132, 103), (172, 106), (201, 105)], [5.2, 5.0, 4.8, 4.2, 4.6, 4.8])
-    return sketch
-
-
-def _loop() -> Sketch:
-    sketch = Sketch()
-    upper = sketch.run(
+        (
+            _Branch(0, (112, 42), -52.0, [(116, 22), (98, 12), (72, 20), (52, 14)], [3.9, 3.8, 3.7, 3.6, 3.5]),
+            _Branch(0, (149, 43), 40.0, [(166, 61), (184, 72)], [4.0, 3.8, 3.6]),
+        ),
+    ),
+    "parallel_channels": (
+        [(-1, 75), (22, 75), (60, 75), (120, 77), (170, 73), (201, 75)],
+        [7.0, 7.0, 5.0, 4.4, 4.8, 5.0],
+        (
+            _Branch(0, (26, 75), -40.0, [(46, 54), (78, 45), (128, 47), (172, 44), (201, 45)], [5.4, 5.2, 5.0, 4.2, 4.6, 4.8]),
+            _Branch(0, (40, 75), 42.0, [(60, 94), (86, 104), (132, 103), (172, 106), (201, 105)], [5.2, 5.0, 4.8, 4.2, 4.6, 4.8]),
+        ),
+    ),
+    "loop": (
         [(201, 84), (178, 84), (150, 74), (124, 46), (92, 38), (62, 52), (38, 72), (12, 76)],
         [6.4, 6.4, 5.8, 4.8, 4.6, 5.0, 5.4, 4.2],
-    )
-    sketch.branch(
-        upper, (156, 77), -44.0, [(122, 106), (90, 117), (60, 102)], [5.2, 5.0, 4.4, 4.6, 5.0], rejoin=(upper, (36, 73), 50.0)
-    )
-    return sketch
-
-
-def _coronary() -> Sketch:
-    sketch = Sketch()
-    main = sketch.run(
+        (_Branch(0, (156, 77), -44.0, [(122, 106), (90, 117), (60, 102)], [5.2, 5.0, 4.4, 4.6, 5.0], (0, (36, 73), 50.0)),),
+    ),
+    "coronary": (
         [(30, -1), (32, 20), (46, 44), (76, 56), (110, 58), (142, 74), (162, 102), (168, 134)],
         [5.6, 5.6, 5.2, 4.8, 3.6, 4.6, 4.0, 3.5],
-    )
-    sketch.branch(main, (40, 36), 50.0, [(38, 68), (42, 98), (62, 124), (92, 136)], [4.6, 4.6, 5.8, 4.2, 3.6])
-    sketch.branch(main, (84, 57), 50.0, [(100, 82), (122, 106), (128, 130)], [4.2, 4.0, 3.8, 3.5])
-    sketch.branch(main, (106, 57), -44.0, [(130, 40), (156, 36), (184, 26)], [4.2, 4.0, 3.8, 3.5])
-    return sketch
-
-
-_DRAWN: dict[str, Callable[[], Sketch]] = {
-    "s_curve": _s_curve,
-    "y_branch": _y_branch,
-    "tree": _tree,
-    "aortic_arch": _aortic_arch,
-    "tortuous": _tortuous,
-    "cerebral_siphon": _cerebral_siphon,
-    "parallel_channels": _parallel_channels,
-    "loop": _loop,
-    "coronary": _coronary,
-}
+        (
+            _Branch(0, (40, 36), 50.0, [(38, 68), (42, 98), (62, 124), (92, 136)], [4.6, 4.6, 5.8, 4.2, 3.6]),
+            _Branch(0, (84, 57), 50.0, [(100, 82), (122, 106), (128, 130)], [4.2, 4.0, 3.8, 3.5]),
+            _Branch(0, (106, 57), -44.0, [(130, 40), (156, 36), (184, 26)], [4.2, 4.0, 3.8, 3.5]),
+        ),
+    ),
+}  # fmt: skip
 
 PHANTOM_NAMES: tuple[str, ...] = tuple(PHANTOM_TITLES)
 
@@ -581,6 +550,11 @@ def make_phantom(name: str) -> Phantom:
     kind, _, seed = name.partition(":")
     if kind == "random" and seed.isdecimal():
         return random_phantom(int(seed))
-    if name not in _DRAWN:
+    if name not in _NAMED:
         raise ValueError(f"unknown phantom {name!r}; known: {', '.join(PHANTOM_NAMES)}, random:<seed>")
-    return Phantom(name, PHANTOM_TITLES[name], _DRAWN[name]().graph(), port=0)
+    waypoints, radii, branches = _NAMED[name]
+    sketch = Sketch()
+    sketch.run(waypoints, radii)
+    for branch in branches:
+        sketch.branch(branch.parent, branch.near, branch.angle_deg, branch.waypoints, branch.radii, branch.rejoin)
+    return Phantom(name, PHANTOM_TITLES[name], sketch.graph(), port=0)
