@@ -26,7 +26,7 @@ from core.types import Frame, Image, Scene
 
 if TYPE_CHECKING:
     from core.evaluation.accuracy import FrameScore
-    from core.evaluation.paper import PaperBaseline
+    from core.evaluation.paper_baseline import PaperBaseline
     from core.perception.pipeline import Pipeline
 
 
@@ -134,7 +134,7 @@ def _warm_up(pipeline: Pipeline) -> tuple[float, PaperBaseline]:
     for index, image in enumerate(_pictures(_WARM_UP)):
         scene = pipeline.perceive_single(Frame(index, index / 30, image))
     peak_memory_mb = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1)
-    from core.evaluation.paper import PaperBaseline
+    from core.evaluation.paper_baseline import PaperBaseline
 
     baseline = PaperBaseline()
     if scene.masks is not None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 from rich.console import Console
@@ -26,8 +26,10 @@ from core.control.policies import POLICY_NAMES
 from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
 from core.files import write_atomic
-from hardware.twin.catalog import BENCH_LOOK
-from hardware.twin.trial import RANDOM_LOOK, TRIAL_LOOKS, TrialPlan
+from hardware.twin.catalog import BENCH_LOOK, RANDOM_LOOK, TRIAL_LOOKS
+
+if TYPE_CHECKING:
+    from hardware.twin.trial import TrialPlan
 
 Job = tuple[PolicyName, int]
 """A policy and a seed."""
@@ -65,6 +67,8 @@ def trial(
     config_path: ConfigOption = None,
 ) -> None:
     """Closed-loop trials in the bench twin: a policy drives the robot to a target that it has never seen."""
+    from hardware.twin.trial import TrialPlan
+
     check_masks(model, true_masks=true_masks)
     overrides = choose_model(model)
     config = load_config(config_path, None, overrides)

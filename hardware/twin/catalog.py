@@ -34,7 +34,10 @@ RARE_TITLES = {
 """Looks of rigs of other kinds, drawn only where they are named (``rare_looks.py``)."""
 
 LOOKS = (*LOOK_TITLES, *RARE_TITLES, BENCH_LOOK)
-"""All that a look may be called."""
+"""The names of all looks."""
+RANDOM_LOOK = "random"
+"""For trials: each gets another look of the ten families."""
+TRIAL_LOOKS = (RANDOM_LOOK, BENCH_LOOK, *LOOK_TITLES, *RARE_TITLES)
 
 
 def look_of(config: TwinConfig) -> str | None:

@@ -21,7 +21,7 @@ from core.evaluation.trial import Row, TrialLog, TrialSample, trial_row
 from core.perception.centerline import plan_route
 from core.perception.pipeline import Pipeline
 from core.types import Advice, Command, Frame, Point, Points, Scene, Speed
-from hardware.twin.catalog import BENCH_LOOK, LOOK_TITLES, RARE_TITLES
+from hardware.twin.catalog import RANDOM_LOOK
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.rendering.appearance import named_appearance
@@ -43,9 +43,6 @@ _SETTLE_S = 0.5
 _STOPPED_S = 2.0
 _NO_PROGRESS_S, _PROGRESS_MM = 40.0, 2.0  # time to back out of a missed branch and to try again
 _HELP_S, _HELP_MM_S, _MAX_HELP = 1.0, 5.0, 5
-
-RANDOM_LOOK = "random"
-TRIAL_LOOKS = (RANDOM_LOOK, BENCH_LOOK, *LOOK_TITLES, *RARE_TITLES)
 
 
 @dataclass(frozen=True, slots=True)

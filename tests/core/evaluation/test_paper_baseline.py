@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from core.evaluation.paper import connect_gaps, end_points, trace_paper
+from core.evaluation.paper_baseline import connect_gaps, end_points, trace_paper
 from tests.core.drawing import art, picture
 
 
