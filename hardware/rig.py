@@ -189,7 +189,7 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
 
 def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     """The twin and its seven software servos in a process of their own."""
-    from hardware.twin.process import PrestartedProcesses, RemoteCamera, RemoteTwin
+    from hardware.twin.process import PrestartedProcesses, RemoteTwin
 
     loading = ahead or PrestartedProcesses()
     with ExitStack() as undo:
@@ -198,7 +198,7 @@ def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         undo.callback(twin.close)
         robot = _twin_servos(config, twin.port, twin.status, process=loading.bus)
         undo.pop_all()
-    return Rig(config.rig.name, RigKind.SIM, RemoteCamera(twin), robot)
+    return Rig(config.rig.name, RigKind.SIM, twin, robot)
 
 
 def _soft_servos(config: Config, world: TwinWorld) -> ServoRobot:

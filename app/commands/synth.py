@@ -61,12 +61,12 @@ def make_set(
         except ValueError as error:
             raise SynthError(str(error)) from None
     plan = SynthPlan(out, count, seed, size, families, phantom, poses)
-    elsewhere = None
+    remote = None
     if scheduler is not None:
         from app.commands.workers import over_cluster
 
-        elsewhere = partial(over_cluster, scheduler)
+        remote = partial(over_cluster, scheduler)
     with progress_bar() as bar:
         task = bar.add_task(f"frames -> {out}", total=count)
-        write_set(plan, workers=workers, elsewhere=elsewhere, on_progress=lambda frames: bar.advance(task, frames))
+        write_set(plan, workers=workers, remote=remote, on_progress=lambda frames: bar.advance(task, frames))
     console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)

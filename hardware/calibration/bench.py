@@ -133,10 +133,10 @@ def open_bench(config: Config, perceive: Perceive) -> CalibrationBench:
     config = config.model_copy(update={"servos": config.servos.model_copy(update={"port": None})})
     if not config.twin.own_process:
         return _twin_in_process(config, perceive)
-    from hardware.twin.process import RemoteCamera, RemoteTwin
+    from hardware.twin.process import RemoteTwin
 
     twin = RemoteTwin(config, START_INSERTION_MM)
-    return CalibrationBench(config, RemoteCamera(twin), twin.port, perceive, twin.close)
+    return CalibrationBench(config, twin, twin.port, perceive, twin.close)
 
 
 def _twin_in_process(config: Config, perceive: Perceive) -> CalibrationBench:

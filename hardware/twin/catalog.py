@@ -1,11 +1,11 @@
-"""How looks are called, and which one is configured; apart from their drawing, which a menu does not need."""
+"""Names and titles of the looks, and the configured one. Without the rendering, which menus need not load."""
 
 from __future__ import annotations
 
 from core.config.models import TwinConfig
 
 BENCH_LOOK = "bench"
-"""The twin's own fixed look, which is in none of the families."""
+"""The fixed default look, in none of the families."""
 BENCH_TITLE = "Clear bench"
 
 LOOK_TITLES = {
@@ -20,7 +20,7 @@ LOOK_TITLES = {
     "fluoroscopy": "Fluoroscopy",
     "subtraction": "Subtraction angiography",
 }
-"""The ten families, of which looks are drawn where none is named."""
+"""The ten families that looks are drawn from where none is named."""
 
 RARE_TITLES = {
     "gel": "Turbid gel",
@@ -31,7 +31,7 @@ RARE_TITLES = {
     "picture": "Printed photograph",
     "resin": "Layers of printed resin",
 }
-"""Looks of rigs of other kinds, drawn only where they are named (``rare_looks.py``)."""
+"""Looks of other kinds of rigs, drawn only where they are named."""
 
 LOOKS = (*LOOK_TITLES, *RARE_TITLES, BENCH_LOOK)
 """The names of all looks."""
@@ -41,5 +41,5 @@ TRIAL_LOOKS = (RANDOM_LOOK, BENCH_LOOK, *LOOK_TITLES, *RARE_TITLES)
 
 
 def look_of(config: TwinConfig) -> str | None:
-    """The name of the configured look; None: any of the ten families, by the seed."""
+    """Name of the configured look; None: any of the ten families, by the seed."""
     return config.look if config.look is not None or config.appearance_seed else BENCH_LOOK

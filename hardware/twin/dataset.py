@@ -1,9 +1,9 @@
 """Labelled data sets from the twin: random phantoms, physical robot shapes, random looks, exact masks and truth.
 
-A set is made in episodes: one random phantom (seed = first seed + episode) through which the robot is driven once, in
-``LOOKS_PER_EPISODE`` looks. Painting a look takes far longer than painting a robot into it, so a look can be shown with several
-poses of the robot. A frame depends on its episode's seed and on the plan alone, so a set can be continued after an interruption,
-and two sets are disjoint when their seed ranges are.
+A set consists of episodes: one random phantom (seed = first seed + episode) through which the robot is driven once, in
+``LOOKS_PER_EPISODE`` looks. Painting a look takes far longer than painting a robot into it, so one look can serve several poses.
+A frame depends only on the seed of its episode and on the plan: a set can be continued after an interruption, and two sets with
+disjoint seed ranges are disjoint.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from hardware.twin.catalog import BENCH_LOOK
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
-from hardware.twin.rendering.appearance import Appearance, make_view, named_appearance
+from hardware.twin.rendering.appearance import make_view, named_appearance
 from hardware.twin.rendering.renderer import RenderedFrame, Renderer
 from hardware.twin.truth import RouteFollower, truth_of
 
 LOOKS_PER_EPISODE = 16
-_EMPTY_SHARE = 0.03
+_EMPTY_SHARE = 0.03  # of the frames show no robot
 _STEP_S = 0.02
 _FEED_MM_S = 40.0
 
@@ -43,7 +43,7 @@ _FEED_MM_S = 40.0
 @dataclass(frozen=True, slots=True)
 class SynthPlan:
     """What to write. ``families`` of ``LOOKS`` limits the looks (None: all random ones), ``phantom`` fixes the phantom (None:
-    random ones), ``poses`` is how many poses of the robot every look is shown with."""
+    random ones), ``poses`` is the number of poses of the robot in every look."""
 
     out: Path
     count: int
@@ -59,11 +59,9 @@ class SynthPlan:
 
     @property
     def frames_per_episode(self) -> int:
-        """Of all episodes but the last, which may have fewer."""
         return LOOKS_PER_EPISODE * self.poses
 
     def frames_of(self, episode: int) -> int:
-        """How many frames an episode has."""
         return min(self.frames_per_episode, self.count - episode * self.frames_per_episode)
 
 
@@ -78,23 +76,22 @@ class LabelledFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Episode:
-    """One made episode: what to write where in a set's folder, and the truth of its frames, a line each."""
+    """A finished episode: contents of its files by relative path, and the truth of its frames, a line each."""
 
     number: int
     files: dict[str, bytes]
     truth: tuple[str, ...]
 
 
-Elsewhere = Callable[[Callable[[int], Episode], Sequence[int]], Iterable[Episode]]
-"""Makes the episodes of these numbers on other machines, in any order."""
+RemoteEpisodes = Callable[[Callable[[int], Episode], Sequence[int]], Iterable[Episode]]
+"""Makes the episodes with these numbers on other machines, in any order."""
+
+RobotShape = tuple[Points, float, float]
+"""Points (N, 2) mm tail -> head, sheath mm, clearance mm."""
 
 
-Shape = tuple[Points, float, float]
-"""The robot at a moment: points (N, 2) mm tail -> head, sheath mm, clearance mm."""
-
-
-def robot_shapes(phantom: Phantom, seed: int, looks: int, poses: int = 1) -> list[Shape]:
-    """Drive the robot once through a phantom; `poses` moments for each of `looks` looks, in order."""
+def robot_shapes(phantom: Phantom, seed: int, looks: int, poses: int = 1) -> list[RobotShape]:
+    """Drive the robot once through a phantom; `poses` shapes for each of `looks` looks, in order."""
     count = looks * poses
     rng = np.random.default_rng((seed, 11))
     physics = TwinPhysics(phantom, seed)
@@ -103,7 +100,7 @@ def robot_shapes(phantom: Phantom, seed: int, looks: int, poses: int = 1) -> lis
         phantom, target, lookahead_mm=float(rng.uniform(6, 14)), wander=float(rng.choice((0.0, 0.4, 0.9))), seed=seed
     )
     moments = np.sort(rng.uniform(0.12, 0.98, count)) * follower.length_mm
-    shapes: list[Shape] = []
+    shapes: list[RobotShape] = []
     sheath_speed = float(rng.choice((0.0, 0.0, 6.0, 14.0)))
     for _ in range(int(3.0 * follower.length_mm / _FEED_MM_S / _STEP_S)):
         command = follower.command(physics.robot_points_mm(), _FEED_MM_S, _STEP_S)
@@ -112,14 +109,12 @@ def robot_shapes(phantom: Phantom, seed: int, looks: int, poses: int = 1) -> lis
             shapes.append((physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm()))
             if len(shapes) % poses:
                 break  # the robot has not moved since
-            # A free wiggle now and then: not every picture shows a robot that follows its route.
+            # A random bend, so that not every picture shows a robot that follows its route.
             physics.step(type(command)(float(rng.uniform(-1, 1)), 0.0, 0.0, 0.0), float(rng.uniform(0.0, 0.15)))
         if len(shapes) == count:
             break
     last = (physics.robot_points_mm(), physics.delivery_mm, physics.clearance_mm())
-    while len(shapes) < count:  # it got stuck: its last shape, seen by other looks
-        shapes.append(last)
-    return shapes
+    return shapes + [last] * (count - len(shapes))  # a stuck robot: its last shape in the remaining looks
 
 
 def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
@@ -129,14 +124,17 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
     rng = np.random.default_rng((seed, 13))
     config = PerceptionConfig()
     shapes = robot_shapes(phantom, seed, LOOKS_PER_EPISODE, plan.poses)
-    # Several poses of a look lie anywhere on the way, not one behind the other; single ones are shown in order.
+    # Several poses of a look come from anywhere on the route; single ones are shown in order.
     moments = np.random.default_rng((seed, 17)).permutation(len(shapes)) if plan.poses > 1 else np.arange(len(shapes))
     first = episode * plan.frames_per_episode
     first_look = seed * LOOKS_PER_EPISODE
     for place in range(plan.frames_of(episode)):
         look, pose = divmod(place, plan.poses)
         if pose == 0:
-            appearance = _look(plan, first_look + look, rng)
+            family = str(rng.choice(plan.families)) if plan.families else None
+            appearance = named_appearance(family, first_look + look)
+            if family == BENCH_LOOK:
+                appearance = replace(appearance, family=BENCH_LOOK)
             view = make_view(appearance, plan.size, phantom)
             renderer = Renderer(phantom, appearance, plan.size, seed)
         moment = int(moments[place])
@@ -152,14 +150,8 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
         yield LabelledFrame(stem, picture, row | truth)
 
 
-def _look(plan: SynthPlan, look_seed: int, rng: np.random.Generator) -> Appearance:
-    family = str(rng.choice(plan.families)) if plan.families else None
-    look = named_appearance(family, look_seed)
-    return replace(look, family=BENCH_LOOK) if family == BENCH_LOOK else look
-
-
 def make_episode(plan: SynthPlan, number: int) -> Episode:
-    """Make an episode; nothing is written."""
+    """Render an episode in memory."""
     import cv2
 
     cv2.setNumThreads(1)
@@ -174,11 +166,11 @@ def make_episode(plan: SynthPlan, number: int) -> Episode:
 
 
 def _write_episode(plan: SynthPlan, number: int) -> int:
-    return _keep(plan, make_episode(plan, number))
+    return _save_episode(plan, make_episode(plan, number))
 
 
-def _keep(plan: SynthPlan, made: Episode) -> int:
-    """Write an episode; its truth file comes last, by rename, and marks it as complete. Returns how many frames it has."""
+def _save_episode(plan: SynthPlan, made: Episode) -> int:
+    """Write an episode and return its number of frames. The truth file comes last, by rename, and marks it as complete."""
     for name, data in made.files.items():
         write_atomic(plan.out / name, data)
     write_atomic(_episode_file(plan, made.number), ("\n".join(made.truth) + "\n").encode())
@@ -189,17 +181,12 @@ def _episode_file(plan: SynthPlan, episode: int) -> Path:
     return plan.out / "episodes" / f"{episode:05d}.jsonl"
 
 
-def _is_complete(plan: SynthPlan, episode: int) -> bool:
-    path = _episode_file(plan, episode)
-    return path.is_file() and len(path.read_text(encoding="utf-8").splitlines()) >= plan.frames_of(episode)
-
-
 class SynthError(UserError):
     """The set cannot be written; the message is one line and says what to do."""
 
 
 class SynthFolderError(SynthError):
-    """The folder holds something else; ``problem`` says what, for those who cannot just choose another one."""
+    """The folder holds something else; ``problem`` says what, without the advice to choose another one."""
 
     def __init__(self, problem: str, advice: str = "choose another folder") -> None:
         super().__init__(f"{problem}; {advice}")
@@ -207,14 +194,13 @@ class SynthFolderError(SynthError):
 
 
 def write_set(
-    plan: SynthPlan, *, workers: int = 1, elsewhere: Elsewhere | None = None, on_progress: Callable[[int], None] = lambda _: None
+    plan: SynthPlan, *, workers: int = 1, remote: RemoteEpisodes | None = None, on_progress: Callable[[int], None] = lambda _: None
 ) -> int:
-    """Write the set; frames that are there already are kept. Returns the number of frames in it.
+    """Write the set and return its number of frames; existing frames are kept.
 
-    With `elsewhere` other machines make the frames, in place of `workers` processes here; what they make is written here.
-
-    `on_progress` is given the number of frames that were completed since its last call. An interruption (Ctrl-C) loses the episodes
-    in hand only; the same call goes on from there.
+    With `remote`, other machines render the frames in place of `workers` processes here; they are written here. `on_progress` gets
+    the number of frames completed since its last call. An interruption (Ctrl-C) loses only unfinished episodes; the same call
+    continues.
 
     Raises
     ------
@@ -223,7 +209,7 @@ def write_set(
     """
     _prepare(plan)
     try:
-        _write_missing(plan, workers, elsewhere, on_progress)
+        _write_missing(plan, workers, remote, on_progress)
     except OSError as error:
         raise SynthError(f"{error.filename or plan.out}: cannot be written ({error.strerror}); free some space and go on") from None
     except BrokenProcessPool:
@@ -234,12 +220,16 @@ def write_set(
     return plan.count
 
 
-def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, on_progress: Callable[[int], None]) -> None:
-    missing = [episode for episode in range(plan.episodes) if not _is_complete(plan, episode)]
+def _write_missing(plan: SynthPlan, workers: int, remote: RemoteEpisodes | None, on_progress: Callable[[int], None]) -> None:
+    def is_complete(episode: int) -> bool:
+        path = _episode_file(plan, episode)
+        return path.is_file() and len(path.read_text(encoding="utf-8").splitlines()) >= plan.frames_of(episode)
+
+    missing = [episode for episode in range(plan.episodes) if not is_complete(episode)]
     on_progress(plan.count - sum(map(plan.frames_of, missing)))
-    if elsewhere is not None and missing:
-        for made in elsewhere(partial(make_episode, plan), missing):
-            on_progress(_keep(plan, made))
+    if remote is not None and missing:
+        for made in remote(partial(make_episode, plan), missing):
+            on_progress(_save_episode(plan, made))
     elif workers <= 1:
         for episode in missing:
             on_progress(_write_episode(plan, episode))
@@ -253,7 +243,7 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
                 for job in as_completed(jobs):
                     on_progress(job.result())
             finally:
-                # Nothing is left to cancel or to end unless it was interrupted or an episode failed.
+                # There is something to cancel or to end only after an interruption or a failed episode.
                 pool.shutdown(wait=False, cancel_futures=True)
                 for worker in set(multiprocessing.active_children()) - others:
                     worker.terminate()
@@ -262,6 +252,7 @@ def _write_missing(plan: SynthPlan, workers: int, elsewhere: Elsewhere | None, o
 
 
 def _prepare(plan: SynthPlan) -> None:
+    """Make the folders and the plan file, or check that those that exist are of this plan."""
     described = {
         "seed": plan.seed,
         "size": list(plan.size),
@@ -281,7 +272,7 @@ def _prepare(plan: SynthPlan) -> None:
             if json.loads(path.read_text(encoding="utf-8")) != described:
                 raise SynthFolderError(f"{plan.out}: holds a set with other settings ({path.name})")
         else:
-            write_atomic(path, f"{json.dumps(described)}\n".encode())  # first: it says whose folder this is
+            write_atomic(path, f"{json.dumps(described)}\n".encode())  # first: it marks the folder as one of synth
         folders = [plan.out / name for name in ("images", "masks", "episodes")]
         for folder in folders:
             folder.mkdir(exist_ok=True)

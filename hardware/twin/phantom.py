@@ -1,4 +1,4 @@
-"""Vascular phantoms as centerline graphs with a lumen radius along the way, in millimetres on a 200 x 150 mm board."""
+"""A vascular phantom: centerline graph with lumen radii, in millimetres on a board of 200 x 150 mm."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PHANTOM_TITLES = {
     "loop": "Loop of two ways",
     "coronary": "Coronary tree with stenosis",
 }
-"""The named phantoms and what people call them; apart from their drawing, which takes a second to load."""
+"""Titles of the named phantoms. Apart from ``phantoms``, which takes a second to load."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,15 +1,9 @@
-"""The bench twin's mechanics: a tendon-driven chain fed through a port into the walls of a phantom. Lock-step and deterministic.
+"""The twin's mechanics in MuJoCo: a tendon-driven chain fed through a port into the lumen of a phantom. Deterministic.
 
-The robot's body in the solver: one MuJoCo model of a given length, and what guide, sheath and port do to its links.
-
-The MuJoCo model of robot and walls. Units mm, kg, s, so forces are millinewtons; board plane z = 0, x right, y down, z away
-from the camera. Numbers come from measurements of stability and bending; they are not calibrated to a real rig. Sparse Jacobian and
-elliptic cones: with 25 contacts on 127 degrees of freedom a step took 1.4 ms, 1.8 with pyramidal cones, 5.8 with a
-dense Jacobian too.
-
-The lumen's walls as thin boxes for the contact solver, pushed outward from the outline of the lumen. Lengths in mm.
-
-Between a bend command and the tendon: slew limit, backlash and dead zone. Tendon friction in the solver gave no hysteresis.
+Units mm, kg, s, so forces are millinewtons; board plane z = 0, x right, y down, z away from the camera. Parameters were chosen by
+stability and bending and are not calibrated to a real rig. Walls are thin boxes outside the outline of the lumen. Drives have slew
+limit, backlash and dead zone (tendon friction in the solver gave no hysteresis). Sparse Jacobian and elliptic cones are fastest: a
+step with 25 contacts on 127 degrees of freedom took 1.4 ms, with pyramidal cones 1.8 ms, with a dense Jacobian too 5.8 ms.
 """
 
 from __future__ import annotations
@@ -62,7 +56,7 @@ class Port:
 
 
 def port_of(phantom: Phantom) -> Port:
-    """The phantom's port, with the direction of its first 2 mm of centerline."""
+    """The phantom's port, with the direction of the first 2 mm of centerline."""
     for edge in phantom.graph.edges:
         if phantom.port in (edge.start, edge.end):
             points, radius = (edge.points, edge.radius) if edge.start == phantom.port else (edge.points[::-1], edge.radius[::-1])
@@ -80,7 +74,7 @@ def lumen_outline(graph: VesselGraph) -> list[Points]:
     x, y = low[0] + _GRID_MM * np.arange(columns), low[1] + _GRID_MM * np.arange(rows)
     depth = np.full((rows, columns), -1.0)
     for (cx, cy), radius in zip(centers, radii, strict=True):
-        # Each disc only touches a window around it; one millimetre outside is enough to interpolate the zero line.
+        # A disc changes only a window around it; 1 mm outside is enough to interpolate the zero line.
         reach = radius + 1.0
         i = slice(int((cy - reach - low[1]) / _GRID_MM), int((cy + reach - low[1]) / _GRID_MM) + 2)
         j = slice(int((cx - reach - low[0]) / _GRID_MM), int((cx + reach - low[0]) / _GRID_MM) + 2)
@@ -99,13 +93,13 @@ def wall_boxes(phantom: Phantom, outlines: list[Points]) -> tuple[list[Wall], Po
             if length < 1e-6:
                 continue
             along = (end - start) / length
-            # Outlines keep the lumen on a fixed hand, islands too: here (x right, y down) on their left as seen on screen.
+            # The lumen lies on the left of all outlines as seen on screen (x right, y down), islands too.
             outward = np.array([along[1], -along[0]])
             count = int(np.ceil(length / _MAX_PIECE_MM))
             for piece in range(count):
                 ends = start + np.outer((piece, piece + 1), along) * length / count
                 middle = ends.mean(axis=0)
-                if not _in_mouth(middle, port):
+                if not _in_port_opening(middle, port):
                     thickness = _thickness(ends, outward, discs)
                     x, y = middle + outward * thickness / 2
                     angle = float(np.arctan2(along[1], along[0]))
@@ -114,7 +108,7 @@ def wall_boxes(phantom: Phantom, outlines: list[Points]) -> tuple[list[Wall], Po
 
 
 def _thickness(ends: Points, outward: NDArray[np.float64], discs: tuple[Points, NDArray[np.float64]]) -> float:
-    """As thick as may be without sticking out into the lumen behind, which happens at the sharp divider of two branches."""
+    """The largest thickness that does not reach into the lumen behind, as at the sharp divider of two branches."""
     centers, radii = discs
     for thickness in _THICKNESSES_MM[:-1]:
         outer = ends + outward * thickness
@@ -124,7 +118,7 @@ def _thickness(ends: Points, outward: NDArray[np.float64], discs: tuple[Points, 
     return _THICKNESSES_MM[-1]
 
 
-def _in_mouth(point: NDArray[np.float64], port: Port) -> bool:
+def _in_port_opening(point: NDArray[np.float64], port: Port) -> bool:
     """The rounded cap of the lumen behind the port, through which the robot comes."""
     offset = point - port.point
     return float(offset @ port.inward) < 0.0 and float(np.linalg.norm(offset)) < 1.2 * port.radius + 1.0
@@ -132,9 +126,9 @@ def _in_mouth(point: NDArray[np.float64], port: Port) -> bool:
 
 ROBOT_RADIUS_MM = 1.25
 LINK_MM = 2.0
-"""Length of the steerable links; facts on the bend per pull hold for ten of them."""
+"""Length of the steerable links; the bend per pull was measured with ten of them."""
 SHAFT_LINK_MM = 3.0
-"""Shaft links are longer: at the shaft's tightest bends (8 mm) the axis is off by 0.14 mm, and a step costs half."""
+"""Shaft links are longer, which halves the cost of a step; at the tightest bends (8 mm) the axis is off by 0.14 mm."""
 STEERABLE_LINKS = 10
 TENDONS = ("right", "left", "up", "down")
 TIMESTEP_S = 0.002
@@ -147,7 +141,7 @@ _TENDON_KP_MN_MM, _TENDON_KV, _TENDON_MAX_MN = 2000.0, 40.0, 4000.0
 
 @dataclass(frozen=True, slots=True)
 class Specimen:
-    """One robot's mechanical properties; no two are alike.
+    """Mechanical properties of one robot.
 
     ``shaft_ei`` and ``tip_ei`` are bending stiffnesses (mN mm2), ``damping_s`` is damping over stiffness, ``tip_set_deg`` the bend
     that the steerable part keeps with slack tendons (positive: right), ``friction`` that against the wall.
@@ -162,7 +156,7 @@ class Specimen:
 
     @staticmethod
     def drawn(seed: int) -> Specimen:
-        """The nominal robot for seed 0, else one drawn at random."""
+        """The nominal robot for seed 0, else a random one."""
         if seed == 0:
             return Specimen()
         rng = np.random.default_rng([seed, 40427])
@@ -232,7 +226,7 @@ def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Speci
 
 
 def _chain(lengths: NDArray[np.float64], specimen: Specimen) -> str:
-    """The nested bodies of the chain, written from the base outward."""
+    """The nested bodies of the chain, from the base on."""
     opening, first = [], len(lengths) - STEERABLE_LINKS
     before = -float(lengths.sum())
     for link, length in enumerate(lengths):
@@ -262,22 +256,14 @@ _GUIDE_MM = 3.0
 _SHEATH_EI = 6e4
 
 
-def _on_warning(message: str) -> None:
-    _log.warning("MuJoCo: %s", message)
-
-
 # Without a callback MuJoCo writes its warnings to a file in the working directory.
-mujoco.set_mju_user_warning(_on_warning)
+mujoco.set_mju_user_warning(lambda text: _log.warning("MuJoCo: %s", text))
 
 
 class LinkChain:
-    """A chain of links with the port at slide position 0 of its tip.
+    """A MuJoCo model of the robot with a fixed number of links; the tip is at the port for slide position 0.
 
-    Attributes
-    ----------
-    model, data : MuJoCo's.
-    length_mm : of all links.
-    slack_mm : tendon lengths (4,) of the straight robot.
+    ``slack_mm`` (4,) are the tendon lengths of the straight robot.
     """
 
     def __init__(self, walls: list[Wall], port: Port, shaft_links: int, specimen: Specimen) -> None:
@@ -318,14 +304,14 @@ class LinkChain:
         Raises
         ------
         FloatingPointError
-            When the state is no longer finite. It was never seen; MuJoCo would silently start again from the straight robot.
+            When the state is no longer finite (never seen); MuJoCo would silently restart from the straight robot.
         """
         mujoco.mj_step(self.model, self.data)
         if any(self.data.warning[kind].number for kind in _FATAL):
             raise FloatingPointError(f"the twin's physics diverged at {self.data.time:.3f} s")
 
     def take_over(self, other: LinkChain) -> None:
-        """Carry on from the state of a shorter or longer chain: the distal joints are copied, further ones are straight."""
+        """Copy the state of a shorter or longer chain: distal joints are copied, further ones are straight."""
         self.reset()
         joints = min(self.model.nv, other.model.nv) - 1
         self.data.time = other.data.time
@@ -339,9 +325,9 @@ class LinkChain:
         self.data.ctrl[:] = other.data.ctrl
 
     def shape(self, delivery_mm: float) -> None:
-        """Stiffen what the guide behind the port and the sheath cover; links touch walls only once they are inside.
+        """Stiffen what the guide behind the port and the sheath cover; links touch walls only inside.
 
-        Joints outside are held straight by stiffness, so the robot cannot buckle there and comes back clean.
+        Stiffness keeps the joints outside straight, so the robot cannot buckle there.
         """
         insertion_mm = self.insertion_mm
         key = round(insertion_mm, 1), round(delivery_mm, 1)
@@ -420,7 +406,7 @@ class TendonDrive:
 
 STEERABLE_MM = STEERABLE_LINKS * LINK_MM
 OUTSIDE_MM = 30.0
-"""How much of the straight robot behind the port ``robot_points_mm`` shows."""
+"""Length of the straight robot behind the port in ``robot_points_mm``."""
 _SPARE_MM = 24.0
 _CHAIN_STEP_LINKS = 20
 _SWAP_MM, _SWAP_BACK_MM = 8.0, 20.0
@@ -447,8 +433,8 @@ class TwinPhysics:
         self.specimen = Specimen.drawn(seed)
         outlines = lumen_outline(phantom.graph)
         walls, self._port = wall_boxes(phantom, outlines)
-        ways = node_distances_mm(phantom)[phantom.port, list(phantom.targets)]
-        self._shaft_links = math.ceil((float(ways.max()) + _SPARE_MM - STEERABLE_MM) / SHAFT_LINK_MM)
+        routes_mm = node_distances_mm(phantom)[phantom.port, list(phantom.targets)]
+        self._shaft_links = math.ceil((float(routes_mm.max()) + _SPARE_MM - STEERABLE_MM) / SHAFT_LINK_MM)
         self.chain_mm = self._shaft_links * SHAFT_LINK_MM + STEERABLE_MM
         self._walls = walls
         self._discs = lumen_discs(phantom.graph)
@@ -460,7 +446,7 @@ class TwinPhysics:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start: the tip at the port, tendons slack, time 0."""
+        """The tip at the port, tendons slack, time 0."""
         with self._lock:
             self._chain = self._chain_of(0)
             self._chain.reset()
@@ -472,9 +458,9 @@ class TwinPhysics:
             self._due_s = 0.0
 
     def _chain_of(self, size: int) -> LinkChain:
-        """The chain with `size` + 1 times twenty shaft links, at most what the phantom's longest way needs.
+        """The chain with (`size` + 1) * 20 shaft links, at most what the longest route of the phantom needs.
 
-        What lies far outside the port cannot matter, and the cost of a step grows faster than the number of links.
+        Links far outside the port do not matter, and the cost of a step grows faster than the number of links.
         """
         shaft_links = min(self._shaft_links, (size + 1) * _CHAIN_STEP_LINKS)
         if size not in self._chains:
@@ -492,7 +478,7 @@ class TwinPhysics:
             chosen = self._chain_of(self._size - 1)
         if chosen is not now:
             chosen.take_over(now)
-            self._chain = chosen  # last, so that nobody reads a chain that is not in its place yet
+            self._chain = chosen  # last: other threads read it without the lock
 
     @property
     def time_s(self) -> float:
@@ -525,7 +511,7 @@ class TwinPhysics:
         control, slack = chain.data.ctrl, chain.slack_mm
         bend = self._bend.step(command.bend, TIMESTEP_S)
         pitch = self._pitch.step(command.pitch, TIMESTEP_S)
-        # The antagonist pays out as much as the other takes in: held still it would halve the bend.
+        # The antagonist releases as much as the other pulls; a fixed one would halve the bend.
         control[0], control[1] = slack[0] - bend, slack[1] + bend
         control[2], control[3] = slack[2] - pitch, slack[3] + pitch
         control[4] = self._feed(command.advance_mm_s)
@@ -534,9 +520,9 @@ class TwinPhysics:
         chain.shape(self._delivery_mm)
 
     def _feed(self, advance_mm_s: float) -> float:
-        """The feed's next goal. A stalled drive slips: its goal stays within reach of its greatest force.
+        """The next goal of the feed. A stalled drive slips: the goal stays where the drive's maximal force still reaches.
 
-        The limit acts on the goal, because a saturated force inside the solver is explicit and swings from step to step.
+        The limit acts on the goal, because a saturated force inside the solver is explicit and oscillates.
         """
         insertion_mm, speed_mm_s = self._chain.insertion_mm, float(self._chain.data.qvel[0])
         slip_mm, lag_s = self.specimen.feed_force_mn / FEED_KP_MN_MM, FEED_KV / FEED_KP_MN_MM

@@ -1,8 +1,8 @@
-"""The bench twin in a process of its own: physics, pictures and software servos take no time from the program that looks at them.
+"""The bench twin in a process of its own, so that physics, rendering and software servos do not slow the application down.
 
-The application starts it as ``python -m hardware.twin.process MEMORY PIPE SOCKET PARENT``, sends the configuration as its first
-message, and gets one back: the servos' port, or what is wrong. From then on pictures and truth go through shared memory, a byte in
-the pipe tells that there is a new picture, and the end of the socket ends the process.
+The application starts it as ``python -m hardware.twin.process MEMORY PIPE SOCKET PARENT`` and sends the configuration; the process
+answers with the port of the servos, or an error. Pictures and the robot's status then go through shared memory, a byte in the pipe
+announces a new picture, and the end of the socket ends the process.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,15 +31,14 @@ from hardware.servos.bus_ipc import start_bus
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.world import TwinWorld
 
-_START_S, _END_S = 60.0, 5.0
-
-
+_START_S, _END_S = 60.0, 5.0  # time limits for start and end of the process
+_WAIT_S = 0.2
 _FRAME = struct.Struct("<Qdii")  # index, captured, width, height
 _STATUS = struct.Struct("<3d8dd")  # time, insertion, delivery, pulls and forces, contact (NaN: unknown)
 
 
 def _slot_sizes(twin: TwinConfig) -> tuple[int, int]:
-    """Bytes of a frame and a status in the shared memory; both processes know the twin's picture size."""
+    """Bytes of a frame and of a status in the shared memory."""
     return _FRAME.size + 3 * twin.image_width_px * twin.image_height_px, _STATUS.size
 
 
@@ -69,19 +67,21 @@ def unpack_status(data: bytes) -> RobotStatus:
 
 
 def start_twin() -> DeviceProcess:
-    """A twin process, which loads for seconds and then waits for its configuration; raises DeviceError."""
+    """Start a twin process, which loads for seconds and then waits for its configuration; raises DeviceError."""
     return DeviceProcess("hardware.twin.process", "the bench twin", writes_pipe=False)
 
 
 class RemoteTwin:
-    """A running twin process. ``read`` and ``close`` belong to one thread, ``status`` to any.
+    """A running twin process as a ``Camera``. ``read`` and ``close`` belong to one thread, ``status`` to any.
 
     Parameters
     ----------
-    prestarted : a process from ``start_twin``; without one, or when it has died meanwhile, one is started.
+    prestarted : a process from ``start_twin``; a new one is started when it is missing or has ended.
 
-    Raises DeviceError: when it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
+    Raises DeviceError when it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
+
+    is_live = False
 
     def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
         self._number = 0
@@ -91,24 +91,28 @@ class RemoteTwin:
         self._frames, self._status = SharedSlot.row(memory, sizes)
         with contextlib.ExitStack() as undo:
             undo.callback(self.close)
-            with contextlib.suppress(OSError):  # a process that is gone has no answer either
+            with contextlib.suppress(OSError):  # a process that has ended gives no answer either
                 self._process.send({"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm})
             answer = self._receive(_START_S)
             if "error" in answer:
                 raise DeviceError(answer["error"])
             if "port" not in answer:
                 raise DeviceError("the bench twin did not start: free memory, then start the rig again (F5)")
-            self.port, self.title = answer["port"], answer["title"]
+            self.port = answer["port"]
+            self.name = f"bench twin: {answer['title']}"
             undo.pop_all()
 
     def _receive(self, timeout_s: float) -> dict[str, str]:
-        """What the process says; empty when it says nothing, or is gone."""
+        """The next message of the process; empty without one, or when the process has ended."""
         with contextlib.suppress(OSError):
             return self._process.receive(timeout_s) or {}
         return {}
 
+    def open(self) -> None:
+        """The process runs already."""
+
     def read(self, timeout_s: float) -> Frame | None:
-        """The newest frame, waiting at most `timeout_s` for one that was not given yet. Raises DeviceError: the process is gone."""
+        """The newest frame not read yet, waiting at most `timeout_s` for it. Raises DeviceError when the process has ended."""
         until_s = time.monotonic() + timeout_s
         while True:
             found = self._frames.newest()
@@ -126,7 +130,7 @@ class RemoteTwin:
                     time.sleep(max(0.0, until_s - time.monotonic()))
 
     def status(self) -> RobotStatus:
-        """The truth, as the process told it last; raises DeviceError before the first time."""
+        """The latest status of the simulated robot; raises DeviceError before the first one."""
         found = self._status.newest()
         if found is None:
             raise DeviceError("the bench twin has not told anything yet")
@@ -147,85 +151,49 @@ class RemoteTwin:
             raise DeviceError(message("the bench twin stopped ({why}): start the rig again (F5)", why=why))
 
 
-class RemoteCamera:
-    """A ``Camera`` over a twin's process. Closing it ends the process."""
+def pair_bend_mm(first_mm: float, second_mm: float) -> float:
+    """The bend by two antagonistic wires, positive towards the first, from their pulls relative to where each is without tension.
 
-    def __init__(self, twin: RemoteTwin) -> None:
-        self._twin = twin
-
-    @property
-    def name(self) -> str:
-        return f"bench twin: {self._twin.title}"
-
-    @property
-    def is_live(self) -> bool:
-        """False: what it shows is simulated."""
-        return False
-
-    def open(self) -> None:
-        """It runs already."""
-
-    def read(self, timeout_s: float) -> Frame | None:
-        return self._twin.read(timeout_s)
-
-    def close(self) -> None:
-        self._twin.close()
-
-
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """An antagonistic pair. ``bend_mm`` is what it does to the head, positive towards the first; slack: the pulls sum below 0."""
-
-    bend_mm: float
-    slack: bool
-
-
-def pair_of(first_mm: float, second_mm: float) -> Pair:
-    """The pair's effect at two pulls, in mm from where each wire is without tension.
-
-    Two stiff wires on a soft head: taut, both hold it and it goes to half their difference. Slack, only a wire that is pulled
-    counts, and nothing holds against it; with none pulled the head is straight. Both agree where the sum is zero.
+    Two taut stiff wires hold the soft head at half their difference. In a slack pair (negative sum) only a pulled wire acts, and
+    without one the head is straight. Both rules agree where the sum is zero.
     """
     if first_mm + second_mm >= 0.0:
-        return Pair((first_mm - second_mm) / 2.0, slack=False)
-    return Pair(max(first_mm, 0.0) - max(second_mm, 0.0), slack=True)
+        return (first_mm - second_mm) / 2.0
+    return max(first_mm, 0.0) - max(second_mm, 0.0)
 
 
 class JointsToTwin:
-    """Turns measured joint positions over time into what the twin's physics takes.
+    """Converts measured joint positions into commands for the twin's physics.
 
-    Feeds go by differences: the sum of what is fed equals the joint's way, however time is cut. With a roll the robot is turned
-    about its axis: what its tendon "right" does is then partly up or down as the camera sees it.
+    Feeds are differences, so their sum equals the travel of the joint for any time step. With a roll the robot is turned about its
+    axis: its tendon "right" then acts partly up or down as seen by the camera.
     """
 
     def __init__(self, config: ServosConfig, start_mm: Sequence[float], roll_deg: float = 0.0) -> None:
         self._max_pull_mm = config.max_pull_mm
         self._turn = math.cos(math.radians(roll_deg)), math.sin(math.radians(roll_deg))
         self._last_mm = tuple(start_mm)
-        self.slack = (False, False)
-        """Of the bending and of the pitching pair."""
 
     def command(self, positions_mm: Sequence[float], duration_s: float) -> Command:
-        """What moves the twin for `duration_s`, with the joints (in the order of ``JOINT_NAMES``) at `positions_mm` at its end."""
+        """The command for `duration_s`, at whose end the joints (in the order of ``JOINT_NAMES``) are at `positions_mm`."""
         right, left, up, down = positions_mm[:4]
         advance, first, second = (now - last for now, last in zip(positions_mm[4:], self._last_mm[4:], strict=True))
         self._last_mm = tuple(positions_mm)
-        bend, pitch = pair_of(right, left), pair_of(up, down)
-        self.slack = bend.slack, pitch.slack
+        bend_mm, pitch_mm = pair_bend_mm(right, left), pair_bend_mm(up, down)
         cos, sin = self._turn
         return Command(
-            bend=_within_one((cos * bend.bend_mm + sin * pitch.bend_mm) / self._max_pull_mm),
-            pitch=_within_one((cos * pitch.bend_mm - sin * bend.bend_mm) / self._max_pull_mm),
+            bend=_within_one((cos * bend_mm + sin * pitch_mm) / self._max_pull_mm),
+            pitch=_within_one((cos * pitch_mm - sin * bend_mm) / self._max_pull_mm),
             advance_mm_s=advance / duration_s,
-            # Two rollers on one sheath: it moves as their mean.
+            # Two rollers drive one sheath, which moves by their mean.
             delivery_mm_s=(first + second) / 2.0 / duration_s,
         )
 
 
 def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
-    """The servos as they really are: as the twin's wiring says, whatever the program believes of them.
+    """The servos as the twin's wiring has them, which the program may not know.
 
-    Raises ValueError: when two servos have the same id, or one has none.
+    Raises ValueError when an id is missing or used twice.
     """
     if twin.wiring is None:
         return servos
@@ -239,8 +207,8 @@ def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
     return servos.model_copy(update={"joints": joints})
 
 
-def drive_world(world: TwinWorld, bus: SoftServoBus, config: ServosConfig) -> JointsToTwin:
-    """From now on the servos of `bus` move the robot of `world`, and feel its wires. Returns the link, which knows slack pairs."""
+def drive_world(world: TwinWorld, bus: SoftServoBus, config: ServosConfig) -> None:
+    """Let the servos of `bus` move the robot of `world`; they get the forces of its wires as loads."""
     joints = JointsToTwin(config, bus.positions_mm(), world.config.roll_deg)
 
     def drive(duration_s: float) -> Command:
@@ -248,18 +216,14 @@ def drive_world(world: TwinWorld, bus: SoftServoBus, config: ServosConfig) -> Jo
         return joints.command(bus.positions_mm(), duration_s)
 
     world.drive = drive
-    return joints
 
 
 def _within_one(value: float) -> float:
     return max(-1.0, min(1.0, value))
 
 
-_WAIT_S = 0.2
-
-
 def main(arguments: list[str]) -> int:
-    """Run until the application ends it, or is gone. Arguments: those of ``ParentLink``."""
+    """Run until the application ends it, or has ended. Arguments: those of ``ParentLink``."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the application decides what Ctrl-C means
     link = ParentLink(arguments)
     message = link.first_message()
@@ -280,7 +244,7 @@ def main(arguments: list[str]) -> int:
     drive_world(world, servos, wiring)
     world.start()
     gc.collect()
-    gc.freeze()  # what is loaded stays: later collections are short
+    gc.freeze()  # keeps later collections short
     link.send({"port": servos.port, "title": world.phantom.title})
     ended = threading.Event()
     threading.Thread(target=link.wait_for_end, args=(ended,), name="end of link", daemon=True).start()
@@ -304,23 +268,23 @@ def _serve(world: TwinWorld, frames: SharedSlot, status: SharedSlot, link: Paren
             try:
                 os.write(link.pipe, b".")
             except BlockingIOError:
-                pass  # a full pipe wakes as well
+                pass  # a full pipe wakes the reader as well
             except BrokenPipeError:
-                return  # the application was ended at this moment, before the end of the link is seen
+                return  # the application ended just now, before the end of the link is seen
 
 
 class PrestartedProcesses:
-    """The twin and its servo bus, loading before the rig is opened. Raises DeviceError when they cannot be started."""
+    """The processes of the twin and of its servo bus, loading before the rig is opened. Raises DeviceError."""
 
     def __init__(self) -> None:
-        self.twin = start_twin()  # first: it loads for longer
+        self.twin = start_twin()  # first, because it loads longer
         with contextlib.ExitStack() as undo:
             undo.callback(self.twin.discard)
             self.bus = start_bus()
             undo.pop_all()
 
     def end(self) -> None:
-        """End those that no rig has taken over."""
+        """End the processes that no rig has claimed."""
         self.bus.discard()
         self.twin.discard()
 

@@ -1,4 +1,4 @@
-"""A software foot pedal on a pseudo-terminal, with switches for its faults: for tests, and to try the program without a pedal."""
+"""A software foot pedal on a pseudo-terminal with fault injection, for tests and for use without a pedal."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from pathlib import Path
 from hardware.inputs.pedal import NUMBERS, PERIOD_S, PedalLine, line_bytes
 
 _STOP_REPORTS = 5
-"""Reports that tell of a STOP, however short it was; docs/bench.md has the same in the firmware."""
+"""Number of reports with STOP after even the shortest press, as in the firmware (docs/bench.md)."""
 
 
 class SoftPedal:
-    """Two switches and the firmware between them and the line. ``start`` makes ``port`` and reports there every 20 ms.
+    """Two switches and the firmware that reports them on ``port`` every 20 ms. A context manager that starts and stops it.
 
-    All methods may be called from any thread. A context manager that starts and stops it.
+    All methods may be called from any thread.
     """
 
     def __init__(self, seed: int = 0) -> None:
@@ -61,7 +61,7 @@ class SoftPedal:
         return str(self._folder / "pedal")
 
     def start(self) -> None:
-        """Plug it in and report; does nothing when it runs."""
+        """Open the port and report; does nothing when it runs."""
         if self._thread is None:
             self._folder = Path(tempfile.mkdtemp(prefix="lumenpilot_pedal_"))
             self._end.clear()
@@ -70,7 +70,7 @@ class SoftPedal:
             self._thread.start()
 
     def stop(self) -> None:
-        """Pull the plug, and end; may be called twice."""
+        """Close the port; may be called twice."""
         if self._thread is not None:
             self._end.set()
             self._thread.join()
@@ -79,47 +79,42 @@ class SoftPedal:
             shutil.rmtree(str(self._folder), ignore_errors=True)
             self._folder = None
 
-    # --- the foot ---
-
     def press(self) -> None:
-        """Step onto the deadman."""
+        """Close the dead-man switch."""
         self._deadman_closed = True
 
     def release(self) -> None:
-        """Lift the foot."""
         self._deadman_closed = False
 
     def press_stop(self) -> None:
-        """Press STOP, which opens its switch."""
+        """Press STOP, which opens its normally closed switch."""
         self._stop_left = _STOP_REPORTS
         self._stop_closed = False
 
     def release_stop(self) -> None:
         self._stop_closed = True
 
-    # --- faults ---
-
     def break_stop_wire(self, broken: bool = True) -> None:
         self._stop_wire = not broken
 
     def mute(self, on: bool = True) -> None:
-        """The firmware hangs: nothing is sent."""
+        """A hanging firmware: nothing is sent."""
         self._muted = on
 
     def stick(self, on: bool = True) -> None:
-        """The same number again and again, as from a buffer that nobody fills any more."""
+        """The same report number again and again, as from a stale buffer."""
         self._stuck = on
 
     def damage(self, count: int) -> None:
-        """One bit is wrong in each of the next `count` reports."""
+        """Flip one bit in each of the next `count` reports."""
         self._damaged = count
 
     def garbage(self, count: int) -> None:
-        """`count` random bytes come before the next report."""
+        """Send `count` random bytes before the next report."""
         self._noise = self._random.randbytes(count)
 
     def vanish(self) -> None:
-        """Pull the USB plug: the port is gone."""
+        """Unplug: the port disappears."""
         with self._lock:
             if self._pty is not None:
                 Path(self.port).unlink(missing_ok=True)
@@ -128,10 +123,10 @@ class SoftPedal:
                 self._pty = None
 
     def reappear(self) -> None:
-        """Plug it in again, at the same path. The firmware starts anew."""
+        """Plug it in again, at the same path. The firmware restarts."""
         with self._lock:
             if self._pty is None:
-                # the own end of the port keeps the line alive between two programs
+                # The open slave end keeps the line alive between two programs.
                 master, slave = os.openpty()
                 tty.setraw(slave)
                 os.set_blocking(master, False)
@@ -147,7 +142,7 @@ class SoftPedal:
                 self._report()
 
     def _report(self) -> None:
-        """One turn of the firmware."""
+        """Send one report."""
         if not (self._stop_closed and self._stop_wire):
             self._stop_left = _STOP_REPORTS
         line = bytearray(line_bytes(PedalLine(self._number, self._deadman_closed, self._stop_left > 0)))
@@ -159,5 +154,5 @@ class SoftPedal:
             line[self._random.randrange(len(line) - 1)] ^= 1 << self._random.randrange(8)
         noise, self._noise = self._noise, b""
         if self._pty is not None and not self._muted:
-            with contextlib.suppress(BlockingIOError):  # nobody reads: the line's buffer is full, and the bytes are lost
+            with contextlib.suppress(BlockingIOError):  # no reader: the buffer is full, and the bytes are lost
                 os.write(self._pty[0], noise + bytes(line))

@@ -1,7 +1,7 @@
 """One closed-loop trial in the twin, in lock-step: picture -> perception -> policy -> drive -> robot, against the truth.
 
-Nothing looks at a clock but the simulated one, so the same seed and settings give the same bits. What the loop needs in reality
-between picture and motion is put in as a delay of whole frames.
+Only the simulated clock is used, so the same seed and settings give the same bits. The latency between picture and motion is
+simulated as a delay of whole frames.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from hardware.twin.view import CameraView
 from hardware.twin.world import TwinCamera, TwinWorld
 
 FIRST_SEED = 2_000_000
-"""Trial 0 has this seed's phantom, look and robot; sets for training stay below it."""
+"""Seed of phantom, look and robot of trial 0; training sets use lower seeds."""
 REACHED_MM = 5.0
 DELAY_FRAMES = 2
-"""67 ms at 30 frames per second, of the 100 ms that capture to servo may take."""
+"""67 ms at 30 frames per second; capture to servo may take 100 ms."""
 _START_MM, _START_MOST_MM, _BEFORE_JUNCTION_MM = 22.0, 45.0, 12.0
 _BEFORE_END_MM = 6.0
 _LEAST_WAY_MM = 60.0
@@ -41,16 +41,16 @@ _MARGIN_PX = 14.0
 _MEASURE_EVERY = 3
 _SETTLE_S = 0.5
 _STOPPED_S = 2.0
-_NO_PROGRESS_S, _PROGRESS_MM = 40.0, 2.0  # time to back out of a missed branch and to try again
+_NO_PROGRESS_S, _PROGRESS_MM = 40.0, 2.0  # enough to back out of a missed branch and to try again
 _HELP_S, _HELP_MM_S, _MAX_HELP = 1.0, 5.0, 5
 
 
 @dataclass(frozen=True, slots=True)
 class TrialPlan:
-    """What all trials of a campaign share.
+    """Settings of all trials of a campaign.
 
-    ``true_masks``: the twin's masks stand in for the network's. ``look`` of ``TRIAL_LOOKS``: every trial another
-    picture, of any of the ten families or of the one named, or all of them the default clear bench.
+    ``true_masks``: the twin's masks in place of the network's. ``look`` of ``TRIAL_LOOKS``: every trial has another look, of any
+    of the ten families or of the named one, or all have the default clear bench.
     """
 
     config: Config
@@ -61,7 +61,7 @@ class TrialPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """A place to go to: the end ``node``, the ``route`` (N, 2) to it in board mm, ``at_mm`` along it, and the operator's click."""
+    """The end ``node``, the ``route`` (N, 2) to it in board mm, the position ``at_mm`` along it, and the operator's click."""
 
     node: int
     route: Points
@@ -71,9 +71,9 @@ class Target:
 
 
 def choose_target(phantom: Phantom, view: CameraView, seed: int) -> Target:
-    """One of the ends that the camera sees the way to, drawn at random; the click lies on the centerline shortly before the end.
+    """A random end to which the route is visible; the click lies on the centerline shortly before the end.
 
-    An end outside the picture is aimed at as far as the picture goes.
+    For an end outside the picture the click lies where the route leaves the picture.
     """
     targets = [_target_at(phantom, view, node) for node in phantom.targets]
     whole = [t for t in targets if t.at_mm >= _LEAST_WAY_MM]
@@ -96,7 +96,7 @@ def _target_at(phantom: Phantom, view: CameraView, node: int) -> Target:
 
 
 def start_mm(phantom: Phantom, target: Target) -> float:
-    """How far the robot is brought in by hand: to shortly before the first bifurcation, so that autonomy takes all."""
+    """Insertion before the trial: shortly before the first bifurcation, so that autonomy has to take all of them."""
     graph = phantom.graph
     degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
     places = [geometry.nearest(target.route, (x, y))[:2] for x, y in graph.nodes[degree >= 3].tolist()]
@@ -105,13 +105,9 @@ def start_mm(phantom: Phantom, target: Target) -> float:
 
 
 class Trial:
-    """One trial. ``run`` turns it to its end and returns its row.
+    """One trial; ``run`` returns its row.
 
-    Parameters
-    ----------
-    plan, seed, policy : what to do.
-    pipeline : perception; its memory of other streams is cleared.
-    masks : where the pipeline looks when it runs on true masks, else None.
+    `pipeline` is reset. `masks` is the segmentation of the pipeline when it runs on true masks, else None.
     """
 
     def __init__(self, plan: TrialPlan, seed: int, policy: PolicyName, pipeline: Pipeline, masks: TrueMasks | None = None) -> None:
@@ -127,9 +123,9 @@ class Trial:
         self._policy: Policy = make_policy(policy, config, own_seed)
         self._drive = AdviceController(config.policy.drive)
         self._operator = _Operator(config.safety.pose_disarm_s)
-        self._hand = RouteFollower(phantom, self.target.node)
+        self._manual = RouteFollower(phantom, self.target.node)
         self._log = TrialLog()
-        self._on_the_way = deque([Command()] * DELAY_FRAMES)
+        self._delayed = deque([Command()] * DELAY_FRAMES)
         self._backing_off = False
         self._first_mm = self._left_mm = self._best_mm = math.inf
         self._best_s = 0.0
@@ -137,7 +133,7 @@ class Trial:
         self._stopped_s: float | None = None
 
     def run(self) -> Row:
-        """Turn the loop until the target is reached or nothing helps any more."""
+        """Run until the target is reached or the trial has failed."""
         world = self._world
         world.insert(start_mm(world.phantom, self.target), target=self.target.node)
         world.robot.connect()
@@ -145,7 +141,7 @@ class Trial:
         outcome = ""
         while not outcome:
             try:
-                outcome = self._turn(start_s)
+                outcome = self._run_frame(start_s)
             except FloatingPointError:  # never seen; a campaign of hundreds must not end with it
                 outcome = "physics diverged"
         return trial_row(
@@ -158,16 +154,16 @@ class Trial:
             target_mm=self.target.point_mm,
         )
 
-    def _turn(self, start_s: float) -> str:
-        """One frame; how the trial has ended with it, "" while it goes on."""
+    def _run_frame(self, start_s: float) -> str:
+        """Process one frame; returns the outcome, "" while the trial goes on."""
         frame = self._read()
         scene = self._pipeline(frame, self.target.click_px)
         status = self._world.robot.status()
         advice = self._policy(scene, status)
         if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
-            advice = None  # where autonomy has to hold
-        self._on_the_way.append(self._command(advice, frame.captured_s))
-        self._world.robot.send(self._on_the_way.popleft())
+            advice = None  # autonomy has to hold
+        self._delayed.append(self._command(advice, frame.captured_s))
+        self._world.robot.send(self._delayed.popleft())
         time_s, contact_n = frame.captured_s - start_s, status.wall_contact_n or 0.0
         self._log.count(scene.pose, scene.refusal.reason.value if scene.refusal else "", contact_n)
         if len(self._log.forces_n) % _MEASURE_EVERY == 1:
@@ -186,8 +182,8 @@ class Trial:
         return Frame(len(self._log.forces_n), world.physics.time_s, picture.image)
 
     def _command(self, advice: Advice | None, now_s: float) -> Command:
-        # The eye follows all the time: by hand the way is known from where the head is.
-        by_hand = self._hand.command(self._world.physics.robot_points_mm(), _HELP_MM_S, 1.0 / self._world.config.frames_per_second)
+        # Computed in every frame, so that its progress along the route is up to date.
+        manual = self._manual.command(self._world.physics.robot_points_mm(), _HELP_MM_S, 1.0 / self._world.config.frames_per_second)
         helping = self._operator.acts(advice is not None, now_s)
         if helping is None:
             backing_off = advice is not None and advice.advance_mm_s < 0.0
@@ -197,8 +193,8 @@ class Trial:
         if helping:
             self._log.interventions += 1
         self._policy.reset()
-        self._drive.take_over(by_hand.bend)
-        return by_hand
+        self._drive.take_over(manual.bend)
+        return manual
 
     def _measure(self, scene: Scene, time_s: float, insertion_mm: float, wall_contact_n: float) -> None:
         truth = self._world.truth(self.target.click_px)
@@ -223,12 +219,12 @@ class Trial:
                 head_error_px=head_error,
             )
         )
-        self._follow(head_mm, time_s)
+        self._update_progress(head_mm, time_s)
 
-    def _follow(self, head_mm: Point, time_s: float) -> None:
-        """How far it is still, by the phantom's own graph, and when that last became less."""
+    def _update_progress(self, head_mm: Point, time_s: float) -> None:
+        """Remaining distance on the phantom's graph, and the time of the last progress."""
         left = plan_route(self._world.phantom.graph, head_mm, self.target.point_mm)
-        assert left is not None  # a phantom is of one piece
+        assert left is not None  # a phantom is connected
         self._left_mm = left.length_px
         if math.isinf(self._first_mm):
             self._first_mm = self._left_mm
@@ -238,7 +234,7 @@ class Trial:
             self._reached_s = time_s
 
     def _outcome(self, time_s: float, advice: Advice | None) -> str:
-        """How the trial has ended, "" while it goes on."""
+        """The outcome, "" while the trial goes on."""
         stopped = advice is not None and advice.speed is Speed.STOP
         if self._reached_s is not None and (stopped or time_s - self._reached_s >= _SETTLE_S):
             return "reached"
@@ -253,7 +249,7 @@ class Trial:
 
 
 class _Operator:
-    """Takes over when there was no advice for longer than autonomy may last without: steers by eye for a second (5 mm)."""
+    """Takes over for a second (5 mm) when there was no advice for longer than `patience_s`."""
 
     def __init__(self, patience_s: float) -> None:
         self._patience_s = patience_s
@@ -261,7 +257,7 @@ class _Operator:
         self._until_s = -math.inf
 
     def acts(self, advised: bool, now_s: float) -> bool | None:
-        """None: autonomy goes on. True: the operator takes over now. False: the operator still has it."""
+        """None: autonomy goes on. True: the operator takes over now. False: the operator is still driving."""
         if now_s < self._until_s:
             self._well_s = now_s
             return False

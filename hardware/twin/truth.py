@@ -1,9 +1,7 @@
-"""What perception should find in the twin's picture, from the geometry itself: no pixels are looked at.
+"""Ground truth of the twin's pictures, from geometry without any pixels, and a follower of the true centerline.
 
-Truth is measured in working pixels (longer side of the image = ``working_size_px``) by the same public functions and the same 40-px
-rule as perception, on the true lines: the local tangent at the tip would differ from the 40-px line by several degrees in a bend.
-
-Drives the twin's robot along the true centerline, for data sets and demonstrations. It knows the truth; policies do not.
+Truth is measured in working pixels (longer side of the image = ``working_size_px``) by the same functions and the same 40-px rule
+as perception, on the true lines: in a bend the local tangent at the tip would differ from the 40-px line by several degrees.
 """
 
 from __future__ import annotations
@@ -31,9 +29,9 @@ _CLIP_STEP_PX = 0.5
 class Truth:
     """The true scene; points and distances in working px, missing parts None.
 
-    The head is the very tip: the end of the robot's line extended by the radius of its round cap, which is where the robot's mask
-    ends and what perception's head is extended to. The tail is the other end of what is visible (at the image border or, within
-    the picture, extended likewise). Exactly one of ``pose`` and ``reason`` is set.
+    The head is the end of the robot's line extended by the radius of its round cap, where the robot's mask ends and to which
+    perception extends its head. The tail is the other visible end (at the image border or, within the picture, extended
+    likewise). Exactly one of ``pose`` and ``reason`` is set.
 
     Attributes
     ----------
@@ -43,7 +41,7 @@ class Truth:
     ambiguity : 0..1, how nearly another branch fits as well.
     head_clearance_mm, body_clearance_mm : least distance between the robot's visible surface and the lumen's wall, at the end of
         the robot's line and anywhere within the lumen; negative: it overlaps the wall.
-    head_visible : whether the head lies in the picture; a robot whose head does not has no pose, though its body may be seen.
+    head_visible : whether the head lies in the picture; otherwise there is no pose, though the body may be visible.
     scale : working px per source px.
     """
 
@@ -105,7 +103,7 @@ class Truth:
 
 
 def true_graph(phantom: Phantom, view: CameraView, scale: float = 1.0) -> VesselGraph:
-    """The phantom's centerlines as seen: pixels of the view times `scale`, lumen radii likewise (by the local scale)."""
+    """The phantom's centerlines in pixels of the view times `scale`, lumen radii likewise (by the local scale)."""
     edges = tuple(
         GraphEdge(edge.start, edge.end, _scaled(view.project(edge.points), scale), edge.radius * view.scales(edge.points) * scale)
         for edge in phantom.graph.edges
@@ -173,7 +171,7 @@ def truth_of(
 def _refusal(
     path: Points, view: CameraView, graph: VesselGraph, robot: Vector | None, vessel: Vector | None, config: PerceptionConfig
 ) -> Reason | None:
-    """Why perception, seeing perfectly, would refuse; by its own limits."""
+    """Why perception would refuse at its own limits, even with perfect masks."""
     if robot is None or float(geometry.arc_length(path)[-1]) < config.quality.min_robot_length_px:
         return Reason.TOO_SHORT
     total = float(geometry.arc_length(path)[-1])
@@ -216,7 +214,7 @@ def _depths_mm(points_mm: Points, graph: VesselGraph) -> NDArray[np.float64]:
 
 
 def _beyond_port(points_mm: Points, phantom: Phantom) -> NDArray[np.bool_]:
-    """Which points have passed the port: everything after the last point that still lies behind its cross-section."""
+    """Which points have passed the port: all after the last point behind its cross-section."""
     port = phantom.graph.nodes[phantom.port]
     edge = next(edge for edge in phantom.graph.edges if phantom.port in (edge.start, edge.end))
     line = edge.points if edge.start == phantom.port else edge.points[::-1]
@@ -256,11 +254,6 @@ class RouteFollower:
     def length_mm(self) -> float:
         return float(self._along[-1])
 
-    @property
-    def progress_mm(self) -> float:
-        """Arc length of the route point beside the head."""
-        return self._progress_mm
-
     def command(self, robot_points_mm: Points, advance_mm_s: float, dt_s: float) -> Command:
         """The next command for the robot's current shape (N, 2), tail -> head, in board mm."""
         head = robot_points_mm[-1]
@@ -290,7 +283,7 @@ class RouteFollower:
 def way_from_port(phantom: Phantom, target: int) -> Points:
     """The shortest way (N, 2) along the phantom's true centerlines from its port to a node, mm; raises ValueError without one.
 
-    From node to node, and so without perception's loops (``plan_route``), for which a twin's process would wait a second.
+    It does not use perception's ``plan_route``, whose Numba loops take a second to load.
     """
     graph = phantom.graph
     lengths = [float(_arc_length(edge.points)[-1]) for edge in graph.edges]
@@ -314,10 +307,3 @@ def _heading(points: Points, over_mm: float = 3.0) -> np.ndarray:
     behind = points[np.flatnonzero(distance >= over_mm)[-1]] if np.any(distance >= over_mm) else points[0]
     step = points[-1] - behind
     return np.asarray(step / max(float(np.linalg.norm(step)), 1e-9))
-
-
-def nearest_target(phantom: Phantom, point_mm: Point) -> int:
-    """The target node nearest to a point on the board."""
-    nodes = np.array(phantom.targets)
-    distance = np.sum((phantom.graph.nodes[nodes] - np.asarray(point_mm)) ** 2, axis=1)
-    return int(nodes[int(np.argmin(distance))])

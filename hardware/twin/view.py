@@ -1,7 +1,4 @@
-"""How the twin's camera sees the board: millimetres on the board <-> pixels of the image.
-
-How far every pixel is from the lumen's wall: exact distances in mm, from which label and looks of the vessel follow.
-"""
+"""The twin's camera view (board millimetres <-> pixels), and the distance of every pixel to the wall of the lumen in mm."""
 
 from __future__ import annotations
 
@@ -115,11 +112,11 @@ def lumen_discs(graph: VesselGraph, spacing_mm: float = _LABEL_SPACING_MM) -> tu
         keep = np.concatenate([[True], np.diff(along) > 0])
         wanted = np.linspace(0.0, along[-1], max(2, int(np.ceil(along[-1] / spacing_mm)) + 1))
         gap = along[-1] / max(len(along) - 1, 1)
-        if gap > 1.3 * spacing_mm:  # sparse samples are corners of the centerline: none of them may be cut
+        if gap > 1.3 * spacing_mm:  # sparse samples are corners of the centerline, which must stay
             wanted = np.union1d(wanted, along)
         elif gap >= 0.5 * spacing_mm:
             wanted = along
-        else:  # the phantom's own samples, so that few discs never cover more than all
+        else:  # a subset of the phantom's samples, so that the thinned discs never cover more than all
             wanted = along[np.unique(np.searchsorted(along, wanted).clip(max=len(along) - 1))]
         centers.append(np.column_stack([np.interp(wanted, along[keep], edge.points[keep, axis]) for axis in (0, 1)]))
         radii.append(np.interp(wanted, along[keep], edge.radius[keep]))
@@ -129,8 +126,8 @@ def lumen_discs(graph: VesselGraph, spacing_mm: float = _LABEL_SPACING_MM) -> tu
 def measure_lumen(graph: VesselGraph, view: CameraView, grid_mm: F32, wall_mm: float, reach_mm: float) -> LumenField:
     """The field of `graph` seen through `view`; `grid_mm` (H, W, 2) holds the board position of every pixel centre.
 
-    Each disc only touches a small window around it, which costs about 60 us. So the discs stand 1 mm apart at first; what is
-    missing then is a scallop of at most 0.05 mm along the wall, whose few pixels are then compared with all discs.
+    A disc changes a small window, which costs about 60 us. So discs 1 mm apart come first; they leave scallops of at most 0.05 mm
+    along the wall, whose few pixels are then compared with all discs.
     """
     height, width = grid_mm.shape[:2]
     distance = np.full((height, width), reach_mm, np.float32)
@@ -154,12 +151,12 @@ def measure_lumen(graph: VesselGraph, view: CameraView, grid_mm: F32, wall_mm: f
         np.minimum(ratio[window], away / radius, out=ratio[window])
         away /= radius + np.float32(wall_mm)
         np.minimum(outer[window], away, out=outer[window])
-    _settle_wall(distance, grid_mm, graph)
+    _refine_wall(distance, grid_mm, graph)
     return LumenField(distance, ratio, outer, reach_mm)
 
 
-def _settle_wall(distance: F32, grid_mm: F32, graph: VesselGraph) -> None:
-    """Exact distances, by all discs, for the pixels just outside of the coarse wall."""
+def _refine_wall(distance: F32, grid_mm: F32, graph: VesselGraph) -> None:
+    """Exact distances, by all discs, for pixels just outside the coarse wall."""
     rows, columns = np.nonzero((distance >= 0) & (distance < _SCALLOP_MM))
     centers, radii = lumen_discs(graph)
     for some in np.array_split(np.arange(len(rows)), len(rows) // 500 + 1):

@@ -31,7 +31,7 @@ from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
 from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
 from hardware.twin.rendering.renderer import RenderedFrame, Renderer
-from hardware.twin.truth import RouteFollower, Truth, nearest_target, true_graph, truth_of
+from hardware.twin.truth import RouteFollower, Truth, true_graph, truth_of
 
 MAX_ADVANCE_MM_S = 20.0
 MAX_DELIVERY_MM_S = 10.0
@@ -210,11 +210,6 @@ class TwinWorld:
             ends = (self.view.project(points[-1:])[0] + 0.5) * scale - 0.5, (np.array(target_px) + 0.5) * scale - 0.5
             route = plan_route(graph, (float(ends[0][0]), float(ends[0][1])), (float(ends[1][0]), float(ends[1][1])))
         return truth_of(self.phantom, self.view, points, self.appearance.robot_radius_mm, self._perception, route)
-
-    def target_at(self, point_px: Point) -> int:
-        """The phantom's target node nearest to an image point."""
-        point = self.view.unproject(np.array([point_px]))[0]
-        return nearest_target(self.phantom, (float(point[0]), float(point[1])))
 
     def start(self) -> None:
         """Let the world run by itself, in step with the wall clock as far as the machine can."""

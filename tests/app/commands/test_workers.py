@@ -123,17 +123,17 @@ def test_what_a_cluster_has_not_made_is_made_when_the_command_is_given_again(add
         raise ClusterError("the scheduler has gone")
 
     with pytest.raises(ClusterError):
-        write_set(plan, elsewhere=breaks_off)
+        write_set(plan, remote=breaks_off)
     asked: list[int] = []
 
     def the_rest(make: Callable[[int], Episode], numbers: Sequence[int]) -> Iterator[Episode]:
         asked.extend(numbers)
         return over_cluster(address, make, numbers)
 
-    assert write_set(plan, elsewhere=the_rest) == 17
+    assert write_set(plan, remote=the_rest) == 17
     assert len(asked) == 1
     assert len(list((plan.out / "images").iterdir())) == len((plan.out / "truth.jsonl").read_text().splitlines()) == 17
-    write_set(plan, elsewhere=the_rest)
+    write_set(plan, remote=the_rest)
     assert len(asked) == 1
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from core.config.models import TwinConfig
 from core.config.safety import ServosConfig
-from hardware.twin.process import JointsToTwin, Pair, drive_world, pair_of
+from hardware.twin.process import JointsToTwin, drive_world, pair_bend_mm
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.device import MAX_TICKS_S, MotorGoal, ServoMotor, SoftServo
 from hardware.twin.servos.protocol import (
@@ -390,24 +390,24 @@ def test_started_again_the_servos_are_as_they_were(bus: SoftServoBus) -> None:
 
 
 @pytest.mark.parametrize(
-    ("first_mm", "second_mm", "pair"),
+    ("first_mm", "second_mm", "bend_mm"),
     [
-        (0.3, 0.3, Pair(0.0, slack=False)),
-        (1.3, -0.7, Pair(1.0, slack=False)),
-        (-0.7, 1.3, Pair(-1.0, slack=False)),
-        (1.0, -1.0, Pair(1.0, slack=False)),
-        (0.5, -2.0, Pair(0.5, slack=True)),
-        (-2.0, 0.5, Pair(-0.5, slack=True)),
-        (-1.0, -1.0, Pair(0.0, slack=True)),
+        (0.3, 0.3, 0.0),
+        (1.3, -0.7, 1.0),
+        (-0.7, 1.3, -1.0),
+        (1.0, -1.0, 1.0),
+        (0.5, -2.0, 0.5),
+        (-2.0, 0.5, -0.5),
+        (-1.0, -1.0, 0.0),
     ],
 )
-def test_what_a_pair_of_wires_does(first_mm: float, second_mm: float, pair: Pair) -> None:
-    assert pair_of(first_mm, second_mm) == Pair(pytest.approx(pair.bend_mm), pair.slack)
+def test_bend_by_a_pair_of_wires(first_mm: float, second_mm: float, bend_mm: float) -> None:
+    assert pair_bend_mm(first_mm, second_mm) == pytest.approx(bend_mm)
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-1e-6, 1e-6))
-def test_a_pair_never_jumps(first_mm: float, second_mm: float, little_mm: float) -> None:
-    assert pair_of(first_mm + little_mm, second_mm).bend_mm == pytest.approx(pair_of(first_mm, second_mm).bend_mm, abs=2e-6)
+def test_bend_by_a_pair_is_continuous(first_mm: float, second_mm: float, little_mm: float) -> None:
+    assert pair_bend_mm(first_mm + little_mm, second_mm) == pytest.approx(pair_bend_mm(first_mm, second_mm), abs=2e-6)
 
 
 def test_joints_become_a_command() -> None:
@@ -415,9 +415,7 @@ def test_joints_become_a_command() -> None:
     command = joints.command((1.3, -0.7, -0.2, 0.8, 0.4, 0.1, 0.3), 0.02)
     assert (command.bend, command.pitch) == (pytest.approx(0.5), pytest.approx(-0.25))
     assert (command.advance_mm_s, command.delivery_mm_s) == (pytest.approx(20.0), pytest.approx(10.0))
-    assert joints.slack == (False, False)
     command = joints.command((-1.0, 0.2, -0.2, 0.8, 0.3, 0.1, 0.3), 0.02)
-    assert joints.slack == (True, False)
     assert (command.advance_mm_s, command.delivery_mm_s) == (pytest.approx(-5.0), 0.0)
 
 
@@ -437,7 +435,7 @@ def test_the_servos_move_the_twins_robot_and_feel_its_wires() -> None:
     world = TwinWorld(TwinConfig(image_width_px=160, image_height_px=120))
     world.insert(30.0)
     before = world.physics.insertion_mm
-    link = drive_world(world, bus, config)
+    drive_world(world, bus, config)
     for joint, goal_mm in zip(config.joints, (0.8, -0.2, 0.3, 0.3, 10.0, 0.0, 0.0), strict=True):
         servo = _armed(bus.servo(joint.id))
         _goal(servo, servo.table["present_position"] + round(goal_mm * joint.ticks_per_mm))
@@ -449,4 +447,3 @@ def test_the_servos_move_the_twins_robot_and_feel_its_wires() -> None:
     pull = world.physics.status().tendon_pull_mm
     assert pull[0] - pull[1] > 0.5
     assert bus.servo(1).motor.load_mnm > 0.0
-    assert link.slack == (False, False)
