@@ -28,8 +28,8 @@ damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: wha
 	@export LUMENPILOT_FUZZ=1000
 	only='damage_at_random or damaged_files_end or damaged_at_random'
 	$(PY) -m pytest --timeout 3600 tests/core -k "$$only"
-	LUMENPILOT_KILLS=50 $(PY) -m pytest --timeout 3600 tests/core/test_session_recovery.py -k is_killed
-	LUMENPILOT_KILLS=100 $(PY) -m pytest --timeout 3600 tests/core/test_annotation_store.py -k kill_9
+	LUMENPILOT_KILLS=50 $(PY) -m pytest --timeout 3600 tests/core/session/test_recovery.py -k is_killed
+	LUMENPILOT_KILLS=100 $(PY) -m pytest --timeout 3600 tests/core/annotation/test_store.py -k kill_9
 
 mutation: setup  ## does a test fail for every small change of gate and supervisor? (a quarter to half an hour)
 	@$(PY) -m tools.mutation $(ARGS)

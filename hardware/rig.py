@@ -36,7 +36,7 @@ class RigKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """An open rig. ``robot`` is None when pictures are only looked at; ``world`` exists when the twin is in this process."""
+    """An open rig. ``robot``: None when pictures are only looked at; ``world`` exists when the twin is in this process."""
 
     name: str
     kind: RigKind

@@ -351,7 +351,7 @@ class AnnotationCanvas(ImageCanvas):
         self.update()
 
     def zoom(self, factor: float) -> None:
-        """Zoom at the cursor, or in the middle when there is none."""
+        """Zoom at the cursor, or in the middle without one."""
         at = self.view.to_screen(self._cursor) if self._cursor is not None and self.view.shows(self._cursor, 0.0) else None
         self.zoom_at(factor, at or (self.width() / 2, self.height() / 2))
 

@@ -120,7 +120,7 @@ def comparable_answers(
 ) -> tuple[list[StoredAnnotation], list[str]]:
     """The finished answers of one study to the images that are here, measured as the algorithm is, and notes for the reader.
 
-    Raises AnnotationError where there are none, or several studies.
+    Raises AnnotationError without any, or several studies.
     """
     records = {image.sha256: image.record for image in images}
     done = [one for one in choose_study(annotations, study, where) if one.key.sha256 in records]

@@ -280,7 +280,7 @@ def default_store(paths: Sequence[Path]) -> Path:
 def image_files(paths: Sequence[Path], frames: int | None, *, reuse: bool = False) -> list[Path]:
     """All pictures among `paths`, in name order; of each video `frames` pictures, which lie in a folder beside it afterwards.
 
-    Without a number, or with `reuse`, those that were extracted before, however many they are; where there are none, `frames` (or
+    Without a number, or with `reuse`, those that were extracted before, however many they are; without any, `frames` (or
     ``FRAMES``) new ones. Raises AnnotationError when a path does not exist, a video cannot be read, or there is no picture at all.
     """
     files: list[Path] = []
@@ -356,7 +356,7 @@ def _known_images(files: Sequence[Path], store: AnnotationStore) -> tuple[list[F
 
 
 def of_rater(annotations: list[StoredAnnotation], rater: str | None) -> list[StoredAnnotation]:
-    """Those of one rater; None: of all. Raises AnnotationError where there are none."""
+    """Those of one rater; None: of all. Raises AnnotationError without any."""
     if rater is None:
         return annotations
     own = [one for one in annotations if one.key.rater == rater]

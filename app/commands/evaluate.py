@@ -272,7 +272,7 @@ def _recorded(folder: Path, config: Config, model: str | None) -> tuple[Config, 
 
 @dataclass(frozen=True, slots=True)
 class _Truth:
-    """A labelled image; theta and state are None where it shows no pose."""
+    """A labelled image; theta and state: None where it shows no pose."""
 
     stem: str
     image: Path

@@ -151,7 +151,7 @@ def _perceive_picture(pipeline: Pipeline, picture: FilePicture, image: Image, in
 
 
 def _write_masks(folder: Path, stem: str, scene: Scene) -> None:
-    """At source size, empty where there are none; raises OSError."""
+    """At source size, empty without any; raises OSError."""
     width, height = scene.source_size
     for name in ("vessel", "robot"):
         mask = getattr(scene.masks, name) if scene.masks is not None else np.zeros((height, width), bool)

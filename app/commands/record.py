@@ -152,7 +152,7 @@ def _record_into(engine: RigEngine, writer: SessionWriter, seconds: float, done:
                 break
             pilot = engine.pilot
             if pilot is not None:
-                pilot.window_alive()  # the pilot stops a robot whose window hangs; there is none here
+                pilot.window_alive()  # the pilot stops a robot whose window hangs; no window here
                 news = pilot.news()
                 for view in news.changes:
                     writer.drive(view)

@@ -259,7 +259,7 @@ def _check_places(options: TrainOptions) -> tuple[Path, Path | None]:
         if out in (place := Path(os.path.realpath(read)), *place.parents):
             raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
     if held_out is not None:
-        find_samples([held_out])  # raises where there are none
+        find_samples([held_out])  # raises without any
     return out, began_with
 
 

@@ -128,13 +128,13 @@ class EngineThread(QThread):
         return self._changed.is_set()
 
     def stop_opening(self) -> bool:
-        """STOP while an engine is announced or being opened: it starts stopped. False when there is none. From any thread."""
+        """STOP while an engine is announced or being opened: it starts stopped. False without one. From any thread."""
         with self._lock:
             self._stop_next = self._stop_next or self._opening
             return self._opening
 
     def bus_status(self) -> BusStatus | None:
-        """The newest status of the servo bus; None where there is none."""
+        """The newest status of the servo bus; None without one."""
         engine = self._engine
         return engine.bus_status() if engine is not None else None
 

@@ -398,7 +398,7 @@ class DriveController(QObject):
 
     @property
     def bus(self) -> BusStatus | None:
-        """The newest status of the servo bus; None where there is none."""
+        """The newest status of the servo bus; None without one."""
         return self._rig.engine.bus_status()
 
     @property
@@ -550,7 +550,7 @@ class OperatorDevices(QObject):
     Parameters
     ----------
     config : sections `gamepad` and `pedal`; without a pedal's port there is no pedal.
-    pilot : the running rig's pilot, None while there is none; called from the devices' threads.
+    pilot : the running rig's pilot, None without one; called from the devices' threads.
     stop : called instead for STOP while there is no pilot: something else may be moving the servos.
     """
 

@@ -46,7 +46,7 @@ _TALL_PX = 780
 class OperatorPanels(ScenePanels):
     """Makes the widgets and lays them out; shows a tick on all of them, or nothing and why.
 
-    ``picker`` is None when there is no phantom to choose.
+    ``picker``: None when there is no phantom to choose.
     """
 
     def __init__(self, config: Config, kind: RigKind, phantoms: Sequence[tuple[str, str]]) -> None:

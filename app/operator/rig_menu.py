@@ -210,7 +210,7 @@ class RigMenuController(QObject):
         self._window.say(said)
 
     def _rig_path(self) -> Path | None:
-        """The rig file that keeps the port; None, said, when there is none or the robot is in use."""
+        """The rig file that keeps the port; None, said, without one or the robot is in use."""
         file = self._rig.config.rig.file
         why = self.hindrance() if file is not None else tr("it has no file: save one first (menu Rig, New rig)")
         if why:

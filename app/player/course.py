@@ -153,7 +153,7 @@ def places_of(kind: JumpKind, course: Course, events: Sequence[Event]) -> NDArra
 
 
 def neighbour(places: NDArray[np.int64], place: int, step: int) -> int | None:
-    """The next one after `place` (`step` 1) or before it (-1); None where there is none."""
+    """The next one after `place` (`step` 1) or before it (-1); None without one."""
     found = places[places > place] if step > 0 else places[places < place][::-1]
     return int(found[0]) if len(found) else None
 

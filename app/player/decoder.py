@@ -27,7 +27,7 @@ _NO_GEOMETRY: dict[str, Any] = dict.fromkeys(("path", "vessel_graph", "route", "
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decoded:
-    """Row number ``place``: ``row`` is None when it is damaged, ``tick`` when its picture is lost; ``other`` is of a replay."""
+    """Row number ``place``: ``row``: None when it is damaged, ``tick`` when its picture is lost; ``other`` is of a replay."""
 
     place: int
     row: RecordedRow | None

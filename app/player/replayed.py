@@ -58,7 +58,7 @@ class Replayed:
         return int(row)
 
     def theta_deg(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Signed angles of these rows, NaN where there is none."""
+        """Signed angles of these rows, NaN without one."""
         return np.array([self._values.get(row, (math.nan, -1))[0] for row in rows.tolist()], np.float64)
 
     def changed(self, rows: NDArray[np.int64], theta_deg: NDArray[np.float64], states: NDArray[np.int8]) -> NDArray[np.int64]:

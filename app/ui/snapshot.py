@@ -68,7 +68,7 @@ def _free_name(folder: Path, name: str) -> str:
 
 
 def _write_new(path: Path, data: bytes) -> None:
-    """Raises OSError, also when somebody else has made one of that name meanwhile."""
+    """Raises OSError, also when one of that name was made meanwhile."""
     with path.open("xb") as file:
         file.write(data)
 

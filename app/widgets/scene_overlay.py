@@ -21,7 +21,7 @@ _CLEAR_OFFSET_PX = 3.0  # from which on a label changes its side of the vessel l
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneShapes:
-    """Shapes in source pixels (pixel centres at integers). What the scene does not have is None or empty.
+    """Shapes in source pixels (pixel centres at integers). What the scene lacks: None or empty.
 
     ``head_foot`` and ``tail_foot`` are the projections of the robot vector's end and start on the vessel line, so that
     robot_vector.end -> head_foot and robot_vector.start -> tail_foot are d_head and d_tail. ``angle_arc`` (N, 2) turns from the

@@ -574,7 +574,7 @@ class ServoTable(QWidget):
         return self._bus.text()
 
     def show_status(self, status: BusStatus | None, servos: ServosConfig) -> None:
-        """The newest status of the bus, None when there is none; a status that is older than a second is shown as silence."""
+        """The newest status of the bus, None without one; a status that is older than a second is shown as silence."""
         self._servos = servos
         silence_s = self._clock() - status.time_s if status is not None else 0.0
         is_silent = silence_s > SILENT_AFTER_S

@@ -151,7 +151,7 @@ def place_card(size: QSize, room: QRect, light: QRect, clear: Sequence[QRect]) -
     Parameters
     ----------
     size : of the card.
-    room, light, clear : in the same pixels; an invalid `light` means that there is none.
+    room, light, clear : in the same pixels; an invalid `light` means that there is no light.
     """
     inner = room.adjusted(_MARGIN, _MARGIN, -_MARGIN, -_MARGIN)
     width, height = size.width(), size.height()

@@ -77,7 +77,7 @@ def agreement_report(
         ``raters``: each rater's first against second measure (``angle`` with limits of agreement and ICC, ``state`` with kappa),
         and the SD of one measure, over all repeats. ``within``: that SD over all raters. ``pairs``: two raters' first measures of
         the same images, likewise. ``between``: over all raters that measured the same images, SD of a rater's measure about the
-        image's mean, and ICC(2,1). Undefined figures are None.
+        image's mean, and ICC(2,1). Undefined figures: None.
     """
     draw = _Draw(seed, groups or {})
     table = {(one.key.rater, one.key.sha256, one.key.repeat): one for one in annotations}

@@ -21,7 +21,7 @@ from core.config.models import PerceptionConfig
 from core.devices import UserError
 from core.messages import message
 from core.perception.centerline import centerline_at
-from core.perception.pose import measure
+from core.perception.pose import measure_pose
 from core.perception.vectors import MIN_LENGTH_PX, fit_robot_vector, fit_vessel_vector
 from core.types import GraphEdge, Image, Point, Points, Pose, PoseState, Vector, VesselGraph
 
@@ -173,7 +173,7 @@ def measure_lines(annotation: Annotation, size: tuple[int, int], config: Percept
         vessel_piece=to_source(beside.piece),
         vessel_vector=vector_to_source(vessel_vector),
         vessel_length_px=float(geometry.arc_length(beside.piece)[-1]),
-        pose=measure(robot_vector, vessel_vector, config.pose),
+        pose=measure_pose(robot_vector, vessel_vector, config.pose),
     )
 
 

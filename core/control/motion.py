@@ -77,7 +77,7 @@ class JogIntegrator:
     """Controls -> command: bend and pitch change while a control is held and stay when it is released; advance and delivery are
     speeds.
 
-    The command runs ahead of the robot by ``_MOST_MOST_AHEAD`` at most, so that releasing the control of a robot that lags ends
+    The command runs ahead of the robot by ``_MOST_AHEAD`` at most, so that releasing the control of a robot that lags ends
     its motion.
     """
 

@@ -27,7 +27,7 @@ _LEAST_DIFFICULTY = 0.02  # of a frame that is known by heart: it may still be d
 
 @dataclass(frozen=True, slots=True)
 class FrameScore:
-    """One frame against its truth. Errors are None where perception or truth has no pose; Dice of an absent robot is None."""
+    """One frame against its truth. Errors: None where perception or truth has no pose; Dice of an absent robot: None."""
 
     stem: str
     vessel_dice: float

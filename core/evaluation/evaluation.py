@@ -241,7 +241,7 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     -------
     dict
         ``images``, ``intervals`` (what the bootstrap draws), ``angle``, ``state``, ``manual`` (the two manual measures against
-        each other) and ``notes``: one sentence for each thing that a reader should know. Undefined figures are None, and a note
+        each other) and ``notes``: one sentence for each thing that a reader should know. Undefined figures: None, and a note
         says why.
     """
     pairs = angle_pairs(rows)

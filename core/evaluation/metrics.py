@@ -377,8 +377,8 @@ def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0
     -------
     dict
         As ``metrics.json`` has it. ``labels`` are those that occur on either side; ``confusion`` has manual rows and algorithm
-        columns. Precision of a class that the algorithm never gave is None and counts as 0 in the averages (else never to find a
-        class would be better than to find a part of it); recall of a class without a manual label is None and left out of them.
+        columns. Precision of a class that the algorithm never gave: None, which counts as 0 in the averages (else never to find a
+        class would be better than to find a part of it); recall of a class without a manual label: None, left out of them.
         ``fowlkes_mallows_pairs`` is the pair-counting index, ``fowlkes_mallows_macro`` the mean over the classes of
         ``sqrt(precision * recall)``, the formula of the paper's table, with 0 for a class without a hit.
     """

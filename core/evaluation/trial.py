@@ -18,7 +18,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class TrialSample:
-    """One sample of the truth during a trial; unknown values are None.
+    """One sample of the truth during a trial; unknown values: None.
 
     ``head_mm`` lies on the board; ``offset_ratio`` is the head's distance from the centerline over the lumen's radius, ``d_px``
     that distance in working px; the errors are perception's.

@@ -330,7 +330,7 @@ def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...]
 
 
 def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Generator) -> Point:
-    """Near one of the places, or anywhere in the picture where there is none."""
+    """Near one of the places, or anywhere in the picture without one."""
     height, width = robot.shape
     x, y = places[int(rng.integers(len(places)))] if places else (rng.uniform(0, width), rng.uniform(0, height))
     across, down = rng.normal(0, jitter_px, 2)

@@ -18,7 +18,7 @@ from core.perception.vectors import is_walled_off, project
 from core.types import Centerline, Mask, Point, Points, Route, VesselGraph
 
 REACH_RADII = 1.5
-"""Vessels farther from the head than this many of their radii are ignored."""
+"""Vessels further from the head than this many of their radii are ignored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ OFF_VESSEL_PX = 15.0
 
 
 def route_or_reason(graph: VesselGraph, start: Point, target: Point, vessel: Mask | None = None) -> Route | str:
-    """The route, or why there is none: the target is beside the vessel, or no vessel that was found leads there."""
+    """The route, or the reason for none: the target is beside the vessel, or no vessel that was found leads there."""
     there = _lumen(graph, target)
     if there is None:
         return "no vessel was found"

@@ -31,7 +31,7 @@ NEARER_BY = 0.6
 class PreviousPath:
     """What a stream knows of the robot from the frames before.
 
-    ``path`` is the last frame's. After a gap it is None, and ``before_gap`` still tells which end is the head.
+    ``path`` is the last frame's. After a gap: None, and ``before_gap`` still tells which end is the head.
     ``came_from_within``: the head of either was seen well within the picture before it was where it is, so at the image border it
     is no entry."""
 

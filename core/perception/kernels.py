@@ -270,7 +270,7 @@ def sample(values: FloatMap | BoolMap, x: Floats, y: Floats) -> Floats:
 def wall_distance(
     level: FloatMap | BoolMap, x: float, y: float, across_x: float, across_y: float, expected: float, search_px: int
 ) -> tuple[float, float]:
-    """Distance of a wall from (x, y), NaN where there is none, and the slope of the level there, per px."""
+    """Distance of a wall from (x, y), NaN without one, and the slope of the level there, per px."""
     old = here = math.nan
     distance = farther = 0.0
     for k in range(-search_px, search_px + 1):
@@ -315,7 +315,7 @@ SOFTEST = 0.02
 WIDTH_SHARE = 0.2
 """By how much a vessel's width may differ from what is measured at one place."""
 MOST_SHIFT_PX = 2.0
-"""Greatest error of the distance map; a wall farther off belongs to something else."""
+"""Greatest error of the distance map; a wall further off belongs to something else."""
 
 
 @kernel((MAP, POINTS, STARTS, POINTS, VALUES, float64))

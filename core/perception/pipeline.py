@@ -18,8 +18,8 @@ from core.perception.centerline import route_or_reason
 from core.perception.head_tail import PreviousPath
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.out_of_distribution import OutOfDistributionReference
-from core.perception.pose import measure
-from core.perception.quality import ConfidenceCalibration, collect
+from core.perception.pose import measure_pose
+from core.perception.quality import ConfidenceCalibration, confidence_features
 from core.perception.roi import Background, segment_roi
 from core.perception.segmentation import OrientationAverage, Segmenter, to_working
 from core.perception.tip_refinement import MAX_PASSES, TipRefinement
@@ -373,9 +373,9 @@ class Pipeline:
             refusal = quality.check_walls(masks, path.head, config.quality)
             if refusal is not None:
                 return refusal
-            pose = measure(located.robot, located.vessel, config.pose)
+            pose = measure_pose(located.robot, located.vessel, config.pose)
             believed = _without_artefacts(masks, run.state.artefacts.removed if run.state is not None else None)
-            features = collect(path, located.robot, located.centerline, believed, config)
+            features = confidence_features(path, located.robot, located.centerline, believed, config)
         if segmenter.sensitivity:
             with run.watch.stage("steadiness"):
                 others = [
@@ -388,7 +388,7 @@ class Pipeline:
         if segmenter.calibration is not None:
             confidence = segmenter.calibration.confidence(features)
         else:
-            confidence = quality.confidence(path, located.centerline, masks, config)
+            confidence = quality.uncalibrated_confidence(path, located.centerline, masks, config)
         refusal = quality.check_confidence(confidence, config.quality)
         if refusal is None:
             run.add(pose=replace(pose, confidence=confidence))
@@ -403,7 +403,7 @@ class Pipeline:
         located = structures if isinstance(structures, Refusal) else self._locate(other, structures, before, None)
         if isinstance(located, Refusal):
             return None
-        return located.path.head, measure(located.robot, located.vessel, self._config.pose).theta_signed_deg
+        return located.path.head, measure_pose(located.robot, located.vessel, self._config.pose).theta_signed_deg
 
 
 def _without_artefacts(masks: Masks, removed: Mask | None) -> Masks:

@@ -9,7 +9,7 @@ from core.config.models import PoseConfig
 from core.types import Point, Pose, PoseState, Vector
 
 
-def measure(robot: Vector, vessel: Vector, config: PoseConfig, confidence: float = 1.0) -> Pose:
+def measure_pose(robot: Vector, vessel: Vector, config: PoseConfig, confidence: float = 1.0) -> Pose:
     """The robot's pose against the vessel's line, with the state that this one image shows.
 
     Parameters

@@ -37,7 +37,7 @@ _AROUND_PX = 60
 class ConfidenceFeatures:
     """Features of one answer: shares or ratios without unit, but for ``log_length`` (natural logarithm of px) and the swings.
 
-    The swings (``threshold_sensitivity``) are None where they were not computed: they take several times as long as all the rest.
+    The swings (``threshold_sensitivity``) None where they were not computed: they take several times as long as all the rest.
     """
 
     robot_seen: float
@@ -120,7 +120,9 @@ class ConfidenceCalibration(BaseModel):
         return float(1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0))))
 
 
-def collect(path: RobotPath, robot: Vector, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> ConfidenceFeatures:
+def confidence_features(
+    path: RobotPath, robot: Vector, centerline: Centerline, masks: Masks, config: PerceptionConfig
+) -> ConfidenceFeatures:
     """The features of an answer, without the threshold sensitivity; coordinates in working pixels."""
     along = geometry.arc_length(path.points)
     total = float(along[-1])
@@ -374,7 +376,7 @@ def inside_share(path: RobotPath, vessel: Mask, length_px: float) -> float:
     return float(at(vessel, geometry.resample(geometry.cut(path.points, total - length_px, total), 1.0)).mean())
 
 
-def confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> float:
+def uncalibrated_confidence(path: RobotPath, centerline: Centerline, masks: Masks, config: PerceptionConfig) -> float:
     """The confidence of an answer of a model without calibration, 0..1: the product of
 
     - how clearly the network saw the robot's last 40 px, and the vessel beside them,

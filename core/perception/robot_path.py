@@ -407,7 +407,7 @@ def find(
     port: Point | None = None,
     before: PreviousPath = PreviousPath(),  # noqa: B008 (it is frozen)
 ) -> RobotPath | Refusal:
-    """The robot's path, tail -> head, or why there is none.
+    """The robot's path, tail -> head, or the reason for none.
 
     Starts are the ends at the image border or at the insertion port; a robot that enters inside the image starts at any end. From
     each start the longest branch is kept (shortened by the cost of its turns at junctions), and the best scored of these is the

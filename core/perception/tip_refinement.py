@@ -25,7 +25,7 @@ _SEEN_PX = 40.0
 """An end this near to the middle of a window has been refined."""
 _MAX_WINDOWS = 5
 _ROUNDS = 2
-"""What the refinement adds may end farther on: then that end is refined, too."""
+"""What the refinement adds may end further on: then that end is refined, too."""
 _FAINT = 0.1
 """Least robot probability of the likeliest place, which is refined where nothing is taken for a robot."""
 _MIN_AREA_PX = 20

@@ -155,7 +155,7 @@ class RouteMemory:
         self._settled = self._known, self._other
 
     def update(self, found: Route | str, head: Point, target: Point, vessel: Mask, captured_s: float) -> Route | str:
-        """The route that was found, or the rest of the known one, or why there is none.
+        """The route that was found, or the rest of the known one, or the reason for none.
 
         `found` is what ``route_or_reason`` says of this frame, `vessel` the mask (h, w), all in working px.
         """
@@ -275,7 +275,7 @@ class StaticArtefacts:
         self._seen_s[~self._known] = -math.inf
 
     def remove(self, robot: Mask, image: Image, captured_s: float, window: Window | None = None) -> Mask:
-        """The robot's mask (h, w) of the next frame without artefacts; the same object where there are none.
+        """The robot's mask (h, w) of the next frame without artefacts; the same object without any.
 
         Parameters
         ----------
@@ -377,7 +377,7 @@ class StaticArtefacts:
         return kept, left
 
     def _artefact_in(self, component: _Component, image: Image, captured_s: float) -> Mask | None:
-        """A component's known pixels, within its box, with their edge; None where there are none.
+        """A component's known pixels, within its box, with their edge; None without any.
 
         Where the robot has reached something of its own colour the two cannot be told apart: there all is robot.
         """

@@ -26,8 +26,11 @@ def fit_robot_vector(points: Points, length_px: float, fit: LineFit = "total_lea
     length_px : arc length that is used, counted back from the head; a shorter path is used whole.
     fit : how the line is fitted, see ``fit_line``.
 
-    Returns ------- Vector with ``end`` = projection of the head on the line, ``start`` = that of the point `length_px` back, or
-    None when the piece is shorter than ``MIN_LENGTH_PX`` or has no direction (it ends where it began)."""
+    Returns
+    -------
+    Vector with ``end`` = projection of the head on the line, ``start`` = that of the point `length_px` back; None when the piece is
+    shorter than ``MIN_LENGTH_PX`` or has no direction (it ends where it began).
+    """
     if len(points) < 2:
         return None
     total = float(geometry.arc_length(points)[-1])

@@ -451,7 +451,7 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, with_masks: 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedRow:
     """One recorded frame without its picture. ``row`` counts in the session, ``index`` is the camera's; ``pts_ms`` is the time in
-    the video file number ``video``. ``size`` is the picture's (width, height). ``drive`` is None when there was no robot to drive.
+    the video file number ``video``. ``size`` is the picture's (width, height). ``drive``: None when there was no robot to drive.
     ``bus`` is the status of the servo bus as plain values, None where there was none. ``camera_lost`` counts, since the camera was
     opened, the frames that never came from it; ``dropped_frames`` those that came and were skipped for a newer one.
     """

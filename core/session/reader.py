@@ -1,4 +1,4 @@
-"""A recorded session: rows, events, pictures and timeline. A bad record is named and skipped, a lost picture is None."""
+"""A recorded session: rows, events, pictures and timeline. A bad record is named and skipped, a lost picture becomes None."""
 
 from __future__ import annotations
 

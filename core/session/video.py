@@ -321,7 +321,7 @@ def packet_times(path: Path) -> list[int]:
 
 
 def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int], list[str]]:
-    """Copy the sound packets of `source`; nothing is written where there are none.
+    """Copy the sound packets of `source`; nothing is written without any.
 
     Parameters
     ----------

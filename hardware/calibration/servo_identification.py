@@ -111,7 +111,7 @@ def _or_back(back: Callable[[], None]) -> Iterator[None]:
 
 
 def identify_servo(bench: ServoBench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, say: Say) -> ServoFinding | None:
-    """What one servo does; None when nothing clear was seen. It is turned no farther than needed.
+    """What one servo does; None when nothing clear was seen. It is turned no further than needed.
 
     Raises ServoError, DeviceError, HeadNotSeen.
     """

@@ -130,7 +130,7 @@ def probe_config(
     Notes
     -----
     A known servo turns its own joint's millimetres per turn. An unknown one may drive any of the seven: with the largest of theirs
-    its wire or screw never moves farther, nor faster, than it is asked to.
+    its wire or screw never moves further, nor faster, than it is asked to.
 
     Raises ProbeFailed when there are not seven, or `servo_id` is not among them.
     """
@@ -161,7 +161,7 @@ def probe_config(
 def patient(servos: ServosConfig) -> ServosConfig:
     """The bus as a slow procedure needs it, beside a network and a window: fewer cycles, and a pause of the program is no fault.
 
-    A goal is at most one step away all the same, so a longer watchdog lets nothing run farther.
+    A goal is at most one step away all the same, so a longer watchdog lets nothing run further.
     """
     calm = {
         "bus_hz": min(_CALM_HZ, servos.bus_hz),

@@ -19,7 +19,7 @@ from hardware.cameras.files import VideoFile
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilePicture:
-    """One picture of the input; unreadable: ``image`` is None and ``problem`` says why. ``time_s`` is set in videos.
+    """One picture of the input; unreadable: ``image`` None and ``problem`` says why. ``time_s`` is set in videos.
 
     ``stem`` is unique; ``real_stems`` are what the user may call it by, the nearest first.
     """

@@ -69,7 +69,7 @@ class Layout:
 class GamepadState:
     """How the controls are held, at ``time_s`` on the monotonic clock; each rate -1..1 of full speed.
 
-    Positive: bend to the robot's right as seen on screen, pitch up, advance and sheath forward. ``deadman`` is None when the
+    Positive: bend to the robot's right as seen on screen, pitch up, advance and sheath forward. ``deadman``: None when the
     configuration does not make the gamepad a deadman. ``stop``: the STOP button is down.
     """
 
@@ -195,7 +195,7 @@ class Gamepad:
 
     @property
     def name(self) -> str | None:
-        """What the gamepad calls itself; None while there is none."""
+        """What the gamepad calls itself; None without one."""
         return self._name
 
     @property

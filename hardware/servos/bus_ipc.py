@@ -368,7 +368,7 @@ class BusServer(ParentLink):
         return False
 
     def read_request(self) -> Request | None:
-        """The next request; None when there is none, or it cannot be understood."""
+        """The next request; None without one, or it cannot be understood."""
         try:
             data = self.socket.recv(MESSAGE_BYTES)
         except BlockingIOError:

@@ -294,7 +294,7 @@ class ServoLine:
             raise RuntimeError("the servo line belongs to the thread that opened it")
         try:
             yield port
-        except (OSError, termios.error) as error:  # SerialException is an OSError, termios.error is none
+        except (OSError, termios.error) as error:  # SerialException is an OSError, termios.error is not
             self.close()
             reason = " ".join(str(error).split())[:80]
             raise PortLost(

@@ -131,7 +131,7 @@ def describe(error: HardwareError) -> str:
 class ServoState:
     """What one servo reported. ``time_s`` is monotonic, at the arrival of the answer.
 
-    ``position_mm`` and ``goal_mm`` are None until the joint has been zeroed; ``ticks`` always tells the position register.
+    ``position_mm`` and ``goal_mm``: None until the joint has been zeroed; ``ticks`` always tells the position register.
     ``goal_ticks`` is the goal that the servo has really taken: a group write has no answer that would tell.
     """
 

@@ -18,7 +18,7 @@ from core.control.joints import Joints
 from core.messages import message
 
 _FAR_SHARE, _MOVED_SHARE = 0.5, 0.2
-"""Of the step: a goal farther ahead is far, and a joint that moved less did not move. One that lags so far in healthy motion moves
+"""Of the step: a goal further ahead is far, and a joint that moved less did not move. One that lags so far in healthy motion moves
 five times as much in the time."""
 _SLOW_SHARE = 0.25
 """Of what a joint can do in the time from rest: a slow joint that did so much has moved."""
@@ -88,7 +88,7 @@ class _Drift:
 
 
 class DriftMonitor:
-    """Updated in every cycle; `limit_s` is how long a joint may have drifted farther than it takes to brake."""
+    """Updated in every cycle; `limit_s` is how long a joint may have drifted further than it takes to brake."""
 
     def __init__(self, joints: Sequence[JointConfig], limit_s: float) -> None:
         self._joints, self._limit_s = joints, limit_s

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from core import geometry
 from core.config.models import PerceptionConfig
 from core.perception.centerline import centerline_at, distances, go_back, incidence_of, joined
-from core.perception.pose import measure
+from core.perception.pose import measure_pose
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.types import Centerline, Command, GraphEdge, Point, Points, Pose, Reason, Route, Vector, VesselGraph
 from hardware.twin.phantom import Phantom
@@ -148,7 +148,7 @@ def truth_of(
     reason = _refusal(path, view, phantom.graph, robot_vector, vessel_vector, config)
     pose = None
     if reason is None and robot_vector is not None and vessel_vector is not None:
-        pose = measure(robot_vector, vessel_vector, config.pose)
+        pose = measure_pose(robot_vector, vessel_vector, config.pose)
     return Truth(
         scale=scale,
         reason=reason,

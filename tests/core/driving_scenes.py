@@ -8,7 +8,7 @@ import numpy as np
 
 from core.config.models import Config
 from core.perception.centerline import centerline_at, plan_route
-from core.perception.pose import measure
+from core.perception.pose import measure_pose
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.types import GraphEdge, Point, Points, RobotPath, RobotStatus, Scene, VesselGraph
 
@@ -56,7 +56,7 @@ def scene_at(
     assert centerline is not None
     vessel = fit_vessel_vector(centerline)
     assert vessel is not None
-    pose = measure(robot, vessel, Config().perception.pose)
+    pose = measure_pose(robot, vessel, Config().perception.pose)
     path = RobotPath(points, 1.0, None, True, 0.0, 3.5)
     return Scene(
         0, time_s, (640, 480), 1.0, path=path, vessel_graph=graph, route=route, centerline=centerline,

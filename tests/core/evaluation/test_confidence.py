@@ -11,7 +11,7 @@ from core.evaluation.accuracy import FrameScore
 from core.evaluation.confidence import CalibrationError, auroc, expected_calibration_error, fit, is_right, reliability
 from core.learning.model_writer import save_model, write_calibration
 from core.perception.model_file import ModelError, read_model_info
-from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures, collect
+from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures, confidence_features
 from core.perception.unet import DualUNet, UNetShape
 from core.perception.vectors import fit_robot_vector
 from core.types import Centerline, Masks, RobotPath, Vector
@@ -34,7 +34,7 @@ def _collect(masks: Masks, bridged_px: float = 0.0) -> ConfidenceFeatures:
     vector = fit_robot_vector(LINE, 40.0)
     assert isinstance(vector, Vector)
     path = RobotPath(LINE, 1.3, 0.9, True, bridged_px, 4.5)
-    return collect(path, vector, PIECE, masks, CONFIG)
+    return confidence_features(path, vector, PIECE, masks, CONFIG)
 
 
 def test_evidence_of_a_clear_answer_by_hand() -> None:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.config.models import PoseConfig
-from core.perception.pose import StateFilter, classify, measure, room_px, signed_distance
+from core.perception.pose import StateFilter, classify, measure_pose, room_px, signed_distance
 from core.types import Pose, PoseState, Vector
 
 A, B, C, D = PoseState.A, PoseState.B, PoseState.C, PoseState.D
@@ -33,13 +33,13 @@ EAST = vector((0.0, 100.0), (40.0, 100.0))
     ],
 )
 def test_theta_is_positive_to_the_right_as_seen_on_screen(robot: Vector, theta_signed_deg: float) -> None:
-    pose = measure(robot, EAST, CONFIG)
+    pose = measure_pose(robot, EAST, CONFIG)
     assert pose.theta_signed_deg == pytest.approx(theta_signed_deg)
     assert pose.theta_deg == pytest.approx(abs(theta_signed_deg))
 
 
 def test_distances_are_true_px_and_signed_to_the_right() -> None:
-    pose = measure(vector((10, 112), (50, 97)), EAST, CONFIG)
+    pose = measure_pose(vector((10, 112), (50, 97)), EAST, CONFIG)
     assert pose.c_head_px == pytest.approx(-3.0)
     assert pose.c_tail_px == pytest.approx(12.0)
     assert (pose.d_head_px, pose.d_tail_px) == (pytest.approx(3.0), pytest.approx(12.0))
@@ -132,9 +132,9 @@ def test_turning_the_picture_changes_nothing_and_mirroring_it_the_signs(
     def mirrored(p: tuple[float, float]) -> tuple[float, float]:
         return -p[0], p[1]
 
-    plain = measure(vector(*robot), vector(*vessel), CONFIG)
-    rotated = measure(vector(*map(turned, robot)), vector(*map(turned, vessel)), CONFIG)
-    flipped = measure(vector(*map(mirrored, robot)), vector(*map(mirrored, vessel)), CONFIG)
+    plain = measure_pose(vector(*robot), vector(*vessel), CONFIG)
+    rotated = measure_pose(vector(*map(turned, robot)), vector(*map(turned, vessel)), CONFIG)
+    flipped = measure_pose(vector(*map(mirrored, robot)), vector(*map(mirrored, vessel)), CONFIG)
     assert rotated.theta_deg == pytest.approx(plain.theta_deg, abs=1e-5)
     assert rotated.c_head_px == pytest.approx(plain.c_head_px, abs=1e-6)
     assert flipped.theta_deg == pytest.approx(plain.theta_deg, abs=1e-5)

@@ -185,7 +185,7 @@ def test_a_head_farther_from_the_centerline_than_any_lumen_reaches_is_in_a_vesse
 
 
 def test_confidence_is_one_when_nothing_speaks_against() -> None:
-    assert quality.confidence(path(), PIECE, masks(), CONFIG) == pytest.approx(1.0)
+    assert quality.uncalibrated_confidence(path(), PIECE, masks(), CONFIG) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_confidence_is_one_when_nothing_speaks_against() -> None:
     ],
 )
 def test_each_doubt_lowers_the_confidence(found: RobotPath, piece: Centerline, where: Masks) -> None:
-    assert 0.0 <= quality.confidence(found, piece, where, CONFIG) < 0.9
+    assert 0.0 <= quality.uncalibrated_confidence(found, piece, where, CONFIG) < 0.9
 
 
 def test_low_confidence_is_refused_with_both_numbers() -> None:
