@@ -1,10 +1,7 @@
-"""The bench twin as one world: phantom, physics, look and camera view share a clock that is stepped or follows the wall clock.
+"""The bench twin: a world of phantom, physics, look and camera view, with its camera and robot.
 
-The twin's camera: gives what the world renders, either as it runs or one frame per read in lock-step.
-
-The twin's robot behind the ``Robot`` protocol: it keeps the current command, which the world applies as it steps the physics.
-
-The twin's robot without servos in between, under the pilot's rules: no bus, no process, the lightest load on the machine.
+The world is stepped by the caller (lock-step) or follows the wall clock. It applies the current command of its ``TwinRobot``;
+``DirectRobot`` puts the pilot's rules before that robot, without servos in between.
 """
 
 from __future__ import annotations
@@ -40,35 +37,28 @@ MAX_DELIVERY_MM_S = 10.0
 class TwinRobot:
     """Clamps commands to the robot's limits and holds the last one. All methods may be called from any thread."""
 
-    def __init__(
-        self, physics: TwinPhysics, *, max_advance_mm_s: float = MAX_ADVANCE_MM_S, max_delivery_mm_s: float = MAX_DELIVERY_MM_S
-    ) -> None:
+    name = "bench twin"
+
+    def __init__(self, physics: TwinPhysics) -> None:
         self._physics = physics
-        self._max_advance_mm_s = max_advance_mm_s
-        self._max_delivery_mm_s = max_delivery_mm_s
         self._lock = threading.Lock()
         self._command = Command()
         self._connected = False
         self._sent_s = time.monotonic()
 
     @property
-    def name(self) -> str:
-        return "bench twin"
-
-    @property
     def current_command(self) -> Command:
-        """What the world applies now."""
+        """The command that the world applies now."""
         with self._lock:
             return self._command
 
     def connect(self) -> None:
-        """Ready for commands, at rest."""
         with self._lock:
             self._command = Command()
             self._connected = True
 
     def send(self, command: Command) -> Command:
-        """Make `command`, clamped to the limits, the current one; returns what was really sent.
+        """Make `command`, clamped to the limits, the current one; returns the clamped command.
 
         Raises
         ------
@@ -83,8 +73,8 @@ class TwinRobot:
         sent = Command(
             bend=_clamp(command.bend, 1.0),
             pitch=_clamp(command.pitch, 1.0),
-            advance_mm_s=_clamp(command.advance_mm_s, self._max_advance_mm_s),
-            delivery_mm_s=_clamp(command.delivery_mm_s, self._max_delivery_mm_s),
+            advance_mm_s=_clamp(command.advance_mm_s, MAX_ADVANCE_MM_S),
+            delivery_mm_s=_clamp(command.delivery_mm_s, MAX_DELIVERY_MM_S),
         )
         with self._lock:
             if not self._connected:
@@ -94,7 +84,7 @@ class TwinRobot:
         return sent
 
     def command_age_s(self) -> float:
-        """Time since the last command came; the living world holds a robot whose driver has fallen silent."""
+        """Time since the last command; the real-time world holds a robot that gets no commands any more."""
         with self._lock:
             return time.monotonic() - self._sent_s
 
@@ -119,7 +109,7 @@ def _clamp(value: float, limit: float) -> float:
 
 _log = logging.getLogger(__name__)
 
-_CONTROL_S = 0.02
+_CONTROL_S = 0.02  # period of the command, in simulated time
 _COMMAND_EXPIRES_S = 0.3
 _CATCH_UP_S = 0.2
 
@@ -127,9 +117,8 @@ _CATCH_UP_S = 0.2
 class TwinWorld:
     """Steps the physics under the robot's current command and renders frames.
 
-    Lock-step: call ``advance`` and ``frame``; nothing runs by itself, and the same seeds and commands give the same bits.
-    Real time: ``start`` runs both in a thread; its clock gives up what it cannot catch up within 0.2 s, so a busy machine slows
-    the world down instead of making it jump.
+    Lock-step: call ``advance`` and ``frame``; the same seeds and commands give the same bits. Real time: ``start`` runs both in a
+    thread; it drops delays of more than 0.2 s, so on a busy machine the world becomes slower and does not jump.
     """
 
     def __init__(
@@ -143,15 +132,13 @@ class TwinWorld:
     ) -> None:
         self.config = config
         self.phantom = phantom or make_phantom(config.phantom)
-        if appearance is None:
-            appearance = appearance_of(config)
-        self.appearance = appearance
+        self.appearance = appearance_of(config) if appearance is None else appearance
         self._perception = perception or PerceptionConfig()
         size = (config.image_width_px, config.image_height_px)
-        self.view = make_view(appearance, size, self.phantom)
+        self.view = make_view(self.appearance, size, self.phantom)
         self.physics = TwinPhysics(self.phantom, seed)
         self.robot = TwinRobot(self.physics)
-        self._renderer = Renderer(self.phantom, appearance, size, seed)
+        self._renderer = Renderer(self.phantom, self.appearance, size, seed)
         self._frame_index = 0
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -159,7 +146,7 @@ class TwinWorld:
         self.frames: Latest[Frame] = Latest()
         self.failure: str | None = None
         self.drive: Callable[[float], Command] | None = None
-        """Asked for the command of the coming seconds instead of the robot, when something else moves it (the servos)."""
+        """Gives the command for the coming seconds in place of the robot, when the servos move it."""
 
     def advance(self, duration_s: float) -> None:
         """Step the physics by simulated seconds under the robot's current command."""
@@ -171,7 +158,7 @@ class TwinWorld:
                 left -= step
 
     def insert(self, length_mm: float, speed_mm_s: float = 40.0, target: int | None = None) -> None:
-        """Feed the robot to an insertion length along the route to `target` (default: the farthest), so that there is a view."""
+        """Feed the robot to an insertion length along the route to `target` (default: the longest route)."""
         nodes = self.phantom.targets
         follower = max((RouteFollower(self.phantom, node) for node in nodes), key=lambda f: f.length_mm)
         if target is not None:
@@ -180,14 +167,14 @@ class TwinWorld:
         for _ in range(int(4 * length_mm / speed_mm_s / _CONTROL_S)):
             if self.physics.insertion_mm >= length_mm:
                 break
-            # Past the robot's own speed limit, straight to the physics: this is set-up, not operation.
+            # Directly in the physics, without the robot's speed limit: this is set-up, not operation.
             with self._lock:
                 self.physics.step(follower.command(self.physics.robot_points_mm(), speed_mm_s, _CONTROL_S), _CONTROL_S)
         with self._lock:
             self.physics.step(Command(), 0.3)
 
     def frame(self, captured_s: float | None = None) -> Frame:
-        """Render the world as it is now; ``captured_s`` defaults to simulated time."""
+        """Render the present state; `captured_s` defaults to simulated time."""
         with self._lock:
             points, sheath_mm, now = self.physics.robot_points_mm(), self.physics.delivery_mm, self.physics.time_s
             index = self._frame_index
@@ -200,7 +187,7 @@ class TwinWorld:
         return self._renderer.render(robot_points_mm, sheath_mm, noise_seed=self._frame_index)
 
     def truth(self, target_px: Point | None = None) -> Truth:
-        """The exact truth of the present moment, by perception's 40-px rule; with a target its route decides at forks."""
+        """The exact truth of the present state; with a target, its route decides at forks."""
         with self._lock:
             points = self.physics.robot_points_mm()
         route = None
@@ -212,7 +199,7 @@ class TwinWorld:
         return truth_of(self.phantom, self.view, points, self.appearance.robot_radius_mm, self._perception, route)
 
     def start(self) -> None:
-        """Let the world run by itself, in step with the wall clock as far as the machine can."""
+        """Run in a thread, in step with the wall clock as far as the machine can."""
         if self._thread is None:
             self.failure = None
             self._stop.clear()
@@ -220,7 +207,7 @@ class TwinWorld:
             self._thread.start()
 
     def stop(self) -> None:
-        """Stop the world's thread; the world can be started again."""
+        """Stop the thread; it can be started again."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -240,7 +227,7 @@ class TwinWorld:
             now = time.monotonic()
             clock = max(clock, now - _CATCH_UP_S)
             if self.robot.command_age_s() > _COMMAND_EXPIRES_S:
-                # Whoever drives repeats the command; a program that hangs does not.
+                # The program repeats its command unless it hangs.
                 self.robot.hold()
             if now - clock >= _CONTROL_S:
                 self.advance(_CONTROL_S)
@@ -256,18 +243,12 @@ class TwinWorld:
 class TwinCamera:
     """A ``Camera`` over a ``TwinWorld``. In lock-step every read advances the world by one frame period."""
 
+    is_live = False
+
     def __init__(self, world: TwinWorld, *, lock_step: bool = False) -> None:
         self._world = world
         self._lock_step = lock_step
-
-    @property
-    def name(self) -> str:
-        return f"bench twin: {self._world.phantom.title}"
-
-    @property
-    def is_live(self) -> bool:
-        """False: what it shows is simulated."""
-        return False
+        self.name = f"bench twin: {world.phantom.title}"
 
     def open(self) -> None:
         if not self._lock_step:
@@ -286,18 +267,18 @@ class TwinCamera:
         self._world.stop()
 
 
-_WELL = BusReport(
+_HEALTHY = BusReport(
     misses=(0,) * len(JOINT_NAMES),
     hardware_errors=(0,) * len(JOINT_NAMES),
     temperatures_c=(25.0,) * len(JOINT_NAMES),
     voltages_v=(12.0,) * len(JOINT_NAMES),
     tracking_mm=(0.0,) * len(JOINT_NAMES),
 )
-"""Servos that do not exist are always well."""
+"""The report in place of that of servos."""
 
 
 class DirectRobot:
-    """Follows the orders of whoever the newest ``beat`` permits, while it is fresh. All methods may be called from any thread."""
+    """Executes commands of the source that the newest ``beat`` permits, while it is fresh. All methods are thread-safe."""
 
     def __init__(self, robot: TwinRobot, safety: SafetyConfig) -> None:
         self._robot, self._safety = robot, safety
@@ -321,17 +302,17 @@ class DirectRobot:
         self._robot.connect()
 
     def beat(self, permitted: Source | None) -> None:
-        """Who may drive; holds good for 100 ms. An order that came just before its permission is followed now."""
+        """The source that may drive, for 100 ms. A command that came just before its permission is executed now."""
         with self._lock:
             self._permitted, self._beat_s = permitted, time.monotonic()
             waiting, self._waiting = self._waiting, None
             if waiting is not None and self._beat_s - waiting.time_s <= self._safety.command_max_age_s:
-                self._follow(waiting)
+                self._execute(waiting)
 
     def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
-        """Make the command the current one if its source may drive; otherwise the robot holds."""
+        """Make the command the current one if its source may drive; otherwise hold."""
         with self._lock:
-            return self._follow(SentMotion(0, time.monotonic(), command, source, captured_s))
+            return self._execute(SentMotion(0, time.monotonic(), command, source, captured_s))
 
     def hold(self) -> None:
         with self._lock:
@@ -351,27 +332,27 @@ class DirectRobot:
         self.stop()
 
     def acknowledge(self) -> None:
-        """There is nothing that latches."""
+        """No fault latches."""
 
     def zero(self, names: Sequence[JointName] | None = None) -> None:
-        """There is nothing to zero."""
+        """No servos."""
 
     def reboot(self, servo_id: int) -> None:
-        """There is nothing to restart."""
+        """No servos."""
 
     def torque_off(self) -> None:
         self.stop()
 
     def report(self) -> BusReport | None:
         with self._lock:
-            return replace(_WELL, armed=self._armed)
+            return replace(_HEALTHY, armed=self._armed)
 
     def sent_motion(self) -> SentMotion | None:
         with self._lock:
             return self._sent if self._armed else None
 
     def kept_back(self) -> Rejection | None:
-        """There is no gate: what is sent is done."""
+        """There is no gate that rejects motions."""
         return None
 
     def status(self) -> RobotStatus:
@@ -380,26 +361,23 @@ class DirectRobot:
     def close(self) -> None:
         self._robot.close()
 
-    def _follow(self, order: SentMotion) -> Command:
-        """Do as the order says if its source may drive; else hold, and keep it for a permission that follows at once."""
+    def _execute(self, order: SentMotion) -> Command:
+        """Execute a command if its source may drive; else hold, and keep it for a permission that follows at once."""
         self._waiting = None
         is_stale = time.monotonic() - self._beat_s > self._safety.command_max_age_s
-        if not self._armed or is_stale or self._permitted is None:
-            self._hold(RejectReason.NOT_ARMED)
-            self._waiting = order
-            return Command()
-        if order.source is not self._permitted:
-            self._hold(RejectReason.WRONG_SOURCE)
+        if not self._armed or is_stale or self._permitted is not order.source:
+            is_armed = self._armed and not is_stale and self._permitted is not None
+            self._hold(RejectReason.WRONG_SOURCE if is_armed else RejectReason.NOT_ARMED)
             self._waiting = order
             return Command()
         sent = self._robot.send(order.motion)
-        self._note(replace(order, motion=sent))
+        self._record(replace(order, motion=sent))
         return sent
 
     def _hold(self, rejection: RejectReason | None) -> None:
         self._robot.hold()
-        self._note(SentMotion(0, time.monotonic(), self._robot.current_command, rejection=rejection))
+        self._record(SentMotion(0, time.monotonic(), self._robot.current_command, rejection=rejection))
 
-    def _note(self, sent: SentMotion) -> None:
+    def _record(self, sent: SentMotion) -> None:
         self._cycle += 1
         self._sent = SentMotion(self._cycle, sent.time_s, sent.motion, sent.source, sent.captured_s, sent.rejection)

@@ -1,7 +1,4 @@
-"""Everything that the twin's camera picture depends on, apart from phantom and robot: one explicit, randomisable record.
-
-Looks by their names, and how the configured twin looks.
-"""
+"""The appearance of the twin's picture: everything apart from phantom and robot shape. Named, random and configured looks."""
 
 from __future__ import annotations
 
@@ -13,10 +10,8 @@ from core.config.models import TwinConfig
 from core.types import Points
 from hardware.twin.catalog import BENCH_LOOK, LOOKS, look_of
 from hardware.twin.phantom import BOARD_MM, Phantom
-from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES, ROBOT_LOOKS, draw_family
+from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES, draw_family
 from hardware.twin.view import CameraView
-
-__all__ = ["LOOK_FAMILIES", "RARE_FAMILIES", "ROBOT_LOOKS", "Appearance", "default_appearance", "make_view", "random_appearance"]
 
 Rgb = tuple[float, float, float]
 
@@ -27,7 +22,9 @@ _MARGIN_PX = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """All knobs of the picture. Colours and strengths are 0..1; lengths are millimetres on the board.
+    """All parameters of the picture. Colours and strengths are 0..1; lengths are millimetres on the board.
+
+    The defaults are the clear bench: transparent silicone, slightly tinted liquid, light board, dark ringed robot.
 
     Settings in px mean pixels of an image whose longer side has 640; other sizes scale them. ``light_deg`` is the direction towards
     the lamp as seen on the board (0 = right, 90 = down). ``material`` is how the lumen is made: a silicone ``tube``, a transparent
@@ -37,7 +34,7 @@ class Appearance:
     family: str = "silicone_white"
     material: str = "tube"
 
-    # board and what lies around it
+    # board and table
     board_rgb: Rgb = (0.86, 0.87, 0.86)
     board_texture: str = "speckle"  # plain, speckle, wood, grid, brushed, cloth, folds, layers, patches
     texture_strength: float = 0.25
@@ -55,8 +52,8 @@ class Appearance:
     edge_mm: float = 0.45
     refraction_mm: float = 1.2
     lumen_shade: float = 0.15
-    scatter_mm: float = 0.0  # how far a turbid gel spreads what is seen through it
-    glow: float = 0.0  # light that the liquid gives by itself
+    scatter_mm: float = 0.0  # blur of what is seen through a turbid gel
+    glow: float = 0.0  # light emitted by the liquid
 
     # light
     light_deg: float = 235.0
@@ -67,7 +64,7 @@ class Appearance:
     lamp_mm: float = 5.0
     tube_shadow: float = 0.25
     shadow_mm: float = 2.5
-    caustics: float = 0.0  # net of light beneath rippling water
+    caustics: float = 0.0  # net of light under rippling water
     lamp_rgb: tuple[Rgb, Rgb] = ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0))  # of the lamp's side and of the far side
 
     # robot and catheter sheath
@@ -88,7 +85,7 @@ class Appearance:
     sheath_rgb: Rgb = (0.62, 0.74, 0.86)
     sheath_opacity: float = 0.45
 
-    # what lies on, over and beside the vessel
+    # things on, over and beside the vessel
     fittings: int = 1
     fitting_rgb: Rgb = (0.88, 0.88, 0.85)
     fitting_opacity: float = 0.8
@@ -102,14 +99,14 @@ class Appearance:
     dust: int = 25
     clutter_seed: int = 0
 
-    # where the camera stands
+    # camera pose and lens
     pixels_per_mm: float = 3.1
     rotation_deg: float = 0.0
     tilt: tuple[float, float] = (0.0, 0.0)
     offset_mm: tuple[float, float] = (0.0, 0.0)
     distortion: float = 0.0
 
-    # what lens and sensor do
+    # effects of lens and sensor
     blur_px: float = 0.6
     motion_px: float = 0.0
     motion_deg: float = 0.0
@@ -125,23 +122,10 @@ class Appearance:
     jpeg_quality: int = 0
 
 
-def default_appearance() -> Appearance:
-    """A clear, realistic bench: transparent silicone, slightly tinted liquid, light board, dark ringed robot with a visible tip."""
-    return Appearance()
-
-
 def random_appearance(seed: int, family: str | None = None) -> Appearance:
-    """A random appearance, the same for the same `seed` and `family`.
+    """A random appearance of one of ``LOOK_FAMILIES`` or ``RARE_FAMILIES`` (None: a random one of the former).
 
-    Parameters
-    ----------
-    seed : any non-negative integer.
-    family : one of ``LOOK_FAMILIES`` or ``RARE_FAMILIES``; None draws one of the former.
-
-    Raises
-    ------
-    ValueError
-        If `family` is unknown.
+    The same for the same `seed` (not negative) and `family`. Raises ValueError for an unknown `family`.
     """
     known = (*LOOK_FAMILIES, *RARE_FAMILIES)
     if family is not None and family not in known:
@@ -154,8 +138,8 @@ def random_appearance(seed: int, family: str | None = None) -> Appearance:
 def make_view(appearance: Appearance, size: tuple[int, int], phantom: Phantom | None = None) -> CameraView:
     """The camera's view of the board for an image of `size` (width, height).
 
-    The lumen's middle (without a phantom: the board's) comes to the image's middle, plus ``offset_mm``. With a `phantom`, offset
-    and zoom give way until the port and three quarters of the centerlines are in the picture.
+    The middle of the lumen (without a phantom: of the board) plus ``offset_mm`` lies in the middle of the image. With a `phantom`,
+    offset and zoom are reduced until the port and three quarters of the centerlines are in the picture.
     """
     points = None if phantom is None else np.vstack([edge.points for edge in phantom.graph.edges])
     middle = np.array(BOARD_MM) / 2 if points is None else (points.min(axis=0) + points.max(axis=0)) / 2
@@ -167,7 +151,7 @@ def make_view(appearance: Appearance, size: tuple[int, int], phantom: Phantom | 
     for step in range(40):
         if _share_inside(view, port) == 1 and _share_inside(view, points) >= _MIN_SHARE_IN_VIEW:
             break
-        # First move towards the whole picture, then also step back.
+        # First only a smaller offset, then a smaller zoom too.
         offset, zoom = offset * 0.6, zoom * (0.95 if step >= 3 else 1.0)
         view = _view(appearance, size, middle + offset, zoom)
     return view
@@ -198,19 +182,16 @@ def _share_inside(view: CameraView, points_mm: Points) -> float:
 
 
 def named_appearance(look: str | None, seed: int) -> Appearance:
-    """The clear bench, or a random one of the family `look`; None: of any of the ten.
+    """The clear bench, or a random look of the family `look` (None: of any of the ten).
 
-    Raises ValueError when there is no look of that name; the message lists them.
+    Raises ValueError for an unknown name; the message lists the known ones.
     """
     if look is not None and look not in LOOKS:
         raise ValueError(f"unknown look {look!r}; known: {', '.join(LOOKS)}")
-    return default_appearance() if look == BENCH_LOOK else random_appearance(seed, look)
+    return Appearance() if look == BENCH_LOOK else random_appearance(seed, look)
 
 
 def appearance_of(config: TwinConfig) -> Appearance:
-    """The configured look, without one the clear bench or any of the ten families by the seed; with the configured lens.
-
-    Raises ValueError as ``named_appearance`` does.
-    """
+    """The configured look (see ``look_of``) with the configured lens. Raises ValueError as ``named_appearance`` does."""
     look = named_appearance(look_of(config), config.appearance_seed)
     return replace(look, distortion=config.lens_distortion) if config.lens_distortion else look

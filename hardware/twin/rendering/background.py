@@ -1,7 +1,4 @@
-"""Strokes, filled shapes and levels: thin wrappers around cv2's anti-aliased drawing in 1/16 px.
-
-The board and the table under the phantom: colour, texture, uneven light.
-"""
+"""The board and the table under the phantom: colour, texture, uneven light. Helpers for anti-aliased drawing in 1/16 px."""
 
 from __future__ import annotations
 
@@ -15,24 +12,25 @@ from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.rendering.appearance import Appearance
 
 U8 = NDArray[np.uint8]
+F32 = NDArray[np.float32]
 Level = tuple[int, int, int]
 
-_SHIFT = 4
+_SHIFT = 4  # binary digits after the point of cv2's fixed-point coordinates
+_TABLE_MARGIN_MM = 6.0
 
 
-def fixed(points: Points) -> NDArray[np.int32]:
-    """Pixel points in cv2's fixed point."""
+def _fixed_point(points: Points) -> NDArray[np.int32]:
     return np.rint(np.clip(points, -4000, 12000) * (1 << _SHIFT)).astype(np.int32)
 
 
 def stroke(canvas: U8, points: Points, colour: Level | int, width_px: float) -> None:
     """A polyline (N, 2) in px, `width_px` wide."""
-    cv2.polylines(canvas, [fixed(points)], False, colour, max(1, round(width_px)), cv2.LINE_AA, _SHIFT)
+    cv2.polylines(canvas, [_fixed_point(points)], False, colour, max(1, round(width_px)), cv2.LINE_AA, _SHIFT)
 
 
 def fill(canvas: U8, points: Points, colour: Level | int) -> None:
     """A filled polygon (N, 2) in px."""
-    cv2.fillPoly(canvas, [fixed(points)], colour, cv2.LINE_AA, _SHIFT)
+    cv2.fillPoly(canvas, [_fixed_point(points)], colour, cv2.LINE_AA, _SHIFT)
 
 
 def level(rgb: tuple[float, float, float] | NDArray[np.float64], gain: float = 1.0) -> Level:
@@ -54,15 +52,10 @@ def normals(points: Points) -> Points:
     return np.column_stack([-tangent[:, 1], tangent[:, 0]])
 
 
-F32 = NDArray[np.float32]
-
-_TABLE_MARGIN_MM = 6.0
-
-
 def smooth_noise(rng: Generator, shape: tuple[int, int], cell_px: float) -> F32:
     """Soft random field of `shape` (H, W) in about -1..1, with features of `cell_px`."""
     height, width = shape
-    # Drawn at about two samples a feature and blurred there: plain interpolation of one sample a feature shows its lattice.
+    # Two samples per feature, blurred: with one sample per feature its lattice would be visible.
     step = max(1.0, 0.4 * cell_px)
     coarse = rng.standard_normal((int(height / step) + 8, int(width / step) + 8), np.float32)
     coarse = np.asarray(cv2.GaussianBlur(coarse, (0, 0), 0.4 * cell_px / step)[3:-3, 3:-3], np.float32)
@@ -80,7 +73,7 @@ def paint_board(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng:
         _paint_patches(board, appearance, pixels_per_mm, rng)
     if appearance.material == "xray":
         return np.clip(board, 0, 1)
-    # Beyond the board lies the table; a thin dark line and a soft shadow part the two.
+    # Around the board lies the table, behind a thin dark line and a soft shadow.
     outside = np.maximum(
         np.abs(grid_mm[..., 0] - np.float32(BOARD_MM[0] / 2)) - np.float32(BOARD_MM[0] / 2 + _TABLE_MARGIN_MM),
         np.abs(grid_mm[..., 1] - np.float32(BOARD_MM[1] / 2)) - np.float32(BOARD_MM[1] / 2 + _TABLE_MARGIN_MM),
@@ -106,7 +99,7 @@ def light_field(appearance: Appearance, grid_mm: F32, rng: Generator) -> F32:
 
 
 def _caustics(shape: tuple[int, int], scale: float, rng: Generator) -> F32:
-    """The net of light that ripples on water throw on the ground, in about -0.3..1, (H, W)."""
+    """Light through rippling water on the ground, in about -0.3..1, (H, W)."""
     lines = np.zeros(shape, np.float32)
     for cell in (70.0, 38.0):
         lines += np.clip(1 - 3.5 * np.abs(smooth_noise(rng, shape, cell * scale)), 0, 1) ** 2
@@ -114,7 +107,7 @@ def _caustics(shape: tuple[int, int], scale: float, rng: Generator) -> F32:
 
 
 def _paint_patches(board: F32, appearance: Appearance, pixels_per_mm: float, rng: Generator) -> None:
-    """A printed picture on the board: patches of other colours with outlines, as drawings of organs have."""
+    """A printed picture on the board: patches of other colours with outlines, as in drawings of organs."""
     shape = board.shape[:2]
     for _ in range(int(rng.integers(2, 7))):
         field = smooth_noise(rng, shape, rng.uniform(18, 70) * pixels_per_mm) - np.float32(rng.uniform(-0.1, 0.45))
@@ -155,7 +148,7 @@ def _texture(appearance: Appearance, grid_mm: F32, pixels_per_mm: float, rng: Ge
 
 
 def _folds(grid_mm: F32, shape: tuple[int, int], pixels_per_mm: float, rng: Generator) -> F32:
-    """Creases of a cloth that was not drawn tight, lit from one side, and its weave."""
+    """Creases of a loose cloth, lit from one side, and its weave."""
     shade = 0.25 * smooth_noise(rng, shape, 1.0 * pixels_per_mm)
     for _ in range(int(rng.integers(2, 5))):
         angle, pitch = rng.uniform(0, np.pi), rng.uniform(30, 110)

@@ -1,4 +1,4 @@
-"""What lens and sensor do to the picture: blur, vignette, colour and tone, noise, compression. All prepared once per view."""
+"""Effects of lens and sensor: blur, vignette, colour and tone, noise, compression. Prepared once per view."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NOISE_SLACK = 48
 
 
 class CameraEffects:
-    """Turns scene colours (float32, 0..1) into an image; ``reach_px`` tells how far blur carries a change."""
+    """Turns scene colours (float32, 0..1) into an image; ``reach_px`` is the reach of its blur."""
 
     def __init__(self, appearance: Appearance, size: tuple[int, int], rng: Generator) -> None:
         self._appearance = appearance
@@ -59,7 +59,7 @@ class CameraEffects:
 
 
 def _recompressed(image: Image, quality: int) -> Image:
-    """The image after JPEG; that red and blue are swapped on the way changes the artefacts' tint only."""
+    """The image after JPEG; swapped red and blue change only the tint of the artefacts."""
     _, data = cv2.imencode(".jpg", image, [int(cv2.IMWRITE_JPEG_QUALITY), quality])
     return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8)
 
@@ -114,7 +114,7 @@ def _gain(appearance: Appearance, size: tuple[int, int]) -> F32 | None:
 
 
 def _noise_pool(appearance: Appearance, size: tuple[int, int], rng: Generator) -> NDArray[np.int16] | None:
-    """A field of noise larger than the picture; each frame takes another cut-out of it, which is much cheaper than drawing."""
+    """A field of noise larger than the picture; each frame uses another section, which is cheaper than drawing."""
     if not appearance.noise:
         return None
     shape = (size[1] + _NOISE_SLACK, size[0] + _NOISE_SLACK)

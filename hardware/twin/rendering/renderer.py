@@ -1,7 +1,7 @@
-"""The twin's camera picture with its exact labels: the background once, then the robot into it, frame by frame.
+"""The twin's picture with its exact labels: the background is painted once, then the robot into it for every frame.
 
-Only a window around the robot is painted, blurred and developed again for each frame; the rest is copied. Labels never come from
-the painting: they are exact distances of pixel centres, in mm on the board, to the robot's line and to the lumen's discs.
+A frame repaints only a window around the robot and copies the rest. Labels are independent of the painting: exact distances of
+pixel centres, in mm on the board, to the robot's line and to the lumen's discs.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Renderer:
     appearance : all looks; the same appearance and `seed` give the same pictures.
     size : (width, height) in px.
     seed : chooses textures, clutter and the sensor's noise.
-    view : how the camera stands; None takes ``make_view(appearance, size, phantom)``.
+    view : None takes ``make_view(appearance, size, phantom)``.
     """
 
     def __init__(
@@ -69,26 +69,21 @@ class Renderer:
         whole = slice(0, self.view.size[1]), slice(0, self.view.size[0])
         self._empty = self._camera.expose(self._under * self._front_keep + self._front, whole)
 
-    @property
-    def robot_radius_mm(self) -> float:
-        """Radius of the robot as seen and as labelled."""
-        return self.appearance.robot_radius_mm
-
     def render(self, robot_points_mm: Points | None, sheath_mm: float = 0.0, noise_seed: int = 0) -> RenderedFrame:
         """The picture with the robot's line at `robot_points_mm` (N, 2), tail -> head (None or one point: no robot).
 
-        Everything of the line that lies in the picture is painted and labelled, outside the port too. `sheath_mm` of catheter
-        sheath, measured from the port, cover its proximal part; the label goes on beneath.
+        The whole line within the picture is painted and labelled, outside the port too. `sheath_mm` of catheter sheath, measured
+        from the port, cover its proximal part, which stays labelled.
         """
-        shape = self._vessel.shape
-        robot = np.zeros(shape, bool)
+        radius_mm = self.appearance.robot_radius_mm
+        robot = np.zeros(self._vessel.shape, bool)
         image = self._empty
         if robot_points_mm is not None and len(robot_points_mm) >= 2:
             points = np.asarray(robot_points_mm, np.float64)
-            reach = self.robot_radius_mm + max(self.appearance.sheath_extra_mm if sheath_mm > 0 else 0.0, 1.0 / self._scale) + 0.3
-            band = measure_band(points, self.robot_radius_mm, reach, self.view, self._grid)
+            reach = radius_mm + max(self.appearance.sheath_extra_mm if sheath_mm > 0 else 0.0, 1.0 / self._scale) + 0.3
+            band = measure_band(points, radius_mm, reach, self.view, self._grid)
             if len(band.pixel):
-                robot.reshape(-1)[band.pixel] = band.distance_mm < np.float32(self.robot_radius_mm)
+                robot.reshape(-1)[band.pixel] = band.distance_mm < np.float32(radius_mm)
                 image = self._with_robot(points, band, sheath_mm)
         return RenderedFrame(self._camera.add_noise(image, noise_seed), self._vessel.copy(), robot)
 
@@ -104,7 +99,7 @@ class Renderer:
         return layers.under * light[..., None], layers.front, (1 - layers.front_alpha)[..., None]
 
     def _with_robot(self, points: Points, band: Band, sheath_mm: float) -> Image:
-        """The noise-free image: the window around the robot painted anew, from the scene's colours to the tone curve."""
+        """The noise-free image, with the window around the robot painted again."""
         appearance = self.appearance
         outer, inner = self._windows(band)
         scene = self._under[outer].copy()
@@ -113,12 +108,14 @@ class Renderer:
         local = _local(band, outer, self.view.size[0])
         canvas = scene.reshape(-1, 3)
         lit = band.side * (band.normal @ np.asarray(self._lamp, np.float32))
-        coverage = np.clip((np.float32(self.robot_radius_mm) - band.distance_mm) * np.float32(self._scale) + np.float32(0.5), 0, 1)
+        coverage = np.clip(
+            (np.float32(appearance.robot_radius_mm) - band.distance_mm) * np.float32(self._scale) + np.float32(0.5), 0, 1
+        )
         veil = np.float32(appearance.robot_veil) * self._vessel.reshape(-1)[band.pixel]
         paint_robot(canvas, local, coverage * (1 - veil), lit.astype(np.float32), appearance, self._light.reshape(-1)[band.pixel])
         if sheath_mm > 0:
             covered = np.clip((self._port_mm(points) + np.float32(sheath_mm) - band.from_tail_mm) * np.float32(self._scale), 0, 1)
-            outside = np.float32(self.robot_radius_mm + appearance.sheath_extra_mm)
+            outside = np.float32(appearance.robot_radius_mm + appearance.sheath_extra_mm)
             coverage = np.clip((outside - band.distance_mm) * np.float32(self._scale) + np.float32(0.5), 0, 1) * covered
             paint_sheath(canvas, local, coverage.astype(np.float32), appearance)
         scene *= self._front_keep[outer]
@@ -131,7 +128,7 @@ class Renderer:
         return image
 
     def _windows(self, band: Band) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-        """The window to paint, and within it the window where blur saw only painted pixels."""
+        """The window to paint, and within it the window where the blur used only painted pixels."""
         width, height = self.view.size
         shadow = int(np.ceil((1.5 * self.appearance.shadow_mm + 2) * self._scale)) if self.appearance.robot_shadow else 0
         y, x = band.pixel // width, band.pixel % width
@@ -147,7 +144,7 @@ class Renderer:
         pixels = self.view.project(points) - (window[1].start, window[0].start)
         pixels = pixels - np.asarray(self._lamp) * 0.5 * self.appearance.shadow_mm * self._scale
         mask = np.zeros(scene.shape[:2], np.uint8)
-        stroke(mask, pixels, 255, 2 * self.robot_radius_mm * self._scale)
+        stroke(mask, pixels, 255, 2 * self.appearance.robot_radius_mm * self._scale)
         soft = cv2.blur(mask, (3, 3) if self._scale < 2 else (5, 5))
         soft = cv2.blur(soft, (5, 5))
         scene *= (1 - np.float32(self.appearance.robot_shadow / 255) * soft.astype(np.float32))[..., None]

@@ -1,4 +1,4 @@
-"""The robot in the picture: exact distances of pixels to its body, and how its looks, sheath and shadow are painted from them."""
+"""The robot in the picture: exact distances of pixels to its body line, and painting of its body and sheath from them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class Band:
     """Pixels near the robot's body line, arrays of shape (K,).
 
     ``pixel`` is the flat index into the image, ``distance_mm`` the distance to the line (both ends round), ``from_tip_mm`` and
-    ``from_tail_mm`` the arc length from either end to the foot point, ``side`` the signed lateral place (-1..1 over the robot's
-    width) and ``normal`` (K, 2) the line's normal that belongs to it.
+    ``from_tail_mm`` the arc length from either end to the nearest point of the line, ``side`` the signed lateral position (-1..1
+    over the robot's width) and ``normal`` (K, 2) the normal of the line there.
     """
 
     pixel: NDArray[np.int64]
@@ -48,7 +48,7 @@ def measure_band(points_mm: Points, radius_mm: float, reach_mm: float, view: Cam
     x, y = corner[:, 0, None] + window, corner[:, 1, None] + window
     inside = ((y >= 0) & (y < height))[:, :, None] & ((x >= 0) & (x < width))[:, None, :]
     pixel = np.clip(y, 0, height - 1)[:, :, None] * width + np.clip(x, 0, width - 1)[:, None, :]
-    # Windows of one size make dense arrays (pieces, rows, columns): nothing of a piece is copied for each of its pixels.
+    # Windows of one size make dense arrays (pieces, rows, columns), so data of a piece are not copied for its pixels.
     (start_x, start_y), (step_x, step_y) = (part[visible].T.astype(np.float32)[..., None, None] for part in (start, step))
     offset_x, offset_y = grid_mm[..., 0].reshape(-1)[pixel] - start_x, grid_mm[..., 1].reshape(-1)[pixel] - start_y
     squared = (length[visible] ** 2).astype(np.float32)[:, None, None]
@@ -68,7 +68,7 @@ def measure_band(points_mm: Points, radius_mm: float, reach_mm: float, view: Cam
 
 
 def _winners(pixel: NDArray[np.int64], distance: F32, size: int) -> NDArray[np.int64]:
-    """For each pixel that occurs the place of its smallest distance; of equal ones the last."""
+    """Index of the smallest distance of each pixel; the last of equal ones."""
     nearest = np.full(size, np.inf, np.float32)
     np.minimum.at(nearest, pixel, distance)
     place = np.flatnonzero(distance == nearest[pixel])
@@ -79,7 +79,7 @@ def _winners(pixel: NDArray[np.int64], distance: F32, size: int) -> NDArray[np.i
 
 
 def _subdivide(points: Points) -> Points:
-    """The same polyline with no piece longer than 2.2 mm, so that one window size suits all pieces."""
+    """The same polyline in pieces of at most 2.2 mm, so that one window size suits all."""
     pieces = np.maximum(1, np.ceil(np.linalg.norm(np.diff(points, axis=0), axis=1) / _LONGEST_PIECE_MM)).astype(int)
     if len(pieces) and pieces.max() == 1:
         return points

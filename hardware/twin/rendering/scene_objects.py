@@ -1,8 +1,7 @@
-"""Foreign things, never labelled: cables, ruler, stickers and stains beside the vessel.
+"""Unlabelled objects in the picture.
 
-Bulky foreign things beside the vessel: boxes of equipment, and hands, bare or gloved.
-
-Clips over the lumen, connectors at its ends, air bubbles in it, dust above it. The label goes on beneath all of them.
+Beside the vessel: cables, ruler, stickers, stains, boxes of equipment, hands. On the vessel, which stays labelled under them:
+clips, connectors, air bubbles, dust.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ def cast_shadow(canvas: U8, mask: U8, strength: float, blur_px: float) -> None:
 
 
 def place_object(canvas: U8, view: CameraView, field: LumenField, rng: Generator) -> None:
-    """Paint one object with its shadow on `canvas` (H, W, 3) where it covers no lumen; where there is no room, nothing."""
+    """Paint a box or a hand with its shadow on `canvas` (H, W, 3) where it covers no lumen, if there is room."""
     for _ in range(6):
         mask = np.zeros(canvas.shape[:2], np.uint8)
         if rng.random() < 0.6:
@@ -51,7 +50,7 @@ def place_object(canvas: U8, view: CameraView, field: LumenField, rng: Generator
         return
     scale = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
     cast_shadow(canvas, mask, 0.5, 1.5 * scale)
-    # Rounded by its own blurred outline: darker towards the rim.
+    # Darker towards the rim, by the blurred outline.
     height = cv2.GaussianBlur(mask, (0, 0), 2.5 * scale).astype(np.float32) / np.float32(255)
     alpha = mask.astype(np.float32)[..., None] / 255
     painted = colour.astype(np.float32) * (0.5 + 0.55 * height)[..., None]
@@ -93,7 +92,7 @@ F32 = NDArray[np.float32]
 def add_board_clutter(
     appearance: Appearance, board: F32, view: CameraView, phantom: Phantom, field: LumenField, rng: Generator
 ) -> F32:
-    """`board` (H, W, 3) with everything that lies on it beside the vessel."""
+    """`board` (H, W, 3) with the objects beside the vessel."""
     canvas = np.asarray(cv2.convertScaleAbs(board, alpha=255.0), np.uint8)
     scale = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
     _stains(appearance, canvas, scale, rng)
@@ -183,7 +182,7 @@ def _ruler(appearance: Appearance, canvas: U8, view: CameraView, field: LumenFie
 
 
 def _cable_path(view: CameraView, phantom: Phantom, field: LumenField, appearance: Appearance, rng: Generator) -> Points | None:
-    """A smooth line in px that stays clear of the lumen: one across the free board, or one close beside a vessel. None: no room."""
+    """A smooth line in px clear of the lumen, across the free board or close beside a vessel. None: no room."""
     keep_off = appearance.wall_mm + 1.2
     best, best_length = None, 40
     for _ in range(5):
@@ -278,7 +277,7 @@ def add_fittings(appearance: Appearance, layers: Layers, phantom: Phantom, view:
 
 
 def _clip(appearance: Appearance, colour: U8, alpha: U8, phantom: Phantom, view: CameraView, rng: Generator) -> None:
-    """A clip or a joint across the tube; the lumen goes on beneath it."""
+    """A clip or a joint across the tube."""
     edge = random_edge(phantom, rng)
     place = int(rng.integers(int(0.1 * len(edge.points)), max(int(0.9 * len(edge.points)), 1)))
     normal = normals(edge.points)[place]

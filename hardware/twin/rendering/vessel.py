@@ -1,6 +1,6 @@
-"""How the lumen and its wall look: silicone tube, clear block, turbid gel, open channel, or X-ray contrast.
+"""Painting of lumen and wall: silicone tube, clear block, turbid gel, open channel, or X-ray contrast.
 
-A picture has two layers. ``under`` (H, W, 3) is what lies behind the robot; ``front_alpha`` (H, W) and ``front`` (H, W, 3, already
+A picture has two layers. ``under`` (H, W, 3) lies behind the robot; ``front_alpha`` (H, W) and ``front`` (H, W, 3, already
 multiplied by alpha) lie over it: highlights of the tube, lamp reflections, fittings.
 """
 
@@ -119,7 +119,7 @@ def _block(appearance: Appearance, layers: Layers, surface: Surface, rng: Genera
 
 
 def _gel(appearance: Appearance, layers: Layers, surface: Surface, rng: Generator) -> None:
-    """A lumen left free in a turbid gel: no edges, everything behind it spread and milky, reflections on the flat top."""
+    """A lumen in a turbid gel: no edges, everything behind it blurred and milky, reflections on the flat top."""
     _fill_liquid(appearance, layers, surface)
     spread = max(0.5, appearance.scatter_mm * surface.scale)
     layers.under = np.asarray(cv2.GaussianBlur(layers.under, (0, 0), spread, borderType=cv2.BORDER_REPLICATE), np.float32)
@@ -129,7 +129,7 @@ def _gel(appearance: Appearance, layers: Layers, surface: Surface, rng: Generato
 
 
 def _glow(appearance: Appearance, layers: Layers, surface: Surface) -> None:
-    """The liquid's own light, and what of it the air, the walls and the board around scatter."""
+    """Light emitted by the liquid, and the part scattered around it."""
     source = np.float32(appearance.glow) * surface.inside() * (0.4 + 0.6 * _depth(surface))
     near = np.asarray(cv2.GaussianBlur(source, (0, 0), max(1.0, 2.5 * surface.scale), borderType=cv2.BORDER_REPLICATE), np.float32)
     layers.under += (source + 0.35 * near)[..., None] * np.asarray(appearance.liquid_rgb, np.float32)
@@ -178,7 +178,7 @@ def _cast_shadow(appearance: Appearance, layers: Layers, surface: Surface, body:
 
 
 def _refracted(board: F32, surface: Surface, ratio: F32, strength_mm: float) -> F32:
-    """The board as the round tube bends it: pulled outwards, most of all near the tube's edge."""
+    """The board seen through the round tube: shifted outwards, most near the edge of the tube."""
     if not strength_mm:
         return board
     height, width = ratio.shape

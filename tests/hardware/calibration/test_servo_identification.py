@@ -16,7 +16,7 @@ from core.types import Command
 from hardware.calibration import servo_identification
 from hardware.calibration.servo_probe import ProbeFailed, ProbeLimits, ProcedureStopped, probe_config
 from hardware.servos import registers
-from hardware.twin.rendering.appearance import default_appearance
+from hardware.twin.rendering.appearance import Appearance
 from tests.hardware.lock_bench import LockBench, LockTwin, lock_bench
 
 WIRING = "3,-7,1,-12,-5,2,-4"  # tendons right, left, up, down; advance; two of the catheter
@@ -64,7 +64,7 @@ def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[
     finding = servo_identification.identify_servo(bench, ServosConfig(), IDS, feed.id, lambda _: None)
     assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
     assert finding.way.amplitude_mm == 3.0
-    assert finding.way.px_per_mm == pytest.approx(default_appearance().pixels_per_mm, rel=0.1)
+    assert finding.way.px_per_mm == pytest.approx(Appearance().pixels_per_mm, rel=0.1)
     assert twin.turned_mm == pytest.approx(start, abs=0.02)
 
 

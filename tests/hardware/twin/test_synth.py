@@ -14,7 +14,7 @@ from core.learning.dataset import find_samples, read_truth
 from hardware.twin import dataset
 from hardware.twin.dataset import SynthError, SynthPlan, write_set
 from hardware.twin.phantoms import make_phantom
-from hardware.twin.rendering.appearance import default_appearance
+from hardware.twin.rendering.appearance import Appearance
 from hardware.twin.rendering.renderer import Renderer
 
 
@@ -109,7 +109,7 @@ def test_masks_fit_the_picture_of_a_clear_look() -> None:
 def test_the_benchs_own_look_is_the_trials_one() -> None:
     frame = next(dataset.episode_frames(SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("bench",)), 0))
     phantom = make_phantom("random:8")
-    renderer = Renderer(phantom, default_appearance(), (320, 240), 8)
+    renderer = Renderer(phantom, Appearance(), (320, 240), 8)
     points, sheath_mm, _ = dataset.robot_shapes(phantom, 8, dataset.LOOKS_PER_EPISODE)[0]
     assert np.array_equal(frame.picture.image, renderer.render(points, sheath_mm, noise_seed=0).image)
     assert frame.truth["family"] == "bench"

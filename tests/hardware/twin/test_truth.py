@@ -11,7 +11,7 @@ import pytest
 from core.config.models import PerceptionConfig
 from core.types import GraphEdge, Points, Reason, VesselGraph
 from hardware.twin.phantom import Phantom
-from hardware.twin.rendering.appearance import default_appearance
+from hardware.twin.rendering.appearance import Appearance
 from hardware.twin.rendering.renderer import Renderer
 from hardware.twin.truth import Truth, true_graph, truth_of
 from hardware.twin.view import CameraView
@@ -158,9 +158,9 @@ def test_true_graph_in_pixels() -> None:
 
 def test_head_is_where_the_robots_label_ends() -> None:
     robot = _robot(17.0, 1.0)
-    appearance = default_appearance()
+    appearance = Appearance()
     renderer = Renderer(PHANTOM, appearance, view=VIEW)
-    truth = truth_of(PHANTOM, VIEW, robot, renderer.robot_radius_mm, CONFIG)
+    truth = truth_of(PHANTOM, VIEW, robot, renderer.appearance.robot_radius_mm, CONFIG)
     label = renderer.render(robot).robot
     direction = np.array([cos(radians(17)), sin(radians(17))])
     assert truth.head_xy is not None

@@ -7,7 +7,7 @@ import pytest
 
 from core.types import GraphEdge, VesselGraph
 from hardware.twin.phantom import BOARD_MM, Phantom
-from hardware.twin.rendering.appearance import default_appearance, make_view, random_appearance
+from hardware.twin.rendering.appearance import Appearance, make_view, random_appearance
 from hardware.twin.view import CameraView
 
 PLAIN = CameraView(np.array([[3.0, 0, 20], [0, 3, 10], [0, 0, 1]]), (640, 480))
@@ -40,13 +40,13 @@ def test_grid_holds_the_millimetres_under_each_pixel_centre() -> None:
 
 
 def test_default_view_shows_the_board_upright_in_the_middle() -> None:
-    view = make_view(default_appearance(), (640, 480))
+    view = make_view(Appearance(), (640, 480))
     assert view.project(np.array([BOARD_MM]) / 2)[0] == pytest.approx([319.5, 239.5])
-    assert view.pixels_per_mm((100.0, 75.0)) == pytest.approx(default_appearance().pixels_per_mm)
+    assert view.pixels_per_mm((100.0, 75.0)) == pytest.approx(Appearance().pixels_per_mm)
 
 
 def test_zoom_belongs_to_640_px_and_grows_with_the_image() -> None:
-    small, large = (make_view(default_appearance(), size) for size in ((640, 480), (1280, 960)))
+    small, large = (make_view(Appearance(), size) for size in ((640, 480), (1280, 960)))
     assert large.pixels_per_mm((80.0, 40.0)) == pytest.approx(2 * small.pixels_per_mm((80.0, 40.0)))
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from core.config.models import TwinConfig
 from hardware.twin.catalog import BENCH_TITLE, LOOK_TITLES, LOOKS, RARE_TITLES
-from hardware.twin.rendering.appearance import appearance_of, default_appearance, random_appearance
+from hardware.twin.rendering.appearance import Appearance, appearance_of, random_appearance
 from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES
 
 
@@ -20,7 +20,7 @@ def test_all_looks_have_a_title() -> None:
 
 
 def test_without_a_look_the_seed_says_which() -> None:
-    assert appearance_of(TwinConfig()) == default_appearance()
+    assert appearance_of(TwinConfig()) == Appearance()
     assert appearance_of(TwinConfig(appearance_seed=7)) == random_appearance(7)
 
 
@@ -33,7 +33,7 @@ def test_a_family_is_drawn_by_the_seed(look: str, seed: int) -> None:
 
 
 def test_clear_bench_by_its_name_whatever_the_seed() -> None:
-    assert appearance_of(TwinConfig(look="bench", appearance_seed=7)) == default_appearance()
+    assert appearance_of(TwinConfig(look="bench", appearance_seed=7)) == Appearance()
 
 
 def test_lens_is_the_configured_one() -> None:

@@ -10,14 +10,14 @@ import pytest
 
 from core.types import GraphEdge, Mask, Points, VesselGraph
 from hardware.twin.phantom import Phantom
-from hardware.twin.rendering.appearance import Appearance, default_appearance, make_view, random_appearance
+from hardware.twin.rendering.appearance import Appearance, random_appearance
 from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES, ROBOT_LOOKS
 from hardware.twin.rendering.renderer import RenderedFrame, Renderer
 from hardware.twin.view import CameraView
 
 SMALL = (160, 120)
 BENT_VIEW = CameraView(np.array([[0.9, 0.05, -6.0], [-0.04, 0.85, -3.0], [0.0004, -0.0003, 1.0]]), SMALL, -0.08)
-QUIET = replace(default_appearance(), noise=0.0, jpeg_quality=0)
+QUIET = replace(Appearance(), noise=0.0, jpeg_quality=0)
 
 
 def _y_phantom() -> Phantom:
@@ -129,7 +129,7 @@ def test_same_seeds_same_bits_other_noise_seed_other_noise() -> None:
 
 
 def test_a_frame_does_not_remember_the_one_before() -> None:
-    renderer = Renderer(PHANTOM, default_appearance(), SMALL)
+    renderer = Renderer(PHANTOM, Appearance(), SMALL)
     before = renderer.render(_robot(30))
     renderer.render(_robot(70), sheath_mm=20.0)
     assert np.array_equal(before.image, renderer.render(_robot(30)).image)
@@ -148,7 +148,7 @@ def test_painting_a_window_equals_painting_the_whole(family: str, monkeypatch: p
 
 @pytest.mark.parametrize("size", [(161, 97), (97, 161), (1280, 720), (64, 64)])
 def test_any_size(size: tuple[int, int]) -> None:
-    picture = Renderer(PHANTOM, default_appearance(), size).render(_robot())
+    picture = Renderer(PHANTOM, Appearance(), size).render(_robot())
     assert picture.image.shape == (size[1], size[0], 3)
     assert picture.image.dtype == np.uint8
     assert picture.vessel.shape == picture.robot.shape == (size[1], size[0])
@@ -258,9 +258,3 @@ def test_the_device_is_three_to_ten_pixels_wide() -> None:
         appearance = random_appearance(seed)
         assert 2.9 <= 2 * appearance.robot_radius_mm * appearance.pixels_per_mm <= 10.1
         assert 2.0 <= appearance.pixels_per_mm <= 4.5
-
-
-def test_default_is_the_plain_record() -> None:
-    assert default_appearance() == Appearance()
-    view = make_view(default_appearance(), (640, 480), PHANTOM)
-    assert Renderer(PHANTOM, default_appearance()).view.homography == pytest.approx(view.homography)
