@@ -1,37 +1,22 @@
-"""The 45 faults by number: what is injected, what must follow, and the function that does the one and looks for the other.
-
-Looks at what followed a fault: the way through the modes, alerts, the record in the session; and says what is missing of it.
-"""
+"""The register of the 45 faults: what is injected, what must follow, and the function that injects and judges."""
 
 from __future__ import annotations
 
-import logging
-import tempfile
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import NamedTuple
 
-from core.control.alerts import ALERTS, AlertKey
-from core.control.drive_view import DriveView
-from core.control.faults import Cause
-from core.control.modes import DRIVING_MODES, Mode
 from core.devices import UserError
-from core.session.manifest import Event, EventKind
 
-if TYPE_CHECKING:
-    from tools.fault_campaign.bench import FaultBench
 
-_log = logging.getLogger(__name__)
-
-COUNT = 45
-_TRIES = 3
+class CampaignError(UserError):
+    """The campaign, or one of its faults, cannot be run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What followed. ``problems`` are what should have and did not; empty: all as listed."""
+    """What followed a fault. ``problems`` are the differences from what is listed."""
 
     reaction: str
     alerts: tuple[str, ...] = ()
@@ -45,245 +30,179 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Kit:
-    """What a fault may use: a folder of its own, and whether it shall take place over real lines, processes and windows."""
+    """A folder for one fault, and whether it takes place over real lines, processes and windows (`live`) or in lock-step."""
 
     folder: Path
     live: bool
 
+    def part(self, name: str) -> Kit:
+        """The same in a folder inside."""
+        folder = self.folder / name
+        folder.mkdir(parents=True)
+        return Kit(folder, self.live)
 
-class Inject(Protocol):
-    """Brings the fault about and tells what was seen."""
 
-    def __call__(self, kit: Kit) -> Observation: ...
+Inject = Callable[[Kit], Observation]
+
+
+class FaultText(NamedTuple):
+    """A row of the list. ``quick``: it runs in lock-step or on files alone, within a second or so."""
+
+    name: str
+    injected: str
+    wanted: str
+    quick: bool = True
+
+
+# fmt: off
+FAULTS = {
+    1: FaultText("camera unplugged", "the camera gives nothing any more", "HOLD after 150 ms without a frame, DISARM after 500 ms"),
+    2: FaultText("camera read blocks", "the camera's read waits for 1.5 s, the pilot's turns go on",
+        "HOLD, DISARM by the age as seen from outside the camera's thread; the window stays alive"),
+    3: FaultText("frozen camera", "the same picture again and again, with fresh times", "DISARM at the fifth identical picture"),
+    4: FaultText("dropped frames", "first every 7th frame is lost, then every 3rd",
+        "warning above 10 % loss; above 20 % over 3 s HOLD, DISARM after 0.5 s"),
+    5: FaultText("wrong size or format", "pictures of half the size; then, armed anew, grey ones; then 16-bit ones",
+        "each rejected; DISARM"),
+    6: FaultText("black, white", "all pixels 0; then, when the picture was well again, all pixels 255",
+        "HOLD at the third such picture"),
+    7: FaultText("blur, occlusion, glare",
+        "through the network: strong blur; a patch over the head; a white reflection over the head (in lock-step)",
+        "low confidence or a named reason: HOLD; the advice says why", quick=False),
+    8: FaultText("camera moved", "the whole picture is shifted by 14 px",
+        "DISARM by the drift of the landmarks; no arming while it lasts"),
+    9: FaultText("stale perception (overload)", "understanding a frame takes 250 ms; then 800 ms",
+        "pose older than 150 ms: HOLD; older than 500 ms: DISARM"),
+    10: FaultText("results out of order", "some pairs of frames come in the wrong order",
+        "the late one is dropped and counted; nothing else happens"),
+    11: FaultText("NaN or infinity from network or fit",
+        "one pose with theta = NaN; then the network gives NaN in a part of the picture for good",
+        "discarded: HOLD; three in a row: DISARM"),
+    12: FaultText("head lost", "the robot's mask is empty", "HOLD at the third frame, DISARM after 0.5 s"),
+    13: FaultText("several robots", "a second robot of the same size is put into the mask", "DISARM"),
+    14: FaultText("robot outside vessel", "the vessel's mask is shifted by 80 px", "DISARM"),
+    15: FaultText("branch ambiguity", "a symmetric Y; the branch to the destination is cut off, so that no route decides",
+        "HOLD, and the alert asks for a destination"),
+    16: FaultText("pose jump", "the head is found 70 px further back from one frame to the next", "rejected, HOLD"),
+    17: FaultText("state chatter", "the robot swings by 1 px about the threshold of state A, from frame to frame",
+        "the state that is shown does not change: hysteresis and dwell"),
+    18: FaultText("model missing, truncated, bit-flipped", "a copy of the model: a file gone, cut in half, one bit flipped",
+        "its hash tells: refuses to arm; the program opens all the same"),
+    19: FaultText("malicious weights", "the weights are a pickle that runs code when it is loaded, and the manifest vouches for it",
+        "refused: nothing but safetensors and ONNX is read, and nothing runs"),
+    20: FaultText("wrong model",
+        "the network's two outputs are swapped; the verdict of the preflight's self-test goes to the pilot",
+        "the golden picture tells: refuses to arm"),
+    21: FaultText("one servo silent", "the advance servo hears and obeys, but does not answer",
+        "after 3 misses DISARM of all seven", quick=False),
+    22: FaultText("CRC, garbage, short packet", "one damaged answer of each kind; then forty with a wrong CRC",
+        "one retry each, at most a short hold; more than 5 in a second: DISARM; nothing breaks", quick=False),
+    23: FaultText("overload alert", "a servo raises its hardware error bit for overload", "register 70 is read: STOP", quick=False),
+    24: FaultText("over-temperature, under-voltage",
+        "a servo is warmed up, then heated; on another bench the supply sags, then falls",
+        "first a warning, then DISARM, before the servo shuts itself down", quick=False),
+    25: FaultText("tracking error, jam, slack wire",
+        "the advance servo's horn is blocked while the program feeds; on another bench it is pulled back; on a third it "
+        "drifts while nobody drives",
+        "STOP after 200 ms beyond the envelope", quick=False),
+    26: FaultText("USB serial vanishes", "the pseudo-terminal is closed, and comes back two seconds later",
+        "STOP; opened again and checked by itself, never armed by itself", quick=False),
+    27: FaultText("servo rebooted", "a servo loses its power for a moment: RAM and turn count are gone",
+        "DISARM, latched; it must be zeroed before it can be armed", quick=False),
+    28: FaultText("wrong id, model, mode",
+        "a servo with another model number; one with another id inside; one whose mode is altered while it stands by",
+        "named; the rig does not open, or the servos cannot be switched on: nothing to arm", quick=False),
+    29: FaultText("two programs on one port", "a second program opens the port while the first one drives",
+        "the second is refused by name; the first drives on", quick=False),
+    30: FaultText("GUI hangs",
+        "a slot of the window sleeps for 0.8 s: no sign of life, and the deadman that it reports is silent, too",
+        "HOLD by the silent deadman within 100 ms, DISARM after 500 ms"),
+    31: FaultText("worker dies", "in the window, perception raises while the program drives",
+        "DISARM: the robot is held and let go; the window says so and stays; starting again acknowledges nothing", quick=False),
+    32: FaultText("process killed or stopped",
+        "SIGKILL and SIGSTOP, to the application and to the bus process, while the program drives",
+        "the servos stand within 1 s, and within one bounded step from where the order found them", quick=False),
+    33: FaultText("operator input in autonomy",
+        "6 hand-overs, each ended by a touch of the controls at a random moment, mixed with other requests",
+        "the operator has the hand in the same turn; nothing of the program leaves in it"),
+    34: FaultText("deadman lost (focus, pedal unplugged, stuck)",
+        "released; then silent, as when its device is gone; then pressed since before arming (in lock-step)",
+        "HOLD within 100 ms; a press from before arming does not count"),
+    35: FaultText("clock jump, suspend", "the clock leaps by 2 s; live: the whole program stands still for 1.3 s",
+        "DISARM after a gap of more than 1 s; only the monotonic clock counts"),
+    36: FaultText("disk low, full",
+        "the disk's free space falls to 5 %, then to nothing, while it is recorded and the program drives (in lock-step)",
+        "warning below 7 %; the recording stops visibly, what was written stays; driving is not touched"),
+    37: FaultText("kill -9 while recording", "the recording program is killed at a random moment",
+        "the session is listed as cut, is recovered into a copy, and the copy says what is lost", quick=False),
+    38: FaultText("encoder too slow", "the encoder does not return while pictures come; the queue takes 3 (in lock-step)",
+        "bounded queue; drops counted and shown; driving is not touched"),
+    39: FaultText("malformed configuration, session, annotation",
+        "24 copies each of a configuration, a session and an annotation file: cut, zeroed, bits flipped",
+        "read, or refused by one line; the original is untouched; nothing else is ever raised"),
+    40: FaultText("kill during annotation save", "a program that saves one annotation after the other is killed, 8 times",
+        "nothing is lost after it said that it was saved", quick=False),
+    41: FaultText("quit while armed or recording", "the window is closed while it records: in ADVISORY, ARMED and AUTONOMOUS",
+        "disarmed, flushed, joined; exit code 0; the session is whole", quick=False),
+    42: FaultText("twin taken for the real rig", "the twin, a real camera and a recording are opened",
+        "a permanent banner SIM, LIVE or PLAYBACK; the session keeps it"),
+    43: FaultText("picture of an unknown kind",
+        "perception says that the pictures are unlike all that the model knows: three of them, then all",
+        "HOLD at the first, and on again; then DISARM"),
+    44: FaultText("too much current",
+        "the advance servo draws 1.5 A for 100 ms; then 0.9 A for good, with a ripple to nothing for a fifth of the time",
+        "the first is no fault; the second STOPs after half a second", quick=False),
+    45: FaultText("torque-off not proven",
+        "the torque is to go off at STOP; it is pressed while one servo obeys but does not answer, which it does 0.6 s later",
+        "STOP; told at once that the torque is not proven to be off, tried again, and told when all servos have said so",
+        quick=False),
+}
+# fmt: on
+COUNT = len(FAULTS)
 
 
 @dataclass(frozen=True, slots=True)
 class FaultCase:
-    """``quick``: it can also be had in lock-step or on files alone, within a second or so, whatever the machine does meanwhile."""
+    """A fault of the list and the function that injects it."""
 
     number: int
-    name: str
-    injected: str
-    wanted: str
+    text: FaultText
     inject: Inject
-    quick: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """A case and what was seen of it, in the try that is told."""
-
-    case: FaultCase
-    seen: Observation
-    seconds: float
-    tries: int
+CASES: dict[int, FaultCase] = {}
 
 
-class CampaignError(UserError):
-    """The campaign cannot be run."""
-
-
-@dataclass(slots=True)
-class _Register:
-    cases: dict[int, FaultCase] = field(default_factory=dict)
-
-
-_register = _Register()
-
-
-def fault(number: int, name: str, *, injected: str, wanted: str, quick: bool = True) -> Callable[[Inject], Inject]:
-    """Enter the function that injects fault `number` of the list."""
+def fault(number: int) -> Callable[[Inject], Inject]:
+    """Register the function that injects fault `number` of the list."""
 
     def enter(inject: Inject) -> Inject:
-        if number in _register.cases or not 1 <= number <= COUNT:
+        if number in CASES or number not in FAULTS:
             raise ValueError(f"fault {number} is registered twice, or there is none of that number")
-        _register.cases[number] = FaultCase(number, name, injected, wanted, inject, quick)
+        CASES[number] = FaultCase(number, FAULTS[number], inject)
         return inject
 
     return enter
 
 
-def all_cases() -> tuple[FaultCase, ...]:
-    """All faults that are registered, by number."""
-    from tools.fault_campaign import cases  # noqa: F401 - they register themselves
-
-    return tuple(_register.cases[number] for number in sorted(_register.cases))
+def check(*checks: tuple[bool, str]) -> list[str]:
+    """The texts of the conditions that do not hold."""
+    return [problem for holds, problem in checks if not holds]
 
 
-def run_case(case: FaultCase, *, live: bool) -> Result:
-    """Bring a fault about. Over real lines a machine that pauses at the wrong moment spoils a try, so there are up to three."""
-    started_s = time.monotonic()
-    most, tries = _TRIES if live else 1, 0
-    while True:
-        tries += 1
-        with tempfile.TemporaryDirectory(prefix="lumenpilot_fault_") as folder:
-            seen = _try(case, Kit(Path(folder), live))
-        if seen.ok or tries == most:
-            return Result(case, seen, time.monotonic() - started_s, tries)
+def run_parts(kit: Kit, *parts: tuple[str, Inject], named: bool = True) -> Observation:
+    """Inject several kinds of a fault, each in a folder of its own, and join what was seen."""
+    found: list[Observation] = []
+    for name, inject in parts:
+        seen = inject(kit.part(name))
+        found.append(replace(seen, reaction=f"{name}: {seen.reaction}") if named else seen)
 
+    def unique(texts: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(text for part in texts for text in part))
 
-def _try(case: FaultCase, kit: Kit) -> Observation:
-    try:
-        return case.inject(kit)
-    except UserError as error:
-        return Observation("not brought about", problems=(" ".join(str(error).split()),))
-    except Exception as error:  # noqa: BLE001 - one case that breaks must not end the campaign; it is not OK
-        _log.error("fault %d broke", case.number, exc_info=error)
-        return Observation("not brought about", problems=(f"{type(error).__name__}: {' '.join(str(error).split())}",))
-
-
-def tidy(seen: Observation, folder: Path) -> Observation:
-    """Without the names of this machine's folders."""
-
-    def clean(text: str) -> str:
-        return text.replace(str(folder), "…")
-
-    return replace(
-        seen,
-        reaction=clean(seen.reaction),
-        alerts=tuple(map(clean, seen.alerts)),
-        events=tuple(map(clean, seen.events)),
-        problems=tuple(map(clean, seen.problems)),
-    )
-
-
-_WORD = {
-    Mode.HOLD: "HOLD",
-    Mode.STOPPED: "STOP",
-    Mode.ADVISORY: "DISARM",
-    Mode.ARMED: "back to the operator",
-    Mode.AUTONOMOUS: "resumes",
-}
-_BEFORE_S = 0.03
-"""The turn of the mark itself."""
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """Where the observation begins."""
-
-    time_s: float
-    views: int
-    alerts: int
-    mode: Mode
-    active: frozenset[str]
-
-
-@dataclass(frozen=True, slots=True)
-class ExpectedReaction:
-    """What must follow.
-
-    ``path`` are the modes in turn, the one at the mark left out; ``causes`` must all have been active, be said as alerts (but for
-    those of `silent`) and be in the session; ``latched`` is what waits to be acknowledged at the end; ``within_s`` bounds the first
-    change of mode, by the pilot's own clock; ``blank``: no advice from the first cause on. ``alternatives`` are other ways through
-    the modes that are as good; with ``may_hold`` a hold on the way that clears itself is, too: a cycle that waits for answers in
-    vain leaves the gate without positions.
-    """
-
-    path: tuple[Mode, ...]
-    causes: tuple[Cause, ...]
-    latched: Cause | None = None
-    within_s: float | None = None
-    blank: bool = False
-    alerts: tuple[AlertKey, ...] = ()
-    silent: tuple[Cause, ...] = ()
-    alternatives: tuple[tuple[Mode, ...], ...] = ()
-    may_hold: bool = False
-
-
-def mark(bench: FaultBench) -> Mark:
-    """Begin to record and to look; a bench that was handed over is so at the mark, whatever the machine did meanwhile."""
-    bench.record()
-    bench.turn()
-    if bench.handed_over and bench.mode is not Mode.AUTONOMOUS:
-        bench.hand_over()
-    active = frozenset(fault.cause.value for fault in bench.view.active)
-    return Mark(bench.now_s, len(bench.views), len(bench.alerts), bench.mode, active)
-
-
-def judge(bench: FaultBench, start: Mark, wanted: ExpectedReaction, *more: str) -> Observation:
-    """What was seen since the mark, against what was wanted; `more` are problems found elsewhere."""
-    views = bench.views[start.views :]
-    problems = list(more)
-    path, times = _path(views, start)
-    if (_without_holds(path) if wanted.may_hold else path) not in (wanted.path, *wanted.alternatives):
-        problems.append(f"modes went {_words(path)} instead of {_words(wanted.path)}")
-    if wanted.within_s is not None and times and times[0] > wanted.within_s:
-        problems.append(f"first reaction after {1000 * times[0]:.0f} ms (at most {1000 * wanted.within_s:.0f} ms)")
-    active = {fault.cause for view in views for fault in view.active}
-    problems += [f"never active: {cause}" for cause in wanted.causes if cause not in active]
-    if wanted.latched is not None:
-        found = views[-1].latched.cause if views and views[-1].latched is not None else None
-        if found is not wanted.latched:
-            problems.append(f"latched is {found or 'nothing'} instead of {wanted.latched}")
-    if wanted.blank:
-        problems += _not_blank(views, wanted.causes)
-    if views and views[-1].mode not in DRIVING_MODES and views[-1].commanded is not None:
-        problems.append("the program goes on commanding")
-    keys: list[AlertKey] = [*(cause for cause in wanted.causes if cause not in wanted.silent), *wanted.alerts]
-    alerts = bench.alerts[start.alerts :]
-    said = {alert.key for alert in alerts}
-    problems += [f"no alert: {ALERTS[key].text}" for key in keys if key not in said]
-    told, missing = _events(bench, start, keys, wanted.causes, path)
     return Observation(
-        _reaction(path, times), tuple(dict.fromkeys(alert.spec.text for alert in alerts)), told, (*problems, *missing)
+        "; ".join(seen.reaction for seen in found),
+        unique(seen.alerts for seen in found),
+        unique(seen.events for seen in found),
+        tuple(problem for seen in found for problem in seen.problems),
     )
-
-
-def _path(views: Sequence[DriveView], start: Mark) -> tuple[tuple[Mode, ...], list[float]]:
-    path: list[Mode] = []
-    times: list[float] = []
-    for view in views:
-        if view.mode is not (path[-1] if path else start.mode):
-            path.append(view.mode)
-            times.append(view.time_s - start.time_s)
-    return tuple(path), times
-
-
-def _without_holds(path: tuple[Mode, ...]) -> tuple[Mode, ...]:
-    """Without the holds that cleared themselves."""
-    kept = list(path)
-    while len(kept) >= 2 and kept[0] is Mode.HOLD and kept[1] is Mode.AUTONOMOUS:
-        del kept[:2]
-    return tuple(kept)
-
-
-def _words(path: Sequence[Mode]) -> str:
-    return ", ".join(path) or "nowhere"
-
-
-def _reaction(path: Sequence[Mode], times: Sequence[float]) -> str:
-    if not path:
-        return "goes on"
-    return ", ".join(f"{_WORD[mode]} at {1000 * time_s:.0f} ms" for mode, time_s in zip(path, times, strict=True))
-
-
-def _not_blank(views: Sequence[DriveView], causes: Sequence[Cause]) -> list[str]:
-    for view in views:
-        if any(fault.cause in causes for fault in view.active):
-            if view.advice is not None:
-                return ["advice is shown although a fault should blank it"]
-            if not view.blanked:
-                return ["the advice is blank, but nothing says why"]
-    return []
-
-
-def _events(
-    bench: FaultBench, start: Mark, keys: Sequence[AlertKey], causes: Sequence[Cause], path: Sequence[Mode]
-) -> tuple[tuple[str, ...], list[str]]:
-    """The session's events since the mark in words, and what is missing among them."""
-    _, events = bench.recorded()
-    told = [(event.kind, _text(event)) for event in events if event.time_s >= start.time_s - _BEFORE_S]
-    # what was active before is told at the beginning of the session
-    earlier = {event.text for event in events if event.kind is EventKind.FAULT and event.text in start.active}
-    missing = [
-        f"not in the session: fault {c}" for c in causes if (EventKind.FAULT, c.value) not in told and c.value not in earlier
-    ]
-    missing += [f"not in the session: mode {mode}" for mode in path if (EventKind.MODE, mode.value) not in told]
-    missing += [f"not in the session: alert {key}" for key in keys if (EventKind.ALERT, str(key)) not in told]
-    shown = [f"{kind}: {text}" if text else kind.value for kind, text in told if kind is not EventKind.VIDEO]
-    return tuple(dict.fromkeys([*shown, *(f"fault: {text}" for text in sorted(earlier))])), missing
-
-
-def _text(event: Event) -> str:
-    return str(event.data.get("key", event.text)) if event.kind is EventKind.ALERT else event.text

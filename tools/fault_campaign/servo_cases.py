@@ -1,0 +1,356 @@
+"""Faults 21 to 29, 32, 44 and 45: servos and bus. Always over a pseudo-terminal, with the real driver in its own process."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from core.config.safety import ServosConfig
+from core.control.alerts import Note
+from core.control.faults import Cause
+from core.control.modes import Act, Mode
+from hardware.servos.bus_ipc import BusPhase, BusStatus
+from hardware.servos.dynamixel_port import WrongServo
+from hardware.servos.servo_robot import ServoRobot
+from hardware.twin.servos.bus import SoftServoBus
+from hardware.twin.servos.device import OVERLOAD_BIT, SoftServo
+from tools.fault_campaign.bench import ExpectedReaction, FaultBench, bench_fault, is_active, judge, open_bench
+from tools.fault_campaign.children import read_line, start_child
+from tools.fault_campaign.registry import CampaignError, Kit, Observation, check, fault, run_parts
+
+_DISARM, _STOP, _HELD = (Mode.ADVISORY,), (Mode.STOPPED,), (Mode.HOLD, Mode.ADVISORY)
+_ADVANCE = 5  # id of the advance servo
+_CARRIED_TICKS_S = 1000.0  # about 10 mm/s of a joint
+_BOUND_S = 1.0  # patience with a stopped application (0.5 s), a hold, and a machine that has other things to do
+_STEP_SLACK = 1.05
+_REST_MM, _MOVING_MM = 0.01, 0.2
+_SAMPLE_S, _WATCH_S, _POLL_S = 0.004, 1.6, 0.04
+
+
+def _status(bench: FaultBench) -> BusStatus:
+    assert isinstance(bench.robot, ServoRobot)
+    status = bench.robot.bus_status()
+    if status is None:
+        raise CampaignError("the bus process has reported nothing")
+    return status
+
+
+def _moving(bench: FaultBench) -> list[str]:
+    """What is still armed, or moves."""
+    armed = _status(bench).phase is BusPhase.ARMED
+    before = bench.bus.positions_mm()
+    bench.run(0.3)
+    moved_mm = max(abs(a - b) for a, b in zip(before, bench.bus.positions_mm(), strict=True))
+    return check((not armed, "the bus process is still armed"), (moved_mm <= 0.05, f"a servo still moves, by {moved_mm:.2f} mm"))
+
+
+def _expect(path: tuple[Mode, ...], cause: Cause, *more: Cause) -> ExpectedReaction:
+    return ExpectedReaction(path, (cause, *more), cause, alternatives=((Mode.HOLD, *path),), may_hold=True)
+
+
+def _await_end(bench: FaultBench, mode: Mode, release: Callable[[], object] = lambda: None) -> list[str]:
+    """Wait until the pilot has left autonomy, end what moves the servos from outside, and see that they stand."""
+    bench.until_mode(mode)
+    release()
+    bench.run(0.4)
+    return _moving(bench)
+
+
+def _run(kit: Kit, inject: Callable[[FaultBench], list[str]], expected: ExpectedReaction) -> Observation:
+    with open_bench(kit, live=True) as bench:
+        bench.hand_over().mark()
+        return judge(bench, expected, *inject(bench))
+
+
+servo_fault = partial(bench_fault, live=True)
+
+
+@servo_fault(21, _expect(_DISARM, Cause.SERVO_SILENT))
+def silent(bench: FaultBench) -> list[str]:
+    bench.bus.faults.mute(_ADVANCE)
+    return _await_end(bench, Mode.ADVISORY)
+
+
+@servo_fault(22, _expect(_DISARM, Cause.BUS_NOISE))
+def noise(bench: FaultBench) -> list[str]:
+    faults = bench.bus.faults
+    spoils: tuple[Callable[[], object], ...]
+    spoils = (partial(faults.crc, 1), partial(faults.garbage, 24), partial(faults.short, 3), partial(faults.truncate, 2))
+    for spoil in spoils:
+        spoil()
+        bench.run(0.45)
+    single = bench.mode
+    faults.crc(40)
+    bench.until_mode(Mode.ADVISORY)
+    bench.run(0.3)
+    problems = check(
+        (single in {Mode.AUTONOMOUS, Mode.HOLD}, f"single bad packets already led to {single}"),
+        (_status(bench).line.retries >= 3, "there was no retry"),
+    )
+    return problems + _moving(bench)
+
+
+@servo_fault(23, _expect(_STOP, Cause.SERVO_ALERT))
+def overload(bench: FaultBench) -> list[str]:
+    bench.bus.stir(3, lambda servo: servo.alert(OVERLOAD_BIT))
+    return _await_end(bench, Mode.STOPPED)
+
+
+@fault(24)
+def supply(kit: Kit) -> Observation:
+    def await_warning(bench: FaultBench, cause: Cause) -> None:
+        if not bench.until_active(cause):
+            raise CampaignError(f"no warning: {cause}")
+
+    def heat(bench: FaultBench) -> list[str]:
+        bench.bus.stir(2, lambda servo: servo.heat(67.0))
+        await_warning(bench, Cause.WARM)
+        bench.bus.stir(2, lambda servo: servo.heat(72.0))
+        return _await_end(bench, Mode.ADVISORY)
+
+    def set_supply(bench: FaultBench, volts: float) -> None:
+        def set_volts(servo: SoftServo) -> None:
+            servo.supply_v = volts
+
+        for joint in bench.config.servos.joints:
+            bench.bus.stir(joint.id, set_volts)
+
+    def sag(bench: FaultBench) -> list[str]:
+        set_supply(bench, 10.8)
+        await_warning(bench, Cause.VOLTAGE_SAGS)
+        set_supply(bench, 10.3)
+        return _await_end(bench, Mode.ADVISORY)
+
+    return run_parts(
+        kit,
+        ("heat", partial(_run, inject=heat, expected=_expect(_DISARM, Cause.HOT, Cause.WARM))),
+        ("supply", partial(_run, inject=sag, expected=_expect(_DISARM, Cause.VOLTAGE_LOW, Cause.VOLTAGE_SAGS))),
+    )
+
+
+@fault(25)
+def jam(kit: Kit) -> Observation:
+    def carry(bench: FaultBench, ticks_s: float) -> None:
+        bench.bus.stir(_ADVANCE, lambda servo: servo.carry(ticks_s))
+
+    def block(bench: FaultBench) -> list[str]:
+        bench.bus.stir(_ADVANCE, lambda servo: servo.freeze(True))
+        return _await_end(bench, Mode.STOPPED)
+
+    def pull(bench: FaultBench, ticks_s: float = -_CARRIED_TICKS_S) -> list[str]:
+        carry(bench, ticks_s)
+        return _await_end(bench, Mode.STOPPED, lambda: carry(bench, 0.0))
+
+    def drift(kit: Kit) -> Observation:
+        """Armed, with the operator's controls at rest."""
+        with open_bench(kit, live=True) as bench:
+            bench.arm()
+            bench.run(0.3)
+            bench.mark()
+            problems = pull(bench, _CARRIED_TICKS_S / 4)
+            return judge(bench, ExpectedReaction(_STOP, (Cause.TRACKING,), Cause.TRACKING), *problems)
+
+    expected = _expect(_STOP, Cause.TRACKING)
+    jammed, pulled = partial(_run, inject=block, expected=expected), partial(_run, inject=pull, expected=expected)
+    return run_parts(kit, ("jam", jammed), ("pulled", pulled), ("drift", drift))
+
+
+@servo_fault(44, _expect(_STOP, Cause.STRAINED))
+def strain(bench: FaultBench) -> list[str]:
+    bench.bus.stir(_ADVANCE, lambda servo: servo.grind(1500.0))
+    bench.run(0.1)
+    bench.bus.stir(_ADVANCE, lambda servo: servo.grind(0.0))
+    bench.run(0.7)
+    peak = bench.mode
+    bench.bus.stir(_ADVANCE, lambda servo: servo.grind(900.0, ripples=True))
+    bench.until_mode(Mode.STOPPED)
+    bench.run(0.3)
+    return check((peak in {Mode.AUTONOMOUS, Mode.HOLD}, f"a peak already led to {peak}")) + _moving(bench)
+
+
+@servo_fault(
+    45,
+    ExpectedReaction(_STOP, (Cause.STOP_PRESSED, Cause.TORQUE_ON), Cause.STOP_PRESSED, alerts=(Note.TORQUE_OFF,), may_hold=True),
+    servos={"torque_off_on_stop": True},
+)
+def torque_stays(bench: FaultBench) -> list[str]:
+    bench.bus.faults.mute(_ADVANCE)
+    bench.pilot.ask(Act.STOP)
+    bench.until_active(Cause.TORQUE_ON)
+    bench.run(0.6)
+    early = any(alert.key is Note.TORQUE_OFF for alert in bench.alerts_since_mark)
+    bench.bus.faults.mute(_ADVANCE, False)
+    bench.until(lambda view: not is_active(view, Cause.TORQUE_ON))
+    bench.run(0.3)
+    joints = bench.config.servos.joints
+    return check(
+        (not early, "said to be off before the silent servo had said so"),
+        *((not bench.bus.servo(j.id).table["torque"], f"the torque of {j.name} is on") for j in joints),
+    )
+
+
+@servo_fault(26, _expect(_STOP, Cause.PORT_LOST))
+def vanished(bench: FaultBench) -> list[str]:
+    bench.bus.vanish()
+    bench.until_mode(Mode.STOPPED)
+    bench.run(2.0)
+    bench.bus.reappear()
+    back = bench.until(lambda view: _status(bench).phase is not BusPhase.CLOSED)
+    bench.run(1.0)
+    status = _status(bench)
+    return check(
+        (back, "the port was not opened again"),
+        (not status.armed, "it was armed again by itself"),
+        (not bench.view.servos_on, "the servos count as switched on"),
+        (not any(status.zeroed), "joints count as zeroed although nobody watched them"),
+    )
+
+
+@fault(27)
+def rebooted(kit: Kit) -> Observation:
+    # which of the two is seen first depends on when the read falls: it is silent while it boots
+    either: set[object] = {Cause.REBOOTED, Cause.SERVO_SILENT}
+    with open_bench(kit, live=True) as bench:
+        bench.hand_over().mark()
+        bench.bus.stir(4, lambda servo: servo.restart())
+        bench.until_mode(Mode.ADVISORY)
+        bench.run(0.8)
+        problems = check(
+            (not _status(bench).zeroed[3], "its joint still counts as zeroed"),
+            (bench.latched in either, f"latched is {bench.latched or 'nothing'}"),
+            (bool(either & {alert.key for alert in bench.alerts_since_mark}), "no alert"),
+        )
+        expected = ExpectedReaction(_DISARM, (Cause.REBOOTED,), silent=(Cause.REBOOTED,), alternatives=(_HELD,), may_hold=True)
+        seen = judge(bench, expected, *problems)
+        bench.pilot.ask(Act.ACKNOWLEDGE)
+        bench.run(0.2)
+        bench.pilot.switch_on()
+        more = check(("zero" in _why_wrong(bench), "it could be switched on without a new zero"))
+        return replace(seen, problems=(*seen.problems, *more))
+
+
+def _why_wrong(bench: FaultBench) -> str:
+    """Why the servos cannot be switched on; empty when they can."""
+    bench.until(lambda view: is_active(view, Cause.SERVOS_WRONG) or view.servos_on)
+    return next((fault.detail for fault in bench.view.active if fault.cause is Cause.SERVOS_WRONG), "")
+
+
+@fault(28)
+def wrong_servo(kit: Kit) -> Observation:
+    refusals = [_refusal(kit.part(register), register, value) for register, value in (("model_number", 1060), ("id", 9))]
+    with open_bench(kit, live=True) as bench:
+        bench.mark()
+        bench.bus.stir(6, lambda servo: servo.table.__setitem__("operating_mode", 1))
+        bench.pilot.switch_on()
+        refusals.append(_why_wrong(bench))
+        bench.pilot.ask(Act.ARM)
+        bench.run(0.2)
+        problems = check(
+            (not bench.view.servos_on, "the servos could be switched on"),
+            *((bool(text), "not refused by name") for text in refusals),
+        )
+        seen = judge(bench, ExpectedReaction((), (Cause.SERVOS_WRONG,)), *problems)
+        return replace(seen, reaction="; ".join(refusals))
+
+
+def _refusal(kit: Kit, register: str, value: int) -> str:
+    """The driver's error at the opening of a rig with one altered servo; empty when there is none."""
+    try:
+        with open_bench(kit, live=True, before_open=lambda bus: bus.servo(2).table.__setitem__(register, value)):
+            return ""
+    except WrongServo as error:
+        return str(error)
+
+
+# ---- other programs on the line
+
+
+@fault(29)
+def two_programs(kit: Kit) -> Observation:
+    with open_bench(kit, live=True) as bench:
+        bench.hand_over().mark()
+        with start_child("open", bench.bus.port) as process:
+            bench.wait_for(lambda: process.poll() is not None)
+            answer = read_line(process)
+        problems = check(
+            (answer.get("error") == "PortTaken", f"the second program: {answer}"),
+            (bench.mode in {Mode.AUTONOMOUS, Mode.HOLD}, f"the first program went to {bench.mode}"),
+        )
+        seen = judge(bench, ExpectedReaction((), alternatives=((Mode.HOLD,),), may_hold=True), *problems)
+        message = str(answer.get("message", "")).replace(bench.bus.port, "PORT")
+        return replace(seen, reaction=f"refused: {message}; the first one goes on")
+
+
+@fault(32)
+def killed(kit: Kit) -> Observation:
+    problems, reaction = [], []
+    for victim in ("application", "bus process"):
+        for number in (signal.SIGKILL, signal.SIGSTOP):
+            stop_s, steps = _strike(victim, number)
+            name = f"{number.name} {victim}"
+            # a stopped application is permitted until its heartbeat is missed: its order is good for a step, and then held
+            problems += check(
+                (stop_s <= _BOUND_S, f"{name}: still moving after {stop_s:.2f} s"),
+                (steps <= _STEP_SLACK, f"{name}: went {steps:.2f} steps"),
+            )
+            reaction.append(f"{name}: {1000 * stop_s:.0f} ms, {steps:.2f} steps")
+    events = ("the session ends there (fault 37)",)
+    return Observation(f"servos stand. {'; '.join(reaction)}", events=events, problems=tuple(problems))
+
+
+def _strike(victim: str, number: signal.Signals) -> tuple[float, float]:
+    """Seconds until the last servo stands still, and the longest way of one in its own bounded steps."""
+    servos = ServosConfig()
+    bus = SoftServoBus(servos, wire_time=True)
+    bus.start()
+    samples: list[tuple[float, tuple[float, ...]]] = []
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(_SAMPLE_S):
+            positions = bus.positions_mm()
+            samples.append((time.monotonic(), positions))
+
+    try:
+        with start_child("drive", bus.port) as process:
+            bus_pid = int(str(read_line(process)["bus_pid"]))
+            watcher = threading.Thread(target=watch, daemon=True)
+            watcher.start()
+            time.sleep(0.6)
+            _await_motion(bus)
+            hit_s = time.monotonic()
+            os.kill(process.pid if victim == "application" else bus_pid, number)
+            start_mm = bus.positions_mm()
+            struck_s = time.monotonic()
+            time.sleep(_WATCH_S)
+            done.set()
+            watcher.join()
+            if victim != "application":
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(bus_pid, signal.SIGKILL)
+    finally:
+        done.set()
+        bus.stop()
+    after = [sample for sample in samples if sample[0] >= hit_s]
+    end_mm = after[-1][1]
+    moving = [n for n, (_, at) in enumerate(after) if max(abs(a - b) for a, b in zip(at, end_mm, strict=True)) > _REST_MM]
+    stopped_s = after[min(moving[-1] + 1, len(after) - 1)][0] if moving else hit_s
+    late = [at for time_s, at in after if time_s >= struck_s]
+    steps = max(abs(a - b) / j.max_step_mm for at in late for a, b, j in zip(at, start_mm, servos.joints, strict=True))
+    return stopped_s - hit_s, steps
+
+
+def _await_motion(bus: SoftServoBus) -> None:
+    """Wait until a servo moves: a strike at one that stands shows nothing."""
+    until_s = time.monotonic() + _WATCH_S
+    while time.monotonic() < until_s:
+        before = bus.positions_mm()
+        time.sleep(_POLL_S)
+        if max(abs(a - b) for a, b in zip(before, bus.positions_mm(), strict=True)) > _MOVING_MM:
+            return
