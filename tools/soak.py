@@ -126,7 +126,7 @@ class SoakRig:
             undo.callback(self.robot.close)
             self.robot.connect()
             self.robot.zero()
-            self.bus.zeroed()
+            self.bus.set_zero()
             camera = SoakCamera(world, self.injected)
             rig = Rig("soak", RigKind.SIM, camera, self.robot, world)
             perceive, model = maker._perception(config.perception)
@@ -236,25 +236,25 @@ def _vanish(rig: SoakRig, draw: random.Random) -> Undo:
 
 
 def _restart(rig: SoakRig, draw: random.Random) -> Undo:
-    rig.bus.stir(draw.randint(1, 7), lambda servo: servo.restart())
+    rig.bus.modify_servo(draw.randint(1, 7), lambda servo: servo.restart())
     return lambda: None
 
 
 def _overload(rig: SoakRig, draw: random.Random) -> Undo:
-    rig.bus.stir(draw.randint(1, 7), lambda servo: servo.alert(OVERLOAD_BIT))
+    rig.bus.modify_servo(draw.randint(1, 7), lambda servo: servo.alert(OVERLOAD_BIT))
     return lambda: None
 
 
 def _jam(rig: SoakRig, draw: random.Random) -> Undo:
     servo = draw.randint(1, 7)
-    rig.bus.stir(servo, lambda device: device.freeze(True))
-    return lambda: rig.bus.stir(servo, lambda device: device.freeze(False))
+    rig.bus.modify_servo(servo, lambda device: device.freeze(True))
+    return lambda: rig.bus.modify_servo(servo, lambda device: device.freeze(False))
 
 
 def _heat(rig: SoakRig, draw: random.Random) -> Undo:
     servo, hot_c = draw.randint(1, 7), draw.uniform(60.0, 74.0)
-    rig.bus.stir(servo, lambda device: device.heat(hot_c))
-    return lambda: rig.bus.stir(servo, lambda device: device.heat(_SAFE_C))
+    rig.bus.modify_servo(servo, lambda device: device.heat(hot_c))
+    return lambda: rig.bus.modify_servo(servo, lambda device: device.heat(_SAFE_C))
 
 
 def _sag(rig: SoakRig, draw: random.Random) -> Undo:
@@ -262,7 +262,7 @@ def _sag(rig: SoakRig, draw: random.Random) -> Undo:
 
     def supply(volts: float) -> None:
         for servo in range(1, 8):
-            rig.bus.stir(servo, lambda device: setattr(device, "supply_v", volts))
+            rig.bus.modify_servo(servo, lambda device: setattr(device, "supply_v", volts))
 
     supply(low_v)
     return lambda: supply(_SAFE_V)
@@ -355,7 +355,7 @@ class SoakOperator:
         if self._zeroing and not pilot.view.busy:
             # the joints stand: where they are now is what was taken for zero
             self._zeroing = False
-            rig.bus.zeroed()
+            rig.bus.set_zero()
             self._do("servos on", pilot.switch_on)
         if now_s >= self._decide_s:
             self._decide_s = now_s + self._draw.uniform(*_DECIDES_S)
@@ -372,7 +372,7 @@ class SoakOperator:
         if draw.random() < 0.04:
             self._do("rare", lambda: self._rare(rig, now_s))
         elif view.mode is Mode.STOPPED or view.latched is not None:
-            self._watch.stopped(None)
+            self._watch.set_stop(None)
             self._do("acknowledge", lambda: pilot.ask(Act.ACKNOWLEDGE))
         elif not view.servos_on:
             if not view.busy and not self._zeroing:
@@ -447,7 +447,7 @@ class SoakOperator:
         self.count[choice] += 1
         if choice == "stop":
             pilot.ask(Act.STOP)
-            self._watch.stopped(now_s)
+            self._watch.set_stop(now_s)
         elif choice == "hang":
             self._hangs_until_s = now_s + draw.uniform(0.2, _HANGS_S)
         elif choice == "disarm" and pilot.view.mode in ARMED_MODES:
@@ -678,7 +678,7 @@ class Soak:
 
     def summary(self) -> dict[str, Any]:
         """One object; ``ok``: nothing unsafe, nothing lost, nothing grew, nothing unexpected."""
-        tally, seen = self.tally, self.watch.seen
+        tally, seen = self.tally, self.watch.report
         steady = flatness(tally.samples)
         looks = max(1, sum(tally.modes.values()))
         return {
@@ -719,7 +719,7 @@ def soak(
 
         def go_on(now: Soak) -> bool:
             nonlocal written
-            goals, unsafe = now.watch.seen.goals, now.watch.seen.unsafe
+            goals, unsafe = now.watch.report.goals, now.watch.report.unsafe
             bar.update(task, completed=int(now.elapsed_s), description=f"s, {goals} goals, {unsafe} unsafe, {now.tally.lost} lost")
             for sample in now.tally.samples[written:]:
                 file.write(json.dumps(asdict(sample)) + "\n")

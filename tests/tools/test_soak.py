@@ -51,7 +51,7 @@ def test_a_sample_of_this_process() -> None:
 @pytest.mark.real_time
 def test_a_short_soak_sends_nothing_unsafe_and_loses_nothing() -> None:
     short = Soak(seed=1)
-    short.run(6.0, lambda now: now.watch.seen.goals < 200)
+    short.run(6.0, lambda now: now.watch.report.goals < 200)
     summary = short.summary()
     assert summary["unsafe_texts"] == []
     assert summary["records"]["lost"] == 0

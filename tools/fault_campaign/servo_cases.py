@@ -98,7 +98,7 @@ def noise(bench: FaultBench) -> list[str]:
 
 @servo_fault(23, _expect(_STOP, Cause.SERVO_ALERT))
 def overload(bench: FaultBench) -> list[str]:
-    bench.bus.stir(3, lambda servo: servo.alert(OVERLOAD_BIT))
+    bench.bus.modify_servo(3, lambda servo: servo.alert(OVERLOAD_BIT))
     return _await_end(bench, Mode.STOPPED)
 
 
@@ -109,9 +109,9 @@ def supply(kit: Kit) -> Observation:
             raise CampaignError(f"no warning: {cause}")
 
     def heat(bench: FaultBench) -> list[str]:
-        bench.bus.stir(2, lambda servo: servo.heat(67.0))
+        bench.bus.modify_servo(2, lambda servo: servo.heat(67.0))
         await_warning(bench, Cause.WARM)
-        bench.bus.stir(2, lambda servo: servo.heat(72.0))
+        bench.bus.modify_servo(2, lambda servo: servo.heat(72.0))
         return _await_end(bench, Mode.ADVISORY)
 
     def set_supply(bench: FaultBench, volts: float) -> None:
@@ -119,7 +119,7 @@ def supply(kit: Kit) -> Observation:
             servo.supply_v = volts
 
         for joint in bench.config.servos.joints:
-            bench.bus.stir(joint.id, set_volts)
+            bench.bus.modify_servo(joint.id, set_volts)
 
     def sag(bench: FaultBench) -> list[str]:
         set_supply(bench, 10.8)
@@ -137,10 +137,10 @@ def supply(kit: Kit) -> Observation:
 @fault(25)
 def jam(kit: Kit) -> Observation:
     def carry(bench: FaultBench, ticks_s: float) -> None:
-        bench.bus.stir(_ADVANCE, lambda servo: servo.carry(ticks_s))
+        bench.bus.modify_servo(_ADVANCE, lambda servo: servo.carry(ticks_s))
 
     def block(bench: FaultBench) -> list[str]:
-        bench.bus.stir(_ADVANCE, lambda servo: servo.freeze(True))
+        bench.bus.modify_servo(_ADVANCE, lambda servo: servo.freeze(True))
         return _await_end(bench, Mode.STOPPED)
 
     def pull(bench: FaultBench, ticks_s: float = -_CARRIED_TICKS_S) -> list[str]:
@@ -163,12 +163,12 @@ def jam(kit: Kit) -> Observation:
 
 @servo_fault(44, _expect(_STOP, Cause.STRAINED))
 def strain(bench: FaultBench) -> list[str]:
-    bench.bus.stir(_ADVANCE, lambda servo: servo.grind(1500.0))
+    bench.bus.modify_servo(_ADVANCE, lambda servo: servo.grind(1500.0))
     bench.run(0.1)
-    bench.bus.stir(_ADVANCE, lambda servo: servo.grind(0.0))
+    bench.bus.modify_servo(_ADVANCE, lambda servo: servo.grind(0.0))
     bench.run(0.7)
     peak = bench.mode
-    bench.bus.stir(_ADVANCE, lambda servo: servo.grind(900.0, ripples=True))
+    bench.bus.modify_servo(_ADVANCE, lambda servo: servo.grind(900.0, ripples=True))
     bench.until_mode(Mode.STOPPED)
     bench.run(0.3)
     return check((peak in {Mode.AUTONOMOUS, Mode.HOLD}, f"a peak already led to {peak}")) + _moving(bench)
@@ -218,7 +218,7 @@ def rebooted(kit: Kit) -> Observation:
     either: set[object] = {Cause.REBOOTED, Cause.SERVO_SILENT}
     with open_bench(kit, live=True) as bench:
         bench.hand_over().mark()
-        bench.bus.stir(4, lambda servo: servo.restart())
+        bench.bus.modify_servo(4, lambda servo: servo.restart())
         bench.until_mode(Mode.ADVISORY)
         bench.run(0.8)
         problems = check(
@@ -246,7 +246,7 @@ def wrong_servo(kit: Kit) -> Observation:
     refusals = [_refusal(kit.part(register), register, value) for register, value in (("model_number", 1060), ("id", 9))]
     with open_bench(kit, live=True) as bench:
         bench.mark()
-        bench.bus.stir(6, lambda servo: servo.table.__setitem__("operating_mode", 1))
+        bench.bus.modify_servo(6, lambda servo: servo.table.__setitem__("operating_mode", 1))
         bench.pilot.switch_on()
         refusals.append(_why_wrong(bench))
         bench.pilot.ask(Act.ARM)

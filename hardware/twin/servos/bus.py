@@ -1,7 +1,4 @@
-"""Seven software servos on a pseudo-terminal: the real driver talks to them over the real protocol, at the real port's speed.
-
-Switches for what goes wrong on a servo line: between a servo's answer and the computer.
-"""
+"""Seven software servos on a pseudo-terminal, with the real protocol at the real speed, and fault injection on their line."""
 
 from __future__ import annotations
 
@@ -19,24 +16,15 @@ import time
 import tty
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from core.config.safety import ServosConfig
 from hardware.twin.servos.device import SoftServo, StatusReply
-from hardware.twin.servos.protocol import BROADCAST, Instruction, InstructionPacket, PacketParser, status_packet
-
-
-@dataclass(frozen=True, slots=True)
-class TransmittedAnswer:
-    """What really goes onto the line, and how much later than it should."""
-
-    data: bytes
-    delay_s: float = 0.0
+from hardware.twin.servos.protocol import BROADCAST, Instruction, InstructionPacket, PacketParser, group_items, status_packet
 
 
 class LineFaults:
-    """Which answers are lost, late or damaged. Switches may be thrown from any thread while the bus runs."""
+    """Faults of the answers on the line: lost, late or damaged. May be set from any thread while the bus runs."""
 
     def __init__(self, seed: int = 0) -> None:
         self._random = random.Random(seed)
@@ -52,11 +40,11 @@ class LineFaults:
         self._garbage = 0
 
     def mute(self, servo_id: int, on: bool = True) -> None:
-        """The servo hears and obeys, but does not answer."""
+        """The servo obeys, but does not answer."""
         (self._muted.add if on else self._muted.discard)(servo_id)
 
     def delay(self, servo_id: int, seconds: float) -> None:
-        """All answers of the servo come later by so much; 0 ends it."""
+        """Delay all answers of the servo; 0 ends it."""
         self._delay_s[servo_id] = seconds
 
     def crc(self, count: int) -> None:
@@ -64,22 +52,22 @@ class LineFaults:
         self._crc = count
 
     def garbage(self, count: int) -> None:
-        """The next answer comes behind `count` random bytes."""
+        """Put `count` random bytes before the next answer."""
         self._garbage = count
 
     def truncate(self, servo_id: int, count: int = 1) -> None:
-        """The next `count` answers of the servo break off in the middle."""
+        """The next `count` answers of the servo end in the middle."""
         self._truncate[servo_id] = count
 
     def short(self, servo_id: int, count: int = 1) -> None:
         """The next `count` answers of the servo are whole packets without data."""
         self._short[servo_id] = count
 
-    def silences(self, servo_id: int) -> bool:
+    def is_muted(self, servo_id: int) -> bool:
         return servo_id in self._muted
 
-    def shape(self, servo_id: int, answer: bytes) -> TransmittedAnswer:
-        """What becomes of an answer."""
+    def apply(self, servo_id: int, answer: bytes) -> tuple[bytes, float]:
+        """The bytes on the line in place of an answer, and their delay in seconds."""
         if self._short.get(servo_id, 0) > 0:
             self._short[servo_id] -= 1
             answer = status_packet(servo_id, 0)
@@ -92,7 +80,7 @@ class LineFaults:
         if self._garbage > 0:
             answer = self._random.randbytes(self._garbage) + answer
             self._garbage = 0
-        return TransmittedAnswer(answer, self._delay_s.get(servo_id, 0.0))
+        return answer, self._delay_s.get(servo_id, 0.0)
 
 
 _log = logging.getLogger(__name__)
@@ -106,19 +94,18 @@ _PRIORITY = -10
 
 
 class SoftServoBus:
-    """The servos with their line; ``start`` opens ``port`` and answers there from a thread of its own.
+    """The servos with their line; ``start`` opens ``port`` and answers there from a thread.
 
     Parameters
     ----------
-    config : ids, model, speed and conversion of the seven.
-    clock : seconds for motion, heat and the servos' watchdogs; the line itself lives in real time.
-    wire_time : let answers take the time that they need at the port's speed.
-    positions : ticks of each servo's horn at the start; None draws them within one turn, from `seed`.
+    clock : seconds for motion, heat and the servos' watchdogs; the line itself runs in real time.
+    wire_time : delay answers by their duration at the speed of the port.
+    positions : ticks of each horn at the start; None draws them within one turn, from `seed`.
 
     Notes
     -----
-    Strict: what is not stuffed, of a wrong CRC or speed, or of a wrong length is not heard. As the vendor's protocol has it, the
-    answers to a group read follow one another, so a silent servo also silences those behind it.
+    Packets without stuffing, or with a wrong CRC, speed or length are ignored. As in the vendor's protocol the answers to a group
+    read follow one another, so a silent servo also silences those behind it.
     """
 
     def __init__(
@@ -142,9 +129,9 @@ class SoftServoBus:
         self._mounted = {servo.id: servo.mechanical_ticks for servo in self._servos.values()}
         self.faults = LineFaults(seed)
         self.log: deque[InstructionPacket] = deque(maxlen=10_000)
-        """Packets that were heard, oldest first."""
+        """Accepted packets, oldest first."""
         self.rejected = 0
-        """What looked like a packet, and was not heard."""
+        """Number of damaged packets that were ignored."""
         self.failure: str | None = None
         self._lock = threading.RLock()
         self._parser = PacketParser()
@@ -173,17 +160,17 @@ class SoftServoBus:
         return str(self._folder / "servos")
 
     def servo(self, servo_id: int) -> SoftServo:
-        """One servo, to look at or to alter; use ``stir`` where the bus may be at work on it."""
+        """One servo; use ``modify_servo`` while the bus is running."""
         return self._servos[servo_id]
 
-    def stir(self, servo_id: int, action: Callable[[SoftServo], object]) -> None:
-        """Do something to a servo at the present moment, while the bus waits: ``bus.stir(3, lambda s: s.alert(32))``."""
+    def modify_servo(self, servo_id: int, action: Callable[[SoftServo], object]) -> None:
+        """Apply a change to a servo while the bus waits: ``bus.modify_servo(3, lambda s: s.alert(32))``."""
         with self._lock:
             self._advance()
             action(self._servos[servo_id])
 
     def positions_mm(self) -> tuple[float, ...]:
-        """Where the seven joints are now, in mm from where they were at the start, by their mechanics."""
+        """Mechanical positions of the seven joints, in mm from those at the start."""
         with self._lock:
             self._advance()
             return tuple(
@@ -191,7 +178,7 @@ class SoftServoBus:
             )
 
     def set_loads_mn(self, forces_mn: Sequence[float]) -> None:
-        """What pulls at each joint against its positive direction, in mN: the servos' currents show it."""
+        """Set the force at each joint against its positive direction, in mN, which the servos' currents show."""
         with self._lock:
             for joint, force_mn in zip(self._joints, forces_mn, strict=True):
                 radius_m = joint.mm_per_turn / 6.283185307179586 / 1000.0
@@ -212,7 +199,7 @@ class SoftServoBus:
         """Close the line; the servos keep their state, and the bus can be started again."""
         if self._thread is not None:
             self._stop.set()
-            self._poke()
+            self._wake_thread()
             self._thread.join()
             self._thread = None
             self._plug(False)
@@ -223,7 +210,7 @@ class SoftServoBus:
                 self._folder = None
 
     def vanish(self) -> None:
-        """Pull the USB plug: the port is gone. The servos live on."""
+        """Unplug: the port disappears. The servos keep running."""
         self._replug(False)
 
     def reappear(self) -> None:
@@ -233,14 +220,14 @@ class SoftServoBus:
     def _replug(self, plugged: bool) -> None:
         self._settled.clear()
         self._plugged = plugged
-        self._poke()
+        self._wake_thread()
         self._settled.wait(5.0)
 
-    def _poke(self) -> None:
+    def _wake_thread(self) -> None:
         os.write(self._wake[1], b"!")
 
     def _plug(self, plugged: bool) -> None:
-        """Make or close the pseudo-terminal. The own end of it keeps the line alive between two programs."""
+        """Make or close the pseudo-terminal. Its open slave end keeps the line alive between two programs."""
         link = Path(self.port)
         if plugged and self._pty is None:
             master, slave = os.openpty()
@@ -258,18 +245,18 @@ class SoftServoBus:
         self._parser.reset()
 
     def _run(self) -> None:
-        with contextlib.suppress(OSError):  # they stand for hardware, which does not wait for a busy computer
+        with contextlib.suppress(OSError):  # like hardware, they do not wait for a busy computer
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _PRIORITY)
         try:
             while not self._stop.is_set():
-                self._turn()
+                self._run_once()
         except Exception as error:  # noqa: BLE001 - top of the thread: the driver sees silent servos, and this says why
             _log.exception("the twin's servos stopped")
             self.failure = f"the twin's servos stopped ({type(error).__name__}: {error}); start the rig again"
             self._settled.set()
 
-    def _turn(self) -> None:
-        """Wait for bytes, the next answer's time or a poke; then let the servos live and talk."""
+    def _run_once(self) -> None:
+        """Wait for bytes, the time of the next answer or a wake-up; then advance the servos and send what is due."""
         wait_s = min(_IDLE_S, self._due[0][0] - time.monotonic()) if self._due else _IDLE_S
         ends = [self._wake[0], *([self._pty[0]] if self._pty else [])]
         ready, _, _ = select.select(ends, [], [], max(0.0, wait_s))
@@ -294,7 +281,7 @@ class SoftServoBus:
             self._heard_s = now
             baud = _SPEEDS.get(termios.tcgetattr(master)[5])
             for packet in self._parser.feed(data):
-                self._hear(packet, baud, now + self._on_wire_s(len(packet.parameters) + 10, baud))
+                self._execute(packet, baud, now + self._on_wire_s(len(packet.parameters) + 10, baud))
             self.rejected = self._parser.rejected
 
     def _on_wire_s(self, length: int, baud: int | None) -> float:
@@ -305,8 +292,8 @@ class SoftServoBus:
         for servo in self._servos.values():
             servo.advance(now)
 
-    def _hear(self, packet: InstructionPacket, baud: int | None, now_s: float) -> None:
-        """One packet, by all servos that listen at this speed."""
+    def _execute(self, packet: InstructionPacket, baud: int | None, now_s: float) -> None:
+        """Execute a packet by all servos that listen at this speed."""
         self._advance()
         awake = {i: s for i, s in self._servos.items() if not s.is_booting and BAUD_OF_CODE.get(s.table["baud_rate"]) == baud}
         if not awake:
@@ -314,9 +301,12 @@ class SoftServoBus:
             return
         self.log.append(packet)
         for servo in awake.values():
-            servo.hear()
+            servo.feed_watchdog()
         if packet.instruction == Instruction.SYNC_WRITE:
-            self._group_write(packet.parameters, awake)
+            address, items = group_items(packet.parameters)
+            for servo_id, data in items:
+                if servo_id in awake:
+                    awake[servo_id].answer(Instruction.WRITE, address, data=data)
         elif packet.instruction == Instruction.SYNC_READ:
             self._group_read(packet.parameters, awake, baud, now_s)
         else:
@@ -326,9 +316,9 @@ class SoftServoBus:
         to_all = packet.id == BROADCAST
         for servo in sorted(awake.values(), key=lambda servo: servo.id):
             if to_all or servo.id == packet.id:
-                answer = _do(servo, packet)
+                answer = _answer(servo, packet)
                 talks = packet.instruction == Instruction.PING if to_all else servo.answers_to(packet.instruction)
-                if talks and not self.faults.silences(servo.id):
+                if talks and not self.faults.is_muted(servo.id):
                     now_s = self._queue(servo, answer, baud, now_s)
 
     def _group_read(self, parameters: bytes, awake: dict[int, SoftServo], baud: int | None, now_s: float) -> None:
@@ -337,41 +327,29 @@ class SoftServoBus:
         address, length = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
         for servo_id in parameters[4:]:
             servo = awake.get(servo_id)
-            if servo is None or self.faults.silences(servo_id) or not servo.answers_to(Instruction.READ):
-                return  # those behind wait for their turn in vain
+            if servo is None or self.faults.is_muted(servo_id) or not servo.answers_to(Instruction.READ):
+                return  # those behind it get no turn
             now_s = self._queue(servo, servo.answer(Instruction.READ, address, length), baud, now_s)
 
-    @staticmethod
-    def _group_write(parameters: bytes, awake: dict[int, SoftServo]) -> None:
-        address, length = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
-        items = parameters[4:]
-        if length == 0 or len(items) % (length + 1):
-            return
-        for at in range(0, len(items), length + 1):
-            servo = awake.get(items[at])
-            if servo is not None:
-                servo.answer(Instruction.WRITE, address, data=items[at + 1 : at + 1 + length])
-
     def _queue(self, servo: SoftServo, answer: StatusReply, baud: int | None, now_s: float) -> float:
-        """Put an answer onto the line; returns when it will have passed."""
+        """Queue an answer; returns the time of its end on the line."""
         packet = status_packet(servo.id, answer.error, answer.data)
-        sent = self.faults.shape(servo.id, packet)
+        data, delay_s = self.faults.apply(servo.id, packet)
         pause_s = 2e-6 * servo.table["return_delay"] if self._wire_time else 0.0
         now_s += pause_s + self._on_wire_s(len(packet), baud)
         self._order += 1
-        heapq.heappush(self._due, (now_s + sent.delay_s, self._order, sent.data))
+        heapq.heappush(self._due, (now_s + delay_s, self._order, data))
         return now_s
 
     def _send(self) -> None:
         now = time.monotonic()
         while self._due and self._due[0][0] <= now and self._pty is not None:
             data = heapq.heappop(self._due)[2]
-            with contextlib.suppress(BlockingIOError):  # nobody reads: the line's buffer is full, and the bytes are lost
+            with contextlib.suppress(BlockingIOError):  # no reader: the buffer is full, and the bytes are lost
                 os.write(self._pty[0], data)
 
 
-def _do(servo: SoftServo, packet: InstructionPacket) -> StatusReply:
-    """A single servo's instruction with its parameters taken apart."""
+def _answer(servo: SoftServo, packet: InstructionPacket) -> StatusReply:
     parameters = packet.parameters
     address = int.from_bytes(parameters[:2], "little")
     if packet.instruction == Instruction.READ:

@@ -1,8 +1,6 @@
-"""One software servo: what it answers, how its registers move it, and when it switches itself off.
+"""A software servo: answers, motion by its registers, protection, and its motor with current and heat.
 
-A servo's motor: trapezoidal motion to a goal, current from what it pushes against, heat from the current. Pure.
-
-Simple but physical: figures of an XM430-W350 at 12 V, from its data sheet where that has one (speed, stall current, torque).
+Figures are those of an XM430-W350 at 12 V, from its data sheet where it has them (speed, stall current, torque).
 """
 
 from __future__ import annotations
@@ -21,14 +19,14 @@ _STAND_MA, _FRICTION_MA = 8.0, 40.0
 _STIFFNESS_MA_PER_TICK = 12.0
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.0
 _HEAT_C, _HEAT_TIME_S = 400.0, 180.0
-"""Rise of temperature at stall if it lasted, and the time constant."""
+"""Final rise of temperature at stall, and the time constant."""
 _STEP_S = 0.002
 _MAX_STEPS = 5000
 
 
 @dataclass(slots=True)
 class MotorGoal:
-    """What the servo's registers ask for. Ticks, ticks/s, ticks/s^2; ``acceleration`` 0 means none is prescribed."""
+    """The motion that the registers ask for, in ticks, ticks/s, ticks/s^2; ``acceleration`` 0: unlimited."""
 
     torque: bool = False
     goal: int = 0
@@ -37,11 +35,10 @@ class MotorGoal:
 
 
 class ServoMotor:
-    """Position in ticks since the twin was built: it turns on whatever the servo's registers make of it.
+    """The motor; its position in ticks is independent of what the servo counts.
 
-    ``trajectory`` is where the profile wants the horn, ``position`` where it is: the same, unless the horn is frozen. ``grinds_ma``
-    is what it draws beyond friction, as with a damaged gear: it still goes where it shall. ``carried_ticks_s``: something
-    stronger turns the horn, wherever the goal is.
+    ``trajectory`` is the position of the profile, ``position`` that of the horn, which differs only when the horn is frozen.
+    ``grinds_ma`` is additional current as of a damaged gear. ``carried_ticks_s`` is a speed forced from outside.
     """
 
     def __init__(self, position: float, ambient_c: float = 25.0) -> None:
@@ -55,7 +52,7 @@ class ServoMotor:
         self._overloaded_s = 0.0
 
     def step(self, drive: MotorGoal, duration_s: float) -> None:
-        """Let time pass. A pause of more than 10 s is cut: nothing changes in it any more but the temperature."""
+        """Advance time; motion is limited to 10 s of it."""
         self._warm(drive, duration_s)
         strained = drive.torque and abs(self.current_ma(drive)) > _OVERLOAD_SHARE * STALL_MA
         self._overloaded_s = self._overloaded_s + duration_s if strained else 0.0
@@ -74,7 +71,7 @@ class ServoMotor:
             self.position = self.trajectory
 
     def _move(self, drive: MotorGoal, part_s: float) -> None:
-        """One step along the profile: as fast as can still be braked in time."""
+        """One step along the profile, at the highest speed from which it can still brake in time."""
         way = drive.goal - self.trajectory
         fastest = min(drive.speed, MAX_TICKS_S)
         if drive.acceleration <= 0.0:
@@ -92,11 +89,11 @@ class ServoMotor:
             self.trajectory += move
 
     def stop(self) -> None:
-        """Stand still where the horn is, as at a tripped watchdog."""
+        """Stop where the horn is, as at a tripped watchdog."""
         self.trajectory, self.velocity = self.position, 0.0
 
     def current_ma(self, drive: MotorGoal) -> float:
-        """Motor current: load, friction, and the pull towards a trajectory that the horn does not follow."""
+        """Motor current by load, friction, and the lag behind the trajectory."""
         if not drive.torque:
             return 0.0
         lag = self.trajectory - self.position
@@ -107,7 +104,7 @@ class ServoMotor:
 
     @property
     def is_overloaded(self) -> bool:
-        """Too much current for too long: the servo switches itself off."""
+        """Whether the current was too high for too long, at which the servo switches off."""
         return self._overloaded_s > _OVERLOAD_S
 
     def _warm(self, drive: MotorGoal, duration_s: float) -> None:
@@ -115,9 +112,9 @@ class ServoMotor:
         self.temperature_c += (end_c - self.temperature_c) * -math.expm1(-duration_s / _HEAT_TIME_S)
 
 
-_TICKS_PER_TURN = 4096
-_VELOCITY_TICKS_S = 0.229 / 60.0 * _TICKS_PER_TURN
-_ACCELERATION_TICKS_S2 = 214.577 / 3600.0 * _TICKS_PER_TURN
+# Units of the registers.
+_VELOCITY_TICKS_S = 0.229 / 60.0 * TICKS_PER_TURN
+_ACCELERATION_TICKS_S2 = 214.577 / 3600.0 * TICKS_PER_TURN
 _CURRENT_MA = 2.69
 _WATCHDOG_S = _RIPPLE_S = 0.02
 REBOOT_S = 0.3
@@ -133,9 +130,9 @@ class StatusReply:
 
 
 class SoftServo:
-    """A servo of the X series with ``id``, at `position` ticks of its mechanics.
+    """A servo of the X series with its horn at `position` ticks.
 
-    Time comes in through ``advance``; the bus watchdog counts from the last ``hear``.
+    Time advances by ``advance``; the bus watchdog counts from the last ``feed_watchdog``.
     """
 
     def __init__(self, servo_id: int, model: int, position: int, baud_code: int = 3) -> None:
@@ -155,7 +152,7 @@ class SoftServo:
 
     @property
     def mechanical_ticks(self) -> float:
-        """Where the horn really is, whatever the servo counts."""
+        """True position of the horn, independent of what the servo counts."""
         return self.motor.position
 
     @property
@@ -163,52 +160,52 @@ class SoftServo:
         return self._silent_until_s is not None
 
     def advance(self, now_s: float) -> None:
-        """Let the servo live until `now_s`."""
+        """Advance the servo to `now_s`."""
         duration_s = max(0.0, now_s - self._now_s)
         self._now_s = max(self._now_s, now_s)
         if self._silent_until_s is not None and now_s >= self._silent_until_s:
             self._silent_until_s = None
-        self._watch()
+        self._check_watchdog()
         self.motor.grinds_ma = 0.0 if self._ripples and int(self._now_s / _RIPPLE_S) % 5 == 0 else self._grinds_ma
         self.motor.step(self._drive(), duration_s)
         self._protect()
         self._refresh()
 
-    def hear(self) -> None:
-        """Any instruction packet on the line feeds the watchdog, whoever it is for."""
+    def feed_watchdog(self) -> None:
+        """Any instruction packet on the line feeds the watchdog, for any servo."""
         self._heard_s = self._now_s
 
     def restart(self, silent_s: float = REBOOT_S) -> None:
-        """Power-up: RAM and turn count are gone, and for a while nobody is at home."""
-        self.table.forget()
+        """Power-up: reset RAM and turn count, and do not answer for a while."""
+        self.table.reset_ram()
         self.motor.stop()
         self.motor.step(MotorGoal(), 0.0)
-        self._lost_turns = int(self.motor.position // _TICKS_PER_TURN)
+        self._lost_turns = int(self.motor.position // TICKS_PER_TURN)
         self.table["goal_position"] = self._count(self.motor.position)
         self._silent_until_s = self._now_s + silent_s if silent_s > 0.0 else None
         self._refresh()
 
     def answer(self, instruction: int, address: int = 0, length: int = 0, data: bytes = b"") -> StatusReply:
-        """Do what a packet asks."""
+        """Execute an instruction."""
         if instruction == Instruction.PING:
             _, identity = self.table.read(0, 7)
-            return self._say(ErrorCode.NONE, identity[:2] + identity[6:7])
+            return self._reply(ErrorCode.NONE, identity[:2] + identity[6:7])
         if instruction == Instruction.READ:
-            return self._say(*self.table.read(address, length))
+            return self._reply(*self.table.read(address, length))
         if instruction == Instruction.WRITE:
-            return self._say(self._write(address, data))
+            return self._reply(self._write(address, data))
         if instruction == Instruction.REBOOT:
-            said = self._say(ErrorCode.NONE)
+            reply = self._reply(ErrorCode.NONE)
             self.restart()
-            return said
-        return self._say(ErrorCode.INSTRUCTION)
+            return reply
+        return self._reply(ErrorCode.INSTRUCTION)
 
     def answers_to(self, instruction: int) -> bool:
         """Whether its status return level lets it answer."""
         level = self.table["status_return"]
         return instruction == Instruction.PING or level == 2 or (level == 1 and instruction == Instruction.READ)
 
-    def _say(self, error: ErrorCode, data: bytes = b"") -> StatusReply:
+    def _reply(self, error: ErrorCode, data: bytes = b"") -> StatusReply:
         return StatusReply(error | (ALERT if self.table["hardware_error"] else 0), data)
 
     def _write(self, address: int, data: bytes) -> ErrorCode:
@@ -219,16 +216,16 @@ class SoftServo:
         if error:
             return error
         if "torque" in written and self.table["torque"] and not torque:
-            self.motor.stop()  # from where it stands to the goal register, whatever that says: who arms must write it first
+            self.motor.stop()  # it then moves to whatever the goal register has
         if "watchdog" in written:
-            self.hear()
+            self.feed_watchdog()
         if "operating_mode" in written and self.table["operating_mode"] != EXTENDED_POSITION:
-            self._lost_turns = int(self.motor.position // _TICKS_PER_TURN)  # that mode knows one turn only
+            self._lost_turns = int(self.motor.position // TICKS_PER_TURN)  # that mode knows one turn only
         self._refresh()
         return ErrorCode.NONE
 
     def _count(self, mechanical: float) -> int:
-        return round(mechanical) - self._lost_turns * _TICKS_PER_TURN
+        return round(mechanical) - self._lost_turns * TICKS_PER_TURN
 
     def _drive(self) -> MotorGoal:
         table = self.table
@@ -236,12 +233,12 @@ class SoftServo:
         halted = table["watchdog"] == WATCHDOG_TRIPPED or table["operating_mode"] != EXTENDED_POSITION
         return MotorGoal(
             torque=table["torque"] == 1,
-            goal=round(self.motor.trajectory) if halted else table["goal_position"] + self._lost_turns * _TICKS_PER_TURN,
+            goal=round(self.motor.trajectory) if halted else table["goal_position"] + self._lost_turns * TICKS_PER_TURN,
             speed=speed * _VELOCITY_TICKS_S,
             acceleration=table["profile_acceleration"] * _ACCELERATION_TICKS_S2,
         )
 
-    def _watch(self) -> None:
+    def _check_watchdog(self) -> None:
         limit = self.table["watchdog"]
         if self.table["torque"] and limit > 0 and self._now_s - self._heard_s > limit * _WATCHDOG_S:
             self.table["watchdog"] = WATCHDOG_TRIPPED
@@ -262,26 +259,26 @@ class SoftServo:
             self.table["torque"] = 0
 
     def turn(self, ticks: int) -> None:
-        """Somebody turns the horn by hand; he cannot while the torque is on."""
+        """Turn the horn by hand, which works only while the torque is off."""
         if not self.table["torque"]:
             self.motor.position += ticks
             self._refresh()
 
     def freeze(self, frozen: bool) -> None:
-        """Jam the horn, or free it; freed, it starts from where it is."""
+        """Jam the horn, or release it; then it starts from where it is."""
         self.motor.frozen = frozen
         self.motor.stop()
 
     def grind(self, current_ma: float, *, ripples: bool = False) -> None:
-        """Let the motor draw so much more than it needs, until this is 0 again; with ripples, not in every fifth 20 ms."""
+        """Add a motor current (0 ends it); with ripples, not in every fifth 20 ms."""
         self._grinds_ma, self._ripples = current_ma, ripples
 
     def carry(self, ticks_s: float) -> None:
-        """Let something stronger than the motor turn the horn, until this is 0 again."""
+        """Turn the horn by an external force stronger than the motor (0 ends it)."""
         self.motor.carried_ticks_s = ticks_s
 
     def heat(self, temperature_c: float) -> None:
-        """Put the servo into surroundings of this temperature, long enough to have taken it on."""
+        """Set the temperature of the servo and of its surroundings."""
         self.motor.ambient_c = self.motor.temperature_c = temperature_c
 
     def alert(self, bits: int) -> None:
@@ -293,7 +290,7 @@ class SoftServo:
         return bool(self.table["hardware_error"] & self.table["shutdown"])
 
     def _refresh(self) -> None:
-        """The registers that tell the present."""
+        """Update the registers with the present values."""
         table, motor = self.table, self.motor
         current_ma = motor.current_ma(self._drive())
         table["present_position"] = self._count(motor.position)

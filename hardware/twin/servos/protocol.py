@@ -1,15 +1,13 @@
-"""DYNAMIXEL Protocol 2.0 as a strict servo understands it: header, stuffing, length, CRC. Pure; no bytes make it fail.
+"""DYNAMIXEL Protocol 2.0 (header, stuffing, length, CRC) and the used part of the control table of an X servo (XM430).
 
-Written from the protocol's description (Robotis e-Manual), not from the vendor's SDK, so that driver and twin check each other.
-
-The control table of a DYNAMIXEL X servo (XM430), as far as a robot like this uses it: registers, access rights, indirection.
+Written from the protocol's description (Robotis e-Manual), not from the vendor's SDK, so that driver and twin check each other. The
+parser accepts any bytes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cache
 
 HEADER = b"\xff\xff\xfd"
 BROADCAST = 0xFE
@@ -28,7 +26,7 @@ class Instruction(IntEnum):
 
 
 class ErrorCode(IntEnum):
-    """What a status packet's error byte says, beside the alert bit."""
+    """Error byte of a status packet, without the alert bit."""
 
     NONE = 0
     RESULT_FAIL = 1
@@ -93,14 +91,14 @@ def status_packet(servo_id: int, error: int, data: bytes = b"") -> bytes:
 
 
 class PacketParser:
-    """Finds packets in a stream of bytes. ``rejected`` counts what looked like a packet and was none."""
+    """Finds packets in a stream of bytes. ``rejected`` counts damaged ones."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
         self.rejected = 0
 
     def reset(self) -> None:
-        """Forget half a packet, as a servo does after a pause on the line."""
+        """Drop half a packet, as a servo does after a pause on the line."""
         self._buffer.clear()
 
     @property
@@ -121,7 +119,7 @@ class PacketParser:
             whole = bytes(self._buffer[:end])
             body = unstuff(whole[_BODY:-2])
             if body is None:
-                # A bare header inside: the line's word for the start of a packet.
+                # A header without stuffing starts a new packet.
                 self._skip(whole.index(HEADER, _BODY) if HEADER in whole[_BODY:-2] else len(HEADER))
             elif crc16(whole[:-2]) != int.from_bytes(whole[-2:], "little"):
                 self._skip(len(HEADER))
@@ -131,18 +129,27 @@ class PacketParser:
         return found
 
     def _find_header(self) -> bool:
-        """Drop what comes before a header; True when one is there with id and length."""
+        """Drop the bytes before a header; True when one is there with id and length."""
         while (at := self._buffer.find(HEADER)) >= 0:
             del self._buffer[:at]
             if bytes(self._buffer[3:4]) in {b"", b"\0"}:
                 return len(self._buffer) >= _BODY
             del self._buffer[: len(HEADER)]  # stuffed data, or no header of this protocol
-        del self._buffer[: max(0, len(self._buffer) - 2)]  # a header's beginning may be there
+        del self._buffer[: max(0, len(self._buffer) - 2)]  # the start of a header may be there
         return False
 
     def _skip(self, size: int) -> None:
         del self._buffer[:size]
         self.rejected += 1
+
+
+def group_items(parameters: bytes) -> tuple[int, list[tuple[int, bytes]]]:
+    """Address of a group write, and its items (servo id, data); no items when it is malformed."""
+    address, length = int.from_bytes(parameters[:2], "little"), int.from_bytes(parameters[2:4], "little")
+    items = parameters[4:]
+    if length == 0 or len(items) % (length + 1):
+        return address, []
+    return address, [(items[at], items[at + 1 : at + 1 + length]) for at in range(0, len(items), length + 1)]
 
 
 SIZE = 662
@@ -154,7 +161,7 @@ MAX_TICKS = 256 * 4096 - 1
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """``eeprom`` registers are locked while the torque is on. ``low`` and ``high`` bound what is written; None: read-only."""
+    """``eeprom`` registers are locked while the torque is on. ``low`` and ``high`` limit written values; None: read-only."""
 
     name: str
     address: int
@@ -163,10 +170,6 @@ class Register:
     low: int | None = None
     high: int | None = None
     eeprom: bool = False
-
-    @property
-    def writable(self) -> bool:
-        return self.low is not None
 
 
 _REGISTERS = (
@@ -220,12 +223,12 @@ _REGISTERS = (
     ),
 )
 BY_NAME = {register.name: register for register in _REGISTERS}
+_BY_ADDRESS = {register.address: register for register in _REGISTERS}
 GOALS = frozenset({"goal_pwm", "goal_current", "goal_velocity", "goal_position"})
-
-
-@cache
-def _by_address() -> dict[int, Register]:
-    return {register.address: register for register in _REGISTERS}
+_SIGNED = {register.name for register in _REGISTERS if register.low is not None and register.low < 0} | {
+    "watchdog", "present_pwm", "present_current", "present_velocity", "present_position", "velocity_trajectory",
+    "position_trajectory",
+}  # fmt: skip
 
 
 class ControlTable:
@@ -239,24 +242,23 @@ class ControlTable:
     def __getitem__(self, name: str) -> int:
         register = BY_NAME[name]
         value = int.from_bytes(self._bytes[register.address : register.address + register.size], "little")
-        signed = name in _SIGNED or (register.low is not None and register.low < 0)
-        return value - (1 << 8 * register.size) if signed and value >> (8 * register.size - 1) else value
+        return value - (1 << 8 * register.size) if name in _SIGNED and value >> (8 * register.size - 1) else value
 
     def __setitem__(self, name: str, value: int) -> None:
-        """The servo itself sets a register; no rights are asked."""
+        """Set a register without a check of access rights, as the servo itself does."""
         register = BY_NAME[name]
         bits = value & (1 << 8 * register.size) - 1
         self._bytes[register.address : register.address + register.size] = bits.to_bytes(register.size, "little")
 
-    def forget(self) -> None:
-        """RAM as after power-up; the EEPROM stays."""
+    def reset_ram(self) -> None:
+        """Set the RAM as after power-up; the EEPROM stays."""
         for register in _REGISTERS:
             if not register.eeprom:
                 self[register.name] = register.initial
         self._bytes[INDIRECT_DATA : INDIRECT_DATA + INDIRECT_COUNT] = bytes(INDIRECT_COUNT)
 
     def read(self, address: int, length: int) -> tuple[ErrorCode, bytes]:
-        """Bytes of the table; those at indirect data come from where their indirect address points."""
+        """Bytes of the table; indirect data come from their indirect addresses."""
         if length == 0:
             return ErrorCode.DATA_LENGTH, b""
         if address + length > SIZE:
@@ -270,14 +272,11 @@ class ControlTable:
         return min(SIZE - 1, int.from_bytes(self._bytes[pointer : pointer + 2], "little"))
 
     def write(self, address: int, data: bytes) -> tuple[ErrorCode, list[str]]:
-        """Check and write whole registers; nothing is written when one is refused. Returns the names of those written.
-
-        Writing through indirect data is not supported, and refused.
-        """
+        """Check and write whole registers, all or none of them; returns their names. Writing to indirect data is refused."""
         values: list[tuple[Register, int]] = []
         at = 0
         while at < len(data):
-            register = _by_address().get(address + at)
+            register = _BY_ADDRESS.get(address + at)
             if register is None:
                 return ErrorCode.ACCESS, []
             part = data[at : at + register.size]
@@ -305,9 +304,3 @@ class ControlTable:
         if register.name == "profile_velocity" and value > self["velocity_limit"]:
             return ErrorCode.DATA_LIMIT, 0
         return ErrorCode.NONE, value
-
-
-_SIGNED = frozenset({"watchdog", "present_pwm", "present_current", "present_velocity", "present_position"}) | {
-    "velocity_trajectory",
-    "position_trajectory",
-}

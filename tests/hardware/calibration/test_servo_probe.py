@@ -86,7 +86,7 @@ def test_current_stops_it_and_lets_the_wire_go(servos: SoftServoBus) -> None:
         pytest.raises(Strained, match=r"servo 3 drew \d+ mA"),
         ServoProbe.opened(_config(servos), SAFETY, LIMITS, StopSwitch()) as probe,
     ):
-        servos.stir(3, lambda servo: setattr(servo.motor, "load_mnm", 800.0))  # 450 mA
+        servos.modify_servo(3, lambda servo: setattr(servo.motor, "load_mnm", 800.0))  # 450 mA
         probe.move_to(2.0)
     assert servos.positions_mm()[2] < 1.0
     assert servos.servo(3).table["torque"] == 0
@@ -98,12 +98,12 @@ def test_a_jam_ends_it_and_is_not_tried_again(servos: SoftServoBus) -> None:
         pytest.raises(ProbeFailed, match=r"does not follow|does not get"),
         ServoProbe.opened(_config(servos, limits=limits), SAFETY, limits, StopSwitch()) as probe,
     ):
-        servos.stir(3, lambda servo: servo.freeze(True))
+        servos.modify_servo(3, lambda servo: servo.freeze(True))
         probe.move_to(2.0)
 
 
 def test_a_servo_with_an_error_is_not_moved(servos: SoftServoBus) -> None:
-    servos.stir(5, lambda servo: servo.alert(32))
+    servos.modify_servo(5, lambda servo: servo.alert(32))
     told = pytest.raises(NotReady, match=r"hardware error \(servo 5 0x20\)")
     with told, ServoProbe.opened(_config(servos), SAFETY, LIMITS, StopSwitch()):
         raise AssertionError("not armed")

@@ -498,9 +498,9 @@ def test_a_silent_servo_is_named(bus: SoftServoBus) -> None:
 def test_a_weak_supply_and_an_overloaded_servo_are_found(bus: SoftServoBus) -> None:
     demanding = ServosConfig(port=bus.port, min_voltage_v=20.0)
     _bad(device_checks.check_servos(demanding), "V at least", "20 V or more")
-    bus.stir(6, lambda servo: servo.heat(75.0))
+    bus.modify_servo(6, lambda servo: servo.heat(75.0))
     _bad(device_checks.check_servos(ServosConfig(port=bus.port)), "75 .C at most", "cool below 70 .C")
-    bus.stir(2, lambda servo: servo.alert(32))
+    bus.modify_servo(2, lambda servo: servo.alert(32))
     _bad(device_checks.check_servos(ServosConfig(port=bus.port)), "hardware error, .*left: overload", "restart that servo")
 
 

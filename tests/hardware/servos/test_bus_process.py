@@ -471,10 +471,10 @@ def test_whoever_is_not_permitted_is_not_followed(servos: SoftServoBus, armed: S
     [
         (lambda s: s.faults.mute(3), Cause.SERVO_SILENT, BusPhase.DISARMED),
         (lambda s: s.faults.crc(60), Cause.BUS_NOISE, BusPhase.DISARMED),
-        (lambda s: s.stir(2, lambda servo: servo.alert(32)), Cause.SERVO_ALERT, BusPhase.STOPPED),
-        (lambda s: s.stir(5, lambda servo: servo.heat(75.0)), Cause.HOT, BusPhase.DISARMED),
-        (lambda s: s.stir(5, lambda servo: setattr(servo, "supply_v", 10.0)), Cause.VOLTAGE_LOW, BusPhase.DISARMED),
-        (lambda s: s.stir(5, lambda servo: servo.freeze(True)), Cause.TRACKING, BusPhase.STOPPED),
+        (lambda s: s.modify_servo(2, lambda servo: servo.alert(32)), Cause.SERVO_ALERT, BusPhase.STOPPED),
+        (lambda s: s.modify_servo(5, lambda servo: servo.heat(75.0)), Cause.HOT, BusPhase.DISARMED),
+        (lambda s: s.modify_servo(5, lambda servo: setattr(servo, "supply_v", 10.0)), Cause.VOLTAGE_LOW, BusPhase.DISARMED),
+        (lambda s: s.modify_servo(5, lambda servo: servo.freeze(True)), Cause.TRACKING, BusPhase.STOPPED),
     ],
     ids=["21 silent", "22 noise", "23 overload", "24 hot", "24 voltage", "25 jam"],
 )
@@ -494,7 +494,7 @@ def test_faults_end_the_motion(
 def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot) -> None:
     """It is silent for 0.3 s, and then has lost its settings and its zero."""
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
-    servos.stir(6, lambda servo: servo.restart())
+    servos.modify_servo(6, lambda servo: servo.restart())
     status = _drive(armed, until=lambda status: status.latched is not None)
     assert not status.armed
     _seen(armed, lambda status: status.restarts > 0)

@@ -268,7 +268,7 @@ def test_requests_that_follow_each_other_ask_for_different_lengths(twin: SoftSer
 
 def test_a_goal_with_a_header_arrives_and_is_read_back(twin: SoftServoBus, bus: ServoBus) -> None:
     """-131073 ticks are FF FF FD FF in the packet to the servo, and FF FF FD in its answer."""
-    twin.stir(1, lambda servo: servo.turn(-131_073 - servo.table["present_position"]))
+    twin.modify_servo(1, lambda servo: servo.turn(-131_073 - servo.table["present_position"]))
     bus.set_zero()
     bus.arm()
     assert bus.write([0.0] * 7) == (0.0,) * 7
@@ -356,7 +356,7 @@ def test_a_servo_with_another_id_is_named_and_so_are_those_found(twin: SoftServo
 def test_a_wrong_model_and_a_wrong_id_are_refused(
     twin: SoftServoBus, closed: ServoBus, register: str, value: int, words: str
 ) -> None:
-    twin.stir(4, lambda servo: servo.table.__setitem__(register, value))
+    twin.modify_servo(4, lambda servo: servo.table.__setitem__(register, value))
     with pytest.raises(WrongServo, match=rf"servo down \(id 4\) {words}"):
         closed.open()
     assert not closed.is_open
@@ -364,7 +364,7 @@ def test_a_wrong_model_and_a_wrong_id_are_refused(
 
 def test_a_mode_that_was_altered_is_mended_but_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
     armed.torque_off()
-    twin.stir(2, lambda servo: servo.answer(3, 11, data=b"\3"))
+    twin.modify_servo(2, lambda servo: servo.answer(3, 11, data=b"\3"))
     with pytest.raises(NotReady, match="not zeroed: left"):
         armed.arm()
     assert not armed.is_armed
@@ -400,7 +400,7 @@ def test_one_thread_owns_it(bus: ServoBus) -> None:
 
 
 def test_a_servo_that_was_told_not_to_answer_writes_is_told_otherwise(twin: SoftServoBus, closed: ServoBus) -> None:
-    twin.stir(1, lambda servo: servo.table.__setitem__("status_return", 1))
+    twin.modify_servo(1, lambda servo: servo.table.__setitem__("status_return", 1))
     closed.open()
 
 
@@ -446,7 +446,7 @@ def test_a_servo_that_was_changed_since_the_opening_is_not_armed(
 ) -> None:
     """Nor does it cost the others their hold."""
     armed.disarm()
-    twin.stir(4, lambda servo: (servo.table.__setitem__("model_number", model), servo.table.__setitem__("id", servo_id)))
+    twin.modify_servo(4, lambda servo: (servo.table.__setitem__("model_number", model), servo.table.__setitem__("id", servo_id)))
     with pytest.raises(WrongServo, match=r"servo down \(id 4\)"):
         armed.arm()
     assert not armed.is_armed
@@ -471,7 +471,7 @@ def test_a_servo_that_keeps_another_profile_is_not_armed(
 def test_connecting_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, register: str) -> None:
     """Another speed in the settings is another velocity limit, and that can only be written with the torque off."""
     armed.close()
-    twin.stir(3, lambda servo: servo.table.__setitem__(register, 7))
+    twin.modify_servo(3, lambda servo: servo.table.__setitem__(register, 7))
     before = twin.positions_mm()
     armed.open()
     assert _torques(twin) == [1] * 7
@@ -485,7 +485,7 @@ def test_connecting_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, regi
 
 def test_a_servo_that_holds_in_another_mode_is_not_zeroed_before_it_was_let_go(twin: SoftServoBus, armed: ServoBus) -> None:
     armed.close()
-    twin.stir(3, lambda servo: servo.table.__setitem__("drive_mode", 1))
+    twin.modify_servo(3, lambda servo: servo.table.__setitem__("drive_mode", 1))
     armed.open()
     assert _torques(twin) == [1] * 7
     with pytest.raises(NotReady, match=r"servo up \(id 3\) holds in a mode of another program: switch the torque off"):
@@ -504,7 +504,7 @@ def test_opened_again_the_eeprom_is_not_written_again(twin: SoftServoBus, bus: S
 
 
 def test_arming_does_not_move_anything(twin: SoftServoBus, bus: ServoBus) -> None:
-    twin.stir(5, lambda servo: servo.turn(700))  # its goal register still says the old place
+    twin.modify_servo(5, lambda servo: servo.turn(700))  # its goal register still says the old place
     bus.set_zero()
     before = twin.positions_mm()
     bus.arm()
@@ -522,7 +522,7 @@ def test_not_armed_without_zeros(bus: ServoBus) -> None:
 
 def test_not_armed_with_a_hardware_error(twin: SoftServoBus, bus: ServoBus) -> None:
     bus.set_zero()
-    twin.stir(6, lambda servo: servo.alert(32))
+    twin.modify_servo(6, lambda servo: servo.alert(32))
     with pytest.raises(NotReady, match=r"servo delivery_1 \(id 6\) reports overload: .* reboot"):
         bus.arm()
 
@@ -737,7 +737,7 @@ def test_22_a_late_answer_is_never_taken_for_a_new_one(twin: SoftServoBus, bus: 
     _states(bus)
     twin.faults.delay(4, 0.08)
     assert isinstance(bus.read()[3], MissingServo)
-    twin.stir(4, lambda servo: servo.turn(500))
+    twin.modify_servo(4, lambda servo: servo.turn(500))
     twin.faults.delay(4, 0.0)
     for _ in range(10):
         reading = bus.read()[3]
@@ -750,7 +750,7 @@ def test_22_a_late_answer_to_a_single_request(twin: SoftServoBus, bus: ServoBus)
     twin.faults.delay(4, 0.05)
     with pytest.raises(NoAnswer, match="servo 4: no answer, 3 times"):
         bus.set_zero()
-    twin.stir(4, lambda servo: servo.turn(500))
+    twin.modify_servo(4, lambda servo: servo.turn(500))
     twin.faults.delay(4, 0.0)
     bus.set_zero()
     assert bus.zero_ticks[3] == 1504
@@ -758,7 +758,7 @@ def test_22_a_late_answer_to_a_single_request(twin: SoftServoBus, bus: ServoBus)
 
 @pytest.mark.parametrize("bits", [1, 4, 32])
 def test_23_an_alert_is_read(twin: SoftServoBus, armed: ServoBus, bits: int) -> None:
-    twin.stir(2, lambda servo: servo.alert(bits))
+    twin.modify_servo(2, lambda servo: servo.alert(bits))
     state = _states(armed)[1]
     assert state.error == HardwareError(bits)
     assert state.torque == (bits == 1)
@@ -766,8 +766,8 @@ def test_23_an_alert_is_read(twin: SoftServoBus, armed: ServoBus, bits: int) -> 
 
 
 def test_24_heat_and_voltage_are_told(twin: SoftServoBus, armed: ServoBus) -> None:
-    twin.stir(2, lambda servo: servo.heat(72.0))
-    twin.stir(5, lambda servo: setattr(servo, "supply_v", 10.2))
+    twin.modify_servo(2, lambda servo: servo.heat(72.0))
+    twin.modify_servo(5, lambda servo: setattr(servo, "supply_v", 10.2))
     states = _states(armed)
     assert states[1].temperature_c == pytest.approx(72.0)
     assert states[4].voltage_v == pytest.approx(10.2)
@@ -779,7 +779,7 @@ def test_25_a_jam_shows_as_distance_current_and_then_overload(twin: SoftServoBus
     bus.open()
     bus.set_zero()
     bus.arm()
-    twin.stir(1, lambda servo: servo.freeze(True))
+    twin.modify_servo(1, lambda servo: servo.freeze(True))
     bus.write([2.0] + [0.0] * 6)
     time.sleep(0.3)
     state = _states(bus)[0]
@@ -839,7 +839,7 @@ def test_26_an_adapter_that_takes_no_bytes_is_lost_at_once(
 
 
 def test_27_a_restarted_servo_is_noticed_disarmed_and_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
-    twin.stir(3, lambda servo: servo.restart(silent_s=0.0))
+    twin.modify_servo(3, lambda servo: servo.restart(silent_s=0.0))
     reading = armed.read()[2]
     assert isinstance(reading, MissingServo)
     assert reading.restarted
@@ -858,7 +858,7 @@ def test_27_a_restarted_servo_is_noticed_disarmed_and_must_be_zeroed(twin: SoftS
 def test_27_a_servo_that_restarts_between_disarming_and_arming_is_not_armed(twin: SoftServoBus, armed: ServoBus) -> None:
     """Nobody has read it meanwhile: the block that it has forgotten is the only sign, and arming must not wipe it off."""
     armed.disarm()
-    twin.stir(5, lambda servo: servo.restart(silent_s=0.0))
+    twin.modify_servo(5, lambda servo: servo.restart(silent_s=0.0))
     with pytest.raises(NotReady, match="not zeroed: advance "):
         armed.arm()
     assert not armed.is_armed
@@ -870,8 +870,8 @@ def test_27_a_servo_that_restarts_between_disarming_and_arming_is_not_armed(twin
 
 
 def test_27_a_reboot_clears_the_error_and_the_turns(twin: SoftServoBus, bus: ServoBus) -> None:
-    twin.stir(5, lambda servo: servo.turn(3 * 4096))
-    twin.stir(5, lambda servo: servo.alert(32))
+    twin.modify_servo(5, lambda servo: servo.turn(3 * 4096))
+    twin.modify_servo(5, lambda servo: servo.alert(32))
     bus.set_zero()
     bus.reboot(5)
     assert bus.zero_ticks[4] is None
@@ -923,7 +923,7 @@ def test_who_stops_talking_is_held_by_the_watchdog(twin: SoftServoBus, armed: Se
 
 def test_without_power_for_a_moment_all_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
     for joint in CONFIG.joints:
-        twin.stir(joint.id, lambda servo: servo.restart())
+        twin.modify_servo(joint.id, lambda servo: servo.restart())
     for _ in range(60):
         readings = armed.read()
         if all(isinstance(reading, ServoState) for reading in readings):

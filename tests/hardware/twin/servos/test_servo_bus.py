@@ -143,7 +143,7 @@ def test_indirect_data_come_from_where_the_address_points_and_are_zero_after_pow
     table["present_position"] = -2
     table.write(168, b"".join(register.to_bytes(2, "little") for register in (132, 133, 144)))
     assert table.read(224, 3) == (0, b"\xfe\xff\x78")
-    table.forget()
+    table.reset_ram()
     assert table.read(224, 3) == (0, b"\0\0\0")
 
 
@@ -294,7 +294,7 @@ def test_whatever_is_heard_feeds_the_watchdog() -> None:
     servo = _armed(SoftServo(1, 1020, 0), watchdog=10)
     for tick in range(100):
         servo.advance(tick * 0.1)
-        servo.hear()
+        servo.feed_watchdog()
     assert servo.table["watchdog"] == 10
 
 
@@ -369,7 +369,7 @@ def test_an_unstuffed_goal_is_ignored_though_the_sdk_calls_it_a_success(bus: Sof
     """-131073 is FF FF FD FF: the SDK's sender drops its own stuffing."""
     sdk = Protocol2PacketHandler()
     for joint in CONFIG.joints:
-        bus.stir(joint.id, lambda servo: servo.answer(3, 11, data=b"\4"))
+        bus.modify_servo(joint.id, lambda servo: servo.answer(3, 11, data=b"\4"))
     group = GroupSyncWrite(port, sdk, 116, 4)
     for joint in CONFIG.joints:
         group.addParam(joint.id, list((-131073).to_bytes(4, "little", signed=True)))
@@ -380,7 +380,7 @@ def test_an_unstuffed_goal_is_ignored_though_the_sdk_calls_it_a_success(bus: Sof
 
 
 def test_started_again_the_servos_are_as_they_were(bus: SoftServoBus) -> None:
-    bus.stir(3, lambda servo: servo.turn(50))
+    bus.modify_servo(3, lambda servo: servo.turn(50))
     bus.stop()
     bus.start()
     assert bus.positions_mm()[2] == pytest.approx(50 / 102.4)

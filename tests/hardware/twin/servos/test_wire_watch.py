@@ -39,7 +39,7 @@ def servo() -> SoftServo:
 @pytest.fixture
 def watch(servo: SoftServo) -> WireMonitor:
     watch = WireMonitor(SERVOS)
-    watch.zeroed([servo])
+    watch.set_zero([servo])
     return watch
 
 
@@ -54,50 +54,50 @@ def mm(distance: float) -> int:
 )
 def test_a_goal_is_near_the_horn(watch: WireMonitor, servo: SoftServo, distance: float, words: str | None) -> None:
     """A feed's step is 1 mm; at 20 mm/s it moves 4 mm while a reading and an order grow old."""
-    watch.see(goal(mm(distance)), {ADVANCE: servo}, 10.0)
-    assert watch.seen.unsafe == (0 if words is None else len(watch.seen.texts))
-    assert (words is None) == (watch.seen.unsafe == 0)
-    assert words is None or words in watch.seen.texts[0]
+    watch.check_packet(goal(mm(distance)), {ADVANCE: servo}, 10.0)
+    assert watch.report.unsafe == (0 if words is None else len(watch.report.texts))
+    assert (words is None) == (watch.report.unsafe == 0)
+    assert words is None or words in watch.report.texts[0]
 
 
 def test_a_goal_is_inside_the_envelope_unless_the_joint_itself_is_not(watch: WireMonitor) -> None:
     """It ends at -5 mm; the joint's zero is at 1000."""
     near = {ADVANCE: servo_at(mm(-4.8))}
-    watch.see(goal(mm(-5.0)), near, 10.0)
-    assert watch.seen.unsafe == 0
-    watch.see(goal(mm(-5.2)), near, 10.02)
-    assert watch.seen.texts == ["advance: goal -5.20 mm (-5 to 400 mm)"]
-    watch.see(goal(mm(-6.0)), {ADVANCE: servo_at(mm(-6.0))}, 10.04)  # held where it is
-    assert watch.seen.unsafe == 1
+    watch.check_packet(goal(mm(-5.0)), near, 10.0)
+    assert watch.report.unsafe == 0
+    watch.check_packet(goal(mm(-5.2)), near, 10.02)
+    assert watch.report.texts == ["advance: goal -5.20 mm (-5 to 400 mm)"]
+    watch.check_packet(goal(mm(-6.0)), {ADVANCE: servo_at(mm(-6.0))}, 10.04)  # held where it is
+    assert watch.report.unsafe == 1
 
 
 def test_goals_do_not_leap_to_and_fro(watch: WireMonitor, servo: SoftServo) -> None:
-    watch.see(goal(mm(-4.5)), {ADVANCE: servo}, 10.0)
-    watch.see(goal(mm(4.5)), {ADVANCE: servo}, 10.02)
-    assert "leaps by 9.00 mm" in watch.seen.texts[0]
+    watch.check_packet(goal(mm(-4.5)), {ADVANCE: servo}, 10.0)
+    watch.check_packet(goal(mm(4.5)), {ADVANCE: servo}, 10.02)
+    assert "leaps by 9.00 mm" in watch.report.texts[0]
 
 
 def test_after_stop_nothing_moves_until_it_is_acknowledged(watch: WireMonitor, servo: SoftServo) -> None:
-    watch.stopped(10.0)
-    watch.see(goal(mm(0.9)), {ADVANCE: servo}, 10.3)  # on its way already
-    watch.see(goal(mm(0.1)), {ADVANCE: servo}, 11.0)
-    assert watch.seen.unsafe == 0
-    watch.see(goal(mm(0.9)), {ADVANCE: servo}, 11.0)
-    assert "after STOP" in watch.seen.texts[0]
-    watch.stopped(None)
-    watch.see(goal(mm(0.9)), {ADVANCE: servo}, 11.02)
-    assert watch.seen.unsafe == 1
+    watch.set_stop(10.0)
+    watch.check_packet(goal(mm(0.9)), {ADVANCE: servo}, 10.3)  # on its way already
+    watch.check_packet(goal(mm(0.1)), {ADVANCE: servo}, 11.0)
+    assert watch.report.unsafe == 0
+    watch.check_packet(goal(mm(0.9)), {ADVANCE: servo}, 11.0)
+    assert "after STOP" in watch.report.texts[0]
+    watch.set_stop(None)
+    watch.check_packet(goal(mm(0.9)), {ADVANCE: servo}, 11.02)
+    assert watch.report.unsafe == 1
 
 
 def test_torque_comes_on_only_where_the_goal_is(watch: WireMonitor, servo: SoftServo) -> None:
     servo.table["torque"] = 0
     servo.table["goal_position"] = mm(2.0)
     on = InstructionPacket(ADVANCE, Instruction.WRITE, (64).to_bytes(2, "little") + b"\1")
-    watch.see(on, {ADVANCE: servo}, 10.0)
-    assert "torque on with its goal 2.00 mm away" in watch.seen.texts[0]
+    watch.check_packet(on, {ADVANCE: servo}, 10.0)
+    assert "torque on with its goal 2.00 mm away" in watch.report.texts[0]
     servo.table["goal_position"] = mm(0.0)
-    watch.see(on, {ADVANCE: servo}, 10.0)
-    assert watch.seen.unsafe == 1
+    watch.check_packet(on, {ADVANCE: servo}, 10.0)
+    assert watch.report.unsafe == 1
 
 
 @pytest.fixture
@@ -114,7 +114,7 @@ def test_a_real_motion_is_seen_and_safe(bus: MonitoredBus) -> None:
     robot.connect()
     try:
         robot.zero()
-        bus.zeroed()
+        bus.set_zero()
         robot.arm()
         until_s = time.monotonic() + 20.0
         while bus.positions_mm()[4] < 2.0 and time.monotonic() < until_s:
@@ -123,6 +123,6 @@ def test_a_real_motion_is_seen_and_safe(bus: MonitoredBus) -> None:
     finally:
         robot.close()
     assert bus.positions_mm()[4] >= 2.0
-    seen = bus._watch.seen
+    seen = bus._monitor.report
     assert seen.goals > 7
     assert seen.texts == []
