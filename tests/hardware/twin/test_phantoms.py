@@ -58,11 +58,9 @@ def test_a_phantom_is_fit_for_the_bench(name: str) -> None:
     assert phantom.name == name
     assert reachable(phantom) == set(range(len(phantom.graph.nodes)))
     assert phantom.port not in phantom.targets
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_centerlines_are_dense_smooth_and_end_in_their_nodes(name: str) -> None:
-    phantom = make_phantom(name)
+    x, y = phantom.graph.nodes[phantom.port]
+    assert -2.0 <= min(x, y, BOARD_MM[0] - x, BOARD_MM[1] - y) <= 0.0, "the port lies at the edge of the board"
+    # Centerlines are dense, smooth and end in their nodes.
     for edge in phantom.graph.edges:
         steps = np.linalg.norm(np.diff(edge.points, axis=0), axis=1)
         assert steps.max() <= 0.5
@@ -72,13 +70,6 @@ def test_centerlines_are_dense_smooth_and_end_in_their_nodes(name: str) -> None:
         assert 3.3 <= edge.radius.min() and edge.radius.max() <= 12.0
         # No jump of the lumen's radius: at most 0.3 mm per mm.
         assert np.abs(np.diff(edge.radius) / steps).max() < 0.3
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_the_port_lies_at_the_edge_of_the_board(name: str) -> None:
-    phantom = make_phantom(name)
-    x, y = phantom.graph.nodes[phantom.port]
-    assert -2.0 <= min(x, y, BOARD_MM[0] - x, BOARD_MM[1] - y) <= 0.0
 
 
 @pytest.mark.parametrize("name", PHANTOM_NAMES)

@@ -1,15 +1,19 @@
-"""The bench twin as a whole: lock-step and bit-equal, or alive in its own thread; its camera passes the cameras' contract."""
+"""The bench twin as a whole, in lock-step (bit-equal) and in real time, with its camera and robot."""
 
+import math
+import threading
 import time
 
 import numpy as np
 import pytest
 
 from core.config.models import Config, TwinConfig
-from core.devices import DeviceError
+from core.devices import DeviceError, Robot
 from core.types import Command
 from hardware.rig import RigKind, open_rig
-from hardware.twin.world import TwinCamera, TwinWorld
+from hardware.twin.phantoms import make_phantom
+from hardware.twin.physics import TwinPhysics
+from hardware.twin.world import MAX_ADVANCE_MM_S, MAX_DELIVERY_MM_S, TwinCamera, TwinRobot, TwinWorld
 
 
 def _world(**changes: object) -> TwinWorld:
@@ -46,7 +50,7 @@ def test_inserting_shows_a_robot_with_a_truth() -> None:
     assert not picture.robot[0:2, 0:2].any()
 
 
-def test_the_living_camera_gives_new_frames_and_stops() -> None:
+def test_the_real_time_camera_gives_new_frames_and_stops() -> None:
     world = _world()
     camera = TwinCamera(world)
     camera.open()
@@ -96,7 +100,7 @@ def test_an_unknown_phantom_is_one_clear_line() -> None:
         open_rig(Config(twin=TwinConfig(phantom="nope")))
 
 
-def test_a_robot_whose_driver_falls_silent_is_held() -> None:
+def test_a_robot_without_new_commands_is_held() -> None:
     world = _world()
     world.robot.connect()
     world.robot.send(Command(bend=0.4, advance_mm_s=10.0))
@@ -127,3 +131,72 @@ def test_a_target_gives_the_truth_a_route() -> None:
     ends = [world.view.project(world.phantom.graph.nodes[node : node + 1])[0] for node in world.phantom.targets]
     for end in ends:
         assert world.truth((float(end[0]), float(end[1]))).pose is not None
+
+
+@pytest.fixture(scope="module")
+def physics() -> TwinPhysics:
+    return TwinPhysics(make_phantom("y_branch"))
+
+
+@pytest.fixture
+def robot(physics: TwinPhysics) -> TwinRobot:
+    physics.reset()
+    robot = TwinRobot(physics)
+    robot.connect()
+    return robot
+
+
+@pytest.mark.parametrize(
+    ("asked", "sent"),
+    [
+        (Command(0.3, -0.2, 5.0, -1.0), Command(0.3, -0.2, 5.0, -1.0)),
+        (Command(bend=3.0), Command(bend=1.0)),
+        (Command(bend=-1.001, pitch=2.0), Command(bend=-1.0, pitch=1.0)),
+        (Command(advance_mm_s=1e9), Command(advance_mm_s=MAX_ADVANCE_MM_S)),
+        (Command(advance_mm_s=-1e9), Command(advance_mm_s=-MAX_ADVANCE_MM_S)),
+        (Command(delivery_mm_s=99.0), Command(delivery_mm_s=MAX_DELIVERY_MM_S)),
+    ],
+)
+def test_commands_are_clamped(robot: TwinRobot, asked: Command, sent: Command) -> None:
+    as_protocol: Robot = robot
+    assert as_protocol.status().insertion_mm == 0.0
+    assert robot.send(asked) == sent
+    assert robot.current_command == sent
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("key", ["bend", "pitch", "advance_mm_s", "delivery_mm_s"])
+def test_a_command_that_is_not_finite_is_refused(robot: TwinRobot, key: str, bad: float) -> None:
+    before = robot.send(Command(bend=0.1))
+    with pytest.raises(ValueError, match="not finite"):
+        robot.send(Command(**{key: bad}))
+    assert robot.current_command == before
+
+
+def test_a_closed_robot_holds_with_its_bend_and_refuses_until_connected_again(robot: TwinRobot) -> None:
+    robot.send(Command(bend=0.4, pitch=0.1, advance_mm_s=5.0, delivery_mm_s=2.0))
+    robot.close()
+    robot.close()
+    assert robot.current_command == Command(bend=0.4, pitch=0.1)
+    with pytest.raises(DeviceError, match="connect"):
+        robot.send(Command(advance_mm_s=1.0))
+    robot.connect()
+    assert robot.current_command == Command()
+
+
+def test_status_and_commands_come_from_other_threads_while_it_steps(robot: TwinRobot, physics: TwinPhysics) -> None:
+    done, seen = threading.Event(), []
+
+    def operate() -> None:
+        while not done.is_set():
+            robot.send(Command(bend=0.2, advance_mm_s=20.0))
+            seen.append(robot.status())
+
+    operator = threading.Thread(target=operate)
+    operator.start()
+    for _ in range(25):
+        physics.step(robot.current_command, 0.02)
+    done.set()
+    operator.join()
+    assert physics.insertion_mm == pytest.approx(10.0, abs=1.5)
+    assert all(later.time_s >= earlier.time_s for earlier, later in zip(seen, seen[1:], strict=False))

@@ -1,4 +1,4 @@
-"""The twin's pictures: labels against brute force, pictures against their labels, looks against their ranges."""
+"""The twin's pictures: labels by brute force, pictures by their labels, looks by their ranges."""
 
 from __future__ import annotations
 
@@ -67,18 +67,15 @@ def test_vessel_label_is_the_union_of_discs_at_pixel_centres() -> None:
     assert _disagree(picture.vessel, depth) == 0
 
 
-def test_robot_label_is_the_distance_to_its_line_with_round_ends() -> None:
-    robot = _robot()
+@pytest.mark.parametrize(
+    "robot",
+    [_robot(), np.array([[20.0, 80], [70, 80], [70, 60], [60.5, 60], [60, 60], [60, 95], [90, 70]])],
+    ids=["wavy", "crosses itself"],
+)
+def test_robot_label_is_the_distance_to_its_line_with_round_ends(robot: Points) -> None:
     distance = _distance_to_line(BENT_VIEW.grid_mm().reshape(-1, 2), robot)
     picture = Renderer(PHANTOM, QUIET, SMALL, view=BENT_VIEW).render(robot)
     assert picture.robot.sum() > 80
-    assert _disagree(picture.robot, distance - QUIET.robot_radius_mm) == 0
-
-
-def test_robot_that_crosses_itself_and_uneven_pieces() -> None:
-    robot = np.array([[20.0, 80], [70, 80], [70, 60], [60.5, 60], [60, 60], [60, 95], [90, 70]])
-    distance = _distance_to_line(BENT_VIEW.grid_mm().reshape(-1, 2), robot)
-    picture = Renderer(PHANTOM, QUIET, SMALL, view=BENT_VIEW).render(robot)
     assert _disagree(picture.robot, distance - QUIET.robot_radius_mm) == 0
 
 
@@ -99,7 +96,7 @@ def test_robot_is_labelled_up_to_the_image_border() -> None:
     assert picture.robot[:, 0].any()
 
 
-def test_foreign_things_change_the_picture_but_no_label() -> None:
+def test_objects_change_the_picture_but_no_label() -> None:
     bare = replace(QUIET, fittings=0, cables=0, labels=0, stains=0, dust=0, end_fittings=False, lamps=0)
     full = replace(bare, fittings=6, cables=4, labels=3, stains=3, dust=50, end_fittings=True, lamps=5, ruler=True, objects=3)
     empty, crowded = (Renderer(PHANTOM, appearance, seed=3).render(_robot()) for appearance in (bare, full))
