@@ -138,6 +138,7 @@ _ROBOT: Table = {
     "sheath_rgb": either(0.5, grey(0.1, 0.95, 0.05), any_hue((0.2, 0.8), (0.4, 0.95))),
     "sheath_opacity": uniform(0.25, 0.7),
 }
+# All entries are drawn for every robot, whatever its look, so that the draws after them are the same.
 _ROBOT_LOOKS: dict[str, Table] = {
     "ringed": {},
     "plain_dark": {},
@@ -152,7 +153,6 @@ _ROBOT_LOOKS: dict[str, Table] = {
     "banded": {"robot_rgb": grey(0.75, 0.95, 0.03), "robot_accent_rgb": grey(0.02, 0.25, 0.02)},
     "coloured": {"robot_rgb": any_hue((0.5, 1.0), (0.35, 0.95))},
 }
-"""What each look changes of ``_ROBOT``; all are drawn for every robot, so that a look more at the end changes no other one."""
 ROBOT_LOOKS = tuple(_ROBOT_LOOKS)
 
 _COMMON: Table = {

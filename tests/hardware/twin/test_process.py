@@ -1,4 +1,4 @@
-"""The twin in a process of its own: pictures, truth and servos come through, and neither side outlives the other unnoticed."""
+"""The twin in a process of its own: pictures, status and servos, and the end of either side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The twin's servos: strict about the protocol, honest about motion, heat and shut-downs, tied to the robot's mechanics."""
+"""The software servos: protocol, control table, motion, heat and protection, and their link to the robot's mechanics."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_stuffing_by_hand() -> None:
 
 
 @given(st.lists(st.sampled_from([0xFF, 0xFD, 0x00, 0x03])).map(bytes))
-def test_stuffed_there_is_no_header_and_back_it_is_the_same(body: bytes) -> None:
+def test_stuffing_leaves_no_header_and_is_reversible(body: bytes) -> None:
     assert all(
         stuff(body)[at + 3 : at + 4] == b"\xfd" for at in range(len(stuff(body))) if stuff(body)[at : at + 3] == b"\xff\xff\xfd"
     )
@@ -87,7 +87,7 @@ def test_a_packet_is_found_however_it_is_cut(data: bytes, size: int) -> None:
 
 
 @pytest.mark.parametrize("at", range(len(PING)))
-def test_one_wrong_byte_and_it_is_not_heard(at: int) -> None:
+def test_a_packet_with_a_wrong_byte_is_ignored(at: int) -> None:
     assert PacketParser().feed(PING[:at] + bytes([PING[at] ^ 0x10]) + PING[at + 1 :]) == []
 
 
@@ -114,17 +114,6 @@ def test_a_bare_header_inside_begins_a_new_packet() -> None:
         (98, b"\x80", RANGE),
         (112, (201).to_bytes(4, "little"), LIMIT),
         (168, (10).to_bytes(2, "little"), RANGE),
-    ],
-    ids=[
-        "goal",
-        "half a goal",
-        "goal beyond 256 turns",
-        "in the middle",
-        "read-only",
-        "mode",
-        "watchdog",
-        "too fast",
-        "indirect to EEPROM",
     ],
 )
 def test_what_may_be_written(address: int, data: bytes, error: int) -> None:
@@ -290,7 +279,7 @@ def test_a_silent_line_trips_the_watchdog_which_holds_and_locks_the_goals() -> N
     assert _goal(servo, 5) == 0
 
 
-def test_whatever_is_heard_feeds_the_watchdog() -> None:
+def test_any_packet_feeds_the_watchdog() -> None:
     servo = _armed(SoftServo(1, 1020, 0), watchdog=10)
     for tick in range(100):
         servo.advance(tick * 0.1)
@@ -358,7 +347,7 @@ def test_the_vendors_sdk_finds_all_seven(port: PortHandler) -> None:
     assert _ping(port, 8)[1] == COMM_RX_TIMEOUT
 
 
-def test_they_hear_nothing_at_another_speed(port: PortHandler) -> None:
+def test_packets_at_another_speed_are_ignored(port: PortHandler) -> None:
     port.setBaudRate(57600)
     assert _ping(port, 1)[1] == COMM_RX_TIMEOUT
     port.setBaudRate(1_000_000)
@@ -428,7 +417,7 @@ def test_what_is_fed_is_the_joints_way_however_time_is_cut(cut: int) -> None:
     assert fed == pytest.approx(12.0)
 
 
-def test_the_servos_move_the_twins_robot_and_feel_its_wires() -> None:
+def test_the_servos_move_the_twins_robot_and_get_its_loads() -> None:
     now = [0.0]
     config = CONFIG
     bus = SoftServoBus(config, clock=lambda: now[0])

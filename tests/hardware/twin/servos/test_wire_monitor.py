@@ -1,4 +1,4 @@
-"""The witness on the wire: what it calls unsafe, packet by packet, and that a healthy motion is none of it."""
+"""The wire monitor: which packets are unsafe, and that a healthy motion has no unsafe one."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_a_goal_is_inside_the_envelope_unless_the_joint_itself_is_not(watch: Wir
     assert watch.report.unsafe == 1
 
 
-def test_goals_do_not_leap_to_and_fro(watch: WireMonitor, servo: SoftServo) -> None:
+def test_a_leap_between_goals_is_unsafe(watch: WireMonitor, servo: SoftServo) -> None:
     watch.check_packet(goal(mm(-4.5)), {ADVANCE: servo}, 10.0)
     watch.check_packet(goal(mm(4.5)), {ADVANCE: servo}, 10.02)
     assert "leaps by 9.00 mm" in watch.report.texts[0]
@@ -109,7 +109,7 @@ def bus() -> Iterator[MonitoredBus]:
 
 
 @pytest.mark.real_time
-def test_a_real_motion_is_seen_and_safe(bus: MonitoredBus) -> None:
+def test_a_real_motion_is_monitored_and_safe(bus: MonitoredBus) -> None:
     robot = ServoRobot(SERVOS.model_copy(update={"port": bus.port, "watchdog_s": 2.5, "heartbeat_timeout_s": 3.0}), SafetyConfig())
     robot.connect()
     try:
