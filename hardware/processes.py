@@ -208,8 +208,12 @@ class ParentLink:
         """Set `ended` when the parent closes its ends or is gone. For a thread of a child that takes no requests."""
         while not self.is_alone:
             ready, _, _ = select.select([self.socket], [], [], PARENT_CHECK_S)
-            with contextlib.suppress(BlockingIOError):
+            try:
                 self._is_cut = bool(ready) and not self.socket.recv(MESSAGE_BYTES)
+            except BlockingIOError:
+                continue
+            except OSError:  # the parent ended with a message unread
+                self._is_cut = True
         ended.set()
 
     def close(self) -> None:

@@ -47,7 +47,7 @@ from app.commands.options import ConfigOption
 from app.commands.synth import make_set
 from app.operator.preflight import PreflightModel
 from app.operator.preflight_list import PreflightList
-from app.operator.startup import WindowServices
+from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.player.window import PlayerWindow
 from app.rig_wizard.model import RigWizardModel

@@ -343,9 +343,11 @@ def run_annotate(options: AnnotateOptions) -> int:
 
 
 def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
-    from app.ui.window_base import check_display, make_application, run_until_closed
+    from app.ui.display import check_display
 
     check_display()
+    from app.ui.window_base import make_application, run_until_closed
+
     rater = rater_name(options.study)
     files = image_files(paths, options.frames)
     with AnnotationStore(store_path) as store:

@@ -184,10 +184,12 @@ def play(
     against: Annotated[Path | None, typer.Option(help="results of replay --jsonl, shown beside the recording")] = None,
 ) -> None:
     """The player: a recorded session with everything that was understood, frame by frame."""
-    from app.ui.window_base import check_display, make_application, run_until_closed
-    from core.perception import compiled
+    from app.ui.display import check_display
 
     check_display()
+    from app.ui.window_base import make_application, run_until_closed
+    from core.perception import compiled
+
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     if against is not None and not against.is_file():
         raise UserError(f"{against}: no such file; write one with: replay SESSION --jsonl FILE")

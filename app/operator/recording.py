@@ -249,7 +249,7 @@ class RecoveryController(QObject):
         self._work.failed.connect(self._on_search_failed)
 
     def search(self, *, again: bool = False) -> None:
-        """Search cut sessions; `again`: also those that were declined, and say without any."""
+        """Search cut sessions; `again`: also those that were declined, and a line if there was nothing."""
         if self._child is not None or self._waiting or self._is_closed:
             return
         self._says_none = again

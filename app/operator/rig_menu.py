@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer, Slot
 from PySide6.QtGui import QAction, QActionGroup
@@ -22,9 +24,12 @@ from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.models import Config
 from core.config.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
 from core.control.modes import ARMED_MODES, Mode
-from core.types import Point
+from core.types import Frame, Point, Scene
 from hardware.cameras.kinds import FoundCamera
 from hardware.rig import RigKind, find_devices, kind_of, with_camera
+
+if TYPE_CHECKING:
+    from hardware.calibration.bench import CalibrationBench
 
 _CLOSING = mark("Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again")
 _SLOW_MS = 3000
@@ -41,6 +46,12 @@ class _WizardRequest:
     order: int = 0
 
 
+def _open_bench(config: Config, perceive: Callable[[Frame], Scene]) -> CalibrationBench:
+    from hardware.calibration.bench import open_bench  # loads what only a wizard needs
+
+    return open_bench(config, perceive)
+
+
 class RigMenuController(QObject):
     """Lives as long as the window.
 
@@ -52,10 +63,8 @@ class RigMenuController(QObject):
 
     def __init__(self, window: OperatorWindow, open_bench: OpenBench | None = None, make_sight: MakeSight = quick_sight) -> None:
         super().__init__(window)
-        from hardware.calibration import bench  # loads what only a wizard needs
-
         self._window, self._rig = window, window.rig
-        self._open_bench, self._make_sight = open_bench or bench.open_bench, make_sight
+        self._open_bench, self._make_sight = open_bench or _open_bench, make_sight
         self._request: _WizardRequest | None = None
         self._saved = ""
         self.wizard: RigWizard | None = None

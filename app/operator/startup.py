@@ -1,4 +1,4 @@
-"""Opens the operator window on a rig, with what it does beside driving: sessions, checks, models, training, crashes, tour."""
+"""Opens the operator window on a rig. Imports that are slow to load come after the child processes have been started."""
 
 from __future__ import annotations
 
@@ -7,42 +7,22 @@ import json
 import logging
 import sys
 import time
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import platformdirs
-from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QFileDialog, QMessageBox
-
-from app.annotator.sources import default_store
-from app.operator.engine_thread import EnginePhase
-from app.operator.models import ModelMenu
-from app.operator.preflight import PreflightModel
-from app.operator.preflight_list import PreflightList
-from app.operator.recording import AfterSession, Declined, RecoveryController, open_file
-from app.operator.rig_session import StopOutcome
-from app.operator.window import OperatorWindow
-from app.training.dialog import TrainingDialog
-from app.training.model import collect_from_file
-from app.ui.actions import MenuEntry, add_menu
-from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
-from app.ui.i18n import tr
-from app.ui.texts import OperatorStep
-from app.ui.window_base import check_display, make_application, run_until_closed
-from app.widgets.messages import Offer, OfferButton
+from app.ui.display import check_display
 from core.config.files import settings_of_windows
-from core.config.models import Config, sessions_folder
-from core.control.modes import ARMED_MODES, Mode
+from core.config.models import Config
 from core.perception import compiled
-from core.session.writer import RecordStatus
 from core.types import Reason
 from hardware.rig import RigKind, rig_config, start_ahead
 from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
+    from PySide6.QtCore import QTimer
+
     from app.operator.rig_engine import EngineMaker
+    from app.operator.window import OperatorWindow
 
 
 def finish_loading() -> None:
@@ -76,9 +56,11 @@ def run_window(
     from app.operator.manual_drive import OperatorDevices
     from app.operator.rig_engine import EngineMaker
     from app.operator.rig_menu import RigMenuController
+    from app.operator.services import WindowServices, tour_at_start
     from app.settings.apply import SettingsController
     from app.ui.crash_report import CrashWatch, state_folder
     from app.ui.layout_state import LayoutState, Parts, overlay_switches
+    from app.ui.window_base import make_application, run_until_closed
 
     finish_loading()
     application = make_application(config.window)
@@ -140,268 +122,3 @@ def _leave_after_first_frame(window: OperatorWindow) -> QTimer:
     timer.timeout.connect(look)
     timer.start(5)
     return timer
-
-
-_SEARCH_AFTER_MS = 1500
-"""The rig is opened first; a search must not delay that."""
-_CRASH = "crash"
-
-
-class WindowServices(QObject):
-    """What the operator window does beside driving; all work is done in threads and processes of their own.
-
-    Parameters
-    ----------
-    window : not started yet.
-    state : folder of what the program keeps between runs.
-    watch : calls ``make_safe`` at an unforeseen error; installed and removed by its owner.
-    """
-
-    _crashed = Signal(object)
-    _stopped_again = Signal()
-
-    def __init__(self, window: OperatorWindow, state: Path, watch: CrashWatch | None = None) -> None:
-        super().__init__(window)
-        self._window, self._state = window, state
-        offers = window.panels.offers
-        self._offers = offers
-        self.after = AfterSession(offers, parent=self)
-        self.recovery = RecoveryController(
-            sessions_folder(window.rig.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
-        )
-        self.preflight = PreflightModel(lambda: window.rig.config, lambda: window.controls.view, self)
-        self.checks = PreflightList(self.preflight, window, window.panels.mode_bar.stop)
-        self.models = ModelMenu(window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.train)
-        self.training: TrainingDialog | None = None
-        self._saved: Path | None = None
-        self._is_recording = False
-        self._stopped = StopOutcome.UNKNOWN
-        self._wire()
-        self._add_menus()
-        if watch is not None:
-            watch.on_error, watch.on_report = self.make_safe, self._crashed.emit
-            # also from the window's own thread not before the slot that failed has returned
-            self._crashed.connect(self._show_crash, Qt.ConnectionType.QueuedConnection)
-            self._stopped_again.connect(self._report_stopped_again, Qt.ConnectionType.QueuedConnection)
-
-    def _wire(self) -> None:
-        window = self._window
-        for part in (self.after, self.recovery, self.models):
-            part.said.connect(window.say)
-        self.recovery.recovered.connect(self.after.offer)
-        window.recorder.changed.connect(self._on_recording)
-        window.rig.phase_changed.connect(self._on_phase)
-        window.rig.add_guard(self.preflight.may_ask)
-        self.preflight.asked.connect(self._on_not_armed)
-        self.checks.arm_asked.connect(partial(window.ask_step, OperatorStep.ARM))
-        self.models.chosen.connect(self._use_model)
-
-    def _add_menus(self) -> None:
-        window = self._window
-        session = [
-            MenuEntry(tr("&Evaluate the newest session"), partial(self._with_newest, self.after.evaluate)),
-            MenuEntry(tr("&Annotate the newest session"), partial(self._with_newest, self.after.annotate)),
-            MenuEntry(tr("&Play the newest session"), partial(self._with_newest, self.after.play)),
-            MenuEntry(tr("&Open another session..."), self._choose_session),
-            None,
-            MenuEntry(tr("Look for &cut sessions"), partial(self.recovery.search, again=True)),
-        ]
-        add_menu(window, tr("&Session"), session)
-        add_menu(window, tr("&Robot"), [MenuEntry(tr("Chec&ks before driving..."), self.checks.open_list, ("F2",))])
-
-    def start(self) -> None:
-        """Offer what the last run left: cut sessions, a crash report."""
-        QTimer.singleShot(_SEARCH_AFTER_MS, self, self.recovery.search)
-        crash = crash_of_last_run(self._state / "crashes")
-        if crash is not None and crash.report is not None:
-            self._offer_report(tr("The last run of the program crashed"), crash)
-
-    def close(self) -> None:
-        """The window closes."""
-        for part in (self.recovery, self.preflight, self.after):
-            part.close()
-        self.checks.close()
-        if self.training is not None:
-            self.training.end()
-
-    # ---- sessions
-
-    def _on_recording(self, status: RecordStatus) -> None:
-        if status.recording and not self._is_recording:
-            self.after.withdraw()
-        self._is_recording = status.recording
-        if status.saved is not None and status.saved != self._saved:
-            self._saved = status.saved
-            if not status.recording:
-                self.after.offer(status.saved)
-
-    def _with_newest(self, step: object) -> None:
-        session = self.after.session
-        if session is None:
-            self._window.say(tr("No session yet: F9 records one"), False)
-        elif callable(step):
-            step(session)
-
-    def _choose_session(self) -> None:
-        folder = sessions_folder(self._window.rig.config.record.folder)
-        dialog = QFileDialog(self._window, tr("A recorded session"), str(folder))
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        dialog.fileSelected.connect(lambda path: self.after.offer(Path(path), tr("Session")))
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.show()  # not open(): the STOP button must stay within reach
-
-    # ---- before driving
-
-    def _on_phase(self, phase: EnginePhase) -> None:
-        if phase is EnginePhase.RUNNING:
-            self.preflight.begin_soon()
-
-    def _on_not_armed(self, line: str) -> None:
-        self._window.say(line, True)
-        self.checks.open_list()
-
-    # ---- models
-
-    def _model(self) -> str:
-        return self._window.rig.config.perception.segmentation.model
-
-    def _against_another_model(self) -> str:
-        view = self._window.controls.view
-        if view is not None and view.mode in ARMED_MODES:
-            return tr("the program is armed; disarm first (Shift+F6)")
-        return ""
-
-    def _cost_of_another_model(self) -> str:
-        ends = tr(" The recording ends.") if self._is_recording else ""
-        return tr("The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}", ends=ends)
-
-    def _use_model(self, name: str) -> None:
-        config = self._window.rig.config
-        segmentation = config.perception.segmentation.model_copy(update={"model": name})
-        perception = config.perception.model_copy(update={"segmentation": segmentation})
-        self._window.say(tr("Model {name} from now on, until the program ends", name=name), False)
-        self._window.rig.use_config(config.model_copy(update={"perception": perception}))
-
-    def train(self) -> None:
-        """The training that is there already, or a new one on a chosen annotation file."""
-        if self.training is not None and self.training.is_busy:
-            self.training.show()
-            self.training.raise_()
-            return
-        session = self.after.session
-        start = default_store([session]).parent if session is not None else sessions_folder(self._window.rig.config.record.folder)
-        dialog = QFileDialog(self._window, tr("Annotations to train on"), str(start), tr("Annotations (*.sqlite)"))
-        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        dialog.fileSelected.connect(lambda path: self.open_training(Path(path)))
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.show()
-
-    def open_training(self, store: Path) -> None:
-        """The dialog for an annotation file."""
-        if self.training is not None:
-            self.training.end()
-            self.training.deleteLater()
-        self.training = TrainingDialog(partial(collect_from_file, store), str(store), self._window)
-        self.training.job.installed.connect(self._on_installed)
-        self.training.show()
-
-    def _on_installed(self, name: str) -> None:
-        self._window.say(tr("Model {name} is installed; choose it in the Model menu", name=name), False)
-
-    # ---- crashes
-
-    def make_safe(self, is_first: bool = True) -> None:
-        """After an unforeseen error, from any thread: the servos stop; at the first one the recording ends as a whole session.
-
-        At later ones the operator was told and went on: only what moves is stopped.
-        """
-        rig = self._window.rig
-        if is_first:
-            self._stopped = rig.stop()
-            self._window.recorder.stop("the program met an unforeseen error")
-            return
-        pilot = rig.pilot
-        is_at_rest = pilot is not None and (not pilot.can_move or pilot.view.mode is Mode.STOPPED)
-        # an error may come with every repaint, and each STOP is shown
-        if not is_at_rest and rig.stop() is StopOutcome.SERVOS:
-            self._stopped_again.emit()
-
-    def _report_stopped_again(self) -> None:
-        self._window.say(tr("Another unforeseen error: the servos were stopped again"), True)
-
-    def _show_crash(self, crash: Crash) -> None:
-        where = (
-            tr("The report is {report}", report=crash.report) if crash.report is not None else tr("The report could not be written")
-        )
-        box = QMessageBox(
-            QMessageBox.Icon.Critical,
-            tr("Unforeseen error"),
-            tr("The program met an error: {what}", what=crash.what),
-            parent=self._window,
-        )
-        box.setInformativeText(
-            tr(
-                "{stopped}. A recording that ran was ended and is whole.\n\n{where}.\n\nBest close the program "
-                "and start it again. Space is still STOP.",
-                stopped=tr(self._stopped.value),
-                where=where,
-            )
-        )
-        leave = box.addButton(tr("Close the program"), QMessageBox.ButtonRole.AcceptRole)
-        if crash.report is not None:
-            show = box.addButton(tr("Show the report"), QMessageBox.ButtonRole.ActionRole)
-            show.clicked.disconnect()  # it answers nothing: the box stays
-            show.clicked.connect(partial(open_file, crash.report))
-        box.addButton(tr("Go on"), QMessageBox.ButtonRole.RejectRole)
-        box.setDefaultButton(leave)
-        box.setModal(False)
-        box.buttonClicked.connect(lambda button: self._window.close() if button is leave else None)
-        box.finished.connect(box.deleteLater)
-        box.show()
-
-    def _offer_report(self, text: str, crash: Crash) -> None:
-        report = crash.report
-        assert report is not None
-        show = OfferButton(tr("Show the report"), partial(open_file, report), str(report))
-        self._offers.offer(
-            Offer(_CRASH, text, tr("{what}. The report: {report}", what=crash.what, report=report), (show,), is_fault=True)
-        )
-
-
-_SEEN = "tour/seen"
-_NO_SCREEN = ("offscreen", "minimal", "vnc")
-_LOOK_EVERY_MS = 300
-
-
-def _settings() -> QSettings:
-    folder = Path(platformdirs.user_config_dir("LumenPilot", appauthor=False))
-    return QSettings(str(folder / "seen.ini"), QSettings.Format.IniFormat)
-
-
-def was_seen() -> bool:
-    """Whether the tour was shown to this user, skipped or not."""
-    return str(_settings().value(_SEEN, "")).lower() == "true"
-
-
-def mark_seen() -> None:
-    """Do not show it again by itself. A folder that cannot be written is ignored."""
-    settings = _settings()
-    settings.setValue(_SEEN, True)
-    settings.sync()
-
-
-def tour_at_start(window: OperatorWindow, *, asked: bool) -> None:
-    """Begin it when the first picture is there: if it was `asked` for, or at the first start on a real screen."""
-    if not asked and (QGuiApplication.platformName() in _NO_SCREEN or was_seen()):
-        return
-    timer = QTimer(window)
-
-    def look() -> None:
-        if window.shown_tick is not None:
-            timer.stop()
-            mark_seen()
-            window.show_tour()
-
-    timer.timeout.connect(look)
-    timer.start(_LOOK_EVERY_MS)

@@ -19,7 +19,6 @@ from app.ui.actions import MenuEntry, action_of, add_menu
 from app.ui.i18n import tr
 from app.widgets.basics import takes_enter
 from core.config.models import WindowConfig
-from core.devices import UserError
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -198,25 +197,6 @@ def make_application(look: WindowConfig | None = None) -> QApplication:
     use_language(application, look.language if look is not None else ENGLISH)
     theme.apply_theme(application, look.theme if look is not None else theme.Theme.DARK)
     return application
-
-
-def check_display() -> None:
-    """Raise UserError without a display: Qt would end the process with a core dump."""
-    if not sys.platform.startswith("linux"):
-        return
-    display, asked = os.environ.get("DISPLAY"), os.environ.get("QT_QPA_PLATFORM", "")
-    if not display and not os.environ.get("WAYLAND_DISPLAY") and not asked:
-        raise UserError("no display: start it in a desktop session, or give it a virtual one (xvfb-run -a make run)")
-    is_on_x = asked.startswith("xcb") or (not asked and not os.environ.get("WAYLAND_DISPLAY"))
-    if not (display and is_on_x):
-        return
-    from hardware.preflight.checks import x_server_answers  # asks as Qt does; without libxcb Qt reports it itself
-
-    if not x_server_answers(display):
-        raise UserError(
-            f"the display {display} (DISPLAY) does not answer: it has gone, or this user may not use it (over ssh: ssh -X); "
-            "start it in a desktop session, or give it a virtual one (xvfb-run -a make run)"
-        )
 
 
 def close_all(application: QApplication) -> None:

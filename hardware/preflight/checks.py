@@ -17,9 +17,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from core.config.models import RecordConfig, sessions_folder
 from core.messages import message
+
+if TYPE_CHECKING:
+    from core.config.models import RecordConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +87,8 @@ def check_machine(cores: int | None = None, memory: Callable[[], tuple[float, fl
 
 def check_disk(config: RecordConfig, usage: Callable[[Path], tuple[int, int, int]] = shutil.disk_usage) -> Check:
     """Where sessions go: writable, and room for them."""
+    from core.config.models import sessions_folder
+
     name, folder = "recordings", sessions_folder(config.folder)
     there = next((place for place in (folder, *folder.parents) if place.exists()), Path("/"))
     if not there.is_dir():
@@ -218,7 +223,7 @@ def check_binaries(
 ) -> Check:
     """The vendors' own libraries with all that they need in turn."""
     name = "vendor libraries"
-    problems, fine, packages = [], [], []
+    problems, fine, packages, missing = [], [], [], []
     is_damaged = False
     for title, path in _binaries() if binaries is None else binaries:
         problem = load(path) if path is not None else "is not installed"
@@ -229,12 +234,15 @@ def check_binaries(
         needed = re.search(r"(lib[\w.+-]+?\.so[.\d]*): cannot open shared object", problem)
         if needed and needed[1] in LIBRARIES:
             packages.append(LIBRARIES[needed[1]])
+        elif needed and not list(Path(sys.prefix).rglob(f"{needed[1].partition('.so')[0]}*.so*")):
+            missing.append(needed[1])  # no Python package brings it: a library of the system
         else:  # a damaged file, or one of an installed package
             is_damaged = True
     if not problems:
         return Check(name, True, message("{a} can be loaded", a=", ".join(fine)))
     install = f"sudo apt-get install --yes --no-install-recommends {' '.join(dict.fromkeys(packages))}"
-    return Check(name, False, "; ".join(problems), " && ".join([install] * bool(packages) + [RENEW] * is_damaged))
+    search = [f"find and install the package of {library}: apt-file search {library}" for library in dict.fromkeys(missing)]
+    return Check(name, False, "; ".join(problems), " && ".join([install] * bool(packages) + [RENEW] * is_damaged + search))
 
 
 OF_THE_PROGRAM: tuple[Callable[[], Check], ...] = (check_python, check_packages, check_libraries, check_binaries)

@@ -70,7 +70,7 @@ def driving_checks(config: Config) -> Iterator[Check]:
 
 def level_of(check: Check) -> Level:
     """Whether a finding stands against driving, or is only worth knowing."""
-    return Level.GOOD if check.ok else CHECKS[check.name][1] or Level.BAD
+    return Level.GOOD if check.ok else (CHECKS[check.name][1] if check.name in CHECKS else None) or Level.BAD
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
-"""The bench twin in a process of its own, so that physics, rendering and software servos do not slow the application down.
+"""The application's side of the bench twin, which runs in a process of its own (``hardware.twin.server``).
 
-The application starts it as ``python -m hardware.twin.process MEMORY PIPE SOCKET PARENT`` and sends the configuration; the process
+The application sends the configuration; the process
 answers with the port of the servos, or an error. Pictures and the robot's status then go through shared memory, a byte in the pipe
 announces a new picture, and the end of the socket ends the process.
 """
@@ -8,16 +8,13 @@ announces a new picture, and the end of the socket ends the process.
 from __future__ import annotations
 
 import contextlib
-import gc
 import math
 import os
 import select
-import signal
 import struct
-import sys
-import threading
 import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,18 +23,19 @@ from core.config.safety import ServosConfig
 from core.devices import DeviceError
 from core.messages import message
 from core.types import Command, Frame, RobotStatus
-from hardware.processes import DeviceProcess, ParentLink, SharedSlot
+from hardware.processes import DeviceProcess, SharedSlot
 from hardware.servos.bus_ipc import start_bus
-from hardware.twin.servos.bus import SoftServoBus
-from hardware.twin.world import TwinWorld
+
+if TYPE_CHECKING:
+    from hardware.twin.servos.bus import SoftServoBus
+    from hardware.twin.world import TwinWorld
 
 _START_S, _END_S = 60.0, 5.0  # time limits for start and end of the process
-_WAIT_S = 0.2
 _FRAME = struct.Struct("<Qdii")  # index, captured, width, height
 _STATUS = struct.Struct("<3d8dd")  # time, insertion, delivery, pulls and forces, contact (NaN: unknown)
 
 
-def _slot_sizes(twin: TwinConfig) -> tuple[int, int]:
+def slot_sizes(twin: TwinConfig) -> tuple[int, int]:
     """Bytes of a frame and of a status in the shared memory."""
     return _FRAME.size + 3 * twin.image_width_px * twin.image_height_px, _STATUS.size
 
@@ -68,7 +66,7 @@ def unpack_status(data: bytes) -> RobotStatus:
 
 def start_twin() -> DeviceProcess:
     """Start a twin process, which loads for seconds and then waits for its configuration; raises DeviceError."""
-    return DeviceProcess("hardware.twin.process", "the bench twin", writes_pipe=False)
+    return DeviceProcess("hardware.twin.server", "the bench twin", writes_pipe=False)
 
 
 class RemoteTwin:
@@ -86,7 +84,7 @@ class RemoteTwin:
     def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
         self._number = 0
         self._closed = False
-        sizes = _slot_sizes(config.twin)
+        sizes = slot_sizes(config.twin)
         self._process, memory = DeviceProcess.claim(prestarted, start_twin, sum(map(SharedSlot.size, sizes)))
         self._frames, self._status = SharedSlot.row(memory, sizes)
         with contextlib.ExitStack() as undo:
@@ -222,57 +220,6 @@ def _within_one(value: float) -> float:
     return max(-1.0, min(1.0, value))
 
 
-def main(arguments: list[str]) -> int:
-    """Run until the application ends it, or has ended. Arguments: those of ``ParentLink``."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the application decides what Ctrl-C means
-    link = ParentLink(arguments)
-    message = link.first_message()
-    if message is None:  # started ahead, and not needed
-        return 0
-    config = Config.model_validate(message["config"])
-    sizes = _slot_sizes(config.twin)
-    frames, status = SharedSlot.row(link.map_memory(sum(map(SharedSlot.size, sizes))), sizes)
-    try:
-        world = TwinWorld(config.twin, perception=config.perception)
-        world.insert(message["insertion_mm"])
-        wiring = wired(config.twin, config.servos)
-        servos = SoftServoBus(wiring, wire_time=True)
-        servos.start()
-    except (ValueError, OSError, DeviceError) as error:
-        link.send({"error": str(error)})
-        return 1
-    drive_world(world, servos, wiring)
-    world.start()
-    gc.collect()
-    gc.freeze()  # keeps later collections short
-    link.send({"port": servos.port, "title": world.phantom.title})
-    ended = threading.Event()
-    threading.Thread(target=link.wait_for_end, args=(ended,), name="end of link", daemon=True).start()
-    try:
-        _serve(world, frames, status, link, ended)
-    finally:
-        world.stop()
-        servos.stop()
-    return 0
-
-
-def _serve(world: TwinWorld, frames: SharedSlot, status: SharedSlot, link: ParentLink, ended: threading.Event) -> None:
-    while not ended.is_set():
-        if world.failure is not None:
-            link.send({"error": world.failure})
-            return
-        frame = world.frames.take(_WAIT_S)
-        status.put(pack_status(world.physics.status()))
-        if frame is not None:
-            frames.put(pack_frame(frame))
-            try:
-                os.write(link.pipe, b".")
-            except BlockingIOError:
-                pass  # a full pipe wakes the reader as well
-            except BrokenPipeError:
-                return  # the application ended just now, before the end of the link is seen
-
-
 class PrestartedProcesses:
     """The processes of the twin and of its servo bus, loading before the rig is opened. Raises DeviceError."""
 
@@ -287,7 +234,3 @@ class PrestartedProcesses:
         """End the processes that no rig has claimed."""
         self.bus.discard()
         self.twin.discard()
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

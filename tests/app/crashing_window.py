@@ -18,7 +18,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QMessageBox
 
-from app.operator.startup import WindowServices
+from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.ui.crash_report import CrashWatch
 from app.ui.window_base import make_application

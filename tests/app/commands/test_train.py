@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from app.commands.benchmark import benchmark
-from app.ui.window_base import check_display
+from app.ui.display import check_display
 from core.devices import UserError
 from core.evaluation.accuracy import FrameScore, score_set
 from core.learning.augmentation import FrameCrops

@@ -16,7 +16,7 @@ from pytestqt.qtbot import QtBot
 from app.annotator.sources import image_files
 from app.operator import recording
 from app.operator.recording import AfterSession, Declined, RecoveryController, loss_words
-from app.operator.startup import WindowServices
+from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.widgets.messages import OfferStrip
 from app.widgets.record_bar import RecordBar

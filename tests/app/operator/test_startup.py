@@ -13,7 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.rig_menu import RigMenuController
-from app.operator.startup import WindowServices
+from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.ui.crash_report import CrashWatch
 from core.config.models import Config

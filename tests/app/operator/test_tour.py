@@ -11,8 +11,8 @@ from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.operator import startup as tour_module
-from app.operator.startup import mark_seen, tour_at_start, was_seen
+from app.operator import services as tour_module
+from app.operator.services import mark_seen, tour_at_start, was_seen
 from app.operator.window import OperatorWindow
 from app.ui.theme import MIN_WINDOW
 from app.widgets.mode_bar import StopButton

@@ -18,7 +18,7 @@ from PySide6.QtGui import QAction
 from pytestqt.qtbot import QtBot
 
 from app.operator.models import figures_line, installed_models
-from app.operator.startup import WindowServices
+from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.training.dialog import TrainingDialog
 from app.training.model import TrainingJob, TrainingPhase, TrainingRequest, collect_from_file, name_problem

@@ -28,7 +28,8 @@ from hardware.rig import RigKind, open_rig, start_ahead
 from hardware.servos.bus_ipc import start_bus
 from hardware.servos.dynamixel_port import BusProcessLost
 from hardware.servos.servo_robot import ServoRobot
-from hardware.twin.process import RemoteTwin, _serve, pack_frame, pack_status, start_twin, unpack_frame, unpack_status
+from hardware.twin.process import RemoteTwin, pack_frame, pack_status, start_twin, unpack_frame, unpack_status
+from hardware.twin.server import _serve
 
 CONFIG = Config.model_validate({"twin": {"image_width_px": 160, "image_height_px": 120}})
 
