@@ -10,22 +10,25 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import psutil
 import typer
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QEvent, QObject, QTimer
 
 from app.commands.benchmark import print_figures, quantiles, stream_config, use_offscreen
 from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption
 from app.commands.progress import progress_bar
 from app.operator.manual_drive import REPEAT_MS
 from app.operator.rig_engine import leaving_a_core
+from app.operator.startup import finish_loading, make_window
 from app.operator.window import OperatorWindow
+from app.player.window import PlayerWindow
 from app.ui.texts import OperatorStep
+from app.ui.window_base import make_application, quit_on_signal
 from core.config.models import Config, PursuitConfig, TwinConfig, choose_model, load_config
 from core.control.look_ahead import look_ahead
 from core.control.modes import DRIVING_MODES, Mode
@@ -34,24 +37,29 @@ from core.devices import UserError
 from core.evaluation.metrics import MIN_GROUPS, RESAMPLES
 from core.perception.centerline import plan_route
 from core.perception.pipeline import Pipeline, open_pipeline
+from core.session.codec import row_of
+from core.session.files import EncodedFrame, SessionFiles
 from core.session.manifest import about_rig
+from core.session.reader import SessionReader
+from core.session.video import FrameEncoder
 from core.session.writer import SessionWriter
 from core.system import begin_as_worker
 from core.types import Frame, Image, Point, Scene, Tick
+from hardware.rig import rig_config
+from hardware.twin.world import TwinWorld
 from tools.run import run_tool
 
 FRAMES_PER_SECOND = 30.0
-_BLOCK = 30
-"""Frames until it is the other's turn: one second, so that a busy moment of the computer strikes both alike."""
-_WARM_UP = 10
-_STEPS = 24
+_BLOCK = 30  # frames with and without a recording in turn: a second, so that a busy moment of the computer affects both alike
+_WARM_UP = 10  # frames
+_STEPS = 24  # pictures of the stream, one way
 
 
 def measure_recording(config: Config, frames: int) -> dict[str, Any]:
     """Perceive a paced stream of 640x480 pictures, a second without and a second with a recording, in turn.
 
-    The recorder encodes, makes rows and writes to the system's temporary folder beside perception, as it does in the window; the
-    network leaves a core to the rest of the program, as there.
+    The recorder encodes and writes to the system's temporary folder beside perception, and the network leaves a core to the rest of
+    the program, as in the window.
 
     Parameters
     ----------
@@ -64,7 +72,7 @@ def measure_recording(config: Config, frames: int) -> dict[str, Any]:
         the blocks, ``dropped`` frames, ``mb_per_minute``.
     """
     pipeline = open_pipeline(leaving_a_core(config.perception))
-    images = one_way_and_back()
+    images = _stream_images()
     settings = config.record.model_copy(update={"ring_s": 0.0, "stop_free_mb": 0.0})
     blocks = -(-frames // _BLOCK)
     without: list[list[float]] = []
@@ -76,7 +84,7 @@ def measure_recording(config: Config, frames: int) -> dict[str, Any]:
             writer.start()
             _stream(pipeline, images, _WARM_UP, 0, writer)
             for block in range(blocks):
-                # the order changes, so that warming up or cooling down favours nobody
+                # the order alternates, so that warming up or cooling down favours neither
                 for is_recorded in (False, True) if block % 2 else (True, False):
                     first = _WARM_UP + (2 * block + is_recorded) * _BLOCK
                     times = _stream(pipeline, images, _BLOCK, first, writer if is_recorded else None)
@@ -100,16 +108,14 @@ def measure_recording(config: Config, frames: int) -> dict[str, Any]:
     }
 
 
-def one_way_and_back() -> list[Image]:
-    """A robot that goes in and comes back, as a stream shows it: unrelated pictures would cost more room."""
-    from hardware.twin.world import TwinWorld
-
+def _stream_images() -> list[Image]:
+    """A robot that goes in and comes back: unrelated pictures would need more disk space than a stream."""
     world = TwinWorld(TwinConfig(), seed=0)
-    way: list[Image] = []
+    images: list[Image] = []
     for step in range(_STEPS):
         world.insert(50.0 + 1.5 * step)
-        way.append(world.frame().image)
-    return way + way[-2:0:-1]
+        images.append(world.frame().image)
+    return images + images[-2:0:-1]
 
 
 def _stream(pipeline: Pipeline, images: Sequence[Image], count: int, first: int, writer: SessionWriter | None) -> list[float]:
@@ -128,7 +134,7 @@ def _stream(pipeline: Pipeline, images: Sequence[Image], count: int, first: int,
 
 
 def _slowdown(without: list[list[float]], recorded: list[list[float]]) -> dict[str, Any]:
-    """Ratio of the medians, with a percentile bootstrap over the blocks, drawn in pairs; None as interval of too few."""
+    """Ratio of the medians with a percentile bootstrap over pairs of blocks; no interval if there are too few."""
     plain, beside = np.array(without), np.array(recorded)
     ratio = float(np.median(beside) / np.median(plain))
     if len(plain) < MIN_GROUPS:
@@ -140,8 +146,7 @@ def _slowdown(without: list[list[float]], recorded: list[list[float]]) -> dict[s
     return {"slowdown": round(ratio, 3), "slowdown_ci95": [round(float(low), 3), round(float(high), 3)]}
 
 
-_CYCLE = 300
-"""Frames that are perceived and encoded; the session repeats them, which takes seconds and not the hour."""
+_CYCLE = 300  # frames that are perceived and encoded; the session repeats them
 _SEEKS = 60
 _WAIT_S = 120.0
 
@@ -159,10 +164,7 @@ def measure_player(config: Config, minutes: float) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="lumenpilot_benchmark_") as parent:
         child = multiprocessing.get_context("spawn").Process(target=_make_session, args=(config, minutes, parent))
         child.start()
-        try:
-            child.join()
-        finally:
-            child.terminate()  # nothing runs any more unless it was interrupted
+        child.join()
         if child.exitcode:
             raise UserError(f"{parent}: the session could not be made (exit code {child.exitcode}); is the disk full?")
         (folder,) = Path(parent).iterdir()
@@ -172,14 +174,7 @@ def measure_player(config: Config, minutes: float) -> dict[str, Any]:
 
 def _make_session(config: Config, minutes: float, parent: str) -> None:
     begin_as_worker()
-    from core.perception.pipeline import open_pipeline
-    from core.session.codec import row_of
-    from core.session.files import EncodedFrame, SessionFiles
-    from core.session.manifest import about_rig
-    from core.session.video import FrameEncoder
-    from core.types import Frame, Tick
-
-    pipeline, images = open_pipeline(config.perception), one_way_and_back()
+    pipeline, images = open_pipeline(config.perception), _stream_images()
     height, width = images[0].shape[:2]
     encoder = FrameEncoder((width, height), config.record)
     cycle = []
@@ -202,16 +197,10 @@ def _make_session(config: Config, minutes: float, parent: str) -> None:
 
 
 def _measure(folder: Path, config: Config) -> dict[str, Any]:
-    from PySide6.QtCore import QEvent
-
-    from app.player.window import PlayerWindow
-    from app.ui.window_base import make_application
-    from core.session.reader import SessionReader
-
     application = make_application()
 
     def until(condition: Callable[[], bool]) -> float:
-        """Seconds until it is true, while the window runs."""
+        """Run the event loop until it is true; seconds that it took."""
         began_s = time.monotonic()
         while not condition():
             if time.monotonic() - began_s > _WAIT_S:
@@ -249,14 +238,15 @@ def _measure(folder: Path, config: Config) -> dict[str, Any]:
 _MOVE_S = 1.5
 _MOVES = (Jog(bend=0.4, advance=0.8), Jog(bend=-0.6, advance=0.6), Jog(bend=0.2, advance=-1.0), AT_REST)
 _ASK_EVERY_S = 0.5
-_LEAST_WAY_PX = 60.0
-_LOOK_AHEAD = PursuitConfig()
+_REPEAT_S = REPEAT_MS / 1000.0
+_MIN_ROUTE_PX = 60.0
+_PURSUIT = PursuitConfig()
 
 
 class ScriptedOperator(QObject):
-    """Drives by hand for the first `by_hand_s` seconds after ``start``, then wants the program to drive, as long as it is there.
+    """Drives by hand for the first `by_hand_s` seconds after ``start``, then lets the program drive whenever possible.
 
-    ``driven_s`` is how long the program drove. Servos that were switched off stay so: he only does what needs no looking.
+    ``driven_s`` is how long the program drove. Servos that were switched off stay so.
     """
 
     def __init__(self, window: OperatorWindow, by_hand_s: float) -> None:
@@ -276,74 +266,60 @@ class ScriptedOperator(QObject):
         self._window.controls.deadman.hold("mouse", False)
 
     def _act(self) -> None:
-        self._since_s += REPEAT_MS / 1000.0
+        self._since_s += _REPEAT_S
         if self._since_s < self._by_hand_s:
-            # As a held key does, the motion is repeated: silence counts as let go.
+            # repeated, as by a held key: silence counts as released
             self._window.controls.drive(_MOVES[int(self._since_s / _MOVE_S) % len(_MOVES)])
             return
         view = self._window.controls.view
         if view is not None and view.mode in DRIVING_MODES:
-            self.driven_s += REPEAT_MS / 1000.0 * (view.mode is Mode.AUTONOMOUS)
-        self._asked_s += REPEAT_MS / 1000.0
+            self.driven_s += _REPEAT_S * (view.mode is Mode.AUTONOMOUS)
+        self._asked_s += _REPEAT_S
         if view is not None and self._asked_s >= _ASK_EVERY_S:
             self._asked_s = 0.0
             self._ask(view.mode, view.latched is not None)
 
     def _ask(self, mode: Mode, latched: bool) -> None:
-        desk, tick = self._window.controls, self._window.shown_tick
+        controls, tick = self._window.controls, self._window.shown_tick
         if latched:
-            desk.ask_step(OperatorStep.ACKNOWLEDGE)
+            controls.ask_step(OperatorStep.ACKNOWLEDGE)
         elif mode is Mode.ADVISORY:
-            desk.deadman.hold("mouse", False)
-            desk.ask_step(OperatorStep.ARM)
+            controls.deadman.hold("mouse", False)
+            controls.ask_step(OperatorStep.ARM)
         elif mode in {Mode.ARMED, Mode.HOLD}:
-            if tick is not None and mode is Mode.ARMED and (target := _far_ahead(tick.scene)) is not None:
+            if tick is not None and mode is Mode.ARMED and (target := _farthest_end(tick.scene)) is not None:
                 self._window.choose_target(*target)
-            desk.deadman.hold("mouse", True)
-            desk.ask_step(OperatorStep.HAND_OVER)
+            controls.deadman.hold("mouse", True)
+            controls.ask_step(OperatorStep.HAND_OVER)
 
 
-def _far_ahead(scene: Scene) -> Point | None:
-    """The end of the vessel with the longest way that begins ahead of the head, in source pixels; None when no way is long."""
+def _farthest_end(scene: Scene) -> Point | None:
+    """The end of the vessel with the longest route that begins ahead of the head, in source pixels; None when no route is long."""
     if scene.path is None or scene.vessel_graph is None:
         return None
     graph, head = scene.vessel_graph, scene.path.head
-    times = Counter(node for edge in graph.edges for node in (edge.start, edge.end))
-    ends = [graph.nodes[node].tolist() for node, count in times.items() if count == 1]
+    degrees = Counter(node for edge in graph.edges for node in (edge.start, edge.end))
+    ends = [graph.nodes[node].tolist() for node, degree in degrees.items() if degree == 1]
     routes = [(route, end) for end in ends if (route := plan_route(graph, head, (end[0], end[1]))) is not None]
-    # Here in the window's thread each look ahead counts: the longest way first, and mostly it is the only one.
+    # This runs in the window's thread, where each look-ahead costs time: the longest route first is mostly the only one.
     for route, (x, y) in sorted(routes, key=lambda found: -found[0].length_px):
-        if route.length_px <= _LEAST_WAY_PX:
+        if route.length_px <= _MIN_ROUTE_PX:
             break
-        way = look_ahead(replace(scene, route=route), _LOOK_AHEAD.look_ahead_px, _LOOK_AHEAD)
-        if way is not None and not way.behind:
+        ahead = look_ahead(replace(scene, route=route), _PURSUIT.look_ahead_px, _PURSUIT)
+        if ahead is not None and not ahead.behind:
             return scene.to_source((x, y))
     return None
 
 
 _WARM_UP_S = 10.0
-_FIRST_WITHIN_S = 60.0
-"""A rig that shows nothing for so long is not waited for."""
-_LOOK_EVERY_MS = 5
-
-
-@dataclass(slots=True)
-class _Readings:
-    shown: int = 0
-    last_index: int = -1
-    first_shown_s: float | None = None
-    dropped: int = 0
-    blocks: list[tuple[float, float, str]] = field(default_factory=list)
-    bus_p99_ms: float | None = None
-    latency_ms: list[float] = field(default_factory=list)
-    servo_ms: list[float] = field(default_factory=list)
-    memory_mb: list[tuple[float, float]] = field(default_factory=list)
+_FIRST_WITHIN_S = 60.0  # patience with a rig that shows nothing
+_POLL_MS = 5
 
 
 class WindowWatch(QObject):
-    """Takes readings, from the first picture on for `seconds`, then closes the window.
+    """Samples pace and memory from the first picture on for `seconds`, then closes the window.
 
-    Half of that is driven by hand, the rest handed over.
+    Half of that time the robot is driven by hand, then by the program.
     """
 
     def __init__(self, window: OperatorWindow, seconds: float) -> None:
@@ -353,28 +329,36 @@ class WindowWatch(QObject):
         self._ended_s = time.monotonic() + _FIRST_WITHIN_S
         self.ended_early = False
         self._process = psutil.Process()
-        self.readings = _Readings()
+        self.shown = 0
+        self.last_index = -1
+        self.first_shown_s: float | None = None
+        self.dropped = 0
+        self.blocks: list[tuple[float, float, str]] = []
+        self.bus_p99_ms: float | None = None
+        self.latency_ms: list[float] = []
+        self.servo_ms: list[float] = []
+        self.memory_mb: list[tuple[float, float]] = []
         self._operator = ScriptedOperator(window, seconds / 2.0)
         self._timers: list[QTimer] = []
-        for interval_ms, slot in ((_LOOK_EVERY_MS, self._look), (1000, self._weigh)):
+        for interval_ms, slot in ((_POLL_MS, self._sample_window), (1000, self._sample_process)):
             timer = QTimer(self)
             timer.timeout.connect(slot)
             timer.start(interval_ms)
             self._timers.append(timer)
 
-    def _look(self) -> None:
+    def _sample_window(self) -> None:
         tick, now = self._window.shown_tick, time.monotonic()
-        if tick is not None and tick.frame.index != self.readings.last_index:
-            self.readings.last_index = tick.frame.index
-            self.readings.shown += 1
-            self.readings.dropped = tick.dropped_frames
-            self.readings.latency_ms.append((now - tick.frame.captured_s) * 1e3)
-            if self.readings.first_shown_s is None:
-                self.readings.first_shown_s = now
+        if tick is not None and tick.frame.index != self.last_index:
+            self.last_index = tick.frame.index
+            self.shown += 1
+            self.dropped = tick.dropped_frames
+            self.latency_ms.append((now - tick.frame.captured_s) * 1e3)
+            if self.first_shown_s is None:
+                self.first_shown_s = now
                 self._ended_s = now + self._seconds
-                self._weigh()
+                self._sample_process()
                 self._operator.start()
-        view, servo_ms = self._window.controls.view, self.readings.servo_ms
+        view, servo_ms = self._window.controls.view, self.servo_ms
         if view is not None and view.latency_s is not None and servo_ms[-1:] != [view.latency_s * 1e3]:
             servo_ms.append(view.latency_s * 1e3)
         if now >= self._ended_s:
@@ -383,57 +367,51 @@ class WindowWatch(QObject):
             self._operator.stop()
             self._window.close()
 
-    def _weigh(self) -> None:
-        """Once a second from the first picture on; the heartbeat keeps a block for ten, so one longer than any before is new."""
-        seen = self.readings
-        if seen.first_shown_s is None:
+    def _sample_process(self) -> None:
+        """Once a second. The heartbeat keeps a block for ten seconds, so one longer than any before is new."""
+        if self.first_shown_s is None:
             return
-        at_s = time.monotonic() - seen.first_shown_s
+        at_s = time.monotonic() - self.first_shown_s
         view, bus, block_ms = self._window.controls.view, self._window.controls.bus, self._window.max_block_ms
-        if block_ms > max((ms for _, ms, _ in seen.blocks), default=0.0):
-            seen.blocks.append((at_s, block_ms, view.mode.value if view is not None else ""))
+        if block_ms > max((ms for _, ms, _ in self.blocks), default=0.0):
+            self.blocks.append((at_s, block_ms, view.mode.value if view is not None else ""))
         if bus is not None and at_s >= _WARM_UP_S:
-            seen.bus_p99_ms = max(seen.bus_p99_ms or 0.0, bus.times.period_p99_ms)
-        seen.memory_mb.append((at_s, self._process.memory_info().rss / 2**20))
+            self.bus_p99_ms = max(self.bus_p99_ms or 0.0, bus.times.period_p99_ms)
+        self.memory_mb.append((at_s, self._process.memory_info().rss / 2**20))
 
     def end(self) -> None:
-        """The window has gone, perhaps before its time."""
+        """The window was closed, perhaps before its time."""
         now = time.monotonic()
         self.ended_early, self._ended_s = now < self._ended_s, min(now, self._ended_s)
 
     def result(self) -> dict[str, Any]:
         """Pace since the first shown frame; memory 10 s after it, at the end, and its growth per minute in between.
 
-        The bus's cycle is the worst 99th percentile of ten seconds after these; of the blocks, from 10 s before the first frame on,
+        The bus cycle is the worst 99th percentile of ten seconds after these. The blocks, from 10 s before the first frame on, are
         those that were the longest so far.
         """
-        seen = self.readings
-        if seen.first_shown_s is None:
+        if self.first_shown_s is None:
             return {"shown_fps": 0.0}
-        lasted_s = max(self._ended_s - seen.first_shown_s, 1e-9)
-        steady = [(at, mb) for at, mb in seen.memory_mb if at >= _WARM_UP_S] or seen.memory_mb[-1:]
+        lasted_s = max(self._ended_s - self.first_shown_s, 1e-9)
+        steady = [(at, mb) for at, mb in self.memory_mb if at >= _WARM_UP_S] or self.memory_mb[-1:]
         span_min = max((steady[-1][0] - steady[0][0]) / 60.0, 1e-9)
         return {
             "seconds": round(lasted_s, 1),
-            "shown_fps": round(seen.shown / lasted_s, 2),
-            "frames_dropped": seen.dropped,
-            "capture_to_screen_ms": quantiles(seen.latency_ms),
-            "capture_to_servo_ms": quantiles(seen.servo_ms) if seen.servo_ms else None,
+            "shown_fps": round(self.shown / lasted_s, 2),
+            "frames_dropped": self.dropped,
+            "capture_to_screen_ms": quantiles(self.latency_ms),
+            "capture_to_servo_ms": quantiles(self.servo_ms) if self.servo_ms else None,
             "driven_by_program_s": round(self._operator.driven_s, 1),
-            "bus_cycle_p99_ms": round(seen.bus_p99_ms, 1) if seen.bus_p99_ms is not None else None,
-            "gui_max_block_ms": round(seen.blocks[-1][1], 1) if seen.blocks else 0.0,
-            "gui_longer_blocks": [{"at_s": round(at_s, 1), "ms": round(ms, 1), "mode": mode} for at_s, ms, mode in seen.blocks],
+            "bus_cycle_p99_ms": round(self.bus_p99_ms, 1) if self.bus_p99_ms is not None else None,
+            "gui_max_block_ms": round(self.blocks[-1][1], 1) if self.blocks else 0.0,
+            "gui_longer_blocks": [{"at_s": round(at_s, 1), "ms": round(ms, 1), "mode": mode} for at_s, ms, mode in self.blocks],
             "memory_mb": {"after_10_s": round(steady[0][1], 1), "end": round(steady[-1][1], 1)},
             "memory_growth_mb_per_min": round((steady[-1][1] - steady[0][1]) / span_min, 2) if len(steady) > 1 else None,
         }
 
 
 def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
-    """Run the window on the twin for some seconds and tell how it went."""
-    from app.operator.startup import finish_loading, make_window
-    from app.ui.window_base import make_application, quit_on_signal
-    from hardware.rig import rig_config
-
+    """Run the window on the twin for some seconds; the figures of ``WindowWatch.result``."""
     config, kind = rig_config("twin", config_path, None)
     application = make_application()
     finish_loading()
@@ -446,7 +424,7 @@ def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     application.exec()
     signals.stop()
     watch.end()
-    if watch.readings.first_shown_s is None:
+    if watch.first_shown_s is None:
         sys.stderr.write("note: no picture was shown; start the window (python main.py) to see why\n")
     elif watch.ended_early:
         sys.stderr.write(f"note: closed before its {seconds:g} s; the figures are of the time until then\n")

@@ -1,6 +1,6 @@
-"""Seven ideal servos and the real ``BusGuard`` with its gate, on the caller's clock: no port, no process, no waiting.
+"""Seven ideal servos behind the real ``BusGuard`` and its gate, on the caller's clock: no port, no process, no waiting.
 
-A servo is where the cycle before sent it. For trials, which must not depend on the wall clock.
+A servo is where the previous cycle sent it.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from hardware.servos.bus_guard import BusGuard, report_of
 from hardware.servos.bus_ipc import BusOrder, Heartbeat
 from hardware.servos.registers import HardwareError, ServoState
 
-_VOLTAGE_V, _TEMPERATURE_C = 12.0, 30.0
-
 
 class LockStepServos:
     """A guarded robot for one thread. ``cycle`` does what the bus process does fifty times a second."""
+
+    name = "lock-step servos"
+    failure: str | None = None
 
     def __init__(self, servos: ServosConfig, safety: SafetyConfig, clock: Callable[[], float]) -> None:
         self._servos, self._clock = servos, clock
@@ -36,19 +37,11 @@ class LockStepServos:
         """Time and goals (mm) of every cycle that sent some, oldest first."""
 
     @property
-    def name(self) -> str:
-        return "lock-step servos"
-
-    @property
-    def failure(self) -> str | None:
-        return None
-
-    @property
     def armed(self) -> bool:
         return self._guard.armed
 
     def positions_mm(self) -> tuple[float, ...]:
-        """Where the joints are."""
+        """Positions of the joints."""
         return self._at_mm
 
     def cycle(self) -> None:
@@ -68,23 +61,11 @@ class LockStepServos:
     def _readings(self, now_s: float) -> tuple[ServoState, ...]:
         return tuple(
             ServoState(
-                name=joint.name,
-                id=joint.id,
-                time_s=now_s,
-                ticks=0,
-                goal_ticks=0,
-                position_mm=at_mm,
-                goal_mm=at_mm,
-                velocity_mm_s=0.0,
-                current_ma=None,
-                voltage_v=_VOLTAGE_V,
-                temperature_c=_TEMPERATURE_C,
-                error=HardwareError(0),
-                torque=self._torque,
-                watchdog_tripped=False,
+                joint.name, joint.id, now_s, 0, 0, at_mm, at_mm, 0.0, None, voltage_v=12.0, temperature_c=30.0,
+                error=HardwareError(0), torque=self._torque, watchdog_tripped=False,
             )
             for joint, at_mm in zip(self._servos.joints, self._at_mm, strict=True)
-        )
+        )  # fmt: skip
 
     def connect(self) -> None:
         """Nothing to do."""

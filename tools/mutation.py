@@ -1,12 +1,10 @@
 """``make mutation``: does a test fail for every small change of the code that safety rests on?
 
-Each mutant of gate and supervisor differs from the code in one place: a comparison, an operator, a condition, a number, a returned
-value. Its own unit tests are run against it, then the long ones (state machines, pilot). A mutant that they all pass is a survivor:
-either a test is missing, or the change changes nothing, which ``EXPLAINED`` has to say. Ends with 1 when a survivor is unexplained,
-and with 2 when the tests do not pass without any mutant: then they would find everything.
-
-Works on copies in a temporary folder; takes a quarter of an hour on two cores. `python tools/mutation.py NAME ...` does only the
-modules of these names.
+A mutant of gate or supervisor differs from the code in one place: a comparison, an operator, a condition, a number, a returned
+value. Its unit tests run against it, then the long ones (state machines, pilot). A mutant that passes them all survives: a test is
+missing, or ``EXPLAINED`` says why the change has no effect. Exit code 1: a survivor is unexplained; 2: the tests fail without any
+mutant. Works on copies in a temporary folder; a quarter of an hour on two cores. ``python -m tools.mutation NAME ...`` does only
+these modules.
 """
 
 from __future__ import annotations
@@ -30,74 +28,52 @@ from rich.progress import Progress
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = "core/control"
 TEST_FOLDER = "tests/core/control"
-TESTS = {
+TESTS = {  # module -> the tests that should find its mutants
     "gate": ("test_gate.py",),
     "joints": ("test_gate.py", "test_joints.py"),
     "supervisor": ("test_supervisor.py", "test_health.py"),
     "health": ("test_supervisor.py", "test_health.py"),
     "bus_monitor": ("test_bus_monitor.py", "test_supervisor.py", "test_health.py"),
 }
-"""Module -> the tests that should find its mutants."""
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
 JOBS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 TIMEOUT_S = 300.0
 
-MISTRUST = "without a measurement to believe there is an objection already; it stands there for the type checker"
-MOVING = "who moves has goals and a time; it stands there for the type checker"
+# fmt: off
+MISTRUST = "without a trusted measurement there is an objection already; it stands there for the type checker"
+MOVING = "what moves has goals and a time; it stands there for the type checker"
 TIE = "differs only where two numbers are equal to the last bit, a billionth of a millimetre apart"
 EXPLAINED = {
     ("gate", "if objection is not None or request is None or believed is None:", "without term 3"): MISTRUST,
-    (
-        "gate",
-        "believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None",
-        "without term 1",
-    ): MISTRUST,
+    ("gate", "believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None",
+        "without term 1"): MISTRUST,
     ("gate", "if not self.moving or self.goals_mm is None or self.time_s is None:", "without term 2"): MOVING,
     ("gate", "if not self.moving or self.goals_mm is None or self.time_s is None:", "without term 3"): MOVING,
     ("gate", "if abs(goal_mm - from_mm) > joint.max_speed_mm_s * passed_s + _RECORDED_MM:", "Gt -> GtE"): TIE,
     ("gate", "if abs(asked - goal) > _RECORDED_MM", "Gt -> GtE"): TIE,
     ("gate", "if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:", "Gt -> GtE"): TIE,
-    (
-        "gate",
-        "if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:",
-        "without term 1",
-    ): "a goal that no limit touched is the one asked for; it stands there for the type checker",
+    ("gate", "if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:", "without term 1"):
+        "a goal that no limit touched is the one asked for; it stands there for the type checker",
     ("joints", "direction = 1.0 if asked_mm > last_mm else -1.0", "Gt -> GtE"): "where both are equal the step is 0",
-    (
-        "joints",
-        "to_end_mm = joint.high_mm - last_mm if direction > 0 else last_mm - joint.low_mm",
-        "Gt -> GtE",
-    ): "a direction is 1 or -1",
-    (
-        "joints",
-        "faster_mm_s = max(0.0, speed_mm_s * direction) + joint.max_acceleration_mm_s2 * passed_s",
-        "Mult -> Div of speed_mm_s * direction",
-    ): "a direction is 1 or -1",
+    ("joints", "to_end_mm = joint.high_mm - last_mm if direction > 0 else last_mm - joint.low_mm", "Gt -> GtE"):
+        "a direction is 1 or -1",
+    ("joints", "faster_mm_s = max(0.0, speed_mm_s * direction) + joint.max_acceleration_mm_s2 * passed_s",
+        "Mult -> Div of speed_mm_s * direction"): "a direction is 1 or -1",
     ("joints", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
-    (
-        "joints",
-        "found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))",
-        "Gt -> GtE",
-    ): TIE,
+    ("joints", "found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))",
+        "Gt -> GtE"): TIE,
     ("health", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
 }
+# fmt: on
 
 COMPARISONS = {
-    ast.Lt: ast.LtE,
-    ast.LtE: ast.Lt,
-    ast.Gt: ast.GtE,
-    ast.GtE: ast.Gt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.Is: ast.IsNot,
-    ast.IsNot: ast.Is,
-    ast.In: ast.NotIn,
-    ast.NotIn: ast.In,
+    a: b
+    for one, other in ((ast.Lt, ast.LtE), (ast.Gt, ast.GtE), (ast.Eq, ast.NotEq), (ast.Is, ast.IsNot), (ast.In, ast.NotIn))
+    for a, b in ((one, other), (other, one))
 }
 ARITHMETIC = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 OPPOSITES = {"min": "max", "max": "min", "any": "all", "all": "any"}
-HARMLESS = {"strict", "frozen", "slots"}
-"""Keywords that forbid what does not happen; whether they are there changes no result."""
+HARMLESS = {"strict", "frozen", "slots"}  # keywords that change no result
 
 
 @dataclass(frozen=True)
@@ -150,7 +126,7 @@ class _Swap(ast.NodeTransformer):
 
 
 def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
-    """What a node may be replaced by, and in words."""
+    """Replacements of a node, and each in words."""
     new = copy.deepcopy(node)
     if isinstance(new, ast.Compare):
         for place, op in enumerate(new.ops):
@@ -184,7 +160,7 @@ def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
 
 
 class Fate(Enum):
-    """What became of a mutant. A test that stands still or is killed has found it, too, but told nobody why."""
+    """What became of a mutant. A test that hangs or is killed has found it, too, without a reason."""
 
     FOUND = "found"
     HANGS = "hangs"
@@ -192,7 +168,7 @@ class Fate(Enum):
 
 
 def fate_of(mutant: Mutant, tree: Path) -> Fate:
-    """What the tests say in `tree`, a copy of the project, with the mutant in it."""
+    """Run the tests in `tree`, a copy of the project, with the mutant in it."""
     path = tree / FOLDER / f"{mutant.module}.py"
     path.write_text(mutant.source, encoding="utf-8")
     try:
@@ -204,17 +180,8 @@ def fate_of(mutant: Mutant, tree: Path) -> Fate:
 
 def run_tests(tree: Path, tests: tuple[str, ...]) -> Fate:
     """SURVIVES: they all pass."""
-    command = [
-        sys.executable,
-        "-B",
-        "-m",
-        "pytest",
-        "-x",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        *(f"{TEST_FOLDER}/{name}" for name in tests),
-    ]
+    files = [f"{TEST_FOLDER}/{name}" for name in tests]
+    command = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *files]
     try:
         code = subprocess.run(command, cwd=tree, capture_output=True, timeout=TIMEOUT_S, check=False).returncode
     except subprocess.TimeoutExpired:
@@ -223,13 +190,13 @@ def run_tests(tree: Path, tests: tuple[str, ...]) -> Fate:
 
 
 def broken_tests(modules: list[str], tree: Path) -> list[str]:
-    """Of the tests that are to find mutants of the modules those that do not pass on the code as it is."""
+    """The tests of the modules that do not pass on the code as it is."""
     asked = {name for module in modules for name in TESTS[module]} | set(LONG_TESTS)
     return [name for name in sorted(asked) if run_tests(tree, (name,)) is not Fate.SURVIVES]
 
 
 def copy_project(folder: Path) -> Path:
-    """A copy of the project as it lies here, with what is new and without what is ignored."""
+    """Copy the project with new files, without ignored ones."""
     listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--"]
     parts = ["core", "hardware", "tests", "resources", "*.toml"]
     files = subprocess.run([*listed, *parts], cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
@@ -273,7 +240,7 @@ def main(modules: list[str]) -> int:
 
 
 def report(fates: list[tuple[Mutant, Fate]]) -> int:
-    """Tell what survives, and why it may; returns the exit code."""
+    """Print what survives, and why it may; returns the exit code."""
     counts = Counter(fate for _, fate in fates)
     unexplained = 0
     for mutant, fate in fates:

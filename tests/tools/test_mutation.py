@@ -1,31 +1,19 @@
-"""The mutation script: its mutants are changes of today's code, and what it explains away is still among them."""
+"""The mutation tool: its mutants are changes of today's code, and what it explains away is still among them."""
 
 from __future__ import annotations
 
 import ast
-import importlib.util
-import sys
 from collections import Counter
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+
+from tools import mutation
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(scope="module")
-def mutation() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("mutation_script", ROOT / "tools" / "mutation.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # its dataclass asks for its own module
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_a_small_module_has_all_its_mutants(mutation: ModuleType) -> None:
+def test_a_small_module_has_all_its_mutants() -> None:
     source = "def f(a, b):\n    if a > 1 and not b:\n        return min(a, -b)\n    return 0\n"
     found = {mutant.change: mutant.source.splitlines() for mutant in mutation.mutants("gate", source)}
     assert found["Gt -> GtE"][1] == "    if a >= 1 and (not b):"
@@ -40,7 +28,7 @@ def test_a_small_module_has_all_its_mutants(mutation: ModuleType) -> None:
     assert found["0 -> 1"][3] == "    return 1"
 
 
-def test_every_explained_survivor_is_a_change_of_todays_code(mutation: ModuleType) -> None:
+def test_every_explained_survivor_is_a_change_of_todays_code() -> None:
     known: Counter[tuple[str, str, str]] = Counter()
     for module, tests in mutation.TESTS.items():
         source = (ROOT / mutation.FOLDER / f"{module}.py").read_text(encoding="utf-8")
@@ -52,7 +40,7 @@ def test_every_explained_survivor_is_a_change_of_todays_code(mutation: ModuleTyp
     assert {key: known[key] for key in mutation.EXPLAINED} == dict.fromkeys(mutation.EXPLAINED, 1), "one change each"
 
 
-def test_changes_that_read_alike_say_what_they_change(mutation: ModuleType) -> None:
+def test_changes_that_read_alike_say_what_they_change() -> None:
     source = "def f(a, b, c):\n    return a and (b and c or a)\n"
     changes = {mutant.change for mutant in mutation.mutants("gate", source)}
     assert {
@@ -65,14 +53,14 @@ def test_changes_that_read_alike_say_what_they_change(mutation: ModuleType) -> N
 
 
 def test_a_test_that_fails_as_it_is_finds_nothing(
-    mutation: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / mutation.TEST_FOLDER
     folder.mkdir(parents=True)
     (folder / "test_red.py").write_text("def test_red():\n    assert False\n")
     (folder / "test_green.py").write_text("def test_green():\n    pass\n")
     monkeypatch.setattr(mutation, "LONG_TESTS", ("test_green.py",))
-    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)  # what is asked of all tests, a report's file say, is not asked of these
+    monkeypatch.delenv("PYTEST_ADDOPTS", raising=False)
     monkeypatch.setattr(mutation, "TESTS", {"gate": ("test_red.py", "test_missing.py")})
     monkeypatch.setattr(mutation, "copy_project", lambda _folder: tmp_path)
     assert mutation.main(["gate"]) == 2
@@ -82,7 +70,7 @@ def test_a_test_that_fails_as_it_is_finds_nothing(
     assert mutation.broken_tests(["gate"], tmp_path) == []
 
 
-def test_a_survivor_without_an_explanation_is_a_failure(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_survivor_without_an_explanation_is_a_failure(capsys: pytest.CaptureFixture[str]) -> None:
     key = next(iter(mutation.EXPLAINED))
     explained = mutation.Mutant(key[0], 3, key[1], key[2], "")
     new = mutation.Mutant("gate", 7, "if a > b:", "Gt -> GtE", "")
@@ -93,6 +81,6 @@ def test_a_survivor_without_an_explanation_is_a_failure(mutation: ModuleType, ca
     assert "core/control/gate.py:7: Gt -> GtE\n    if a > b:\n    NOT EXPLAINED" in capsys.readouterr().out
 
 
-def test_an_unknown_module_is_one_line(mutation: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_module_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert mutation.main(["pedal"]) == 2
     assert capsys.readouterr().err == "unknown: pedal; known are gate, joints, supervisor, health, bus_monitor\n"
