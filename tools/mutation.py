@@ -66,7 +66,7 @@ EXPLAINED = {
 }
 # fmt: on
 
-COMPARISONS = {
+COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     a: b
     for one, other in ((ast.Lt, ast.LtE), (ast.Gt, ast.GtE), (ast.Eq, ast.NotEq), (ast.Is, ast.IsNot), (ast.In, ast.NotIn))
     for a, b in ((one, other), (other, one))
