@@ -49,18 +49,19 @@ class FrameDecoder(QObject):
         super().__init__(parent)
         self.replayed: Replayed | None = None
         self._reader = reader
-        self._place, self._step = -1, 0
+        self._place, self._step, self._requests = -1, 0, 0
         self._kept: OrderedDict[int, Decoded] = OrderedDict()
         self._kept_bytes = 0
         self._worker = Worker("decode", self, latest_only=True)
         self._worker.done.connect(self._on_done)
-        self._worker.failed.connect(lambda _place, line: self.failed.emit(line))
+        self._worker.failed.connect(lambda _key, line: self.failed.emit(line))
 
     def request(self, place: int, step: int = 1) -> None:
         """The row to be shown; `step` is how far apart the following ones will be, 0: none is decoded ahead."""
         self._place, self._step = place, step
+        self._requests += 1
         replayed = self.replayed
-        self._worker.submit((place, 0), lambda: self._with_replay(self._decode(place), replayed))
+        self._worker.submit((self._requests, 0), lambda: self._with_replay(self._decode(place), replayed))
 
     def request_again(self) -> None:
         if self._place >= 0:
@@ -74,13 +75,17 @@ class FrameDecoder(QObject):
         return self._worker.wait(within_ms)
 
     def _on_done(self, key: tuple[int, int], found: Decoded) -> None:
-        """Show the row, then decode those ahead one by one, until another row is requested."""
-        place, count = key
+        """Show the row, then decode those ahead one by one, until the next request.
+
+        Only a job of the last request is followed by another: its row is decoded, so no request waits that the new job would
+        replace. The row alone does not tell: it may have been requested once more.
+        """
+        request, count = key
         if count == 0:
             self.decoded.emit(found)
-        ahead = place + (count + 1) * self._step
-        if place == self._place and self._step and count < self._ahead_count(found) and 0 <= ahead < len(self._reader):
-            self._worker.submit((place, count + 1), lambda: self._decode(ahead))
+        ahead = self._place + (count + 1) * self._step
+        if request == self._requests and self._step and count < self._ahead_count(found) and 0 <= ahead < len(self._reader):
+            self._worker.submit((request, count + 1), lambda: self._decode(ahead))
 
     def _with_replay(self, shown: Decoded, replayed: Replayed | None) -> Decoded:
         if replayed is None or shown.row is None:
