@@ -54,7 +54,10 @@ _NEAR_PX, _CLEAR_PX = 20, 60  # distances of the head at which the loupe leaves 
 
 
 class LoupeCorner:
-    """Chooses the corner of the loupe: the one that hides least. It leaves it only when it would hide the head or the target."""
+    """Chooses the corner of the loupe: the one that hides least.
+
+    It leaves it for a better one when it would hide the head or the target, or would be covered; the head matters most.
+    """
 
     def __init__(self) -> None:
         self._corner: int | None = None
@@ -67,25 +70,26 @@ class LoupeCorner:
         Parameters
         ----------
         corners : where the loupe would lie, on the view.
-        head, target : must not be hidden.
+        head, target : must not be hidden, the head least of all.
         places : (N, 2) what else there is to see, also beyond the view.
         covers : what lies over the loupe.
         """
 
-        def is_free(corner: QRectF, margin_px: float) -> bool:
+        def faults(corner: QRectF, margin_px: float) -> tuple[bool, bool, bool]:
+            """The worst first, so that they compare: over the head, over the target, covered."""
             grown = corner.adjusted(-margin_px, -margin_px, margin_px, margin_px)
             is_target = target is not None and corner.contains(target)
-            return not (grown.contains(head) or is_target or any(corner.intersects(cover) for cover in covers))
+            return grown.contains(head), is_target, any(corner.intersects(cover) for cover in covers)
 
         def hidden(corner: QRectF) -> int:
             x, y = places[:, 0], places[:, 1]
             inside = (x > corner.left()) & (x < corner.right()) & (y > corner.top()) & (y < corner.bottom())
             return int(np.count_nonzero(inside))
 
-        if self._corner is None or not is_free(corners[self._corner], _NEAR_PX):
-            free = [k for k, corner in enumerate(corners) if is_free(corner, _CLEAR_PX)]
-            if free or self._corner is None:
-                self._corner = min(free or range(len(corners)), key=lambda k: hidden(corners[k]))
+        if self._corner is None or any(faults(corners[self._corner], _NEAR_PX)):
+            best = min(range(len(corners)), key=lambda k: (faults(corners[k], _CLEAR_PX), hidden(corners[k])))
+            if self._corner is None or faults(corners[best], _CLEAR_PX) < faults(corners[self._corner], _NEAR_PX):
+                self._corner = best
         return self._corner
 
 

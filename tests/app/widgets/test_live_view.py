@@ -52,6 +52,7 @@ def test_ghost_is_drawn_only_with_advice_and_goes_with_the_scene(own: Own, bench
 CORNERS = [QRectF(300, 0, 100, 80), QRectF(0, 0, 100, 80), QRectF(300, 220, 100, 80), QRectF(0, 220, 100, 80)]
 UPPER_RIGHT, UPPER_LEFT, LOWER_RIGHT, LOWER_LEFT = range(4)
 MIDDLE = QPointF(200, 150)
+STRIPS = [QRectF(12, 12, 376, 30), QRectF(12, 258, 376, 30)]
 
 
 def crowd(*counts: int) -> Points:
@@ -64,6 +65,7 @@ def test_the_loupe_begins_where_it_hides_least() -> None:
     assert LoupeCorner().choose(CORNERS, MIDDLE, None, crowd()) == UPPER_RIGHT
     assert LoupeCorner().choose(CORNERS, MIDDLE, None, crowd(50, 20, 1, 40)) == LOWER_RIGHT
     assert LoupeCorner().choose(CORNERS, MIDDLE, CORNERS[LOWER_RIGHT].center(), crowd(50, 20, 1, 40)) == UPPER_LEFT
+    assert LoupeCorner().choose(CORNERS, CORNERS[LOWER_RIGHT].center(), None, crowd(50, 20, 1, 40), STRIPS) == UPPER_LEFT
 
 
 @pytest.mark.parametrize(
@@ -73,8 +75,11 @@ def test_the_loupe_begins_where_it_hides_least() -> None:
         (QPointF(290, 70), None, [], LOWER_LEFT),
         (MIDDLE, QPointF(350, 40), [], LOWER_LEFT),
         (MIDDLE, None, [QRectF(12, 12, 360, 60)], LOWER_LEFT),
+        (MIDDLE, None, STRIPS, UPPER_RIGHT),
+        (QPointF(350, 40), None, STRIPS, LOWER_LEFT),
+        (QPointF(350, 40), CORNERS[LOWER_LEFT].center(), STRIPS, LOWER_RIGHT),
     ],
-    ids=["nothing", "head", "target", "alerts"],
+    ids=["nothing", "head", "target", "alerts", "strips", "head and strips", "head, target and strips"],
 )
 def test_the_loupe_leaves_its_corner_only_for_what_must_be_seen(
     head: QPointF, target: QPointF | None, covers: list[QRectF], corner: int
