@@ -10,6 +10,7 @@ import base64
 import csv
 import heapq
 import json
+import os
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -28,7 +29,7 @@ from core.control.modes import Mode
 from core.session.codec import RecordedRow
 from core.session.manifest import EventKind, SessionError
 from core.session.reader import SessionReader
-from core.session.video import MS, has_h264, media_name, open_video, sound_packets, video_number
+from core.session.video import MS, has_h264, media_name, open_video, packets_of, sound_packets, video_number
 from core.types import Command, Image, Points, PoseState, Tick
 
 Draw = Callable[[Tick], Image]
@@ -44,14 +45,30 @@ def new_file(path: Path) -> Iterator[Path]:
             raise SessionError(f"{path}: is there already; choose another file")
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
-        if path.exists():
-            raise SessionError(f"{path}: was made by something else meanwhile; choose another file")
-        part.replace(path)
+        try:
+            _move(part, path)
+        except FileExistsError:
+            raise SessionError(f"{path}: was made by something else meanwhile; choose another file") from None
     except (av.error.FFmpegError, OSError) as error:
         raise SessionError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
     finally:
         with suppress(OSError):
             part.unlink()
+
+
+def _move(part: Path, path: Path) -> None:
+    """Give `part` its name. Raises FileExistsError: of two that write the same file the first one stands."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a drive without links
+        path.touch(exist_ok=False)
+        try:
+            part.replace(path)
+        except OSError:
+            path.unlink()  # the empty one that held the name
+            raise
 
 
 def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None) -> int:
@@ -454,7 +471,7 @@ def _packets(reader: SessionReader) -> Iterator[tuple[float, bytes]]:
             if not has_h264(container):
                 continue
             to_annex_b = BitStreamFilterContext("h264_mp4toannexb", container.streams.video[0])
-            for pts_ms, packet in sound_packets(container, partial(reader.number_of, number)):
+            for pts_ms, packet in sound_packets(packets_of(container), partial(reader.row_of, number)):
                 for filtered in to_annex_b.filter(packet):
                     yield time_of(number, pts_ms), bytes(filtered)
 

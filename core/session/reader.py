@@ -36,7 +36,7 @@ from core.session.manifest import (
     read_manifest,
     was_added_later,
 )
-from core.session.video import NumberOf, has_h264, open_video, packet_times, sound_packets, upright, video_number
+from core.session.video import RowOf, has_h264, open_video, packet_times, packets_of, sound_packets, upright, video_number
 from core.types import Frame, Image, PoseState, Tick
 
 _CACHE_BYTES = 48_000_000  # of decoded pictures
@@ -53,8 +53,8 @@ def _to_rgb(frame: av.VideoFrame) -> Image:
 class _OpenVideo:
     """One file and how far it has been decoded: ``at_ms``. Pictures that are damaged, or build on such ones, are left out."""
 
-    def __init__(self, path: Path, number_of: NumberOf) -> None:
-        self._path, self._number_of = path, number_of
+    def __init__(self, path: Path, row_of: RowOf) -> None:
+        self._path, self._row_of = path, row_of
         self._open()
         self._frames = self._decode()
         self.at_ms: int | None = None
@@ -88,7 +88,7 @@ class _OpenVideo:
     def _decode(self) -> Iterator[av.VideoFrame]:
         is_whole = True
         with contextlib.suppress(av.error.FFmpegError, OSError):  # of the file, where it ends early
-            for _, packet in sound_packets(self._container, self._number_of):
+            for _, packet in sound_packets(packets_of(self._container), self._row_of):
                 is_whole = is_whole or packet.is_keyframe
                 try:
                     frames = packet.decode()
@@ -109,12 +109,14 @@ class _Pictures:
 
     Parameters
     ----------
-    number_of : file and time in it (ms) -> number of the row, or None.
+    row_of : file and time in it (ms) -> place and number of the row, or None.
     on_problem : gets a line for each file and each picture that cannot be read, once.
     """
 
-    def __init__(self, folder: Path, number_of: Callable[[int, int], int | None], on_problem: Callable[[str], None]) -> None:
-        self._number_of = number_of
+    def __init__(
+        self, folder: Path, row_of: Callable[[int, int], tuple[int, int] | None], on_problem: Callable[[str], None]
+    ) -> None:
+        self._row_of = row_of
         self._folder = folder
         self._on_problem = on_problem
         self._lock = threading.Lock()
@@ -181,7 +183,7 @@ class _Pictures:
 
     def _video(self, number: int) -> _OpenVideo:
         if number not in self._open:
-            self._open[number] = _OpenVideo(self._path(number), partial(self._number_of, number))
+            self._open[number] = _OpenVideo(self._path(number), partial(self._row_of, number))
             while len(self._open) > _OPEN_FILES:
                 self._open.popitem(last=False)[1].close()
         self._open.move_to_end(number)
@@ -288,12 +290,13 @@ class _RowIndex:
         with self._lock:
             return Timeline(*(np.array(column) for column in self._columns))
 
-    def number_of(self, video: int, pts_ms: int) -> int | None:
-        """Number of the row whose picture is at this time of this file; None: no such row yet."""
+    def row_of(self, video: int, pts_ms: int) -> tuple[int, int] | None:
+        """Place and number of the row whose picture is at this time of this file; None: no such row yet."""
         key = _key(video, pts_ms)
         with self._lock:
             place = bisect_left(self._keys, key)
-            return int(self._columns[0][place]) if place < len(self._keys) and self._keys[place] == key else None
+            is_there = place < len(self._keys) and self._keys[place] == key
+            return (place, int(self._columns[0][place])) if is_there else None
 
     def close(self) -> None:
         self._stop.set()
@@ -377,7 +380,7 @@ class SessionReader:
         with contextlib.suppress(OSError):  # the index names what cannot be opened
             self._file = (folder / FRAMES).open("rb")
         self._index = _RowIndex(folder / FRAMES, self._problem)
-        self._pictures = _Pictures(folder, self._index.number_of, self._problem)
+        self._pictures = _Pictures(folder, self._index.row_of, self._problem)
 
     def __enter__(self) -> SessionReader:
         return self
@@ -488,9 +491,9 @@ class SessionReader:
         """The video files that are there."""
         return tuple(sorted(self.folder.glob("video_*.mkv")))
 
-    def number_of(self, video: int, pts_ms: int) -> int | None:
-        """Number of the row whose picture is at this time (ms) of a video; None: no row has it."""
-        return self._index.number_of(video, pts_ms)
+    def row_of(self, video: int, pts_ms: int) -> tuple[int, int] | None:
+        """Place and number of the row whose picture is at this time (ms) of a video; None: no row has it."""
+        return self._index.row_of(video, pts_ms)
 
     def decoded(self, video: int, pts_ms: int) -> av.VideoFrame | None:
         """A picture by file and time, as it was decoded; None when it is lost or damaged."""

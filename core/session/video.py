@@ -9,12 +9,14 @@ for the same size.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from heapq import heappop, heappush
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -266,9 +268,11 @@ def _is_mirrored(frame: av.VideoFrame) -> bool:
     return bool(across_x * down_y - across_y * down_x < 0)
 
 
-_MAX_STEP_MS = 5_000  # a larger step to a picture without a row is a damaged time
-NumberOf = Callable[[int], int | None]
-"""Time in the file (ms) -> number of the row whose picture it is; None: no row has it."""
+_MAX_STEP_MS = 5_000  # behind the last row, a larger step is a damaged time
+RowOf = Callable[[int], tuple[int, int] | None]
+"""Time in the file (ms) -> place (among the good rows) and number of the row whose picture it is; None: no row has it."""
+Packets = Iterator[tuple[int, "av.Packet[av.VideoStream]"]]
+"""Time in the file (ms) and packet of each picture."""
 
 
 def video_number(path: Path) -> int | None:
@@ -283,29 +287,30 @@ def has_h264(container: InputContainer) -> bool:
     return context is not None and context.name == "h264" and context.width > 0 and context.height > 0
 
 
-def packets_of(container: InputContainer) -> Iterator[tuple[int, av.Packet[av.VideoStream]]]:
-    """Time (ms) and packet of each picture of the first video. Raises FFmpegError, OSError where the file cannot be read on."""
+def packets_of(container: InputContainer) -> Packets:
+    """The packets of the first video. Raises FFmpegError, OSError where the file cannot be read on."""
     stream = container.streams.video[0]
     for packet in container.demux(stream):
         if packet.pts is not None and packet.size and stream.time_base is not None:
             yield round(packet.pts * stream.time_base * 1000), packet
 
 
-def sound_packets(container: InputContainer, number_of: NumberOf) -> Iterator[tuple[int, av.Packet[av.VideoStream]]]:
-    """As ``packets_of``, without damaged packets, and without those that build on a damaged or missing one."""
-    last: int | None = None
+def sound_packets(packets: Packets, row_of: RowOf) -> Packets:
+    """`packets` without damaged ones, and without those that build on a damaged or missing one."""
+    last: tuple[int, int] | None = None
     unknown, is_whole = 0, False
-    for pts_ms, packet in packets_of(container):
-        number = number_of(pts_ms)
+    for pts_ms, packet in packets:
+        row = row_of(pts_ms)
         if packet.is_corrupt:
             is_whole = False
             continue
-        if number is None:
+        if row is None:
             unknown += 1
         else:
-            if last is not None and number > last + 1 + unknown:
+            # no row lies in between, and as many pictures came by as rows are lost there
+            if last is not None and (row[0] != last[0] + 1 or row[1] > last[1] + 1 + unknown):
                 is_whole = False
-            last, unknown = number, 0
+            last, unknown = row, 0
         is_whole = is_whole or packet.is_keyframe
         if is_whole:
             yield pts_ms, packet
@@ -323,9 +328,11 @@ def packet_times(path: Path) -> list[int]:
 def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int], list[str]]:
     """Copy the sound packets of `source`; nothing is written without any.
 
+    A time that no row has is possible where rows are missing, or soon after the last row; others are damaged.
+
     Parameters
     ----------
-    rows : time (ms) of a picture -> number of its row.
+    rows : time (ms) of a picture -> number of its row, in order.
 
     Returns
     -------
@@ -339,6 +346,20 @@ def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int]
     """
     kept: set[int] = set()
     problems: list[str] = []
+    last_ms, found = -1, 0
+    known: list[tuple[float, int]] = [(-1, -2), *(rows.items() or [(math.inf, 0)])]
+    gaps = [(low, high) for (low, before), (high, after) in pairwise(known) if after > before + 1]
+    end_ms = known[-1][0]
+    places = {pts_ms: (place, row) for place, (pts_ms, row) in enumerate(rows.items())}
+
+    def possible(packets: Packets) -> Packets:
+        nonlocal found
+        for pts_ms, packet in packets:
+            found += 1
+            is_known = pts_ms in rows or any(low < pts_ms < high for low, high in gaps)
+            if pts_ms > last_ms and (is_known or end_ms < pts_ms < max(last_ms, end_ms) + _MAX_STEP_MS):
+                yield pts_ms, packet
+
     try:
         container = open_video(source)
     except (av.error.FFmpegError, OSError) as error:
@@ -346,7 +367,7 @@ def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int]
     with container:
         if not has_h264(container):
             return kept, [f"{source.name}: has no H.264 video in it"]
-        packets, last_ms, left_out = sound_packets(container, rows.get), -1, 0
+        packets = sound_packets(possible(packets_of(container)), places.get)
         try:
             with av.open(media_name(target), "w", format="matroska") as output:
                 copy = output.add_stream_from_template(container.streams.video[0])
@@ -358,9 +379,6 @@ def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int]
                     except (av.error.FFmpegError, OSError) as error:
                         problems.append(f"{source.name}: ends early ({_words(error)})")
                         break
-                    if pts_ms <= last_ms or (pts_ms not in rows and last_ms >= 0 and pts_ms > last_ms + _MAX_STEP_MS):
-                        left_out += 1
-                        continue
                     last_ms = pts_ms
                     packet.stream = copy
                     packet.dts = packet.pts
@@ -368,7 +386,7 @@ def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int]
                     kept.add(pts_ms)
         except (av.error.FFmpegError, OSError, ValueError) as error:
             raise VideoError(f"{target}: cannot be written ({_words(error)})") from None
-    if left_out:
+    if left_out := found - len(kept):
         problems.append(f"{source.name}: {left_out} damaged pictures left out")
     if not kept:
         target.unlink(missing_ok=True)

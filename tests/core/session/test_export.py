@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import csv
+import errno
 import json
+import os
 from pathlib import Path
 
 import av
@@ -194,6 +196,52 @@ def test_colons_in_a_relative_path_name_no_protocol(tmp_path: Path, monkeypatch:
         assert number_in(frame.image) == 4
         assert export_mp4(reader, Path("clip:1.mp4")) == 5
     assert recover(session, Path("copy:1")).pictures == 5
+
+
+def no_links(*_: object) -> None:
+    raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+
+@pytest.mark.parametrize("has_links", [True, False])
+def test_of_two_that_export_to_one_file_the_first_one_stands(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_links: bool
+) -> None:
+    """Also when the other one ends between a check whether the file exists and the move."""
+    if not has_links:
+        monkeypatch.setattr(os, "link", no_links)
+    out = tmp_path / "x.csv"
+    with SessionReader(session) as reader, pytest.raises(SessionError, match="was made by something else meanwhile"):
+
+        def another() -> None:
+            if not out.exists():
+                with SessionReader(session) as other:
+                    export_csv(other, out)
+                monkeypatch.setattr(Path, "exists", lambda _: False)
+
+        export_csv(reader, out, another)
+    monkeypatch.undo()
+    with SessionReader(session) as reader:
+        export_csv(reader, tmp_path / "y.csv")
+    assert out.read_bytes() == (tmp_path / "y.csv").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["x.csv", "y.csv"]
+
+
+def test_a_drive_without_links_takes_an_export_too(session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "link", no_links)
+    with SessionReader(session) as reader:
+        written = export_csv(reader, tmp_path / "x.csv")
+    assert len((tmp_path / "x.csv").read_text().splitlines()) == written + 1
+    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
+
+
+def test_a_drive_that_takes_no_file_in_the_end_keeps_no_empty_one(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "link", no_links)
+    monkeypatch.setattr(Path, "replace", no_links)
+    with SessionReader(session) as reader, pytest.raises(SessionError, match="cannot be written"):
+        export_csv(reader, tmp_path / "x.csv")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_was_made_while_exporting_is_not_overwritten(session: Path, tmp_path: Path) -> None:

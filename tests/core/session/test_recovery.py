@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,17 +69,19 @@ def read_all(session: Path) -> tuple[list[int], list[int], tuple[str, ...]]:
         )
 
 
-def without_packet(path: Path, place: int) -> None:
-    """The video without its n-th packet."""
+def rewrite_video(path: Path, delays_ms: Mapping[int, int] | None = None, without: int | None = None) -> None:
+    """Write the video once more, without one of its packets and with some of its times changed, both by the packet's place."""
     whole = path.with_suffix(".whole")
     path.rename(whole)
     with av.open(str(whole), format="matroska") as source, av.open(str(path), "w", format="matroska") as target:
         stream = source.streams.video[0]
         copy = target.add_stream_from_template(stream)
-        packets = [packet for packet in source.demux(stream) if packet.size]
-        for packet in packets[:place] + packets[place + 1 :]:
-            packet.stream, packet.dts = copy, packet.pts
-            target.mux_one(packet)
+        for place, packet in enumerate(packet for packet in source.demux(stream) if packet.size):
+            assert packet.pts is not None
+            if place != without:
+                packet.pts += (delays_ms or {}).get(place, 0)
+                packet.stream, packet.dts = copy, place
+                target.mux_one(packet)
     whole.unlink()
 
 
@@ -292,6 +294,32 @@ def test_pictures_whose_rows_were_cut_off_are_kept_however_many(tmp_path: Path) 
     assert (expected.frames, expected.pictures, expected.loss.rows) == (done.frames, done.pictures, done.loss.rows)
 
 
+@pytest.mark.parametrize(
+    ("delays_ms", "kept"),
+    [
+        (dict.fromkeys(range(30), 4_096_000), range(30, COUNT)),
+        (dict.fromkeys(range(30, 43), 1_024), [*range(30), *range(60, COUNT)]),
+        ({5: 4_096_000}, [*range(5), *range(30, COUNT)]),
+        ({5: 10}, [*range(5), *range(30, COUNT)]),
+    ],
+)
+def test_damaged_times_cost_their_pictures_and_what_builds_on_them(
+    session: Path, delays_ms: dict[int, int], kept: Sequence[int]
+) -> None:
+    """A time that no row has is damaged; key pictures are 0, 30 and 60."""
+    rewrite_video(session / "video_0000.mkv", delays_ms)
+    done = recover(session)
+    assert f"video_0000.mkv: {COUNT - len(kept)} damaged pictures left out" in done.loss.problems
+    assert checked(session, done) == (list(range(COUNT)), list(kept))
+    assert done.pictures == len(kept)
+
+
+def test_without_rows_all_pictures_are_kept_also_after_a_pause(tmp_path: Path) -> None:
+    session = record(tmp_path, (tick_of(i, 1000.0 + i / FPS + 8.0 * (i >= 40)) for i in range(COUNT)))
+    (session / "frames.jsonl").write_bytes(b"")
+    assert recover(session).pictures == COUNT
+
+
 def test_a_disk_that_cannot_be_read_any_further_costs_only_what_comes_after(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def bad_sector(path: Path) -> Iterator[Any]:
         for line in lines_of(path):
@@ -319,7 +347,7 @@ def test_a_picture_that_is_lost_with_its_row_takes_along_what_builds_on_it(sessi
     rows, pictures, _ = read_all(session)
     assert rows == pictures == [index for index in range(COUNT) if index != lost], "the row alone: its picture has come by"
 
-    without_packet(session / "video_0000.mkv", lost)
+    rewrite_video(session / "video_0000.mkv", without=lost)
     for folder in (session, recover(session).folder):
         rows, pictures, _ = read_all(folder)  # which looks that no picture is another one's
         assert rows == [index for index in range(COUNT) if index != lost]
