@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from app.ui.theme import ON_PICTURE, STATE_COLOUR
+from app.ui.palette import ON_PICTURE, STATE_COLOUR
 from core.config.models import RESOURCES
 from core.evaluation.evaluation import AnglePairs
 from core.evaluation.metrics import LIMITS_SD, RANGE_DEG

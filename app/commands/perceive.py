@@ -16,6 +16,7 @@ import typer
 
 from app.commands.options import ConfigOption, ModelOption, PresetOption
 from app.commands.progress import LineOutput, check_apart, check_no_input, is_same, make_folder, progress_bar
+from app.ui.display import check_qt
 from core.config.models import choose_model, load_config
 from core.control.policies import table_policy
 from core.devices import UserError
@@ -50,6 +51,8 @@ def perceive(
     files = expand(images)
     if not files:
         raise UserError(f"{', '.join(map(str, images))}: no pictures or videos there{_hint_inner(images)}")
+    if overlay is not None:
+        check_qt("leave --overlay out")
     lines_to = None if jsonl == "-" else Path(jsonl)  # ./- is a file
     if lines_to is not None:
         read = (path for path in (*files, targets, config) if path is not None)

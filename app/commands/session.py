@@ -18,6 +18,7 @@ from rich.table import Table
 
 from app.commands.options import JsonOption, ProgressOption, SessionArgument
 from app.commands.progress import progress_bar, report_progress
+from app.ui.display import check_qt
 from core.config.files import own_config
 from core.config.models import Config
 from core.control.modes import Mode
@@ -138,6 +139,8 @@ def export(
     for path in out:
         if path.suffix.lower() not in _UNITS:
             raise SessionError(f"{path}: unknown format; the file's ending must be one of {', '.join(_UNITS)}")
+    if not plain and any(path.suffix.lower() == ".mp4" for path in out):
+        check_qt("export it with --plain")
     written: dict[str, int] = {}
     with SessionReader(session) as reader:
         reader.wait()
@@ -168,6 +171,8 @@ def _export(reader: SessionReader, out: Path, plain: bool, on_row: Any) -> int:
             return export_csv(reader, out, on_row)
         case ".mcap":
             return export_mcap(reader, out, on_row)
+    if plain:
+        return export_mp4(reader, out, None, on_row=on_row)
     from app.widgets.overlay_image import draw_overlay
 
     # The banner of an exported video says that a simulation is no real run.
@@ -176,7 +181,7 @@ def _export(reader: SessionReader, out: Path, plain: bool, on_row: Any) -> int:
     def draw(tick: Tick) -> Image:
         return draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=stamp)
 
-    return export_mp4(reader, out, None if plain else draw, on_row=on_row)
+    return export_mp4(reader, out, draw, on_row=on_row)
 
 
 def play(

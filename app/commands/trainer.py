@@ -15,7 +15,7 @@ import torch
 from rich.progress import Progress
 
 from app.commands.progress import Interrupt, ProgressWriter
-from app.ui import theme
+from app.ui import palette
 from core.config.models import SegmentationConfig
 from core.devices import UserError
 from core.evaluation.accuracy import difficulty
@@ -218,14 +218,14 @@ def write_pictures(result: HeldOutResult, folder: Path, when: str) -> list[str]:
 
 def draw_held_out(frame: HeldOutFrame) -> Image:
     """Found masks as colours (vessel, then robot), true ones as outlines, RGB at working size."""
-    colours = theme.ON_PICTURE
+    colours = palette.ON_PICTURE
     picture = frame.image.astype(np.float32)
     for mask, name in ((frame.vessel, colours.VESSEL), (frame.robot, colours.ROBOT)):
-        picture[mask] = (1 - _OPACITY) * picture[mask] + _OPACITY * np.array(theme.rgb(name), np.float32)
+        picture[mask] = (1 - _OPACITY) * picture[mask] + _OPACITY * np.array(palette.rgb(name), np.float32)
     drawn = np.ascontiguousarray(np.clip(picture, 0, 255).astype(np.uint8))
     for mask, name in ((frame.true_vessel, colours.VESSEL_VECTOR), (frame.true_robot, colours.ROBOT_VECTOR)):
         outlines, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(drawn, list(outlines), -1, theme.rgb(name), 1, cv2.LINE_AA)
+        cv2.drawContours(drawn, list(outlines), -1, palette.rgb(name), 1, cv2.LINE_AA)
     return drawn
 
 

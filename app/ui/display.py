@@ -1,4 +1,4 @@
-"""Whether a window can be opened at all; asked before Qt is loaded."""
+"""Whether a window can be opened and Qt can be loaded; asked before either is done."""
 
 from __future__ import annotations
 
@@ -25,3 +25,16 @@ def check_display() -> None:
             f"the display {display} (DISPLAY) does not answer: it has gone, or this user may not use it (over ssh: ssh -X); "
             "start it in a desktop session, or give it a virtual one (xvfb-run -a make run)"
         )
+
+
+def check_qt(instead: str) -> None:
+    """Raise UserError where Qt, with which overlays are drawn, or a library of the system that it needs does not load.
+
+    `instead` : what else the user can do.
+    """
+    try:
+        from PySide6 import QtWidgets  # noqa: F401
+    except ImportError as error:
+        raise UserError(
+            f"overlays are drawn with Qt, which does not load ({error}): install what main.py doctor names, or {instead}"
+        ) from None

@@ -189,7 +189,6 @@ def check_all_files(folder: Path) -> list[str]:
 
 def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
     """The torch network in evaluation mode with its weights; raises ModelError."""
-    from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
     from safetensors import SafetensorError
     from safetensors.torch import load
 
@@ -207,20 +206,30 @@ def load_network(folder: Path) -> tuple[DualUNet, ModelInfo]:
         wrong = [*unexpected, *(key for key in missing if not key.endswith("num_batches_tracked"))]
         if wrong:
             raise ValueError(f"weights {wrong[0]}")
-    except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError, DecodeError) as error:
+    except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
         reason = str(error).splitlines()[0]
         raise ModelError(f"{folder / name}: does not fit the shape in {INFO} ({reason}); restore the model folder") from None
     return network.eval(), info
 
 
 def _state_of_onnx(data: bytes) -> dict[str, Any]:
-    """The initializers of an ONNX file as tensors, under the names that they have in the torch network."""
-    import onnx
+    """The initializers of an ONNX file as tensors, under their names in the torch network; raises ModelError, ValueError."""
     import torch
-    from onnx import numpy_helper
 
+    try:
+        import onnx
+        from google.protobuf.message import DecodeError  # type: ignore[import-untyped]
+        from onnx import numpy_helper
+    except ImportError as error:
+        raise ModelError(
+            f"networks are read with the package onnx, which does not load ({error}): make clean && make setup"
+        ) from None
+    try:
+        graph = onnx.load_model_from_string(data).graph
+    except DecodeError as error:
+        raise ValueError(str(error)) from None
     state = {}
-    for one in onnx.load_model_from_string(data).graph.initializer:
+    for one in graph.initializer:
         name = one.name.removeprefix(ONNX_PREFIX).removesuffix(HALF_SUFFIX)
         state[name] = torch.from_numpy(numpy_helper.to_array(one).copy()).float()
     return state

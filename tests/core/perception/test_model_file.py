@@ -129,14 +129,19 @@ def test_weights_survive_the_round_trip(model: Path) -> None:
         torch.testing.assert_close(tensor, original[name])
 
 
-def test_a_folder_of_format_1_has_its_weights_in_a_file_of_their_own(model: Path, tmp_path: Path) -> None:
+def test_a_folder_of_format_1_has_its_weights_in_a_file_of_their_own(
+    model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     network, info = load_network(model)
     half = {name: tensor.half() if tensor.dim() > 1 else tensor for name, tensor in network.state_dict().items()}
     (model / WEIGHTS).write_bytes(save(half))
     changes = {"format": 1, "weights_sha256": sha256_of(model / WEIGHTS)}
     (model / INFO).write_text(info.model_copy(update=changes).model_dump_json())
     check_model(str(model))
-    old = load_network(model)[0].state_dict()
+    with monkeypatch.context() as without_onnx:
+        for package in ("onnx", "google.protobuf.message"):
+            without_onnx.setitem(sys.modules, package, None)
+        old = load_network(model)[0].state_dict()
     assert all(torch.equal(old[name], tensor) for name, tensor in network.state_dict().items())
     near = with_prior_planes(network)
     save_with_second_look(model, near, tmp_path / "both", training={}, figures={})
@@ -145,6 +150,13 @@ def test_a_folder_of_format_1_has_its_weights_in_a_file_of_their_own(model: Path
     (tmp_path / "both" / WEIGHTS).write_bytes(b"cut")
     with pytest.raises(ModelError, match=f"{WEIGHTS}: SHA-256 differs"):
         check_model(str(tmp_path / "both"))
+
+
+@pytest.mark.parametrize("package", ["onnx", "google.protobuf.message"])
+def test_a_package_that_does_not_load_is_one_clear_error(model: Path, monkeypatch: pytest.MonkeyPatch, package: str) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ModelError, match=f"which does not load .*{package}.*: make clean && make setup$"):
+        load_network(model)
 
 
 def test_figures_are_added_without_touching_the_rest(model: Path) -> None:
