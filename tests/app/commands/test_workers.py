@@ -112,7 +112,7 @@ def test_sessions_are_perceived_again_on_a_cluster(address: str, tmp_path: Path)
     assert json.loads((tmp_path / "out" / GOLDEN.name / "replay.json").read_text()) == told
     away = tmp_path / "away"
     (outcome,) = over_cluster(address, partial(replay_one, ReplayOptions(away)), [away])
-    assert (outcome.done, outcome.problem) == (None, f"{away}: no such session")
+    assert (outcome.result, outcome.problem) == ({}, f"{away}: no such session")
 
 
 def test_what_a_cluster_has_not_made_is_made_when_the_command_is_given_again(address: str, tmp_path: Path) -> None:
