@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from app.cli import app, main
 from app.commands import synth
 from core.session.manifest import read_manifest
-from hardware.twin.rendering.presets import RARE
+from hardware.twin.rendering.presets import RARE_FAMILIES
 from tests.core.session_data import record, tick_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -150,4 +150,4 @@ def test_a_name_that_the_output_cannot_hold_is_no_traceback(tmp_path: Path, enco
 
 def test_the_help_of_synth_names_every_rare_look() -> None:
     """It is written out there: whoever asks for help does not wait for the twin to be imported."""
-    assert f"({', '.join(RARE)}: drawn" in " ".join(help_of("synth").split())
+    assert f"({', '.join(RARE_FAMILIES)}: drawn" in " ".join(help_of("synth").split())

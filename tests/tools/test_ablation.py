@@ -15,6 +15,7 @@ from core.config.models import GapConfig, PerceptionConfig, PoseConfig, QualityC
 from core.devices import UserError
 from core.evaluation.accuracy import FrameScore, TrueMasks
 from core.perception.pipeline import Pipeline
+from core.perception.segmentation import Segmenter
 from core.perception.vectors import fit_line
 from core.types import Frame, Image, Reason
 from tests.core.drawing import curve, depth
@@ -149,7 +150,7 @@ def test_both_fits_find_a_straight_line() -> None:
 
 
 def test_the_network_runs_once_per_frame() -> None:
-    class Counting:
+    class Counting(Segmenter):
         engine = "counted"
         runs = 0
 
