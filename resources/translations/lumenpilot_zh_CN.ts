@@ -1523,82 +1523,82 @@ destination, target: 目标点, 目标            route: 路线                 
         <translation>无法确定舵机是否已停止：请按空格键</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}</source>
         <translation>装置将重新打开：几秒内没有图像，且须重新开启舵机。{ends}</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Session</source>
         <translation>会话(&amp;S)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Robot</source>
         <translation>机器人(&amp;R)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>A recorded session</source>
         <translation>已录制的会话</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>the program is armed; disarm first (Shift+F6)</source>
         <translation>程序处于待命；请先解除待命 (Shift+F6)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source> The recording ends.</source>
         <translation>录制将结束。</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Model {name} from now on, until the program ends</source>
         <translation>从现在到程序结束使用模型 {name}</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Annotations to train on</source>
         <translation>用于训练的标注</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Annotations (*.sqlite)</source>
         <translation>标注 (*.sqlite)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Model {name} is installed; choose it in the Model menu</source>
         <translation>模型 {name} 已安装；请在“模型”菜单中选择</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Another unforeseen error: the servos were stopped again</source>
         <translation>又发生了意外错误：舵机已再次停止</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>The report is {report}</source>
         <translation>报告位于 {report}</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>The report could not be written</source>
         <translation>报告无法写入</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Unforeseen error</source>
         <translation>意外错误</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>The program met an error: {what}</source>
         <translation>程序遇到错误：{what}</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>{stopped}. A recording that ran was ended and is whole.
 
 {where}.
@@ -1611,67 +1611,67 @@ Best close the program and start it again. Space is still STOP.</source>
 建议关闭程序后重新启动。空格键仍是急停。</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Close the program</source>
         <translation>关闭程序</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Go on</source>
         <translation>继续</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Show the report</source>
         <translation>显示报告</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Evaluate the newest session</source>
         <translation>评估最新会话(&amp;E)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Annotate the newest session</source>
         <translation>标注最新会话(&amp;A)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Play the newest session</source>
         <translation>回放最新会话(&amp;P)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Open another session...</source>
         <translation>打开其他会话(&amp;O)...</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Look for &amp;cut sessions</source>
         <translation>查找中断的会话(&amp;C)</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>The last run of the program crashed</source>
         <translation>程序上次运行时崩溃</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>No session yet: F9 records one</source>
         <translation>还没有会话：按 F9 录制</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>{what}. The report: {report}</source>
         <translation>{what}。报告：{report}</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Chec&amp;ks before driving...</source>
         <translation>驾驶前检查(&amp;K)...</translation>
     </message>
     <message>
-        <location filename="../../app/operator/startup.py"/>
+        <location filename="../../app/operator/services.py"/>
         <source>Session</source>
         <translation>会话</translation>
     </message>
