@@ -54,11 +54,11 @@ def model(tmp_path: Path) -> Path:
 
 
 def _looks(model: Path, **how: bool) -> list[bool]:
-    """Whether a picture is looked at closely four times, and its answer's swings looked for: seen once, and in all orientations."""
+    """Whether the tip is refined in four passes and the threshold sensitivity computed: seen once, and in all orientations."""
     config = PerceptionConfig.model_validate({"segmentation": {"model": str(model), "threads": 1}})
     sights = open_calibrated(config, **how)
     often = [getattr(sight.segment, "engine", "").endswith(f"second look {MAX_PASSES} times") for sight in sights]
-    assert often == [sight.swings for sight in sights]
+    assert often == [sight.sensitivity for sight in sights]
     return often
 
 
