@@ -314,7 +314,7 @@ def _existing(path: Path) -> list[Path]:
 
 
 def listed_images(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
-    """Enter the files into the store as images, with a warning for each unreadable one. Raises AnnotationError without any."""
+    """Enter the files into the store as images, with a warning for each unreadable one. Raises AnnotationError if all are."""
     with progress_bar() as bar:
         task = bar.add_task("looking at the images", total=len(files))
         images, problems = find_images(files, store, lambda: bar.advance(task))
@@ -356,7 +356,7 @@ def _known_images(files: Sequence[Path], store: AnnotationStore) -> tuple[list[F
 
 
 def of_rater(annotations: list[StoredAnnotation], rater: str | None) -> list[StoredAnnotation]:
-    """Those of one rater; None: of all. Raises AnnotationError without any."""
+    """Those of one rater; None: of all. Raises AnnotationError if the list is empty."""
     if rater is None:
         return annotations
     own = [one for one in annotations if one.key.rater == rater]

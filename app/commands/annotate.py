@@ -183,7 +183,7 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
 
 def import_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
-    """``--import``: the lines and masks of other programs' files, for one rater. Raises AnnotationError without any."""
+    """``--import``: the lines and masks of other programs' files, for one rater. Raises AnnotationError if they hold nothing."""
     from core.annotation.exchange import merged, read_files
 
     sources = [file for path in options.imports for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]

@@ -68,7 +68,7 @@ class SettingPage(QScrollArea):
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
 
     def show_groups(self, groups: Sequence[Group], empty: str = "") -> None:
-        """Show these groups, or the text `empty` without any.
+        """Show these groups, or the text `empty` in place of no groups.
 
         What is in sight is made at once, the rest bit by bit: a long section would block the window for too long.
         """

@@ -275,7 +275,7 @@ class StaticArtefacts:
         self._seen_s[~self._known] = -math.inf
 
     def remove(self, robot: Mask, image: Image, captured_s: float, window: Window | None = None) -> Mask:
-        """The robot's mask (h, w) of the next frame without artefacts; the same object without any.
+        """The robot's mask (h, w) of the next frame without artefacts; the same object if nothing was removed.
 
         Parameters
         ----------
@@ -377,7 +377,7 @@ class StaticArtefacts:
         return kept, left
 
     def _artefact_in(self, component: _Component, image: Image, captured_s: float) -> Mask | None:
-        """A component's known pixels, within its box, with their edge; None without any.
+        """A component's known pixels, within its box, with their edge; None if no pixel is known.
 
         Where the robot has reached something of its own colour the two cannot be told apart: there all is robot.
         """

@@ -326,7 +326,7 @@ def packet_times(path: Path) -> list[int]:
 
 
 def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int], list[str]]:
-    """Copy the sound packets of `source`; nothing is written without any.
+    """Copy the sound packets of `source`; nothing is written if all are damaged.
 
     A time that no row has is possible where rows are missing, or soon after the last row; others are damaged.
 

@@ -109,7 +109,7 @@ def check_disk(config: RecordConfig, usage: Callable[[Path], tuple[int, int, int
 def check_clock(wall: Callable[[], float] = time.time) -> Check:
     """The date can be true: sessions are named by it. Ages and time limits go by the monotonic clock."""
     date = time.gmtime(wall())
-    detail = message("monotonic, now {time} UTC", time=time.strftime("%Y-%m-%d %H:%M", date))
+    detail = message("now {time} UTC", time=time.strftime("%Y-%m-%d %H:%M", date))
     if date.tm_year < _BUILT_IN_YEAR:
         return Check("clock", False, f"{detail}: the date is wrong, and sessions are named by it", "sudo timedatectl set-ntp true")
     return Check("clock", True, detail)

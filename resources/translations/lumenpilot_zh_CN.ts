@@ -6839,8 +6839,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/preflight/checks.py"/>
-        <source>monotonic, now {time} UTC</source>
-        <translation>单调，现在 {time} UTC</translation>
+        <source>now {time} UTC</source>
+        <translation>现在 {time} UTC</translation>
     </message>
     <message>
         <location filename="../../hardware/preflight/checks.py"/>

@@ -563,7 +563,7 @@ def test_all_checks_are_made_one_after_the_other_and_named_as_in_the_table(tmp_p
         ("camera", "USB 2", Level.BAD),
         ("adapter latency", "16 ms", Level.BAD),
         ("packages", "numpy 1 instead of 2", Level.BAD),
-        ("clock", "monotonic, now 1970-01-01 00:00 UTC: the date is wrong, and sessions are named by it", Level.WARNING),
+        ("clock", "now 1970-01-01 00:00 UTC: the date is wrong, and sessions are named by it", Level.WARNING),
         ("recordings", "0.1 GB free", Level.WARNING),
         ("cores and memory", "1 core", Level.WARNING),
         ("gamepad", "no permission", Level.WARNING),
