@@ -1,0 +1,174 @@
+"""Benches: what is combined from pictures and frames, the folder on disk, and what cannot be a bench."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from core.bench.bench import Bench, BenchError, bench_from_frames, bench_from_pictures, read_bench, write_bench
+from core.types import Image, Mask
+
+SIZE = (320, 240)
+
+
+def board(seed: int = 1, y: int = 120) -> Image:
+    """A board with dark discs and a bright tube across it."""
+    rng = np.random.default_rng(seed)
+    picture = np.full((SIZE[1], SIZE[0], 3), (150, 120, 90), np.uint8)
+    for _ in range(25):
+        x, y = rng.integers(10, SIZE[0] - 10), rng.integers(10, SIZE[1] - 10)
+        cv2.circle(picture, (int(x), int(y)), int(rng.integers(3, 9)), [int(c) for c in rng.integers(30, 220, 3)], cv2.FILLED)
+    cv2.line(picture, (0, y), (SIZE[0], y + 10), (200, 190, 180), 30)
+    return cv2.GaussianBlur(picture, (0, 0), 0.7)
+
+
+def tube() -> Mask:
+    drawn = np.zeros((SIZE[1], SIZE[0]), np.uint8)
+    cv2.line(drawn, (0, 120), (SIZE[0], 130), 1, 30)
+    return drawn > 0
+
+
+def noisy(picture: Image, sigma: float, seed: int, gain: float = 1.0) -> Image:
+    noise = np.random.default_rng(seed).normal(0.0, sigma, picture.shape)
+    return np.clip(np.rint(picture * gain + noise), 0, 255).astype(np.uint8)
+
+
+def with_line(picture: Image, start: tuple[int, int], end: tuple[int, int]) -> Image:
+    return cv2.line(picture.copy(), start, end, (20, 20, 20), 7)
+
+
+def test_noise_is_measured_from_one_picture_and_from_two() -> None:
+    for pictures in ([noisy(board(), 6.0, 1)], [noisy(board(), 6.0, 1), noisy(board(), 6.0, 2)]):
+        bench = bench_from_pictures(pictures, None, "b", 320)
+        assert abs(float(np.median(bench.noise)) / (6.0 * np.sqrt(0.299**2 + 0.587**2 + 0.114**2)) - 1.0) < 0.25
+        assert bench.known.mean() > 0.99
+
+
+def test_a_cable_in_one_of_three_pictures_is_left_out() -> None:
+    pictures = [noisy(board(), 2.0, 1), with_line(noisy(board(), 2.0, 2, 0.8), (20, 20), (300, 60)), noisy(board(), 2.0, 3, 1.1)]
+    bench = bench_from_pictures(pictures, tube(), "b", 320)
+    assert np.abs(bench.empty.astype(int) - board()).max(axis=2)[30:50, 100:200].mean() < 4.0
+    assert bench.known.all()
+    assert bench.vessel is not None
+    assert np.array_equal(bench.vessel, tube())
+
+
+def test_where_two_pictures_differ_the_bench_is_not_known() -> None:
+    bench = bench_from_pictures([noisy(board(), 2.0, 1), with_line(noisy(board(), 2.0, 2), (20, 20), (300, 60))], None, "b", 320)
+    assert not bench.known[40, 160]
+    assert bench.known[200, 160]
+
+
+def test_a_blurred_second_picture_does_not_blur_the_bench() -> None:
+    sharp = noisy(board(), 1.0, 1)
+    bench = bench_from_pictures([cv2.GaussianBlur(board(), (0, 0), 3.0), sharp], None, "b", 320)
+    assert np.abs(bench.empty.astype(int) - board()).mean() < 2.0
+
+
+def test_the_bench_of_frames_is_what_most_of_them_show() -> None:
+    frames = [with_line(noisy(board(), 2.0, k, 1.0 + 0.02 * k), (0, 125), (60 + 40 * k, 125)) for k in range(5)]
+    robots = []
+    for k in range(5):
+        robot = np.zeros((SIZE[1], SIZE[0]), np.float32)
+        robots.append(cv2.line(robot, (0, 125), (60 + 40 * k, 125), 1.0, 7))
+    bench = bench_from_frames(frames, "b", 320, robots=robots)
+    assert not bench.known[125, 20]
+    assert bench.known[125, 120]
+    assert (
+        np.abs(
+            bench.empty[120:131, 110:300].astype(int)
+            - board()[120:131, 110:300] * bench.empty[200, 5].mean() / board()[200, 5].mean()
+        ).mean()
+        < 6
+    )
+
+
+def test_a_robot_that_lies_still_gives_no_bench() -> None:
+    frames = [with_line(noisy(board(), 2.0, k), (0, 125), (160, 125)) for k in range(4)]
+    with pytest.raises(BenchError, match="lies still"):
+        bench_from_frames(frames, "b", 320)
+    with pytest.raises(BenchError, match="too few"):
+        bench_from_frames(frames[:2], "b", 320)
+
+
+def test_pictures_are_scaled_to_the_working_size() -> None:
+    bench = bench_from_pictures([board()], tube(), "b", 160)
+    assert bench.size == (160, 120)
+    assert bench.vessel is not None
+    assert bench.vessel.shape == (120, 160)
+
+
+@pytest.mark.parametrize(
+    ("pictures", "vessel", "problem"),
+    [
+        ([], None, "needs a picture"),
+        ([board(), board()[:200]], None, "picture 2 has 320x200 px, the first 320x240"),
+        ([board(), board(8, 40)], None, "another bench"),
+        ([cv2.GaussianBlur(board(), (0, 0), 12.0)], None, "blurred"),
+        ([board()], tube()[:, :100], "vessel mask has 100x240 px"),
+        ([board()], np.zeros_like(tube()), "vessel mask is empty"),
+        ([board()], ~tube(), "white must be the vessel"),
+    ],
+)
+def test_what_cannot_be_a_bench_is_named(pictures: list[Image], vessel: Mask | None, problem: str) -> None:
+    with pytest.raises(BenchError, match=problem):
+        bench_from_pictures(pictures, vessel, "b", 320)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return bench_from_pictures(
+        [noisy(board(), 3.0, 1), with_line(noisy(board(), 3.0, 2), (20, 20), (300, 60))], tube(), "lab 3", 320
+    )
+
+
+def test_a_bench_is_read_as_it_was_written(bench: Bench, tmp_path: Path) -> None:
+    folder = tmp_path / "benches" / "one"
+    write_bench(bench, folder)
+    write_bench(bench, folder)  # in the place of the older one
+    again = read_bench(folder)
+    assert again.name == "lab 3"
+    assert np.array_equal(again.empty, bench.empty)
+    assert np.allclose(again.noise, bench.noise, atol=1 / 256)
+    assert np.array_equal(again.known, bench.known)
+    assert again.vessel is not None
+    assert bench.vessel is not None
+    assert np.array_equal(again.vessel, bench.vessel)
+    assert np.allclose(again.landmarks, bench.landmarks, atol=0.01)
+    assert [path.name for path in folder.parent.iterdir()] == ["one"]
+
+
+def test_a_damaged_bench_is_named(bench: Bench, tmp_path: Path) -> None:
+    folder = tmp_path / "one"
+    with pytest.raises(BenchError, match="cannot be read"):
+        read_bench(folder)
+    write_bench(bench, folder)
+    data = (folder / "empty.png").read_bytes()
+    (folder / "empty.png").write_bytes(data[:-50])
+    with pytest.raises(BenchError, match="cut or damaged"):
+        read_bench(folder)
+    (folder / "empty.png").unlink()
+    with pytest.raises(BenchError, match=r"empty\.png"):
+        read_bench(folder)
+    (folder / "empty.png").write_bytes(data)
+    info = json.loads((folder / "bench.json").read_text())
+    (folder / "bench.json").write_text(json.dumps(info | {"format": 2}))
+    with pytest.raises(BenchError, match="newer version"):
+        read_bench(folder)
+    (folder / "bench.json").write_text(json.dumps(info | {"width": 10}))
+    with pytest.raises(BenchError, match="damaged"):
+        read_bench(folder)
+    (folder / "bench.json").write_text("{")
+    with pytest.raises(BenchError, match="damaged"):
+        read_bench(folder)
+
+
+def test_no_other_folder_is_replaced(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(BenchError, match="no bench"):
+        write_bench(bench, tmp_path)
+    assert (tmp_path / "notes.txt").read_text() == "mine"
