@@ -170,6 +170,8 @@ class Reason(StrEnum):
     LOW_CONFIDENCE = "low confidence"
     UNLIKE_TRAINING = "unlike the training data"
     HEAD_JUMP = "head jumped"
+    BENCH_MOVED = "camera or phantom moved"
+    OTHER_BENCH = "not this bench"
 
 
 @dataclass(frozen=True, slots=True)

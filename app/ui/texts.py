@@ -241,6 +241,10 @@ REASON_TEXT = {
         mark("Picture of an unknown kind"), mark("teach the model with labelled pictures of this rig")
     ),
     Reason.HEAD_JUMP: ReasonText(mark("The head jumped"), mark("wait for the next frames")),
+    Reason.BENCH_MOVED: ReasonText(mark("The camera or the phantom was moved"), mark("put it back, or make the bench again")),
+    Reason.OTHER_BENCH: ReasonText(
+        mark("Not the bench that was set up"), mark("point the camera at the phantom, or make the bench again")
+    ),
 }
 
 SPEED_WORD = {

@@ -32,7 +32,7 @@ FORMAT = 1
 INFO, EMPTY, NOISE, KNOWN, VESSEL = "bench.json", "empty.png", "noise.png", "known.png", "vessel.png"
 _FILES = frozenset({INFO, EMPTY, NOISE, KNOWN, VESSEL})
 
-SHARP_SHARE = 0.7
+SHARP_SHARE = 0.9
 """Empty pictures that are less sharp than this share of the sharpest one are not averaged into it."""
 LEAST_SHARPNESS = 0.05
 """A bench whose sharpest picture is below this is out of focus (``quality.sharpness``: 0.15 is a sharp edge)."""

@@ -209,6 +209,8 @@ AT_ONCE: dict[Reason, Cause] = {
     Reason.OUTSIDE_VESSEL: Cause.OUTSIDE_VESSEL,
     Reason.AMBIGUOUS_BRANCH: Cause.BRANCH_UNCLEAR,
     Reason.HEAD_JUMP: Cause.HEAD_JUMP,
+    Reason.BENCH_MOVED: Cause.CAMERA_MOVED,
+    Reason.OTHER_BENCH: Cause.CAMERA_MOVED,
     Reason.LOW_CONFIDENCE: Cause.CONFIDENCE_LOW,
     Reason.UNLIKE_TRAINING: Cause.UNKNOWN_KIND,
     Reason.BLURRED: Cause.POOR_VIEW,

@@ -11,34 +11,7 @@ import pytest
 
 from core.bench.bench import Bench, BenchError, bench_from_frames, bench_from_pictures, read_bench, write_bench
 from core.types import Image, Mask
-
-SIZE = (320, 240)
-
-
-def board(seed: int = 1, y: int = 120) -> Image:
-    """A board with dark discs and a bright tube across it."""
-    rng = np.random.default_rng(seed)
-    picture = np.full((SIZE[1], SIZE[0], 3), (150, 120, 90), np.uint8)
-    for _ in range(25):
-        x, y = rng.integers(10, SIZE[0] - 10), rng.integers(10, SIZE[1] - 10)
-        cv2.circle(picture, (int(x), int(y)), int(rng.integers(3, 9)), [int(c) for c in rng.integers(30, 220, 3)], cv2.FILLED)
-    cv2.line(picture, (0, y), (SIZE[0], y + 10), (200, 190, 180), 30)
-    return cv2.GaussianBlur(picture, (0, 0), 0.7)
-
-
-def tube() -> Mask:
-    drawn = np.zeros((SIZE[1], SIZE[0]), np.uint8)
-    cv2.line(drawn, (0, 120), (SIZE[0], 130), 1, 30)
-    return drawn > 0
-
-
-def noisy(picture: Image, sigma: float, seed: int, gain: float = 1.0) -> Image:
-    noise = np.random.default_rng(seed).normal(0.0, sigma, picture.shape)
-    return np.clip(np.rint(picture * gain + noise), 0, 255).astype(np.uint8)
-
-
-def with_line(picture: Image, start: tuple[int, int], end: tuple[int, int]) -> Image:
-    return cv2.line(picture.copy(), start, end, (20, 20, 20), 7)
+from tests.core.bench.drawn_bench import SIZE, board, noisy, tube, with_line
 
 
 def test_noise_is_measured_from_one_picture_and_from_two() -> None:

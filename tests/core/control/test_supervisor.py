@@ -233,6 +233,11 @@ def test_there_is_a_reaction_and_an_injection_for_every_cause() -> None:
     assert set(INJECTIONS) == set(Cause)
 
 
+@pytest.mark.parametrize("reason", [Reason.BENCH_MOVED, Reason.OTHER_BENCH])
+def test_a_bench_that_was_moved_ends_autonomy(reason: Reason) -> None:
+    assert AT_ONCE[reason].reaction is Reaction.DISARM
+
+
 def test_every_refusal_of_perception_means_something() -> None:
     assert set(AT_ONCE) | set(AFTER_SOME) == set(Reason)
     assert not set(AT_ONCE) & set(AFTER_SOME)
