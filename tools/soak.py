@@ -44,9 +44,9 @@ from hardware.rig import Rig, RigKind
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.process import drive_world
 from hardware.twin.servos.device import OVERLOAD_BIT
-from hardware.twin.servos.wire_monitor import MonitoredBus, WireMonitor
 from hardware.twin.world import TwinCamera, TwinWorld
 from tools.run import run_tool
+from tools.wire_monitor import MonitoredBus, WireMonitor
 
 _log = logging.getLogger(__name__)
 
@@ -446,7 +446,7 @@ class SoakOperator:
         choice = draw.choice(("stop", "stop", "hang", "disarm", "record", "record", "save last", "torque off", "restart"))
         self.count[choice] += 1
         if choice == "stop":
-            pilot.ask(Act.STOP)
+            pilot.stop()
             self._watch.set_stop(now_s)
         elif choice == "hang":
             self._hangs_until_s = now_s + draw.uniform(0.2, _HANGS_S)

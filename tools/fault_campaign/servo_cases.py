@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import signal
-import threading
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -23,14 +18,14 @@ from hardware.twin.servos.device import OVERLOAD_BIT, SoftServo
 from tools.fault_campaign.bench import ExpectedReaction, FaultBench, bench_fault, is_active, judge, open_bench
 from tools.fault_campaign.children import read_line, start_child
 from tools.fault_campaign.registry import CampaignError, Kit, Observation, check, fault, run_parts
+from tools.kill_campaign import KINDS, strike
 
 _DISARM, _STOP, _HELD = (Mode.ADVISORY,), (Mode.STOPPED,), (Mode.HOLD, Mode.ADVISORY)
 _ADVANCE = 5  # id of the advance servo
 _CARRIED_TICKS_S = 1000.0  # about 10 mm/s of a joint
 _BOUND_S = 1.0  # patience with a stopped application (0.5 s), a hold, and a machine that has other things to do
 _STEP_SLACK = 1.05
-_REST_MM, _MOVING_MM = 0.01, 0.2
-_SAMPLE_S, _WATCH_S, _POLL_S = 0.004, 1.6, 0.04
+_MOVING_MM = 0.1  # of the fastest servo in the 100 ms before a strike
 
 
 def _status(bench: FaultBench) -> BusStatus:
@@ -181,7 +176,7 @@ def strain(bench: FaultBench) -> list[str]:
 )
 def torque_stays(bench: FaultBench) -> list[str]:
     bench.bus.faults.mute(_ADVANCE)
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.until_active(Cause.TORQUE_ON)
     bench.run(0.6)
     early = any(alert.key is Note.TORQUE_OFF for alert in bench.alerts_since_mark)
@@ -289,68 +284,21 @@ def two_programs(kit: Kit) -> Observation:
 
 @fault(32)
 def killed(kit: Kit) -> Observation:
+    servos = SoftServoBus(ServosConfig(), wire_time=True)
+    servos.start()
+    try:
+        outcomes = [strike(servos, victim, number, delay_s=0.6) for victim, number in KINDS]
+    finally:
+        servos.stop()
     problems, reaction = [], []
-    for victim in ("application", "bus process"):
-        for number in (signal.SIGKILL, signal.SIGSTOP):
-            stop_s, steps = _strike(victim, number)
-            name = f"{number.name} {victim}"
-            # a stopped application is permitted until its heartbeat is missed: its order is good for a step, and then held
-            problems += check(
-                (stop_s <= _BOUND_S, f"{name}: still moving after {stop_s:.2f} s"),
-                (steps <= _STEP_SLACK, f"{name}: went {steps:.2f} steps"),
-            )
-            reaction.append(f"{name}: {1000 * stop_s:.0f} ms, {steps:.2f} steps")
+    for seen in outcomes:
+        name = f"{seen.signal} {seen.victim}"
+        # a stopped application is permitted until its heartbeat is missed: its order is good for a step, and then held
+        problems += check(
+            (seen.before_mm > _MOVING_MM, f"{name}: no servo moved before"),
+            (seen.stop_ms <= 1000.0 * _BOUND_S, f"{name}: still moving after {seen.stop_ms:.0f} ms"),
+            (seen.steps <= _STEP_SLACK, f"{name}: went {seen.steps:.2f} steps"),
+        )
+        reaction.append(f"{name}: {seen.stop_ms:.0f} ms, {seen.steps:.2f} steps")
     events = ("the session ends there (fault 37)",)
     return Observation(f"servos stand. {'; '.join(reaction)}", events=events, problems=tuple(problems))
-
-
-def _strike(victim: str, number: signal.Signals) -> tuple[float, float]:
-    """Seconds until the last servo stands still, and the longest way of one in its own bounded steps."""
-    servos = ServosConfig()
-    bus = SoftServoBus(servos, wire_time=True)
-    bus.start()
-    samples: list[tuple[float, tuple[float, ...]]] = []
-    done = threading.Event()
-
-    def watch() -> None:
-        while not done.wait(_SAMPLE_S):
-            positions = bus.positions_mm()
-            samples.append((time.monotonic(), positions))
-
-    try:
-        with start_child("drive", bus.port) as process:
-            bus_pid = int(str(read_line(process)["bus_pid"]))
-            watcher = threading.Thread(target=watch, daemon=True)
-            watcher.start()
-            time.sleep(0.6)
-            _await_motion(bus)
-            hit_s = time.monotonic()
-            os.kill(process.pid if victim == "application" else bus_pid, number)
-            start_mm = bus.positions_mm()
-            struck_s = time.monotonic()
-            time.sleep(_WATCH_S)
-            done.set()
-            watcher.join()
-            if victim != "application":
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(bus_pid, signal.SIGKILL)
-    finally:
-        done.set()
-        bus.stop()
-    after = [sample for sample in samples if sample[0] >= hit_s]
-    end_mm = after[-1][1]
-    moving = [n for n, (_, at) in enumerate(after) if max(abs(a - b) for a, b in zip(at, end_mm, strict=True)) > _REST_MM]
-    stopped_s = after[min(moving[-1] + 1, len(after) - 1)][0] if moving else hit_s
-    late = [at for time_s, at in after if time_s >= struck_s]
-    steps = max(abs(a - b) / j.max_step_mm for at in late for a, b, j in zip(at, start_mm, servos.joints, strict=True))
-    return stopped_s - hit_s, steps
-
-
-def _await_motion(bus: SoftServoBus) -> None:
-    """Wait until a servo moves: a strike at one that stands shows nothing."""
-    until_s = time.monotonic() + _WATCH_S
-    while time.monotonic() < until_s:
-        before = bus.positions_mm()
-        time.sleep(_POLL_S)
-        if max(abs(a - b) for a, b in zip(before, bus.positions_mm(), strict=True)) > _MOVING_MM:
-            return

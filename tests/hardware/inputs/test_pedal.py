@@ -33,8 +33,8 @@ from hardware.inputs.pedal import (
     line_bytes,
     open_pedal_port,
 )
-from hardware.twin.soft_pedal import SoftPedal
 from tests.hardware.inputs.listener import Listener
+from tests.hardware.soft_pedal import SoftPedal
 
 ROOT = Path(__file__).resolve().parents[3]
 BENCH = ROOT / "docs" / "bench.md"

@@ -30,7 +30,7 @@ from hardware.preflight import model_checks as model
 from hardware.preflight.checks import Check
 from hardware.preflight.preflight import CHECKS, Level, driving_checks, level_of, run_checks
 from hardware.twin.servos.bus import SoftServoBus
-from hardware.twin.soft_pedal import SoftPedal
+from tests.hardware.soft_pedal import SoftPedal
 
 ROOT = Path(__file__).resolve().parents[3]
 L515 = RealSenseInfo("Intel RealSense L515", "f1", "1.5.8.1", "1.5.8.1", "3.2")

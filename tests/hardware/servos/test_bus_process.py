@@ -29,7 +29,7 @@ from hardware.servos.bus_ipc import BusClient, BusOrder, BusPhase, BusStatus, He
 from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.bus import SoftServoBus
-from tests.hardware.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
+from tools.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_behind")]
 
@@ -159,7 +159,7 @@ def test_without_a_supervisor_orders_are_signs_of_life_and_with_one_they_are_not
         if status is not None and not status.armed:
             break
         time.sleep(0.02)
-    assert status.latched.cause is Cause.WORKER_DEAD
+    assert status.latched.cause is Cause.HEARTBEAT_LOST
     assert servos.positions_mm()[4] < 4.0
 
 
@@ -401,7 +401,7 @@ def test_silence_holds_then_disarms_then_quiet_then_the_servos_own_watchdog(serv
         _drive(robot, until=lambda status: servos.positions_mm()[4] > 1.0)
         at_mm = servos.positions_mm()[4]
         status = _seen(robot, lambda status: status.phase is BusPhase.QUIET, beat=False)
-        assert status.latched.cause is Cause.WORKER_DEAD
+        assert status.latched.cause is Cause.HEARTBEAT_LOST
         assert status.servos == ()
         assert abs(servos.positions_mm()[4] - at_mm) <= CONFIG.joints[4].max_step_mm
         heard = len(servos.log)

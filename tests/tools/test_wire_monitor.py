@@ -12,7 +12,7 @@ from core.types import Command
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.device import SoftServo
 from hardware.twin.servos.protocol import EXTENDED_POSITION, Instruction, InstructionPacket
-from hardware.twin.servos.wire_monitor import MonitoredBus, WireMonitor
+from tools.wire_monitor import MonitoredBus, WireMonitor
 
 SERVOS = ServosConfig()
 ADVANCE = 5

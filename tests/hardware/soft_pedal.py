@@ -1,4 +1,4 @@
-"""A software foot pedal on a pseudo-terminal with fault injection, for tests and for use without a pedal."""
+"""A software foot pedal on a pseudo-terminal with fault injection."""
 
 from __future__ import annotations
 

@@ -1,16 +1,14 @@
-"""Kills and stops the application, or its bus process, while the program drives, and measures in the servos what becomes of them.
+"""Kills and stops the application, or its bus process, while the program drives; measures how far and long the servos go on.
 
-``python -m tests.hardware.kill_campaign [COUNT] [SEED]`` prints one line per strike and a summary. Three processes: the servos live
-in this one and are asked for their mechanical positions; the application (``bus_application``) and its bus process are the victims.
+``python -m tools.kill_campaign [COUNT] [SEED]`` prints one line per strike and a summary. Three processes: the servos live in this
+one and are asked for their mechanical positions; the driving application (``fault_campaign.children``) and its bus process are hit.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -21,8 +19,8 @@ from pathlib import Path
 
 from core.config.safety import ServosConfig
 from hardware.twin.servos.bus import SoftServoBus
+from tools.fault_campaign.children import read_line, start_child
 
-ROOT = Path(__file__).resolve().parents[2]
 BOUND_S = 0.3
 REST_MM = 0.01
 """One position unit of the servos."""
@@ -34,7 +32,7 @@ Sample = tuple[float, tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class StrikeOutcome:
     """``stop_ms`` until the last servo stood still for good, ``steps`` the longest way of a servo in its own bounded steps.
 
     ``before_mm`` is how far the fastest servo went in the 100 ms before; ``bus_gone`` whether the bus process ended without us.
@@ -50,7 +48,7 @@ class Outcome:
     blur_ms: float
 
 
-class Recorder(threading.Thread):
+class PositionLog(threading.Thread):
     """Writes down where the servos' horns are."""
 
     def __init__(self, servos: SoftServoBus) -> None:
@@ -76,32 +74,27 @@ class Recorder(threading.Thread):
 
 
 @contextmanager
-def application(servos: SoftServoBus) -> Iterator[tuple[subprocess.Popen[str], int]]:
-    """A driving application and its bus process's id; both are gone afterwards."""
-    command = [sys.executable, "-m", "tests.hardware.bus_application", servos.port]
-    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+def application(servos: SoftServoBus) -> Iterator[tuple[int, int]]:
+    """A driving application: the ids of its process and of its bus process; both are gone afterwards."""
     bus_pid = None
     try:
-        line = process.stdout.readline()
-        bus_pid = json.loads(line or "{}").get("bus_pid")
-        if bus_pid is None:
-            raise RuntimeError(f"the application did not arm: {line!r}")
-        yield process, bus_pid
+        with start_child("drive", servos.port) as process:
+            bus_pid = int(str(read_line(process)["bus_pid"]))
+            yield process.pid, bus_pid
+            process.kill()
+            process.wait()
     finally:
-        process.kill()
-        process.wait()
-        process.stdout.close()
         if bus_pid is not None and not _gone(bus_pid, _GONE_S):
             os.kill(bus_pid, signal.SIGKILL)
 
 
-def strike(servos: SoftServoBus, victim: str, number: signal.Signals, delay_s: float) -> Outcome:
+def strike(servos: SoftServoBus, victim: str, number: signal.Signals, delay_s: float) -> StrikeOutcome:
     """One application, hit `delay_s` after it began to drive."""
-    with application(servos) as (process, bus_pid):
-        recorder = Recorder(servos)
+    with application(servos) as (pid, bus_pid):
+        recorder = PositionLog(servos)
         recorder.start()
         time.sleep(delay_s)
-        target = process.pid if victim == "application" else bus_pid
+        target = pid if victim == "application" else bus_pid
         hit_s, _ = recorder.take()
         os.kill(target, number)
         struck_s, start_mm = recorder.take()
@@ -120,7 +113,7 @@ def strike(servos: SoftServoBus, victim: str, number: signal.Signals, delay_s: f
     before = next(at for time_s, at in samples if time_s >= hit_s - 0.1)
     before_mm = max(abs(a - b) for a, b in zip(before, start_mm, strict=True))
     stop_ms, blur_ms = 1000.0 * (stopped_s - hit_s), 1000.0 * (struck_s - hit_s)
-    return Outcome(victim, number.name, stop_ms, steps, before_mm, gone, blur_ms)
+    return StrikeOutcome(victim, number.name, stop_ms, steps, before_mm, gone, blur_ms)
 
 
 def _gone(pid: int, timeout_s: float) -> bool:
@@ -136,7 +129,7 @@ def _gone(pid: int, timeout_s: float) -> bool:
         time.sleep(0.01)
 
 
-def campaign(count: int, seed: int = 0) -> Iterator[Outcome]:
+def campaign(count: int, seed: int = 0) -> Iterator[StrikeOutcome]:
     """`count` strikes at random moments, all kinds in turn."""
     draw = random.Random(seed)
     servos = SoftServoBus(ServosConfig(), wire_time=True, seed=seed)
