@@ -15,7 +15,7 @@ from core.config.rig_file import RESERVED, calibration_of, find_rig, with_rig
 from core.control.robot import GuardedRobot
 from core.devices import Camera, DeviceError, UserError
 from core.types import RobotStatus
-from hardware.cameras.kinds import CAMERA_KINDS, FoundCamera
+from hardware.cameras.registry import CAMERA_KINDS, FoundCamera
 from hardware.cameras.undistorted import UndistortedCamera
 
 if TYPE_CHECKING:

@@ -558,7 +558,7 @@ def operator_stopped(job: PictureJob) -> None:
         scene.window.choose_target(*_TARGET)
         scene.hand_over()
         scene.play(40)
-        scene.engine.pilot.ask(Act.STOP)
+        scene.engine.pilot.stop()
         scene.engine.deadman = False
         scene.play(3)
         pages = scene.window.panels.pages
@@ -643,7 +643,7 @@ def _session(job: PictureJob) -> Path:
     assert engine.writer is not None
     engine.writer.add_event(Event(engine.now_s, EventKind.NOTE, "contrast agent is in"))
     engine.run(25)
-    engine.pilot.ask(Act.STOP)
+    engine.pilot.stop()
     engine.deadman = False
     engine.run(20)
     engine.close()

@@ -14,7 +14,6 @@ from PySide6.QtCore import QObject, QThread, Signal
 
 from app.ui.workers import error_line
 from core.config.models import PerceptionConfig
-from core.control.modes import Act
 from core.control.pilot import Pilot
 from core.devices import EndOfStream, Latest
 from core.system import lower_priority
@@ -204,7 +203,7 @@ class EngineThread(QThread):
             stop = self._stop_next and engine is not None
             self._stop_next = self._stop_next and engine is None
         if stop and engine is not None and engine.pilot is not None:
-            engine.pilot.ask(Act.STOP)
+            engine.pilot.stop()
 
     def _turn(self, engine: EngineLike) -> None:
         while not self._changed.is_set():

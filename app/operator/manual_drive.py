@@ -1,7 +1,7 @@
 """Manual driving: keys, buttons, gamepad and pedal that move and stop the robot, and the panels that show it.
 
-Keys and buttons act while they are held. STOP acts with any focus: Pause, and Space with Ctrl, Alt or Meta, always; Space alone
-except while a text is typed and nothing can move. The threads of gamepad and pedal call the pilot directly.
+Keys and buttons act while they are held; which keys are STOP is in ``stop_keys``. The threads of gamepad and pedal call the pilot
+directly.
 """
 
 from __future__ import annotations
@@ -14,16 +14,14 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractSpinBox,
-    QApplication,
     QLineEdit,
     QMenuBar,
-    QPlainTextEdit,
-    QTextEdit,
     QWidget,
 )
 
 from app.operator.recording import Recorder
 from app.operator.rig_session import RigSession
+from app.operator.stop_keys import COMMAND_MODIFIERS, application, is_stop
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, Undriven
 from app.widgets.alerts import AlertSounds
@@ -42,13 +40,6 @@ from hardware.inputs.gamepad import Gamepad, GamepadError, GamepadState
 from hardware.inputs.pedal import Pedal, PedalError, PedalReport
 from hardware.servos.bus_ipc import BusStatus
 
-
-def _application() -> QApplication:
-    application = QApplication.instance()
-    assert isinstance(application, QApplication)
-    return application
-
-
 _WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked)
 """Blocked by a dialog, a window gets no release any more, even where the desktop leaves it the focus."""
 
@@ -65,9 +56,9 @@ class HeldInput(QObject):
         self._window = window
         self._timer = QTimer(self, interval=period_ms, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._repeat)
-        application = _application()
-        application.installEventFilter(self)
-        application.applicationStateChanged.connect(self._on_application_state)
+        app = application()
+        app.installEventFilter(self)
+        app.applicationStateChanged.connect(self._on_application_state)
 
     def release_all(self) -> None:
         raise NotImplementedError
@@ -75,7 +66,7 @@ class HeldInput(QObject):
     def detach(self) -> None:
         """Release everything and listen no more."""
         self.release_all()
-        _application().removeEventFilter(self)
+        application().removeEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
@@ -111,65 +102,6 @@ def place_of(event: QKeyEvent) -> tuple[str, int]:
     """
     scan_code = event.nativeScanCode()
     return ("place", scan_code) if scan_code else ("key", event.key())
-
-
-NUMBERS_ONLY = "numbers_only"
-"""Property of a line edit whose text is a number: Space is STOP there, too."""
-_COMMAND_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
-
-
-def is_stop(watched: QObject, event: QKeyEvent, can_move: bool) -> bool:
-    """Whether the press is a STOP.
-
-    Parameters
-    ----------
-    watched : the widget that the key goes to.
-    can_move : whether anything can move, or is about to; then Space is STOP in a text field, too.
-    """
-    if event.key() == Qt.Key.Key_Pause:
-        return True
-    if event.key() != Qt.Key.Key_Space:
-        return False
-    return can_move or bool(event.modifiers() & _COMMAND_MODIFIERS) or not takes_a_space(watched)
-
-
-def takes_a_space(widget: QObject) -> bool:
-    """Whether it is a field that a space can be typed in; numbers have none."""
-    if not isinstance(widget, QLineEdit | QPlainTextEdit | QTextEdit) or not widget.isEnabled() or widget.isReadOnly():
-        return False
-    return not (isinstance(widget, QLineEdit) and widget.property(NUMBERS_ONLY))
-
-
-class StopKeys(QObject):
-    """STOP keys in all windows of the program while `owner` is visible, for a dialog that has the servos.
-
-    Parameters
-    ----------
-    owner : the dialog.
-    can_move : asked at each press.
-    stop : what STOP does.
-    """
-
-    def __init__(self, owner: QWidget, can_move: Callable[[], bool], stop: Callable[[], object]) -> None:
-        super().__init__(owner)
-        self._owner, self._can_move, self._stop = owner, can_move, stop
-        _application().installEventFilter(self)
-
-    def detach(self) -> None:
-        """Listen no more."""
-        _application().removeEventFilter(self)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() not in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride) or not isinstance(event, QKeyEvent):
-            return False
-        if not isinstance(watched, QWidget) or not self._owner.isVisible() or not is_stop(watched, event, self._can_move()):
-            return False
-        if event.type() == QEvent.Type.ShortcutOverride:
-            event.accept()  # it comes as a key, whatever shortcut has it
-            return True
-        if not event.isAutoRepeat():
-            self._stop()
-        return True
 
 
 PERIOD_MS = 33
@@ -245,7 +177,7 @@ class JogKeys(HeldInput):
             return True
         if event.isAutoRepeat() and place_of(event) in self._held:
             return True  # a field or menu that gets the focus meanwhile is not typed into by it
-        if watched.window() is not self._window or event.modifiers() & _COMMAND_MODIFIERS:
+        if watched.window() is not self._window or event.modifiers() & COMMAND_MODIFIERS:
             return False
         motion = _MOTION_OF_KEY.get(key)
         # A field keeps its letters and arrows, and what it does not use must not reach the robot by way of its parent.
@@ -436,23 +368,23 @@ class DriveController(QObject):
             self.ask(_ACT_OF[step])
 
     def ask(self, act: Act) -> None:
-        """A request of the operator; refusals come back as alerts."""
-        pilot = self._rig.pilot
-        if pilot is None and act is Act.STOP:
-            if self._rig.engine.stop_opening():
-                self._log(tr("stop: the rig that is being opened starts stopped"))
-                return
-            pilot = self._rig.pilot  # it may have been opened between the two questions
-        if pilot is not None:
+        """A request of the operator other than STOP; refusals come back as alerts."""
+        if (pilot := self._rig.pilot) is not None:
             pilot.ask(act)
             self._log(act.value)
-        elif act is Act.STOP:
-            self._log(tr("stop: no rig is open, so nothing moves"))
 
     @Slot()
     def stop(self) -> None:
-        """STOP, before anything else."""
-        self.ask(Act.STOP)
+        """STOP, before anything else: to the pilot, or to the rig that is being opened."""
+        text = Act.STOP.value
+        if (pilot := self._rig.pilot) is None:
+            if self._rig.engine.stop_opening():
+                text = tr("stop: the rig that is being opened starts stopped")
+            elif (pilot := self._rig.pilot) is None:  # it may have been opened between the two questions
+                text = tr("stop: no rig is open, so nothing moves")
+        if pilot is not None:
+            pilot.stop()
+        self._log(text)
         self._release_all()
 
     @Slot(int)
@@ -596,7 +528,7 @@ class OperatorDevices(QObject):
         if state.deadman is not None:
             pilot.deadman("gamepad", state.deadman)
         if state.stop:
-            pilot.ask(Act.STOP)
+            pilot.stop()
 
     def _on_pedal(self, report: PedalReport) -> None:
         pilot = self._pilot_or_stop(report.stop)
@@ -604,7 +536,7 @@ class OperatorDevices(QObject):
             return
         pilot.deadman("pedal", report.deadman)
         if report.stop:
-            pilot.ask(Act.STOP)
+            pilot.stop()
 
     def _on_gamepad_device(self, name: str | None, problem: GamepadError | None) -> None:
         before, self._gamepad_name = self._gamepad_name, name

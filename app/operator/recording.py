@@ -153,7 +153,7 @@ class Recorder(QObject):
     def keep_rig_stop(self, message: str) -> None:
         """Keep that the rig stopped by itself, and why: from here on no pilot reports it."""
         if self._writer is not None:
-            self._writer.event(EventKind.FAULT, Cause.WORKER_DEAD.value, {"detail": message})
+            self._writer.event(EventKind.FAULT, Cause.HEARTBEAT_LOST.value, {"detail": message})
 
     def keep_alert(self, alert: Alert, time_s: float) -> None:
         """Keep an alert that was shown."""

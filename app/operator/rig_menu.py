@@ -25,7 +25,7 @@ from core.config.models import Config
 from core.config.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
 from core.control.modes import ARMED_MODES, Mode
 from core.types import Frame, Point, Scene
-from hardware.cameras.kinds import FoundCamera
+from hardware.cameras.registry import FoundCamera
 from hardware.rig import RigKind, find_devices, kind_of, with_camera
 
 if TYPE_CHECKING:

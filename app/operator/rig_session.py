@@ -14,7 +14,6 @@ from app.ui.i18n import mark
 from app.ui.texts import OperatorStep
 from core.config.models import Config
 from core.config.rig_file import RigFileError, as_calibrated
-from core.control.modes import Act
 from core.control.pilot import Pilot
 from core.devices import DeviceError
 from hardware.rig import RigKind, kind_of
@@ -138,11 +137,11 @@ class RigSession(QObject):
         """STOP to the rig's pilot, to a rig that is being opened, and to what borrows the rig; from any thread."""
         before = self.pilot
         if before is not None:
-            before.ask(Act.STOP)
+            before.stop()
         is_opening, is_lent = self.engine.stop_opening(), self.stop_borrowers()
         pilot = self.pilot
         if pilot is not None and pilot is not before:  # opened between the questions
-            pilot.ask(Act.STOP)
+            pilot.stop()
         if before is not None or pilot is not None or is_lent:
             return StopOutcome.SERVOS
         return StopOutcome.OPENING if is_opening else StopOutcome.NOTHING

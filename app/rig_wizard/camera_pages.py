@@ -41,7 +41,7 @@ from core.config.rig_file import check_rig_name, rig_path
 from core.devices import UserError
 from core.types import Image, Point
 from hardware.calibration.rig_draft import RigDraft
-from hardware.cameras.kinds import FoundCamera
+from hardware.cameras.registry import FoundCamera
 from hardware.rig import FoundDevices, find_devices, with_camera
 
 

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.operator.manual_drive import StopKeys
+from app.operator.stop_keys import StopKeys
 from app.rig_wizard.camera_pages import CameraPage, ScalePage
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.pages_base import WizardPage, WizardPicture, button, note, set_main_button

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.operator.manual_drive import NUMBERS_ONLY
+from app.operator.stop_keys import NUMBERS_ONLY
 from app.settings.draft import as_text
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text

@@ -38,7 +38,7 @@ FIXED = (
     "port closed", "disarmed", "armed", "stopped", "quiet",
     "a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit", "was no TOML",
     "was changed meanwhile", "had values that are not allowed", "too much is wrong", "right", "left", "up", "down", "advance",
-    "delivery_1", "delivery_2", "total", "prepare", "network", "masks", "skeletons", "gaps", "graph", "path", "pose", "steadiness",
+    "delivery_1", "delivery_2", "total", "prepare", "network", "masks", "skeletons", "gaps", "graph", "path", "pose", "sensitivity",
     "it has no pixels", "the network's output is not finite", "no centerline beside the robot's head",
     "it reaches the image border at its head, which may be out of view",
     "both of its ends lie at the image border, so its head may be out of view", "it has no direction",

@@ -55,14 +55,14 @@ class Provenance:
             return tuple(ProvenanceRow(label, note=NONE) for label in LABELS)
         by_operator, by_program = view.sent_by is Source.OPERATOR, view.sent_by is Source.PROGRAM
         commanded = ProvenanceRow(LABELS[2], note=tr("does not drive"))
-        if view.commanded is not None:
+        if view.program_command is not None:
             tone = Tone.PLAIN if by_program else Tone.FAINT
-            commanded = ProvenanceRow(LABELS[2], _motion(view.commanded, tone), drives=by_program)
+            commanded = ProvenanceRow(LABELS[2], _motion(view.program_command, tone), drives=by_program)
         return (
             _advised(view),
-            ProvenanceRow(LABELS[1], _motion(view.asked, Tone.PLAIN if by_operator else Tone.FAINT), drives=by_operator),
+            ProvenanceRow(LABELS[1], _motion(view.operator_command, Tone.PLAIN if by_operator else Tone.FAINT), drives=by_operator),
             commanded,
-            self._sent(view.sent, view.asked if by_operator else view.commanded if by_program else None),
+            self._sent(view.sent, view.operator_command if by_operator else view.program_command if by_program else None),
         )
 
     def _sent(self, sent: Command | None, wanted: Command | None) -> ProvenanceRow:

@@ -20,7 +20,7 @@ _REST = Command()
 
 @dataclass(frozen=True, slots=True)
 class DriveView:
-    """Who drives, what hinders, and what was advised, asked for, commanded and sent, each by itself.
+    """Who drives, what hinders, and the policy's advice, both sources' commands and what was sent, each by itself.
 
     Attributes
     ----------
@@ -32,10 +32,10 @@ class DriveView:
     deadman : held now, whether the press counts or not; None when no deadman has reported yet.
     servos_on : checked, torque on, following the permitted source.
     busy : what the servos are doing that takes time ("checking the servos"), else empty.
-    asked, asked_s : the operator's motion, and when it last was not rest (None: never).
+    operator_command, operator_moved_s : the operator's motion, and when it last was not rest (None: never).
     advice : the policy's; None without one, or when it is blanked.
     blanked : why there is no advice, in plain words, when a fault blanks it.
-    commanded : what the program asks of the robot while it drives; None when it does not drive.
+    program_command : what the program asks of the robot while it drives; None when it does not drive.
     sent, sent_by : the motion that left the gate last, and its source; None: a hold, or nothing yet.
     latency_s, latency_p95_s : from the capture of a frame to the first servo command made from it: the newest, and the p95
         of the last hundred.
@@ -52,11 +52,11 @@ class DriveView:
     deadman: bool | None = None
     servos_on: bool = False
     busy: str = ""
-    asked: Command = _REST
-    asked_s: float | None = None
+    operator_command: Command = _REST
+    operator_moved_s: float | None = None
     advice: Advice | None = None
     blanked: str = ""
-    commanded: Command | None = None
+    program_command: Command | None = None
     sent: Command | None = None
     sent_by: Source | None = None
     latency_s: float | None = None

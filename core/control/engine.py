@@ -79,7 +79,7 @@ class Engine:
         frame = self._read(timeout_s)
         if frame is None or self._is_late(frame):
             if self.pilot is not None:
-                self.pilot.worker_alive()
+                self.pilot.perception_alive()
             return None
         if self._last_index is not None:
             self._dropped += max(0, frame.index - self._last_index - 1)

@@ -99,7 +99,7 @@ class Cause(StrEnum):
         "The servos' supply voltage is too low", "check the power supply, then acknowledge")
     WINDOW_HUNG = ("window hangs", Area.HOST, Reaction.DISARM,
         "The window does not answer", "acknowledge when it answers again; restart it if it does not")
-    WORKER_DEAD = ("worker stopped", Area.HOST, Reaction.DISARM,
+    HEARTBEAT_LOST = ("worker stopped", Area.HOST, Reaction.DISARM,
         "The perception worker stopped", "start again with F5, then acknowledge")
     CAMERA_LOST = ("camera lost", Area.CAMERA, Reaction.DISARM,
         "Camera lost", "plug the camera in and start again, then acknowledge")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.config.models import PursuitConfig
-from core.control.health import FrameReport, RouteState
+from core.control.camera_monitor import FrameReport, RouteState
 from core.control.look_ahead import look_ahead
 from core.types import Advice, Frame, Image, Point, Reason, Scene
 

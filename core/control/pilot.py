@@ -18,22 +18,12 @@ from typing import Protocol
 from core.config.models import Config
 from core.config.safety import JointName, SafetyConfig
 from core.control.alerts import AlertReporter, Note
+from core.control.camera_monitor import FrameArrived, FrameLate, RouteState
 from core.control.drive_view import AdviceAdherence, CommandLatency, DriveNews, DriveView
 from core.control.faults import Cause, Fault
 from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.gate import Rejection, RejectReason, Source
-from core.control.health import (
-    Beat,
-    DeadmanReport,
-    FrameArrived,
-    FrameLate,
-    GateReport,
-    ModelReport,
-    Part,
-    RouteState,
-    ServosBusy,
-    ServosChecked,
-)
+from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part, ServoCheckReport, ServosBusy
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, combined
 from core.control.policies import Policy
@@ -157,9 +147,9 @@ class Pilot:
         self._jogging, self._following = JogIntegrator(config.hand), AdviceController(config.policy.drive)
         self._adherence, self._latency = AdviceAdherence(), CommandLatency()
         self._must_rest, self._was_at_rest = False, True
-        self._asked = Command()
+        self._operator_command = Command()
         self._reported_cycle = -1
-        self._asked_s: float | None = None
+        self._operator_moved_s: float | None = None
         self._arrived_since_s: float | None = None
         self._lock = threading.Lock()  # of what follows: other threads read or write it
         self._must_reset_policy = False
@@ -176,13 +166,17 @@ class Pilot:
 
     # ---- from the window's thread
 
+    def stop(self) -> None:
+        """STOP: to the robot at once, by its own pipe; the next turn goes to STOPPED, which only an acknowledgement leaves."""
+        self._is_stop_pending = True
+        self._requests.stop()
+        self._robot.stop()
+        self._busy_s = self._clock()
+        self._inputs.post(Act.STOP)
+
     def ask(self, act: Act) -> None:
-        """A request of the operator. STOP goes to the robot at once, by its own pipe."""
-        if act is Act.STOP:
-            self._is_stop_pending = True
-            self._requests.stop()
-            self._robot.stop()
-        elif act is Act.ACKNOWLEDGE:
+        """A request of the operator; STOP is ``stop``."""
+        if act is Act.ACKNOWLEDGE:
             self._requests.acknowledge()
         self._busy_s = self._clock()
         self._inputs.post(act)
@@ -227,7 +221,7 @@ class Pilot:
         if self._is_stop_pending and view.mode is not Mode.STOPPED:  # no turn has handled it any more
             return LeftOver(Fault(Cause.STOP_PRESSED), True)
         if view.latched is None and view.mode in ARMED_MODES and not self._halted:  # it was not ended: it broke off
-            return LeftOver(Fault(Cause.WORKER_DEAD, "the rig stopped while it was armed"), False)
+            return LeftOver(Fault(Cause.HEARTBEAT_LOST, "the rig stopped while it was armed"), False)
         return LeftOver(view.latched, view.mode is Mode.STOPPED) if view.latched is not None else None
 
     def target_changed(self) -> None:
@@ -279,15 +273,15 @@ class Pilot:
 
     def frame_arrived(self, frame: Frame) -> None:
         """The camera gave a frame, which now goes to perception."""
-        self._inputs.post(FrameArrived(frame.captured_s), Beat(Part.WORKER))
+        self._inputs.post(FrameArrived(frame.captured_s), Beat(Part.PERCEPTION))
 
     def frame_late(self) -> None:
         """The camera gave a frame that is older than the one before; it is left out."""
         self._inputs.post(FrameLate())
 
-    def worker_alive(self) -> None:
+    def perception_alive(self) -> None:
         """A sign of life of perception's thread while there are no frames."""
-        self._inputs.post(Beat(Part.WORKER))
+        self._inputs.post(Beat(Part.PERCEPTION))
 
     def update_scene(self, frame: Frame, scene: Scene, status: RobotStatus | None, *, has_target: bool) -> Advice | None:
         """Make and queue the advice for a perceived frame; returns the advice that may be shown."""
@@ -303,7 +297,7 @@ class Pilot:
         if turns_back and report.route is RouteState.BEHIND:
             report = replace(report, route=RouteState.READY)  # a policy backs out of a branch that it missed by itself
         arrived = sound and scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
-        self._inputs.set_advice(LatestAdvice(frame.captured_s, advice, arrived), report, Beat(Part.WORKER))
+        self._inputs.set_advice(LatestAdvice(frame.captured_s, advice, arrived), report, Beat(Part.PERCEPTION))
         return advice if not blanked or blanked in _ENDED_BY_A_FRAME else None
 
     # ---- from the pilot's own thread
@@ -335,9 +329,9 @@ class Pilot:
             # not after a hold that ends by itself: how often a branch was missed, and that the robot was backing off, is still true
             with self._lock:
                 self._must_reset_policy = True
-        commanded = self._send(decision, inputs.jog, latest, sent, now_s)
+        program_command = self._send(decision, inputs.jog, latest, sent, now_s)
         self._alerts.report_turn(before, self._state, decision, inputs.jog, sent if is_new else None, kept_back, now_s)
-        view = self._make_view(decision, inputs, commanded, sent, now_s)
+        view = self._make_view(decision, inputs, program_command, sent, now_s)
         with self._lock:
             if view.is_change_of(self._view):
                 self._changes = [*self._changes, view][-_MOST_CHANGES:]
@@ -385,7 +379,7 @@ class Pilot:
         if is_released:
             self._release.handle(ReleaseEvent.CONFIRM)
             self._alerts.report([(Note.TORQUE_OFF, "")], now_s)
-        if any(isinstance(event, ServosChecked) and not event.problems for event in events):
+        if any(isinstance(event, ServoCheckReport) and not event.problems for event in events):
             self._release.handle(ReleaseEvent.CANCEL)
         if self._is_bus_lost(self._view.active):
             self._release.handle(ReleaseEvent.LOSE_BUS)
@@ -396,7 +390,7 @@ class Pilot:
             events.append(ServosBusy())
         if not inputs.jog.is_rest:
             events.append(Act.INPUT)
-            self._asked_s = now_s
+            self._operator_moved_s = now_s
         if self._state.mode in {Mode.HOLD, Mode.ARMED}:
             events.append(GateReport(RejectReason.NOT_ARMED))  # no command is expected now, so its absence is no fault
         elif sent is not None and self._permitted is Source.PROGRAM and sent.rejection is not RejectReason.NO_COMMAND:
@@ -433,27 +427,28 @@ class Pilot:
             self._must_rest = self._permitted is None and permitted is Source.OPERATOR and not self._was_at_rest
             self._permitted = permitted
         self._was_at_rest = jog.is_rest
-        self._asked, commanded = Command(), None
+        self._operator_command, program_command = Command(), None
         try:
             if permitted is Source.OPERATOR:
                 self._must_rest = self._must_rest and not jog.is_rest
                 is_blind = any(fault.cause is Cause.WINDOW_HUNG for fault in decision.active)
                 jog = AT_REST if self._must_rest or is_blind else jog
-                self._asked = self._jogging.command(jog, now_s, sent.motion if sent is not None else None, self._hand_speed)
-                robot.send(self._asked, source=Source.OPERATOR)
+                moving = sent.motion if sent is not None else None
+                self._operator_command = self._jogging.command(jog, now_s, moving, self._hand_speed)
+                robot.send(self._operator_command, source=Source.OPERATOR)
             elif permitted is Source.PROGRAM and latest is not None:
-                commanded = self._following.command(latest.advice, now_s)
-                robot.send(commanded, source=Source.PROGRAM, captured_s=latest.captured_s)
+                program_command = self._following.command(latest.advice, now_s)
+                robot.send(program_command, source=Source.PROGRAM, captured_s=latest.captured_s)
             else:
                 robot.hold()
         except DeviceError as error:
             self._inputs.post(Fault(Cause.BUS_DEAD, str(error)))
         # after the command: the bus never has the permission before the permitted source's command, so no cycle holds in between
         robot.beat(permitted)
-        return commanded
+        return program_command
 
     def _make_view(
-        self, decision: Decision, inputs: Inputs, commanded: Command | None, sent: SentMotion | None, now_s: float
+        self, decision: Decision, inputs: Inputs, program_command: Command | None, sent: SentMotion | None, now_s: float
     ) -> DriveView:
         safety, latest = self._config.safety, inputs.latest
         is_fresh = latest is not None and now_s - latest.captured_s <= safety.pose_disarm_s
@@ -471,11 +466,11 @@ class Pilot:
             deadman=self._state.health.deadman_down(now_s, safety),
             servos_on=self._state.health.servos_ready,
             busy=self._requests.busy,
-            asked=self._asked,
-            asked_s=self._asked_s,
+            operator_command=self._operator_command,
+            operator_moved_s=self._operator_moved_s,
             advice=advice,
             blanked="" if decision.blanked is None else decision.blanked.cause.value,
-            commanded=commanded,
+            program_command=program_command,
             sent=sent.motion if sent is not None and sent.source is not None else None,
             sent_by=sent.source if sent is not None else None,
             latency_s=self._latency.newest_s,

@@ -12,7 +12,7 @@ from enum import Enum
 
 from core.config.safety import JointName
 from core.control.faults import Cause, Fault
-from core.control.health import ServosChecked, ServosOff
+from core.control.health import ServoCheckReport, ServoRequestBegun
 from core.control.modes import Event
 from core.control.robot import GuardedRobot
 from core.devices import DeviceError
@@ -198,11 +198,11 @@ class ServoRequests:
             try:
                 do()
             except DeviceError as error:
-                self._post(ServosChecked((str(error),)))
+                self._post(ServoCheckReport((str(error),)))
             except Exception as error:  # noqa: BLE001 - top of the thread: the future is never looked at
                 _log.error("%s failed", what, exc_info=error)
                 self._post(
-                    ServosChecked(
+                    ServoCheckReport(
                         (
                             message(
                                 "{what} failed ({kind}: {why}): start the rig again",
@@ -230,7 +230,7 @@ class ServoRequests:
 
     def _switch_on(self, asked: tuple[int, int]) -> None:
         robot = self._robot
-        self._post(ServosOff())
+        self._post(ServoRequestBegun())
         self._check(asked)
         if robot.failure is not None:
             robot.connect()
@@ -244,10 +244,10 @@ class ServoRequests:
             raise
         with self._lock:
             self._offs_done = max(self._offs_done, asked[1])  # earlier torque-offs are over, whatever became of them
-        self._post(ServosChecked())
+        self._post(ServoCheckReport())
 
     def _switch_off(self, asked: int, *, is_bus_lost: bool) -> None:
-        self._post(ServosOff())
+        self._post(ServoRequestBegun())
         # a servo that is missing, or a hold that fails, is no reason to let the others pull
         with contextlib.suppress(DeviceError):
             if self._robot.failure is not None:
@@ -269,6 +269,6 @@ class ServoRequests:
             raise Interrupted("the torque was switched off meanwhile: switch the servos on again")
 
     def _disarm_and(self, do: Callable[[], None]) -> None:
-        self._post(ServosOff())
+        self._post(ServoRequestBegun())
         self._robot.disarm()
         do()

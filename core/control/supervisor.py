@@ -22,9 +22,10 @@ from collections.abc import Collection, Sequence, Set
 from dataclasses import replace
 
 from core.config.safety import SafetyConfig, ServosConfig
+from core.control.camera_monitor import RouteState
 from core.control.faults import Area, Cause, Fault, Reaction, first_fault, worst
 from core.control.gate import Source
-from core.control.health import DeadmanReport, Health, Report, RouteState
+from core.control.health import DeadmanReport, Health, Report
 from core.control.modes import (
     ARMED_MODES,
     DRIVING_MODES,

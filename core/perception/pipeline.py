@@ -377,7 +377,7 @@ class Pipeline:
             believed = _without_artefacts(masks, run.state.artefacts.removed if run.state is not None else None)
             features = confidence_features(path, located.robot, located.centerline, believed, config)
         if segmenter.sensitivity:
-            with run.watch.stage("steadiness"):
+            with run.watch.stage("sensitivity"):
                 others = [
                     self._answer_to(segmentation.clean(*shifted, config), run, before)
                     for shifted in quality.shifted_probabilities(believed)

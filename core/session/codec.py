@@ -322,8 +322,14 @@ class _DriveLayout(JsonLayout):
     follow_share: _Maybe4 = None
 
 
+def _drive_key(name: str) -> str:
+    """The key in a row of a field of DriveView."""
+    return {"operator_command": "asked", "operator_moved_s": "asked_s", "program_command": "commanded"}.get(name, name)
+
+
 def _drive(layout: _DriveLayout) -> DriveView:
-    return DriveView(**layout.__dict__ | {"asked": layout.asked or Command()})
+    values = {field.name: getattr(layout, _drive_key(field.name)) for field in fields(DriveView)}
+    return DriveView(**values | {"operator_command": layout.asked or Command()})
 
 
 class _RefusalLayout(JsonLayout):
@@ -424,7 +430,7 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, with_masks: 
         "advice": tick.advice,
         "sent": tick.sent,
         "servo": tick.status,
-        "drive": {field.name: getattr(drive, field.name) for field in fields(drive)} if drive else None,
+        "drive": {_drive_key(field.name): getattr(drive, field.name) for field in fields(drive)} if drive else None,
         "bus": finite_tree(asdict(bus)) if bus is not None else None,
         "latency_ms": scene.latency_ms,
         "scene": parts,

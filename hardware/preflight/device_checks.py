@@ -21,7 +21,7 @@ from core.devices import Camera, DeviceError
 from core.messages import message
 from core.types import Frame
 from hardware.cameras import sysfs
-from hardware.cameras.kinds import CAMERA_KINDS
+from hardware.cameras.registry import CAMERA_KINDS
 from hardware.preflight.checks import NOT_CONFIGURED, RENEW, Check, one_line
 from hardware.rig import RigKind, kind_of, real_camera
 

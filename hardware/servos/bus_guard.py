@@ -141,7 +141,7 @@ class BusGuard:
         faults = []
         silence_s, gap_s = self.silence_s(beat, now_s), now_s - self._cycle_s
         if silence_s > self._servos.heartbeat_timeout_s:
-            faults.append(Fault(Cause.WORKER_DEAD, f"no heartbeat of the application for {1000 * silence_s:.0f} ms"))
+            faults.append(Fault(Cause.HEARTBEAT_LOST, f"no heartbeat of the application for {1000 * silence_s:.0f} ms"))
         if not 0.0 <= gap_s <= self._safety.clock_gap_s:
             faults.append(Fault(Cause.CLOCK, f"the bus process stood still for {gap_s:.2f} s"))
         if self._measurement is not None and (problem := self._tracking.update(self._written_mm, self._measurement)) is not None:

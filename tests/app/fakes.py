@@ -250,6 +250,9 @@ class FakePilot:
     def ask(self, act: Act) -> None:
         self.acts.append(act)
 
+    def stop(self) -> None:
+        self.acts.append(Act.STOP)
+
     def deadman(self, source: object, pressed: bool | None) -> None:
         self.deadman_said.append(pressed)
 

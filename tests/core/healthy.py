@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
-from core.control.health import Beat, DeadmanReport, FrameReport, ModelReport, Part, RouteState, ServosChecked
+from core.control.camera_monitor import FrameReport, RouteState
+from core.control.health import Beat, DeadmanReport, ModelReport, Part, ServoCheckReport
 from core.control.modes import Act, Decision, Event, Mode, SupervisorState
 from core.control.supervisor import supervise
 
@@ -39,7 +40,7 @@ class Bench:
     def reports(self) -> list[Event]:
         self.index += 1
         report = FrameReport(self.index, self.now_s - 0.015625, confidence=0.9, route=RouteState.READY)
-        found: list[Event] = [self.frame(report), self.bus, Beat(Part.WINDOW), Beat(Part.WORKER), DeadmanReport(self.held)]
+        found: list[Event] = [self.frame(report), self.bus, Beat(Part.WINDOW), Beat(Part.PERCEPTION), DeadmanReport(self.held)]
         return [event for event in found if type(event) not in self.mute]
 
     def tick(self, *events: Event, after_s: float = TICK_S) -> Decision:
@@ -58,11 +59,11 @@ class Bench:
 
     def in_mode(self, mode: Mode) -> Bench:
         """Bring a fresh bench into `mode` the way an operator would."""
-        self.tick(ModelReport(True), ServosChecked())
+        self.tick(ModelReport(True), ServoCheckReport())
         self.run(1.0625)
         if mode is Mode.STOPPED:
             self.tick(Act.STOP)
-            self.tick(ServosChecked())
+            self.tick(ServoCheckReport())
         elif mode is not Mode.ADVISORY:
             self.tick(Act.ARM)
             if mode is not Mode.ARMED:

@@ -157,7 +157,7 @@ class Bench:
                 scene = self.scene(scene_at(self.index, frame.captured_s))
                 self.shown = self.pilot.update_scene(frame, scene, None, has_target=scene.route is not None)
             self.pilot.window_alive()
-            self.pilot.worker_alive()
+            self.pilot.perception_alive()
             self.pilot.deadman("key", self.held)
             if not self.jog.is_rest:
                 self.pilot.jog("keys", self.jog)

@@ -14,9 +14,9 @@ from core.config.models import CameraConfig, Config, RigConfig, load_config
 from core.config.rig_file import RigFileError, make_rig, with_rig, write_rig
 from core.devices import DeviceError
 from hardware.cameras import realsense, sysfs
-from hardware.cameras.kinds import CAMERA_KINDS
 from hardware.cameras.live import LiveCamera
 from hardware.cameras.realsense import RealSenseInfo, RealSenseSensor
+from hardware.cameras.registry import CAMERA_KINDS
 from hardware.cameras.undistorted import UndistortedCamera
 from hardware.rig import RigKind, find_devices, open_rig, with_camera, with_port
 from hardware.twin.servos.bus import SoftServoBus

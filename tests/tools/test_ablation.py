@@ -1,4 +1,4 @@
-"""The ablation: its variants, figures with values counted by hand, steadiness in a stream, and a run on a set and on the twin."""
+"""The ablation: its variants, figures with values counted by hand, stability in a stream, and a run on a set and on the twin."""
 
 from __future__ import annotations
 

@@ -513,7 +513,7 @@ def judge(bench: FaultBench, wanted: ExpectedReaction, *more: str) -> Observatio
             problems.append("advice is shown although a fault should blank it")
         elif any(not view.blanked for view in faulty):
             problems.append("the advice is blank, but nothing says why")
-    if views and views[-1].mode not in DRIVING_MODES and views[-1].commanded is not None:
+    if views and views[-1].mode not in DRIVING_MODES and views[-1].program_command is not None:
         problems.append("the program goes on commanding")
     keys: list[AlertKey] = [*(cause for cause in wanted.causes if cause not in wanted.silent), *wanted.alerts]
     alerts = bench.alerts_since_mark

@@ -295,7 +295,6 @@ def _tube(start: Point, end: Point, radius_px: float) -> Probability:
 
 
 # a head that stays at its new place is accepted after a while
-# a head that stays at its new place is accepted after a while
 @bench_fault(16, _expect(_HELD, Cause.HEAD_JUMP, alternatives=((Mode.HOLD, Mode.AUTONOMOUS),)), seconds=0.3)
 def jump(bench: FaultBench) -> None:
     def shorten(vessel: Probability, robot: Probability) -> Masks:

@@ -131,12 +131,12 @@ def worker_dies(kit: Kit) -> Observation:
         latched = _latched(window)
         problems += check(
             (again, "it could not be started again"),
-            (latched is Cause.WORKER_DEAD, f"after the new start {latched or 'nothing'} is latched"),
+            (latched is Cause.HEARTBEAT_LOST, f"after the new start {latched or 'nothing'} is latched"),
         )
     finally:
         window.close()
     events = _words(_events_of(folder)) if folder is not None else ()
-    problems += check((f"{EventKind.FAULT}: {Cause.WORKER_DEAD}" in events, "not in the session: worker stopped"))
+    problems += check((f"{EventKind.FAULT}: {Cause.HEARTBEAT_LOST}" in events, "not in the session: worker stopped"))
     reaction = "DISARM: rig closed, notice shown; latched until acknowledged"
     return Observation(reaction, ("The rig stopped",), events, tuple(problems))
 
@@ -223,7 +223,7 @@ def _touch(bench: FaultBench, draw: random.Random) -> list[str]:
     bench.jog = draw.choice((Jog(advance=1.0), Jog(bend=-1.0), Jog(straighten=True), Jog(delivery=-0.3)))
     view = bench.turn()
     bench.jog = AT_REST
-    stands = view.commanded is None and view.permitted is not Source.PROGRAM
+    stands = view.program_command is None and view.permitted is not Source.PROGRAM
     return check(
         (view.mode is Mode.ARMED, f"after a touch the mode is {view.mode}"),
         (stands, "the program still drives in the turn of the touch"),

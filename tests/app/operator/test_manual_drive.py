@@ -30,10 +30,10 @@ from core.control.motion import AT_REST, Jog
 from core.devices import DeviceError, EndOfStream
 from hardware.inputs.gamepad import GamepadState
 from hardware.rig import RigKind
-from hardware.twin.soft_pedal import SoftPedal
 from tests.app.bus_status import bus
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, FakePilot, until
+from tests.hardware.soft_pedal import SoftPedal
 
 Key = Qt.Key
 

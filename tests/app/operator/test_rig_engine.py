@@ -72,7 +72,7 @@ def test_the_twins_servos_are_switched_on_at_the_start(open_engine: Open, robots
 def test_starting_again_clears_no_stop(open_engine: Open, robots: list[Robot]) -> None:
     engine = open_engine()
     assert engine.pilot is not None
-    engine.pilot.ask(Act.STOP)
+    engine.pilot.stop()
     engine.close()
     for _ in range(2):  # and neither does a second time
         engine = open_engine()
@@ -141,7 +141,7 @@ def test_other_thresholds_do_not_turn_the_robot_about(knows_past: bool, head_x: 
 def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     engine = open_engine()
     assert engine.pilot is not None
-    engine.pilot.ask(Act.STOP)
+    engine.pilot.stop()
     engine.close()
     works = rig_engine.open_rig
 

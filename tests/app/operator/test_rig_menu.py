@@ -24,7 +24,7 @@ from core.control.modes import Mode
 from core.devices import DeviceError
 from core.session.manifest import read_manifest
 from hardware.calibration.bench import CalibrationBench
-from hardware.cameras.kinds import FoundCamera
+from hardware.cameras.registry import FoundCamera
 from hardware.inputs.gamepad import GamepadState
 from hardware.rig import FoundDevices
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until

@@ -135,10 +135,10 @@ def test_what_could_not_be_stopped_is_not_said_to_be(
     qtbot: QtBot,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def broken(_act: Act) -> None:
+    def broken() -> None:
         raise ValueError("no way to the servos")
 
-    monkeypatch.setattr(engine.pilot, "ask", broken)
+    monkeypatch.setattr(engine.pilot, "stop", broken)
     meet_an_error(watch)
     assert box_of(running, qtbot).startswith("It is not certain that the servos were stopped: press Space.")
 

@@ -73,7 +73,7 @@ def test_stop_in_the_moment_in_which_a_rig_is_opened_is_not_lost(
 ) -> None:
     found = iter([None, engine.pilot])
     monkeypatch.setattr(EngineThread, "pilot", property(lambda _self: next(found)))
-    running.controls.ask(Act.STOP)
+    running.controls.stop()
     monkeypatch.undo()
     assert engine.pilot.acts == [Act.STOP]
 

@@ -39,7 +39,7 @@ from core.config.files import Profiles
 from core.config.models import Config, load_config
 from core.control.drive_view import DriveView
 from hardware.calibration.bench import CalibrationBench
-from hardware.cameras.kinds import FoundCamera
+from hardware.cameras.registry import FoundCamera
 from hardware.rig import FoundDevices
 from hardware.servos.discovery import FoundServo, FoundServos
 from tests.app.fakes import make_scene, until

@@ -87,8 +87,8 @@ def lines(panel: CommandPanel) -> list[str]:
 
 def test_advised_asked_commanded_and_sent_are_kept_apart(panel: CommandPanel) -> None:
     view = DriveView(
-        0.0, asked=Command(0.4, -0.2, 5.0, 0.0), advice=ADVICE, sent=Command(0.4, -0.2, 5.0, 0.0), sent_by=Source.OPERATOR,
-        latency_s=0.0618, follow_share=0.776,
+        0.0, operator_command=Command(0.4, -0.2, 5.0, 0.0), advice=ADVICE, sent=Command(0.4, -0.2, 5.0, 0.0),
+        sent_by=Source.OPERATOR, latency_s=0.0618, follow_share=0.776,
     )  # fmt: skip
     panel.show_view(view, bus())
     assert lines(panel) == [
@@ -104,7 +104,12 @@ def test_advised_asked_commanded_and_sent_are_kept_apart(panel: CommandPanel) ->
 
 def test_a_difference_that_lasts_is_marked(panel: CommandPanel, clock: Clock) -> None:
     view = DriveView(
-        0.0, advice=ADVICE, commanded=Command(0.5, 0.0, 8.0), sent=Command(0.2, 0.0, 8.0), sent_by=Source.PROGRAM, latency_s=0.12
+        0.0,
+        advice=ADVICE,
+        program_command=Command(0.5, 0.0, 8.0),
+        sent=Command(0.2, 0.0, 8.0),
+        sent_by=Source.PROGRAM,
+        latency_s=0.12,
     )
     for _ in range(3):
         clock.now_s += 0.25

@@ -71,7 +71,7 @@ def test_it_is_certain_that_nothing_moves_only_while_the_servos_are_off(bench: B
     bench.seconds(2.0)
     assert bench.pilot.view.servos_on
     assert bench.pilot.can_move
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.seconds(2.0)
     assert bench.pilot.view.mode is Mode.STOPPED
     assert bench.pilot.can_move, "STOP can be said again"
@@ -156,7 +156,7 @@ def test_arming_and_handing_over_lets_the_program_drive_from_where_the_robot_is(
     assert bench.robot.sent[-1][1].bend > bend, "the advice is to the right"
     assert bench.policy.resets == 1
     assert bench.pilot.view.latency_s == pytest.approx(0.08)
-    assert bench.pilot.view.commanded == bench.robot.sent[-1][1]
+    assert bench.pilot.view.program_command == bench.robot.sent[-1][1]
 
 
 def test_the_operators_touch_takes_back_in_the_same_turn_and_from_where_the_program_left(bench: Bench) -> None:
@@ -239,7 +239,7 @@ def test_a_deadman_that_falls_silent_is_let_go_within_a_tenth_of_a_second(bench:
 
 def test_stop_goes_to_the_robot_at_once_and_stays(bench: Bench) -> None:
     bench.handed_over()
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     assert bench.robot.calls[-1] == "stop", "not in the next turn"
     bench.turn()
     assert bench.mode is Mode.STOPPED
@@ -366,7 +366,7 @@ def test_servos_that_the_bus_process_disarmed_by_itself_are_off_with_its_reason(
 
 def test_a_bus_process_that_missed_the_program_is_a_watchdog(bench: Bench) -> None:
     bench.on()
-    bench.robot.bus = replace(WELL, armed=False, ended=Fault(Cause.WORKER_DEAD, "no heartbeat"))
+    bench.robot.bus = replace(WELL, armed=False, ended=Fault(Cause.HEARTBEAT_LOST, "no heartbeat"))
     bench.turn(4)
     assert not bench.pilot.view.servos_on
     assert bench.pilot.view.latched == Fault(Cause.WATCHDOG, "worker stopped, no heartbeat")
@@ -485,7 +485,7 @@ def test_the_soonest_that_a_command_may_be_too_old_is_later_than_a_held_key_is_r
             said_s += period_s
         bench.now_s = now_s
         bench.turn()
-        assert turn < 2 or bench.pilot.view.asked.advance_mm_s > 0.0, turn
+        assert turn < 2 or bench.pilot.view.operator_command.advance_mm_s > 0.0, turn
 
 
 def test_a_tap_of_the_key_beside_a_held_pedal_holds_nothing(bench: Bench) -> None:
@@ -562,7 +562,7 @@ def test_a_rejection_in_the_turn_of_a_touch_does_not_stay(bench: Bench) -> None:
 
 
 def test_keys_while_stopped_remind_and_do_not_sound(bench: Bench) -> None:
-    bench.on().pilot.ask(Act.STOP)
+    bench.on().pilot.stop()
     bench.turn()
     bench.pilot.news()
     bench.jog = Jog(advance=1.0)
@@ -625,7 +625,7 @@ def pilot_after(bench: Bench, left_over: LeftOver | None) -> Bench:
 
 
 def test_a_stop_outlives_the_rig_and_needs_its_acknowledgement(bench: Bench) -> None:
-    bench.on().pilot.ask(Act.STOP)
+    bench.on().pilot.stop()
     bench.turn()
     assert bench.pilot.left_over == LeftOver(Fault(Cause.STOP_PRESSED), stopped=True)
     after = pilot_after(bench, bench.pilot.left_over)
@@ -644,7 +644,7 @@ def test_a_stop_outlives_the_rig_and_needs_its_acknowledgement(bench: Bench) -> 
 
 
 def test_a_stop_that_no_turn_has_heard_any_more_is_left_over_too(bench: Bench) -> None:
-    bench.on().pilot.ask(Act.STOP)
+    bench.on().pilot.stop()
     assert bench.pilot.left_over == LeftOver(Fault(Cause.STOP_PRESSED), stopped=True)
 
 
@@ -652,7 +652,7 @@ def test_a_rig_that_breaks_off_while_armed_leaves_that_and_one_that_is_ended_doe
     bench.armed()
     left_over = bench.pilot.left_over
     assert left_over is not None
-    assert (left_over.fault.cause, left_over.stopped) == (Cause.WORKER_DEAD, False)
+    assert (left_over.fault.cause, left_over.stopped) == (Cause.HEARTBEAT_LOST, False)
     bench.pilot.halt()
     bench.turn()
     assert bench.pilot.left_over is None
@@ -730,7 +730,7 @@ def test_the_deadmans_silence_counts_from_when_it_was_said(bench: Bench, said_af
     while bench.mode is Mode.AUTONOMOUS:
         bench.now_s += PERIOD_S
         bench.pilot.window_alive()
-        bench.pilot.worker_alive()
+        bench.pilot.perception_alive()
         bench.pilot.tick()
     assert bench.mode is Mode.HOLD
     assert bench.now_s - said_s <= 0.1 + 1e-9

@@ -313,7 +313,9 @@ class PilotMachine:
             self.is_on = False
             self.stops_meanwhile += 1
             self.robot.locked = True
-        elif act is Act.ACKNOWLEDGE:
+            self.bench.pilot.stop()
+            return
+        if act is Act.ACKNOWLEDGE:
             self.robot.locked = False
         elif act is Act.HAND_OVER:
             self.handed_over = True
@@ -339,7 +341,7 @@ class PilotMachine:
             if bench.index % 2 and bench.seeing:
                 self._frame()
             pilot.window_alive()
-            pilot.worker_alive()
+            pilot.perception_alive()
             for source in sorted(self.talking):
                 self._say(source, self.deadmen[source])
             for source, jog in self.jogs.items():

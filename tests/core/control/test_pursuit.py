@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from core.config.models import AdviceConfig, Config, PursuitConfig
+from core.control.camera_monitor import RouteState
 from core.control.frame_reports import FrameReports
-from core.control.health import RouteState
 from core.control.look_ahead import LookAhead
 from core.control.policies import POLICY_NAMES, RandomOperator, make_policy
 from core.control.pursuit import BackOff, ContactLimit, FeedMonitor, MissCounter, Pursuit, RetryCounter, StallMonitor, speed_word

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule, run_state_machine_as_test
 
 from core.control.bus_monitor import BusReport
+from core.control.camera_monitor import FrameReport, RouteState
 from core.control.faults import Cause, Fault
 from core.control.gate import GateState, GateStep, GoalRequest, JointMeasurement, Source, gate_step
-from core.control.health import Beat, DeadmanReport, FrameReport, GateReport, RouteState, ServosChecked
+from core.control.health import Beat, DeadmanReport, GateReport, ServoCheckReport
 from core.control.joints import joint_goals
 from core.control.modes import Act, Decision, Event, Mode
 from core.types import Command, Reason
@@ -187,8 +188,8 @@ class Drive(RuleBasedStateMachine):
         """By the book, as far as the mode allows."""
         self.command, self.wild = Command(advance_mm_s=5.0), None
         self.bench.held = False
-        self._tick([Act.ACKNOWLEDGE, ServosChecked()], 0.02)
-        self._tick([ServosChecked()], 0.02)
+        self._tick([Act.ACKNOWLEDGE, ServoCheckReport()], 0.02)
+        self._tick([ServoCheckReport()], 0.02)
         for _ in range(22):
             self._tick([], 0.05)
         self._tick([Act.ARM], 0.02)

@@ -135,7 +135,7 @@ def test_a_stop_while_the_servos_are_being_switched_on_is_not_undone(bench: Benc
 
     def stopped_in_it() -> None:
         before()
-        bench.pilot.ask(Act.STOP)
+        bench.pilot.stop()
 
     setattr(bench.robot, call, stopped_in_it)
     bench.pilot.switch_on()
@@ -265,7 +265,7 @@ def test_the_result_of_a_torque_off_is_reported_also_while_the_servos_are_off(be
     bench.seconds(0.2)
     if is_on:
         bench.on()
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.turn(2).alerts()
     bench.robot.bus = replace(WELL, armed=False, torque_off=True)
     bench.turn()
@@ -284,7 +284,7 @@ def test_a_stop_switches_the_torque_off_also_where_the_bus_process_is_gone(is_en
     _lose_the_bus(bench)
     bench.turn(2)
     assert _offs(bench) == (0, False), "STOP was not pressed"
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.turn(2)
     assert _offs(bench)[1] is is_enabled
     bench.done().turn(3)
@@ -300,12 +300,12 @@ def test_the_torque_off_of_a_stop_is_retried_until_it_is_confirmed_or_the_servos
     bench.on()
     _lose_the_bus(bench)
     _fail(bench, "torque_off", _NOT_PROVEN)
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.turn(3).done().seconds(9.0).done()
     assert _offs(bench) == (1, True)
     bench.seconds(1.5).done()
     assert _offs(bench) == (2, True)
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.turn(2).done()
     assert _offs(bench)[0] == 3, "another STOP need not wait"
     bench.turn().pilot.ask(Act.ACKNOWLEDGE)
@@ -324,11 +324,11 @@ def test_a_torque_off_that_the_bus_process_has_confirmed_is_not_repeated(releasi
     """It may confirm before the pilot's turn handles the STOP, and ignores a second press."""
     bench = releasing
     bench.on()
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.robot.bus = replace(WELL, torque_off=True)
     bench.turn()
     bench.robot.bus = WELL
-    bench.turn().pilot.ask(Act.STOP)
+    bench.turn().pilot.stop()
     bench.turn(3)
     bench.robot.failure = "the servo bus process ended"
     bench.turn(3).done()
@@ -338,14 +338,14 @@ def test_a_torque_off_that_the_bus_process_has_confirmed_is_not_repeated(releasi
     bench.turn().on()
     assert bench.pilot.view.servos_on
     _lose_the_bus(bench)
-    bench.pilot.ask(Act.STOP)
+    bench.pilot.stop()
     bench.turn(3).done().turn()
     assert _offs(bench)[0] == 1, "it was on in between"
 
 
 def test_a_stop_that_no_turn_has_handled_switches_the_torque_off_at_the_end(releasing: Bench) -> None:
     releasing.on()
-    releasing.pilot.ask(Act.STOP)
+    releasing.pilot.stop()
     releasing.pilot.close()
     assert releasing.robot.calls.count("torque off") == 1
 
@@ -356,7 +356,7 @@ def test_a_torque_off_that_is_under_way_at_the_end_is_waited_for_and_not_done_tw
         releasing.seconds(0.2).pilot.torque_off()
         wait()
         if is_stopped:  # which requests one, too
-            releasing.pilot.ask(Act.STOP)
+            releasing.pilot.stop()
         closing = threading.Thread(target=releasing.pilot.close)
         closing.start()
     closing.join(10.0)

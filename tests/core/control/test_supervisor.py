@@ -10,21 +10,10 @@ from dataclasses import replace
 import pytest
 
 from core.control.bus_monitor import BusReport
+from core.control.camera_monitor import FrameArrived, FrameLate, FrameReport, RouteState
 from core.control.faults import AFTER_SOME, AT_ONCE, CAUSES, Area, Cause, Fault, Reaction
 from core.control.gate import RejectReason, Source
-from core.control.health import (
-    Beat,
-    DeadmanReport,
-    FrameArrived,
-    FrameLate,
-    FrameReport,
-    GateReport,
-    ModelReport,
-    Part,
-    RouteState,
-    ServosChecked,
-    ServosOff,
-)
+from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part, ServoCheckReport, ServoRequestBegun
 from core.control.modes import Act, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.supervisor import supervise
 from core.types import Reason
@@ -56,10 +45,10 @@ SINGLE_EVENTS: dict[str, Event] = {
     "gate accepts": GateReport(None),
     "model unfit": ModelReport(False),
     "model fit": ModelReport(True),
-    "servos checked": ServosChecked(),
-    "servos wrong": ServosChecked(("id 3 missing",)),
+    "servos checked": ServoCheckReport(),
+    "servos wrong": ServoCheckReport(("id 3 missing",)),
     "window lives": Beat(Part.WINDOW),
-    "worker lives": Beat(Part.WORKER),
+    "worker lives": Beat(Part.PERCEPTION),
     "frame": FrameReport(9999, 0.0),
     "bus": GOOD_BUS,
 }
@@ -99,7 +88,7 @@ def test_the_table_is_complete() -> None:
     assert {event for event in SINGLE_EVENTS.values() if isinstance(event, Act)} == set(Act)
     kinds = {type(event) for event in SINGLE_EVENTS.values()} - {Act}
     assert kinds == {
-        FrameArrived, FrameReport, BusReport, Beat, DeadmanReport, ModelReport, ServosChecked, GateReport, Fault,
+        FrameArrived, FrameReport, BusReport, Beat, DeadmanReport, ModelReport, ServoCheckReport, GateReport, Fault,
     }  # fmt: skip
     assert set(MODES) == set(Mode)
 
@@ -161,7 +150,7 @@ def _mute(kind: type, seconds: float, *, frames_arrive: bool = False) -> Inject:
 
 def _silent(part: Part) -> Inject:
     def inject(bench: Bench) -> None:
-        other = Part.WORKER if part is Part.WINDOW else Part.WINDOW
+        other = Part.PERCEPTION if part is Part.WINDOW else Part.WINDOW
         bench.mute.add(Beat)
         bench.run(0.53125, Beat(other))
 
@@ -179,7 +168,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.TRACKING: _bus(ticks=8, tracking_mm=_joint(-1.6, 4, 0.0)),
     Cause.STRAINED: _bus(ticks=18, currents_ma=_joint(-601.0, 4, 40.0)),
     Cause.TORQUE_ON: _bus(torque_problem="torque of up is not proven to be off: cut the servos' power"),
-    Cause.SERVOS_WRONG: _events(ServosChecked(("id 4: model 1060 instead of 1020",))),
+    Cause.SERVOS_WRONG: _events(ServoCheckReport(("id 4: model 1060 instead of 1020",))),
     Cause.CLOCK: lambda bench: bench.tick(after_s=1.03125),
     Cause.SERVO_SILENT: _bus(misses=_joint(3, 2, 0)),
     Cause.BUS_NOISE: _bus(ticks=6, errors=1),
@@ -189,7 +178,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.HOT: _bus(temperatures_c=_joint(70.0, 6, 40.0)),
     Cause.VOLTAGE_LOW: _bus(voltages_v=_joint(10.5, 0, 12.0)),
     Cause.WINDOW_HUNG: _silent(Part.WINDOW),
-    Cause.WORKER_DEAD: _silent(Part.WORKER),
+    Cause.HEARTBEAT_LOST: _silent(Part.PERCEPTION),
     Cause.CAMERA_LOST: _mute(FrameReport, 0.53125),
     Cause.CAMERA_FROZEN: _frames(4, same_picture=True),  # with the one that they repeat: five
     Cause.WRONG_FORMAT: _frames(1, format_ok=False),
@@ -347,7 +336,7 @@ def test_the_program_boots_disarmed_and_nothing_may_move() -> None:
     assert decision.permitted is None
     assert state.latched is None
     assert [fault.cause for fault in decision.active] == [
-        Cause.CAMERA_LOST, Cause.BUS_DEAD, Cause.WINDOW_HUNG, Cause.WORKER_DEAD, Cause.MODEL_UNFIT,
+        Cause.CAMERA_LOST, Cause.BUS_DEAD, Cause.WINDOW_HUNG, Cause.HEARTBEAT_LOST, Cause.MODEL_UNFIT,
     ]  # fmt: skip
     assert [fault.detail for fault in decision.active] == [
         "no frame yet", "no report yet", "no sign of life yet", "no sign of life yet", "not checked yet",
@@ -357,7 +346,7 @@ def test_the_program_boots_disarmed_and_nothing_may_move() -> None:
 def test_a_refusal_to_arm_names_all_reasons_at_once() -> None:
     decision = Bench().raw([Act.ARM], 5.0)
     assert _refused(decision, Act.ARM) == {
-        Cause.CAMERA_LOST, Cause.BUS_DEAD, Cause.WINDOW_HUNG, Cause.WORKER_DEAD, Cause.MODEL_UNFIT,
+        Cause.CAMERA_LOST, Cause.BUS_DEAD, Cause.WINDOW_HUNG, Cause.HEARTBEAT_LOST, Cause.MODEL_UNFIT,
         Hindrance.SERVOS_UNCHECKED,
     }  # fmt: skip
     assert decision.mode is V
@@ -365,12 +354,12 @@ def test_a_refusal_to_arm_names_all_reasons_at_once() -> None:
 
 def test_arming_needs_a_whole_second_of_healthy_camera_and_perception() -> None:
     bench = Bench()
-    bench.tick(ModelReport(True), ServosChecked())
+    bench.tick(ModelReport(True), ServoCheckReport())
     assert bench.run(0.96875)[-1].active == ()
     decision = bench.tick(Act.ARM)
     assert decision.mode is R, decision.refused
     early = Bench()
-    early.tick(ModelReport(True), ServosChecked())
+    early.tick(ModelReport(True), ServoCheckReport())
     early.run(0.9375)
     assert _refused(early.tick(Act.ARM), Act.ARM) == {Hindrance.CAMERA_SETTLING, Hindrance.PERCEPTION_SETTLING}
 
@@ -415,14 +404,14 @@ def test_arming_twice_and_arming_when_stopped_are_refused(benches: dict[Mode, Be
 
 def test_wrong_servos_refuse_to_arm_and_say_what_is_wrong(benches: dict[Mode, Bench]) -> None:
     bench = Bench()
-    bench.tick(ModelReport(True), ServosChecked(("id 3 missing", "id 4: wrong model")))
+    bench.tick(ModelReport(True), ServoCheckReport(("id 3 missing", "id 4: wrong model")))
     bench.run(1.0625)
     decision = bench.tick(Act.ARM)
     assert _refused(decision, Act.ARM) == {Cause.SERVOS_WRONG}
     assert Fault(Cause.SERVOS_WRONG, "id 3 missing; id 4: wrong model") in decision.active
     assert decision.latched is None  # they were not in use
     assert decision.permitted is None
-    bench.tick(ServosChecked())
+    bench.tick(ServoCheckReport())
     assert bench.tick(Act.ARM).mode is R
 
 
@@ -468,7 +457,7 @@ def test_a_hand_over_needs_a_destination_ahead(route: RouteState, reason: Hindra
 def test_nobody_stays_armed_when_the_servos_are_unchecked(mode: Mode) -> None:
     """Asked for in ADVISORY, begun when the operator had armed already: then it could be handed over to unchecked servos."""
     bench = Bench().in_mode(mode)
-    decision = bench.tick(ServosOff())
+    decision = bench.tick(ServoRequestBegun())
     assert (decision.mode, decision.permitted, decision.latched) == (V, None, None)
     decision = bench.tick(Act.ARM, Act.HAND_OVER)
     assert decision.mode is V
@@ -477,7 +466,7 @@ def test_nobody_stays_armed_when_the_servos_are_unchecked(mode: Mode) -> None:
 
 
 def test_a_hand_over_in_the_tick_in_which_the_servos_become_unchecked_is_refused() -> None:
-    decision = _ready_to_hand_over().tick(ServosOff(), Act.HAND_OVER)
+    decision = _ready_to_hand_over().tick(ServoRequestBegun(), Act.HAND_OVER)
     assert (decision.mode, decision.permitted) == (V, None)
     assert Hindrance.SERVOS_UNCHECKED in _refused(decision, Act.HAND_OVER)
 
@@ -853,11 +842,11 @@ def test_a_stop_whose_cause_lasts_comes_back(benches: dict[Mode, Bench]) -> None
     bench = benches[U].copy()
     bench.bus = replace(GOOD_BUS, port_open=False)
     bench.tick()
-    bench.tick(ServosChecked())
+    bench.tick(ServoCheckReport())
     decision = bench.tick(Act.ACKNOWLEDGE)
     assert decision.mode is V  # the servos count as unchecked while the port is gone: a reason not to arm, nothing to stop
     assert decision.permitted is None
-    bench.tick(ServosChecked())
+    bench.tick(ServoCheckReport())
     assert bench.state.mode is S
 
 
@@ -868,7 +857,7 @@ def test_after_a_stop_the_servos_must_be_checked_before_anything_moves(benches: 
     assert decision.mode is V
     assert decision.permitted is None
     assert _refused(bench.tick(Act.ARM), Act.ARM) == {Hindrance.SERVOS_UNCHECKED}
-    assert bench.tick(ServosChecked()).permitted is Source.OPERATOR
+    assert bench.tick(ServoCheckReport()).permitted is Source.OPERATOR
 
 
 @pytest.mark.parametrize(
@@ -879,13 +868,13 @@ def test_after_these_the_servos_must_be_checked_again(cause: Cause, benches: dic
     bench.tick(Fault(cause))
     bench.tick(Act.ACKNOWLEDGE)
     assert bench.tick().permitted is None
-    assert bench.tick(ServosChecked()).permitted is Source.OPERATOR
+    assert bench.tick(ServoCheckReport()).permitted is Source.OPERATOR
 
 
 def test_a_servo_fault_while_driving_by_hand_is_latched_a_perception_fault_is_not(benches: dict[Mode, Bench]) -> None:
     bench = benches[V].copy()
     assert bench.tick(Fault(Cause.SEVERAL_ROBOTS), Fault(Cause.WINDOW_HUNG)).latched is None
-    decision = bench.tick(Fault(Cause.WORKER_DEAD), Fault(Cause.HOT))
+    decision = bench.tick(Fault(Cause.HEARTBEAT_LOST), Fault(Cause.HOT))
     assert decision.latched == Fault(Cause.HOT)
     assert bench.tick().permitted is None  # until acknowledged, though it is over
     assert bench.tick(Act.ACKNOWLEDGE).permitted is Source.OPERATOR
@@ -949,10 +938,10 @@ def test_after_a_jump_of_the_clock_only_the_model_is_still_known(benches: dict[M
     bench.tick(Act.INPUT)
     decision = bench.raw([], 3.0)
     assert {fault.cause for fault in decision.active} == {
-        Cause.CLOCK, Cause.CAMERA_LOST, Cause.BUS_DEAD, Cause.WINDOW_HUNG, Cause.WORKER_DEAD,
+        Cause.CLOCK, Cause.CAMERA_LOST, Cause.BUS_DEAD, Cause.WINDOW_HUNG, Cause.HEARTBEAT_LOST,
     }  # fmt: skip
     bench.now_s = 3.0
-    bench.tick(Act.ACKNOWLEDGE, ServosChecked())
+    bench.tick(Act.ACKNOWLEDGE, ServoCheckReport())
     bench.run(0.9375)
     assert _refused(bench.tick(Act.ARM, after_s=0.0), Act.ARM) == {Hindrance.CAMERA_SETTLING, Hindrance.PERCEPTION_SETTLING}
     assert bench.tick(Act.ARM).mode is R
@@ -983,7 +972,7 @@ def test_after_a_jump_of_the_clock_camera_and_perception_must_prove_themselves_a
     """Also when the tick of the jump itself brings good reports."""
     bench = benches[V].copy()
     bench.tick(after_s=5.0)
-    decision = bench.tick(Act.ARM, Act.ACKNOWLEDGE, ServosChecked())
+    decision = bench.tick(Act.ARM, Act.ACKNOWLEDGE, ServoCheckReport())
     assert _refused(decision, Act.ARM) == {Hindrance.CAMERA_SETTLING, Hindrance.PERCEPTION_SETTLING}
 
 

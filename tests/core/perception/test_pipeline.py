@@ -120,7 +120,7 @@ def swings(network: DrawnNetwork) -> tuple[float, float]:
     """Of theta and head, as they lie in the evidence."""
     scene = Pipeline(network, CONFIG, single=CalibratedSegmenter(network, sensitivity=True)).perceive_single(frame())
     assert reason(scene) is None
-    assert list(scene.latency_ms) == [*STAGES[:-1], "steadiness", "total"]
+    assert list(scene.latency_ms) == [*STAGES[:-1], "sensitivity", "total"]
     assert scene.evidence is not None
     named = dict(zip(ConfidenceFeatures.names(), scene.evidence, strict=True))
     return named["theta_swing"], named["head_swing"]

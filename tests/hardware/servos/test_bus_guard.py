@@ -294,7 +294,7 @@ def test_a_dead_application_moves_a_joint_by_one_step_then_it_holds_then_it_is_d
     assert last < held <= last + SERVOS.joints[4].max_step_mm
     assert 0.34 < bench.until_disarmed(1.0) < 0.40
     assert bench.positions[4] == held
-    assert bench.cause is Cause.WORKER_DEAD
+    assert bench.cause is Cause.HEARTBEAT_LOST
 
 
 @pytest.mark.parametrize("permitted", [None, Source.OPERATOR])

@@ -1,7 +1,8 @@
-"""The kinds of camera in one table: ``CAMERA_KINDS``. Rig, device search, wizard and preflight take what they need from its row.
+"""The registry of cameras, ``CAMERA_KINDS``: a row for each value of ``rig.camera``, for rig, device search, wizard and preflight.
 
-A new camera is a module with a ``Sensor`` (see ``live``) or a ``Camera``, a row here, and its name in ``RigConfig.camera``. Drivers
-are imported where they are used: their libraries take long to load, or may be missing.
+A new camera is a file in this folder with a ``Sensor`` (see ``live``) or a ``Camera``, a row here, its name in ``RigConfig.camera``
+(``core/config/models.py``), and in ``RESERVED`` where rig files of it are kept. Drivers are imported where they are used: their
+libraries take long to load, or may be missing.
 """
 
 from __future__ import annotations
