@@ -31,8 +31,9 @@ TEST_FOLDER = "tests/core/control"
 TESTS = {  # module -> the tests that should find its mutants
     "gate": ("test_gate.py",),
     "joints": ("test_gate.py", "test_joints.py"),
-    "supervisor": ("test_supervisor.py", "test_health.py"),
+    "supervisor": ("test_supervisor.py", "test_health.py", "test_camera_monitor.py"),
     "health": ("test_supervisor.py", "test_health.py"),
+    "camera_monitor": ("test_camera_monitor.py", "test_supervisor.py"),
     "bus_monitor": ("test_bus_monitor.py", "test_supervisor.py", "test_health.py"),
 }
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")

@@ -83,4 +83,4 @@ def test_a_survivor_without_an_explanation_is_a_failure(capsys: pytest.CaptureFi
 
 def test_an_unknown_module_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert mutation.main(["pedal"]) == 2
-    assert capsys.readouterr().err == "unknown: pedal; known are gate, joints, supervisor, health, bus_monitor\n"
+    assert capsys.readouterr().err == "unknown: pedal; known are gate, joints, supervisor, health, camera_monitor, bus_monitor\n"

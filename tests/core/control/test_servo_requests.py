@@ -285,9 +285,7 @@ def test_a_stop_switches_the_torque_off_also_where_the_bus_process_is_gone(is_en
     bench.turn(2)
     assert _offs(bench) == (0, False), "STOP was not pressed"
     bench.pilot.stop()
-    bench.turn(2)
-    assert _offs(bench)[1] is is_enabled
-    bench.done().turn(3)
+    bench.turn(2).done().turn(3)
     assert (Note.TORQUE_OFF in bench.alerts()) is is_enabled
     assert _offs(bench) == (int(is_enabled), False)
     bench.seconds(11.0).done()
