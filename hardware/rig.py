@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -14,12 +13,10 @@ from core.config.models import CameraConfig, Config, RigConfig, load_config, mer
 from core.config.rig_file import RESERVED, calibration_of, find_rig, with_rig
 from core.control.robot import GuardedRobot
 from core.devices import Camera, DeviceError, UserError
-from core.types import RobotStatus
 from hardware.cameras.registry import CAMERA_KINDS, FoundCamera
 from hardware.cameras.undistorted import UndistortedCamera
 
 if TYPE_CHECKING:
-    from hardware.processes import DeviceProcess
     from hardware.servos.discovery import FoundPort
     from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.process import PrestartedProcesses
@@ -152,7 +149,7 @@ def real_camera(config: Config) -> Camera:
 def _has_own_process(config: Config) -> bool:
     """Whether this is a twin with servos, in a process of its own."""
     is_driven_twin = kind_of(config.rig) is RigKind.SIM and config.rig.robot == "twin"
-    return is_driven_twin and config.twin.own_process and config.servos.driver == "dynamixel" and config.servos.port is None
+    return is_driven_twin and config.servos.driver == "dynamixel" and config.servos.port is None
 
 
 def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
@@ -173,9 +170,7 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     world.insert(START_INSERTION_MM)
     camera = TwinCamera(world)
     robot: GuardedRobot | None = None
-    if config.rig.robot == "twin" and config.servos.driver == "dynamixel":
-        robot = _soft_servos(config, world)
-    elif config.rig.robot == "twin":
+    if config.rig.robot == "twin":
         robot = DirectRobot(world.robot, config.safety)
         robot.connect()
     try:
@@ -188,7 +183,8 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
 
 
 def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
-    """The twin and its seven software servos in a process of their own."""
+    """The twin and its seven software servos in a process of their own, the real driver in another; zeroed, not armed."""
+    from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.process import PrestartedProcesses, RemoteTwin
 
     loading = ahead or PrestartedProcesses()
@@ -196,46 +192,13 @@ def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         undo.callback(loading.end)
         twin = RemoteTwin(config, START_INSERTION_MM, loading.twin)
         undo.callback(twin.close)
-        robot = _twin_servos(config, twin.port, twin.status, process=loading.bus)
-        undo.pop_all()
-    return Rig(config.rig.name, RigKind.SIM, twin, robot)
-
-
-def _soft_servos(config: Config, world: TwinWorld) -> ServoRobot:
-    """The twin's robot moved by seven software servos in this process."""
-    from hardware.twin.process import drive_world, wired
-    from hardware.twin.servos.bus import SoftServoBus
-
-    try:
-        wiring = wired(config.twin, config.servos)
-    except ValueError as error:
-        raise DeviceError(str(error)) from None
-    servos = SoftServoBus(wiring, wire_time=True)
-    servos.start()
-    drive_world(world, servos, wiring)
-    return _twin_servos(config, servos.port, world.physics.status, on_close=servos.stop)
-
-
-def _twin_servos(
-    config: Config,
-    port: str,
-    truth: Callable[[], RobotStatus],
-    *,
-    on_close: Callable[[], None] | None = None,
-    process: DeviceProcess | None = None,
-) -> ServoRobot:
-    """The real driver in its own process on the software servos' port; zeroed, not armed."""
-    from hardware.servos.servo_robot import ServoRobot
-
-    settings = config.servos.model_copy(update={"port": port})
-    robot = ServoRobot(settings, config.safety, name="bench twin with servos", truth=truth, on_close=on_close, process=process)
-    try:
+        servos = config.servos.model_copy(update={"port": twin.port})
+        robot = ServoRobot(servos, config.safety, name="bench twin with servos", truth=twin.status, process=loading.bus)
+        undo.callback(robot.close)
         robot.connect()
         robot.zero()  # its wires are slack, as nothing has pulled yet
-    except DeviceError:
-        robot.close()
-        raise
-    return robot
+        undo.pop_all()
+    return Rig(config.rig.name, RigKind.SIM, twin, robot)
 
 
 @dataclass(frozen=True, slots=True)

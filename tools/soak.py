@@ -122,7 +122,7 @@ class SoakRig:
             undo.callback(self.bus.stop)
             drive_world(world, self.bus, config.servos)
             servos = config.servos.model_copy(update={"port": self.bus.port})
-            self.robot = ServoRobot(servos, config.safety, truth=world.physics.status, on_close=self.bus.stop)
+            self.robot = ServoRobot(servos, config.safety, truth=world.physics.status)
             undo.callback(self.robot.close)
             self.robot.connect()
             self.robot.zero()
@@ -186,6 +186,7 @@ class SoakRig:
         self._ended.set()
         self._thread.join()
         self.engine.close()
+        self.bus.stop()
         return self.pilot.left_over
 
 
@@ -330,7 +331,7 @@ _HANGS_S = 0.9
 class SoakOperator:
     """Wants to hand over most of the time, and does everything else now and then. All goes through the pilot, as from a window.
 
-    ``hangs`` tells that he, or his window, shows no sign of life just now.
+    ``hangs``: operator or window show no sign of life now.
     """
 
     def __init__(self, seed: int, watch: WireMonitor, writer: SessionWriter) -> None:
@@ -465,7 +466,7 @@ class SoakOperator:
 _WARM_S, _WARM_SHARE = 600.0, 0.4
 _MORE_MB, _MORE_SHARE = 12.0, 0.03
 _MORE_COUNT = 5
-"""A session that is being recorded has three files and a thread of its own; who leaks loses one with every rig, hundreds in all."""
+"""A session that is being recorded has three files and a thread of its own; a leak loses one with every rig, hundreds in all."""
 _LEAST = 6
 
 
@@ -549,7 +550,7 @@ class SoakTally:
 
 
 class Soak:
-    """``run`` goes on until the time is over or somebody interrupts; ``summary`` tells.
+    """``run`` goes on until the time is over or it is interrupted; ``summary`` has the figures.
 
     Parameters
     ----------

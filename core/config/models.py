@@ -362,7 +362,6 @@ class TwinConfig(ConfigSection):
     image_height_px: int = Field(480, ge=120, le=4096, description="of its camera")
     frames_per_second: float = Field(30.0, gt=0.0, le=240.0, description="in lock-step: trials, data sets")
     live_frames_per_second: float = Field(20.0, gt=0.0, le=240.0, description="of the running twin, which shares the computer")
-    own_process: bool = Field(True, description="with servos: the simulation takes no time from the program")
     wiring: str | None = Field(
         None,
         pattern=r"^-?\d{1,3}(,-?\d{1,3}){6}$",
@@ -372,6 +371,12 @@ class TwinConfig(ConfigSection):
         0.0, ge=-180.0, le=180.0, description="turn of the robot about its axis; 0: right and left act in the picture"
     )
     lens_distortion: float = Field(0.0, ge=-0.14, le=0.3, description="of its camera's lens; negative: barrel, 0: none")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _upgrade(cls, values: Any) -> Any:
+        """Files of earlier versions say where the simulation runs."""
+        return {key: value for key, value in values.items() if key != "own_process"} if isinstance(values, dict) else values
 
 
 class RigConfig(ConfigSection):

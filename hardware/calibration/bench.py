@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -25,8 +25,6 @@ from hardware.rig import START_INSERTION_MM, RigKind, kind_of, real_camera
 
 if TYPE_CHECKING:
     from hardware.twin.rendering.calibration_board import BoardPictures
-    from hardware.twin.servos.bus import SoftServoBus
-    from hardware.twin.world import TwinWorld
 
 
 Perceive = Callable[[Frame], Scene]
@@ -45,7 +43,6 @@ class CalibrationBench:
     feed : the camera, read all the time.
     port : the servos' serial port; None when the rig has none.
     stop : ends whatever moves.
-    world, servos : the twin, where it lives in this process; for tests.
     """
 
     def __init__(self, config: Config, camera: Camera, port: str | None, perceive: Perceive, on_close: Callable[[], None]) -> None:
@@ -53,8 +50,6 @@ class CalibrationBench:
         self.kind = kind_of(config.rig)
         self.stop = StopSwitch()
         self.feed = CameraFeed(camera)
-        self.world: TwinWorld | None = None
-        self.servos: SoftServoBus | None = None
         self._boards: dict[BoardSpec, BoardPictures] = {}
         self._boards_shown = 0
 
@@ -131,35 +126,10 @@ def open_bench(config: Config, perceive: Perceive) -> CalibrationBench:
         camera.open()
         return CalibrationBench(config, camera, config.servos.port, perceive, lambda: None)
     config = config.model_copy(update={"servos": config.servos.model_copy(update={"port": None})})
-    if not config.twin.own_process:
-        return _twin_in_process(config, perceive)
     from hardware.twin.process import RemoteTwin
 
     twin = RemoteTwin(config, START_INSERTION_MM)
     return CalibrationBench(config, twin, twin.port, perceive, twin.close)
-
-
-def _twin_in_process(config: Config, perceive: Perceive) -> CalibrationBench:
-    from hardware.twin.process import drive_world, wired
-    from hardware.twin.servos.bus import SoftServoBus
-    from hardware.twin.world import TwinCamera, TwinWorld
-
-    try:
-        world, wiring = TwinWorld(config.twin, perception=config.perception), wired(config.twin, config.servos)
-    except ValueError as error:
-        raise DeviceError(str(error)) from None
-    world.insert(START_INSERTION_MM)
-    with ExitStack() as undo:
-        servos = SoftServoBus(wiring, wire_time=True)
-        servos.start()
-        undo.callback(servos.stop)
-        drive_world(world, servos, wiring)
-        camera = TwinCamera(world)
-        camera.open()
-        undo.pop_all()
-    bench = CalibrationBench(config, camera, servos.port, perceive, servos.stop)
-    bench.world, bench.servos = world, servos
-    return bench
 
 
 def observe_robot(feed: CameraFeed, perceive: Perceive, alive: Callable[[], None]) -> Look:

@@ -35,7 +35,6 @@ class ServoRobot:
     servos, safety : the configuration; ``servos.port`` must be set.
     name : shown to the operator.
     truth : tells the status instead of the servos, where the robot is simulated.
-    on_close : called once, after the servos were let go.
     kept_zero : of the rig file; arming without a zero then says whether the servos have lost their turns since.
     process : a bus process that was started ahead, for the first connection.
 
@@ -54,13 +53,12 @@ class ServoRobot:
         *,
         name: str = "servo robot",
         truth: Callable[[], RobotStatus] | None = None,
-        on_close: Callable[[], None] | None = None,
         kept_zero: ZeroConfig | None = None,
         process: DeviceProcess | None = None,
     ) -> None:
         self._servos, self._safety = servos, safety
         self._name = name
-        self._truth, self._on_close, self._kept_zero = truth, on_close, kept_zero
+        self._truth, self._kept_zero = truth, kept_zero
         self._lock, self._releasing = threading.Lock(), threading.Lock()
         self._prestarted = process
         self._client: BusClient | None = None
@@ -292,9 +290,6 @@ class ServoRobot:
         prestarted, self._prestarted = self._prestarted, None
         if prestarted is not None:
             prestarted.discard()
-        on_close, self._on_close = self._on_close, None
-        if on_close is not None:
-            on_close()
 
     def _disconnect(self, patience_s: float = END_S) -> None:
         client, self._client = self._client, None

@@ -173,7 +173,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("own_folder")
 def test_a_rig_is_opened_with_its_lens() -> None:
-    base = load_config(overrides={"servos": {"driver": "direct"}, "twin": {"own_process": False, "lens_distortion": -0.12}})
+    base = load_config(overrides={"servos": {"driver": "direct"}, "twin": {"lens_distortion": -0.12}})
     known = CalibrationConfig(made_utc=datetime.now(UTC), lens=LENS)
     path = write_rig(make_rig(base, "bent", known))
     rig = open_rig(with_rig(base, make_rig(base, "bent", known), path))

@@ -143,9 +143,7 @@ def test_what_was_started_ahead_of_a_twin_that_cannot_be_is_ended() -> None:
         open_rig(Config.model_validate({"twin": {"phantom": "no such phantom"}}), ahead)
 
 
-@pytest.mark.parametrize(
-    "changed", [{"twin": {"own_process": False}}, {"rig": {"robot": "none"}}, {"servos": {"driver": "direct"}}]
-)
+@pytest.mark.parametrize("changed", [{"rig": {"robot": "none"}}, {"servos": {"driver": "direct"}}])
 def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, Any]) -> None:
     assert start_ahead(load_config(overrides=changed)) is None
 
