@@ -43,6 +43,12 @@ def no_thread_stays_behind() -> Iterator[None]:
 
 
 @pytest.fixture
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings and rig files lie in a folder of the test."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+
+
+@pytest.fixture
 def no_process_stays_behind() -> Iterator[None]:
     """But for Python's own, which an earlier test has started and which stays."""
     yield

@@ -166,11 +166,6 @@ def test_a_recording_is_played_back(bag: Path) -> None:
 # ---- rigs
 
 
-@pytest.fixture
-def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-
-
 @pytest.mark.usefixtures("own_folder")
 def test_a_rig_is_opened_with_its_lens() -> None:
     base = load_config(overrides={"servos": {"driver": "direct"}, "twin": {"lens_distortion": -0.12}})

@@ -11,21 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.config.models import GapConfig, PerceptionConfig, PoseConfig, QualityConfig, load_config
+from core.config.models import PerceptionConfig, PoseConfig, QualityConfig, load_config
 from core.devices import UserError
 from core.evaluation.accuracy import FrameScore, TrueMasks
 from core.perception.pipeline import Pipeline
-from core.perception.segmentation import Segmenter
 from core.perception.vectors import fit_line
 from core.types import Frame, Image, Reason
 from tests.core.drawing import curve, depth
 from tools.ablation import (
-    MEASURES,
     OURS,
     PAPER,
     STEPS,
-    TRACKING,
-    SameMasks,
     StreamFrame,
     are_enough,
     draw_weights,
@@ -33,7 +29,6 @@ from tools.ablation import (
     figures,
     make_variants,
     markdown,
-    refusals,
     run_ablation,
     stream_figures,
 )
@@ -73,23 +68,11 @@ def test_every_step_switches_something_and_nothing_else() -> None:
         assert all(f"{section}.{key}" in step.settings or section in step.settings for section, key in changed)
 
 
-def test_a_step_that_is_left_out_stays_on_in_all_rows() -> None:
-    variants = make_variants(LITERAL, DEFAULTS, [step for step in STEPS if step.name != TRACKING])
-    assert all(variant.config.tracking.enabled for variant in variants)
-    assert TRACKING not in " ".join(variant.name for variant in variants)
-
-
 def test_a_difference_that_no_step_switches_is_an_error() -> None:
     with pytest.raises(ValueError, match=r"no step of the ablation switches pose\.d_allow_px"):
         make_variants(DEFAULTS, DEFAULTS.model_copy(update={"pose": PoseConfig(d_allow_px=7.0)}))
     with pytest.raises(ValueError, match="no step of the ablation switches working_size_px"):
         make_variants(DEFAULTS, DEFAULTS.model_copy(update={"working_size_px": 320}))
-
-
-def test_what_a_users_file_sets_is_kept_in_all_rows() -> None:
-    ours = DEFAULTS.model_copy(update={"gaps": GapConfig(gap_threshold_px=12.0)})
-    paper = LITERAL.model_copy(update={"gaps": GapConfig(rule="every_pair", gap_threshold_px=12.0)})
-    assert all(variant.config.gaps.gap_threshold_px == 12.0 for variant in make_variants(paper, ours))
 
 
 # ---- switches that the steps need ----
@@ -149,36 +132,6 @@ def test_both_fits_find_a_straight_line() -> None:
 # ---- masks ----
 
 
-def test_the_network_runs_once_per_frame() -> None:
-    class Counting(Segmenter):
-        engine = "counted"
-        runs = 0
-
-        def __call__(self, image: Image) -> tuple[np.ndarray, np.ndarray]:
-            self.runs += 1
-            return np.zeros(image.shape[:2], np.float32), np.ones(image.shape[:2], np.float32)
-
-    network, nothing = Counting(), np.zeros((4, 4), bool)
-    masks = SameMasks(network)
-    image = np.zeros((4, 4, 3), np.uint8)
-    first = masks(image)[0]
-    assert masks(image)[0] is first
-    masks.next_frame(nothing, nothing)
-    assert masks(image)[0] is not first
-    assert network.runs == 2
-    assert masks.engine == "counted"
-
-
-def test_true_masks_are_shown_frame_by_frame() -> None:
-    masks = SameMasks(TrueMasks())
-    left = np.array([[True, False]])
-    image = np.zeros((1, 2, 3), np.uint8)
-    masks.next_frame(left, ~left)
-    assert (masks(image)[0] > 0.5).tolist() == [[True, False]]
-    masks.next_frame(~left, left)
-    assert (masks(image)[0] > 0.5).tolist() == [[False, True]]
-
-
 # ---- figures ----
 
 
@@ -190,12 +143,6 @@ def test_estimates_are_those_of_the_repeated_values(quantile: float | None) -> N
     for row, value in zip(weights, found, strict=True):
         repeated = np.repeat(values, row)
         assert value == pytest.approx(repeated.mean() if quantile is None else np.quantile(repeated, quantile))
-
-
-def test_estimates_leave_out_what_is_not_known() -> None:
-    values, weights = np.array([1.0, np.nan, 5.0]), np.array([[1, 7, 1], [0, 3, 2], [0, 4, 0]])
-    np.testing.assert_array_equal(estimate(values, weights, None), [3.0, 5.0, np.nan])
-    np.testing.assert_array_equal(estimate(values, weights, 0.5), [3.0, 5.0, np.nan])
 
 
 def test_whole_phantoms_are_drawn_where_there_are_enough() -> None:
@@ -285,23 +232,6 @@ def test_intervals_hold_the_difference_and_say_when_it_is_clear() -> None:
     assert again == table, "the same seed gives the same intervals"
 
 
-def test_a_row_that_never_answers_has_no_errors() -> None:
-    table = figures([[score(1.0)] * 3, [score(None)] * 3], [None, 0], list("abc"))
-    silent = table[1]
-    assert silent["answered_share"].value == 0.0
-    assert silent["answered_share"].difference == -1.0
-    for measure in MEASURES:
-        if measure.key != "answered_share":
-            figure = silent[measure.key]
-            assert (figure.value, figure.difference, figure.low, figure.high) == (None, None, None, None)
-
-
-def test_refusals_are_counted() -> None:
-    unseen = replace(score(None), reason=Reason.NO_ROBOT)
-    scores = [score(None), unseen, unseen, score(1.0), replace(unseen, expected=False)]
-    assert list(refusals(scores).items()) == [("no robot", 2), ("low confidence", 1)]
-
-
 # ---- streams ----
 
 
@@ -350,12 +280,6 @@ def test_the_lag_of_theta_is_found(delay: float) -> None:
     stream = [seen(signed(theta(frame - delay) + noise[frame]), signed(theta(frame))) for frame in range(120)]
     lag = stream_figures([stream])["theta_lag_frames"]
     assert lag == pytest.approx(delay, abs=0.1)
-
-
-def test_no_lag_is_told_where_nothing_turns() -> None:
-    assert stream_figures([[seen(3.0, 3.0)] * 80])["theta_lag_frames"] is None
-    nothing = stream_figures([])
-    assert [nothing[key] for key in ("theta_lag_frames", "theta_median_deg", "head_median_px", "wrong_share")] == [None] * 4
 
 
 def test_jitter_is_the_spread_of_the_errors_change() -> None:

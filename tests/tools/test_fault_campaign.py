@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import json
 import signal
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from core.devices import UserError
-from core.session.writer import Recording
 from tools.fault_campaign.__main__ import Result, page_of, run_case, run_faults, to_json
 from tools.fault_campaign.registry import CASES, COUNT, FAULTS, CampaignError, FaultCase, Kit, Observation, fault
 
@@ -29,20 +26,6 @@ def test_it_goes_as_listed(number: int) -> None:
     assert FAULTS[number].quick
     result = run_case(CASES[number], live=False)
     assert result.seen.problems == ()
-
-
-def test_on_a_slow_disk_the_encoder_too_slow_goes_as_listed_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    def slow(name: str, act: Callable[..., object]) -> None:
-        def later(self: Recording, *given: object) -> object:
-            done = act(self, *given)
-            time.sleep(0.3)
-            return done
-
-        monkeypatch.setattr(Recording, name, later)
-
-    slow("begin", Recording.begin)
-    slow("write_tick", Recording.write_tick)
-    assert run_case(CASES[38], live=False).seen.problems == ()
 
 
 def test_the_command_tells_one_fault_per_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from core.devices import UserError
-from tools.soak import ProcessSample, Soak, flatness, soak, take_sample
+from tools.soak import ProcessSample, Soak, flatness
 
 
 def samples(count: int, grow_mb: float = 0.0, threads: int = 0, files: int = 0) -> list[ProcessSample]:
@@ -35,19 +32,6 @@ def test_flat_after_ten_minutes(given: list[ProcessSample], flat: bool | None) -
     assert flatness(given).flat is flat
 
 
-def test_what_comes_in_the_first_ten_minutes_is_warm_up() -> None:
-    warm = [ProcessSample(10.0 * n, min(400.0, 200.0 + 4.0 * n), 12, 20, 1, 50.0) for n in range(300)]
-    found = flatness(warm)
-    assert (found.flat, found.warm_s) == (True, 600.0)
-
-
-def test_a_sample_of_this_process() -> None:
-    sample = take_sample(1.0)
-    assert sample.memory_mb > 10.0
-    assert sample.threads >= 1
-    assert sample.files >= 3
-
-
 @pytest.mark.real_time
 def test_a_short_soak_sends_nothing_unsafe_and_loses_nothing() -> None:
     short = Soak(seed=1)
@@ -57,8 +41,3 @@ def test_a_short_soak_sends_nothing_unsafe_and_loses_nothing() -> None:
     assert summary["records"]["lost"] == 0
     assert summary["packets"] > 20
     assert summary["rigs_opened"] >= 1
-
-
-def test_a_file_that_cannot_be_written_is_said_before_the_hours(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="choose another --out"):
-        soak(0.01, 0, tmp_path / "no folder" / "soak.jsonl")

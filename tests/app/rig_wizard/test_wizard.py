@@ -51,9 +51,7 @@ def _open(config: Config, see: object) -> CalibrationBench:
     return CalibrationBench(config, StillCamera(), None, lambda frame: make_scene(), lambda: None)
 
 
-@pytest.fixture(autouse=True)
-def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+pytestmark = pytest.mark.usefixtures("own_folder")
 
 
 MakeWizard = Callable[..., RigWizard]

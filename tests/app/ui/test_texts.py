@@ -80,13 +80,6 @@ def test_advice_headline(speed: Speed, steer: float, expected: str) -> None:
     assert advice_headline(Advice(speed, 1.0, steer, "")) == expected
 
 
-OF_THE_METHOD = {"theta", "d_head", "d_tail", "crossed", "state", "confidence", "latency", "clearance", "force"}
-
-
-def test_the_quantities_of_the_method_are_explained() -> None:
-    assert set(QUANTITY) >= OF_THE_METHOD
-
-
 @pytest.mark.parametrize("name", QUANTITY)
 def test_every_one_is_whole_sentences_that_fit_a_screen(name: str) -> None:
     quantity = QUANTITY[name]
@@ -98,12 +91,3 @@ def test_every_one_is_whole_sentences_that_fit_a_screen(name: str) -> None:
 def test_a_tip_names_quantity_and_unit() -> None:
     assert tip("theta").startswith("theta (degrees): Angle between")
     assert tip("d_head", "d_tail").count("(working px)") == 2
-
-
-def test_the_states_are_the_four_of_the_method() -> None:
-    assert tip("state").splitlines() == list(STATE_MEANING.values())
-
-
-def test_an_unknown_quantity_is_a_mistake() -> None:
-    with pytest.raises(KeyError):
-        tip("speed of light")

@@ -9,6 +9,8 @@ import pytest
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from app.widgets.alerts import AlertStrip
+from core.control.alerts import ALERTS, Alert, AlertKey
 from tests.app.hand_clock import Clock
 
 Widget = TypeVar("Widget", bound=QWidget)
@@ -32,6 +34,21 @@ def own(qtbot: QtBot) -> Callable[..., QWidget]:
 @pytest.fixture
 def clock() -> Clock:
     return Clock()
+
+
+@pytest.fixture
+def picture(own: Own) -> QWidget:
+    """In the place of the live view."""
+    return own(QWidget(), 775, 408, show=True)
+
+
+@pytest.fixture
+def strip(picture: QWidget, clock: Clock) -> AlertStrip:
+    return AlertStrip(picture, clock)
+
+
+def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
+    return Alert(key, ALERTS[key], detail, repeats)
 
 
 def colours_in(widget: QWidget) -> set[str]:

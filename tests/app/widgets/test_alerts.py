@@ -19,13 +19,13 @@ from pytestqt.qtbot import QtBot
 
 from app.widgets.alerts import BRIEF_S, LINGER_S, LOOK, SOUNDS, AlertSounds, AlertStrip
 from core.config.models import RESOURCES
-from core.control.alerts import ALERTS, Alert, AlertKey, Priority
+from core.control.alerts import ALERTS, AlertKey, Priority
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import RejectReason, Source
 from core.control.modes import Hindrance, Mode
 from tests.app.hand_clock import Clock
-from tests.app.widgets.conftest import Own
+from tests.app.widgets.conftest import Own, alert
 
 LEFT = Qt.MouseButton.LeftButton
 OFF = DriveView(0.0)
@@ -37,20 +37,6 @@ def words(key: AlertKey) -> str:
     """What is the matter and what to do, from the table, as two sentences."""
     text, what_to_do = ALERTS[key].text, ALERTS[key].what_to_do
     return f"{text}. {what_to_do[0].upper()}{what_to_do[1:]}."
-
-
-def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
-    return Alert(key, ALERTS[key], detail, repeats)
-
-
-@pytest.fixture
-def picture(own: Own) -> QWidget:
-    return own(QWidget(), 775, 408, show=True)
-
-
-@pytest.fixture
-def strip(picture: QWidget, clock: Clock) -> Iterator[AlertStrip]:
-    yield AlertStrip(picture, clock)
 
 
 def test_alerts_say_what_is_the_matter_how_much_how_often_and_what_to_do(strip: AlertStrip) -> None:

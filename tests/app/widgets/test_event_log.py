@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from datetime import datetime, timedelta
 
 import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QApplication, QMenu, QWidget
+from PySide6.QtWidgets import QApplication, QMenu
 
-from app.widgets.alerts import AlertStrip
 from app.widgets.event_log import MOST_ROWS, EventLog, LogKind
 from app.widgets.mode_bar import HEIGHT, ModeBar
-from core.control.alerts import ALERTS, Alert, AlertKey
 from core.control.drive_view import DriveView
 from core.control.gate import Source
 from core.control.modes import Mode
@@ -25,27 +22,8 @@ ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=Fals
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
-@pytest.fixture
 def bar(own: Own, clock: Clock) -> ModeBar:
     return own(ModeBar(clock), NARROWEST_AT_720, HEIGHT, show=True)
-
-
-def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
-    return Alert(key, ALERTS[key], detail, repeats)
-
-
-@pytest.fixture
-def picture(own: Own) -> QWidget:
-    return own(QWidget(), 775, 408, show=True)
-
-
-@pytest.fixture
-def strip(picture: QWidget, clock: Clock) -> Iterator[AlertStrip]:
-    yield AlertStrip(picture, clock)
 
 
 class WallClock:

@@ -35,7 +35,6 @@ from hardware.twin.servos.protocol import Instruction
 
 pytestmark = pytest.mark.real_time
 
-ROOT = Path(__file__).resolve().parents[3]
 # The servos' watchdog is long, so that a machine that stalls does not trip it; the tests of the watchdog turn the servos' clock.
 CONFIG = ServosConfig(watchdog_s=2.0)
 TENDON, ADVANCE = CONFIG.joints[0], CONFIG.joints[4]
