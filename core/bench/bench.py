@@ -25,6 +25,7 @@ from core.learning.dataset import mask_png, png
 from core.messages import message
 from core.perception import quality
 from core.perception.segmentation import Probability, to_working
+from core.perception.skeleton import end_pixels, thin
 from core.system import MAX_PIXELS
 from core.types import Image, Mask, Points
 
@@ -149,10 +150,13 @@ def bench_from_pictures(
         clean = [np.where(_differs(one, middle, noise)[:, :, None], middle, one) for one in focused]
         empty, known = np.mean(clean, axis=0), np.ones(base.shape[:2], np.bool_)
     else:
-        unlike = np.zeros(base.shape[:2], np.bool_)
+        empty, known = _mean_without_glare(focused), np.ones(base.shape[:2], np.bool_)
         for other in others:
-            unlike |= _differs(other, base, noise)
-        empty, known = np.where(unlike[:, :, None], base, np.mean(focused, axis=0)), ~unlike
+            unlike = _differs(other, base, noise)
+            glare = [_beside_glare(one) for one in (base.astype(np.float32), other)]
+            known &= ~unlike | (glare[0] ^ glare[1])  # the picture without the reflection shows the bench
+            empty = np.where((unlike & ~glare[0])[:, :, None], base, empty)
+            empty = np.where((glare[0] & ~glare[1])[:, :, None], other, empty)
     drawn = _drawn_vessel(vessel, base.shape[:2])
     return _bench(name, empty, noise, known, drawn)
 
@@ -223,6 +227,49 @@ def landmarks_of(empty: Image) -> Points:
     return np.zeros((0, 2)) if found is None else np.asarray(found.reshape(-1, 2), np.float64)
 
 
+def reachable(vessel: Mask) -> Mask:
+    """Where a robot may lie, bool (h, w): in and beside the vessel, and between the border and those of its ends that are near."""
+    height, width = vessel.shape
+    side = 2 * BESIDE_PX + 1
+    solid = vessel.view(np.uint8)
+    area = cv2.dilate(solid, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+    depth = cv2.distanceTransform(cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_REPLICATE), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    skeleton = thin(vessel)
+    line = np.argwhere(skeleton)
+    for x, y in end_pixels(skeleton):
+        radius = float(depth[y, x])
+        if min(x, y, width - 1 - x, height - 1 - y) < radius + 3:
+            continue
+        apart = np.hypot(line[:, 0] - y, line[:, 1] - x)
+        behind = line[np.argmin(np.abs(apart - _DIRECTION_PX))]
+        direction = np.array([x - behind[1], y - behind[0]], np.float64)
+        direction /= max(float(np.hypot(*direction)), 1e-6)
+        # how far it is to the border in that direction
+        ahead = [
+            ((last if step > 0 else 0) - place) / step
+            for place, step, last in ((x, direction[0], width - 1), (y, direction[1], height - 1))
+            if abs(step) > 1e-6
+        ]
+        length = min(ahead)
+        if length > _LONGEST_ENTRY * width:
+            continue
+        across, start = np.array([-direction[1], direction[0]]), np.array([x, y], np.float64)
+        end, narrow = start + direction * (length + 20), across * (radius + BESIDE_PX)
+        wide = narrow + across * _ENTRY_SPREAD * length
+        cv2.fillConvexPoly(area, np.rint([start + narrow, end + wide, end - wide, start - narrow]).astype(np.int32), [1])
+    return np.asarray(area > 0)
+
+
+BESIDE_PX = 5
+"""Width around the drawn vessel in which the robot may lie: outlines are drawn by hand, and a robot presses against the wall."""
+_DIRECTION_PX = 25
+"""Length of a vessel's end from which its direction is taken."""
+_LONGEST_ENTRY = 0.4
+"""Of the picture's width: so far the robot's entrance at the picture's border may be from a vessel's end."""
+_ENTRY_SPREAD = 0.3
+"""By how much of its length the way from a vessel's end to the border widens on each side."""
+
+
 def same_light(image: Image, base: Image) -> NDArray[np.float32]:
     """`image` (h, w, 3) with the exposure and colour of `base`: a factor for each channel, from the middle half of all pixels."""
     ratio = (base.astype(np.float32) + 1.0) / (image.astype(np.float32) + 1.0)
@@ -270,6 +317,23 @@ def _differs(one: NDArray[np.floating] | Image, other: NDArray[np.floating] | Im
     size = np.abs(apart - cv2.blur(apart, (81, 81))).max(axis=2)
     seeds = size > np.maximum(_DIFFERENT_SIGMAS * noise / 7.0, _DIFFERENT_LEVELS)  # a Gaussian of 2 px averages 50 pixels
     return np.asarray(cv2.dilate(seeds.view(np.uint8), np.ones((9, 9), np.uint8)) > 0)
+
+
+def _mean_without_glare(pictures: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
+    """Mean of pictures (h, w, 3) of one light, without those with a reflection at the place, where another has none."""
+    weights = [np.where(_beside_glare(one), np.float32(1e-3), np.float32(1.0))[:, :, None] for one in pictures]
+    total = np.sum([weight * one for weight, one in zip(weights, pictures, strict=True)], axis=0)
+    return np.asarray(total / np.sum(weights, axis=0), np.float32)
+
+
+def _beside_glare(picture: NDArray[np.float32]) -> Mask:
+    """Where a picture (h, w, 3) is overexposed by a reflection, and the halo around it."""
+    core = cv2.morphologyEx((picture.min(axis=2) > _GLARE_LEVEL).view(np.uint8), cv2.MORPH_OPEN, np.ones((5, 5), np.uint8))
+    return np.asarray(cv2.dilate(core, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_HALO_PX, _HALO_PX))) > 0)
+
+
+_GLARE_LEVEL, _HALO_PX = 240.0, 121
+"""Grey level of all channels in a reflection of a lamp, and the diameter of the halo around its rim."""
 
 
 def _masked_median(stack: NDArray[np.float32], usable: NDArray[np.bool_]) -> NDArray[np.float32]:

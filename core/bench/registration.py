@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.bench.bench import Bench
+from core.bench.bench import Bench, reachable
 from core.messages import message
 from core.types import Image, Mask, Reason, Refusal
 
@@ -65,6 +65,7 @@ class BenchView:
     empty : the picture without the robot, RGB uint8 (h, w, 3), at the place and in the light of this picture.
     known : bool (h, w); False where the empty picture is not known, also where the camera now sees what it did not see then.
     vessel : the lumen, bool (h, w); None: not drawn. The same object as long as the camera does not move.
+    reachable : where the robot may lie, bool (h, w); all of it where no vessel is drawn.
     noise : standard deviation of one picture's pixels, float32 (h, w), grey levels.
     shift_px, rotation_deg : how far the camera has moved since the bench was made.
     gain : brightness of this picture against the bench's.
@@ -75,6 +76,7 @@ class BenchView:
     empty: Image
     known: Mask
     vessel: Mask | None
+    reachable: Mask
     noise: NDArray[np.float32]
     shift_px: float
     rotation_deg: float
@@ -122,7 +124,7 @@ def register(image: Image, bench: Bench, previous: BenchView | None = None) -> B
             height=height,
         )
         return Refusal(Reason.OTHER_BENCH, detail)
-    found, likeness = _place(image, bench, previous)
+    found, likeness, slope = _place(image, bench, previous)
     shift, rotation, scaling = _motion(found, (width, height))
     is_far = max(shift / MAX_SHIFT_PX, abs(rotation) / MAX_ROTATION_DEG, abs(scaling) / MAX_SCALING) > _TOLERANCE
     here = np.eye(2, 3) if previous is None else previous.matrix
@@ -145,10 +147,11 @@ def register(image: Image, bench: Bench, previous: BenchView | None = None) -> B
         return Refusal(Reason.BENCH_MOVED, detail)
     if previous is not None and _apart(found, previous.matrix, (width, height)) < SAME_PLACE_PX:
         found, placed, known = previous.matrix, previous.placed, previous.known
-        vessel, noise = previous.vessel, previous.noise
+        vessel, area, noise = previous.vessel, previous.reachable, previous.noise
         shift, rotation, _ = _motion(found, (width, height))
     elif _apart(found, np.eye(2, 3), (width, height)) < SAME_PLACE_PX:
         found, placed, known, vessel, noise = np.eye(2, 3), bench.empty, bench.known, bench.vessel, bench.noise
+        area = _reachable(bench)
         shift = rotation = 0.0
     else:
         placed = np.asarray(_moved(bench.empty, found, cv2.INTER_LINEAR), np.uint8)
@@ -157,9 +160,12 @@ def register(image: Image, bench: Bench, previous: BenchView | None = None) -> B
         vessel = None
         if bench.vessel is not None:
             vessel = _moved(bench.vessel.astype(np.float32), found, cv2.INTER_LINEAR) >= 0.5
+        area = inside & (_moved(_reachable(bench).view(np.uint8), found, cv2.INTER_NEAREST) > 0)
         noise = np.asarray(_moved(bench.noise, found, cv2.INTER_LINEAR), np.float32)
-    empty, gain = relit(placed, image, known)
-    return BenchView(empty, known, vessel, noise, shift, rotation, gain, found, likeness, placed)
+    empty, gain, power = relit(placed, image, known)
+    if slope / power < _SOFT_SLOPE:
+        empty = blurred_alike(empty, image, known)
+    return BenchView(empty, known, vessel, area, noise, shift, rotation, gain, found, likeness, placed)
 
 
 def _moved(values: NDArray[Any], matrix: NDArray[np.float64], how: int, outside: int | None = None) -> NDArray[Any]:
@@ -187,6 +193,11 @@ _SMOOTH = 0.8
 """Deviation of the Gaussian, in pixels of each scale: less noise, and steps from farther away."""
 _MOST_STRUCTURE = 2.0
 """Times the 90th percentile of the bench's structure: what is stronger, a robot or glare, counts as this."""
+
+
+@functools.lru_cache(maxsize=4)
+def _reachable(bench: Bench) -> Mask:
+    return reachable(bench.vessel) if bench.vessel is not None else np.ones(bench.empty.shape[:2], np.bool_)
 
 
 @functools.lru_cache(maxsize=4)
@@ -228,22 +239,22 @@ def _level(empty: Image, known: NDArray[np.uint8], scale: int) -> _Level:
     return _Level(scale, places, values, derivatives, gradient, weight, max(float(np.dot(values * weight, values)), 1e-9), limit)
 
 
-def _place(image: Image, bench: Bench, previous: BenchView | None) -> tuple[NDArray[np.float64], float]:
-    """The transform (2, 3) from the bench to the picture, and the likeness there."""
+def _place(image: Image, bench: Bench, previous: BenchView | None) -> tuple[NDArray[np.float64], float, float]:
+    """The transform (2, 3) from the bench to the picture, the likeness there, and how strong the picture's structure is."""
     levels = _levels(bench)
     if previous is not None:
         start = _from_middle(previous.matrix, bench.size)
-        found, likeness = _refined(image, levels[-2:], start)
+        found, likeness, slope = _refined(image, levels[-2:], start)
         if likeness >= LEAST_LIKENESS_HERE and _apart(_to_corner(found, bench.size), previous.matrix, bench.size) < _HERE_PX:
-            return _to_corner(found, bench.size), likeness
-    best, best_likeness = np.eye(3), -1.0
+            return _to_corner(found, bench.size), likeness, slope
+    best, best_likeness, best_slope = np.eye(3), -1.0, 1.0
     for start, scales in ((np.eye(3), levels[1:]), (_searched(image, levels[1]), levels[1:]), (np.eye(3), levels)):
-        found, likeness = _refined(image, scales, start)
+        found, likeness, slope = _refined(image, scales, start)
         if likeness > best_likeness:
-            best, best_likeness = found, likeness
+            best, best_likeness, best_slope = found, likeness, slope
         if likeness > _SURE_LIKENESS:
             break
-    return _to_corner(best, bench.size), best_likeness
+    return _to_corner(best, bench.size), best_likeness, best_slope
 
 
 def _searched(image: Image, level: _Level) -> NDArray[np.float64]:
@@ -266,9 +277,9 @@ def _searched(image: Image, level: _Level) -> NDArray[np.float64]:
     return start
 
 
-def _refined(image: Image, levels: tuple[_Level, ...], start: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """The transform (3, 3) about the picture's middle in working pixels, and the correlation of the structure there."""
-    transform, likeness = start.copy(), -1.0
+def _refined(image: Image, levels: tuple[_Level, ...], start: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:
+    """The transform (3, 3) about the picture's middle in working pixels, the correlation of the structure there, and its slope."""
+    transform, likeness, slope = start.copy(), -1.0, 1.0
     for level in levels:
         structure = _structure(image, level.scale, level.limit)
         here = transform.copy()
@@ -276,12 +287,8 @@ def _refined(image: Image, levels: tuple[_Level, ...], start: NDArray[np.float64
         reach = math.sqrt(float(np.mean(level.places**2)))
         for _ in range(_STEPS[_LEVELS.index(level.scale)]):
             seen = _sample(structure, level.places, here)
-            slope = float(np.dot(seen * level.weight, level.structure) / level.strength)
-            slope = min(max(slope, 0.3), 1.5)  # a blurred picture has less structure
+            slope, weight = _slope(seen, level, slope)
             apart = seen - slope * level.structure
-            # Strong edges and weak ones count alike: in units of noise and of pixels that an edge is displaced.
-            scale = float(np.median(np.abs(apart))) + 1e-4 + _EDGE_PX * level.gradient
-            weight = (scale / (scale**2 + (0.5 * apart) ** 2)) ** 2  # Geman and McClure's
             weighted = level.derivatives * (weight * slope)[:, None]
             # The derivatives by scaling and rotation are large where the picture is: a little damping in units of pixels.
             normal = weighted.T @ (level.derivatives * slope)
@@ -302,7 +309,52 @@ def _refined(image: Image, levels: tuple[_Level, ...], start: NDArray[np.float64
         seen = _sample(structure, level.places, here)
         likeness = float(np.dot(seen * level.weight, level.structure))
         likeness /= max(math.sqrt(float(np.dot(seen * level.weight, seen)) * level.strength), 1e-9)
-    return transform, likeness
+        slope, _ = _slope(seen, level, slope)
+    return transform, likeness, slope
+
+
+def _slope(seen: NDArray[np.float64], level: _Level, slope: float) -> tuple[float, NDArray[np.float64]]:
+    """How strong the structure that is `seen` (N,) is against the bench's, and the weights (N,), small where it is another."""
+    apart = seen - slope * level.structure
+    # Strong edges and weak ones count alike: in units of noise and of pixels that an edge is displaced.
+    scale = float(np.median(np.abs(apart))) + 1e-4 + _EDGE_PX * level.gradient
+    weight = (scale / (scale**2 + (0.5 * apart) ** 2)) ** 2  # Geman and McClure's
+    weighted = weight * level.structure
+    found = float(np.dot(weighted, seen)) / max(float(np.dot(weighted, level.structure)), 1e-9)
+    return min(max(found, 0.3), 1.5), weight
+
+
+_BLURS_PX = (1.0, 1.5, 2.0, 2.8, 4.0)
+_SOFT_SLOPE = 0.92
+"""Structure that is stronger than this share of the bench's is not blurred."""
+_FOCUS_POINTS = 2000
+_FOCUS_RIM_PX = 3
+"""Width of the picture's rim that is not asked: blur needs what lies beyond the border."""
+
+
+def blurred_alike(empty: Image, image: Image, known: Mask) -> Image:
+    """The empty picture (h, w, 3), blurred as far as makes its sharpest edges most like the picture's."""
+    # smoothed, because noise of the empty picture would make a blurred one more like the other
+    now, before = (cv2.GaussianBlur(cv2.cvtColor(one, cv2.COLOR_RGB2GRAY), (0, 0), 1.2) for one in (image, empty))
+    strength = np.abs(cv2.Laplacian(before, cv2.CV_16S)) * known
+    strength[:_FOCUS_RIM_PX], strength[-_FOCUS_RIM_PX:], strength[:, :_FOCUS_RIM_PX], strength[:, -_FOCUS_RIM_PX:] = 0, 0, 0, 0
+    least = np.partition(strength[::2, ::2].ravel(), -_FOCUS_POINTS // 4)[-_FOCUS_POINTS // 4]
+    places = np.flatnonzero(strength >= max(int(least), 1))
+    values = now.ravel()[places].astype(np.float32)
+    best, chosen = _apart_by(before, places, values), 0.0
+    for blur in _BLURS_PX:
+        found = _apart_by(cv2.GaussianBlur(before, (0, 0), blur), places, values)
+        if found > best:
+            break
+        best, chosen = found, blur
+    return empty if chosen == 0.0 else np.asarray(cv2.GaussianBlur(empty, (0, 0), chosen), np.uint8)
+
+
+def _apart_by(picture: NDArray[Any], places: NDArray[np.intp], values: NDArray[np.float32]) -> float:
+    """Mean of the smaller half of the differences: a robot does not count."""
+    apart = np.abs(picture.ravel()[places] - values)
+    half = max(1, len(apart) // 2)
+    return float(np.partition(apart, half - 1)[:half].mean()) if len(apart) else 0.0
 
 
 def _sample(structure: NDArray[np.float32], places: NDArray[np.float64], transform: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -347,8 +399,8 @@ def _apart(one: NDArray[np.float64], other: NDArray[np.float64], size: tuple[int
     return float(np.hypot(*(middles @ (one - other).T).T).max())
 
 
-def relit(placed: Image, image: Image, known: Mask) -> tuple[Image, float]:
-    """The empty picture (h, w, 3) in the light of `image`, and the factor of its brightness.
+def relit(placed: Image, image: Image, known: Mask) -> tuple[Image, float, float]:
+    """The empty picture (h, w, 3) in the light of `image`, the factor of its brightness, and its power.
 
     A power and a factor for each channel, as exposure, gamma and colour balance make them, from the middle of all cells; then a
     smooth factor for shadows: the median of the cells around, in which a robot does not count.
@@ -358,14 +410,16 @@ def relit(placed: Image, image: Image, known: Mask) -> tuple[Image, float]:
     now = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.float32) + 4.0
     usable = cv2.resize(known.view(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
     if not usable.any():
-        return placed, 1.0
+        return placed, 1.0, 1.0
     one, other = np.log(before), np.log(now)
     factors = np.empty_like(one)
     curves = np.empty((256, 3), np.float64)
     levels = np.log(np.arange(256) + 4.0)
+    powers = []
     for channel in range(3):
         offset, power = _curve(one[usable, channel], other[usable, channel])
         curves[:, channel] = offset + power * levels
+        powers.append(power)
         rest = other[..., channel] - (offset + power * one[..., channel])
         steps = np.clip(np.rint(rest * _LOG_STEPS) + 128, 0, 255).astype(np.uint8)
         median = cv2.medianBlur(cv2.copyMakeBorder(steps, 8, 8, 8, 8, cv2.BORDER_REFLECT), _LIGHT_CELLS)[8:-8, 8:-8]
@@ -375,7 +429,7 @@ def relit(placed: Image, image: Image, known: Mask) -> tuple[Image, float]:
     table = np.exp(curves).astype(np.float32) - 4.0
     lit = cv2.LUT(placed, np.ascontiguousarray(table[None])) + 4.0
     lit *= cv2.resize(np.exp(smooth), placed.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-    return np.clip(lit - 3.5, 0, 255).astype(np.uint8), gain
+    return np.clip(lit - 3.5, 0, 255).astype(np.uint8), gain, float(np.mean(powers))
 
 
 _LOG_STEPS = 150.0

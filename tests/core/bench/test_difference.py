@@ -1,0 +1,73 @@
+"""The robot as the difference to the empty bench: light, shadows, and foreign objects are not taken for it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from core.bench.bench import Bench, bench_from_pictures
+from core.bench.difference import Difference, robot_by_difference
+from core.bench.registration import BenchView, register
+from core.types import Image, Mask
+from tests.core.bench.drawn_bench import SIZE, board, noisy, tube, with_line
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return bench_from_pictures([noisy(board(), 2.0, 1), noisy(board(), 2.0, 2)], tube(), "b", 320)
+
+
+def found(image: Image, bench: Bench) -> Difference:
+    view = register(image, bench)
+    assert isinstance(view, BenchView), view
+    return robot_by_difference(image, view)
+
+
+def line(start: tuple[int, int], end: tuple[int, int], width: int = 7) -> Mask:
+    return cv2.line(np.zeros((SIZE[1], SIZE[0]), np.uint8), start, end, 1, width) > 0
+
+
+def dice(one: Mask, other: Mask) -> float:
+    return 2.0 * float(np.sum(one & other)) / max(1.0, float(one.sum() + other.sum()))
+
+
+ROBOT = ((0, 122), (200, 130))
+
+
+@pytest.mark.parametrize("color", [(20, 20, 20), (250, 250, 250), (200, 40, 40), (40, 60, 200)])
+def test_a_robot_of_any_color_is_found(bench: Bench, color: tuple[int, int, int]) -> None:
+    image = noisy(with_line(board(), *ROBOT, color), 2.0, 3)
+    assert dice(found(image, bench).probability >= 0.5, line(*ROBOT)) > 0.9
+
+
+def test_an_empty_bench_has_no_robot(bench: Bench) -> None:
+    for gain, sigma in ((1.0, 2.0), (0.8, 2.0), (1.15, 6.0)):
+        assert not (found(noisy(board(), sigma, 4, gain), bench).probability >= 0.5).any()
+
+
+def test_a_shadow_across_the_vessel_is_no_robot(bench: Bench) -> None:
+    shade = np.ones((SIZE[1], SIZE[0], 3), np.float32)
+    shade[:, 150:] = 0.7
+    shade = cv2.GaussianBlur(shade, (0, 0), 3.0)
+    image = noisy(np.rint(with_line(board(), *ROBOT) * shade).astype(np.uint8), 2.0, 3)
+    assert dice(found(image, bench).probability >= 0.5, line(*ROBOT)) > 0.85
+
+
+def test_a_cable_beside_the_vessel_is_no_robot_and_no_background(bench: Bench) -> None:
+    image = noisy(with_line(with_line(board(), *ROBOT), (20, 220), (300, 200)), 2.0, 3)
+    difference = found(image, bench)
+    assert dice(difference.probability >= 0.5, line(*ROBOT)) > 0.9
+    assert difference.doubtful[line((40, 218), (280, 202), 3)].mean() > 0.9
+
+
+def test_a_bubble_is_no_robot(bench: Bench) -> None:
+    image = cv2.circle(with_line(board(), *ROBOT), (270, 128), 6, (255, 255, 255), cv2.FILLED)
+    assert not (found(noisy(np.asarray(image, np.uint8), 2.0, 3), bench).probability[118:138, 255:285] >= 0.5).any()
+
+
+def test_the_way_from_the_vessels_end_to_the_border_may_hold_the_robot() -> None:
+    vessel = tube() & (np.arange(SIZE[0]) > 60)[None]
+    bench = bench_from_pictures([noisy(board(), 2.0, 1)], vessel, "b", 320)
+    image = noisy(with_line(board(), *ROBOT), 2.0, 3)
+    assert dice(found(image, bench).probability >= 0.5, line(*ROBOT)) > 0.9
