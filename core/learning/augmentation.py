@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -21,12 +22,14 @@ from core.perception.tip_refinement import WINDOW_PX, find_tips, refine_tips
 from core.types import Image, Mask, Point
 
 
-def random_crop(image: Image, vessel: Mask, robot: Mask, size: tuple[int, int], rng: Generator) -> tuple[Image, Mask, Mask]:
+def random_crop(image: Image, masks: Sequence[Mask], size: tuple[int, int], rng: Generator) -> tuple[Image, list[Mask]]:
     """A turned, scaled, perhaps mirrored cut-out of `size` (height, width), in one warp so that nothing is blurred twice.
 
-    Two of three are centred on the robot, which is one or two percent of the pixels.
+    `masks` are vessel, robot, and others of the same image. Two of three cut-outs are centred on the robot, which is one or two
+    percent of the pixels.
     """
     height, width = size
+    robot = masks[1]
     rows, columns = np.nonzero(robot) if rng.random() < 0.65 else ((), ())
     if len(rows):
         pick = int(rng.integers(len(rows)))
@@ -44,10 +47,8 @@ def random_crop(image: Image, vessel: Mask, robot: Mask, size: tuple[int, int], 
     # Beyond the picture lies one colour without labels; mirrored, robots would meet their own reflection.
     fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1]))])
     cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
-    masks = [
-        cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in (vessel, robot)
-    ]
-    return np.asarray(cut, np.uint8), np.asarray(masks[0]), np.asarray(masks[1])
+    moved_masks = [cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in masks]
+    return np.asarray(cut, np.uint8), [np.asarray(mask) for mask in moved_masks]
 
 
 def with_strips(image: Image, vessel: Mask, robot: Mask, rng: Generator) -> Image:
@@ -184,8 +185,8 @@ BORDER_PX = 8.0
 """Distance from a crop's border within which thinning may have drawn back an end, at least."""
 
 Crop = tuple[Tensor, Tensor]
-"""uint8 (planes, h, w) and its labels uint8 (2 or 3, h, w): vessel, robot (0, 1), and where the plan weighs the robot's ends, how
-near they are (0..255)."""
+"""uint8 (planes, h, w) and its labels uint8 (2 to 4, h, w): vessel, robot (0, 1); where the plan weighs the robot's ends, how near
+they are (0..255); where labels of some frames are unsure, the pixels that are not trained on (0, 1)."""
 
 
 class CropDataset(Dataset[Crop]):
@@ -197,11 +198,21 @@ class CropDataset(Dataset[Crop]):
     def __init__(self, samples: list[Sample], plan: TrainingPlan) -> None:
         self._plan, self._samples, self._kept = plan, samples, KeptFrames(len(samples))
         self._permutation: tuple[int, NDArray[np.int64]] = (-1, np.zeros(0, np.int64))
+        self._has_doubt = any(sample.doubtful is not None for sample in samples)
         if plan.end_weight > 0:
             compiled.load()  # the robot's ends are found with the compiled loops: forked workers inherit them
 
     def __len__(self) -> int:
         return self._plan.steps * self._plan.batch
+
+    def tensors(self, image: NDArray[np.uint8], vessel: Mask, robot: Mask, doubtful: Mask) -> Crop:
+        """A crop (h, w, planes) and its masks (h, w) as tensors; all crops of a data set have the same planes of labels."""
+        labels = [vessel.astype(np.uint8), robot.astype(np.uint8)]
+        if self._plan.end_weight > 0:
+            labels.append(end_nearness(robot))
+        if self._has_doubt:
+            labels += [np.zeros_like(labels[0])] * (3 - len(labels)) + [doubtful.astype(np.uint8)]
+        return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(np.stack(labels))
 
     def place_of(self, index: int) -> int:
         """The number of the sample that crop `index` shows, in a permutation that is drawn for every epoch."""
@@ -226,17 +237,19 @@ class FrameCrops(CropDataset):
         rng = np.random.default_rng((self._plan.seed, index))
         size = self._plan.crop
         if rng.random() < self._plan.clutter_share:
-            image, vessel, robot = random_clutter(size, rng), np.zeros(size, bool), np.zeros(size, bool)
+            image, (vessel, robot, doubtful) = random_clutter(size, rng), np.zeros((3, *size), bool)
         else:
             place = self.place_of(index)
             if self._chances is not None and rng.random() < self._plan.focus_share:
                 place = int(np.searchsorted(self._chances, rng.random(), side="right"))
-            image, vessel, robot = random_crop(*self._kept.frame(self._samples[place]), size, rng)
+            whole, *masks = self._kept.frame(self._samples[place])
+            masks.append(self._kept.doubtful(self._samples[place], whole.shape))
+            image, (vessel, robot, doubtful) = random_crop(whole, masks, size, rng)
             if self._plan.strip_share > 0 and rng.random() < self._plan.strip_share:
                 image = with_strips(image, vessel, robot, rng)
         if rng.random() < self._plan.look_share:
             image = random_look(image, rng)
-        return _tensors(image, vessel, robot, self._plan)
+        return self.tensors(image, vessel, robot, doubtful)
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,7 +319,8 @@ class TipCrops(CropDataset):
         center = _beside(views.wrong, WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
         x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
-        cut = np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part]])
+        doubtful = self._kept.doubtful(sample, image.shape)
+        cut = np.dstack([image[part], seen_vessel[part], seen_robot[part], vessel[part], robot[part], doubtful[part]])
         down, right = WINDOW_PX - height, WINDOW_PX - width
         if down or right:
             cut = np.pad(cut, ((0, down), (0, right), (0, 0)), mode="edge")
@@ -316,7 +330,7 @@ class TipCrops(CropDataset):
         cut = np.ascontiguousarray(cut)
         if rng.random() < self._plan.look_share:
             cut[:, :, :3] = random_look(cut[:, :, :3], rng)
-        return _tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0, self._plan)
+        return self.tensors(cut[:, :, :5], cut[:, :, 5] > 0, cut[:, :, 6] > 0, cut[:, :, 7] > 0)
 
 
 def _place(seen_robot: NDArray[np.uint8], robot: Mask, places: tuple[Point, ...], rng: Generator) -> Point:
@@ -349,13 +363,6 @@ def _some_of(mask: Mask) -> list[Point]:
     rows, columns = np.nonzero(mask)
     step = max(1, len(rows) // _WRONG_PLACES)
     return list(zip(columns[::step].astype(float).tolist(), rows[::step].astype(float).tolist(), strict=True))
-
-
-def _tensors(image: NDArray[np.uint8], vessel: Mask, robot: Mask, plan: TrainingPlan) -> Crop:
-    labels = [vessel.astype(np.uint8), robot.astype(np.uint8)]
-    if plan.end_weight > 0:
-        labels.append(end_nearness(robot))
-    return torch.from_numpy(np.ascontiguousarray(image.transpose(2, 0, 1))), torch.from_numpy(np.stack(labels))
 
 
 def end_nearness(robot: Mask) -> NDArray[np.uint8]:

@@ -1,6 +1,7 @@
 """Labelled frames on disk: ``images/<stem>.png``, ``masks/<stem>_vessel.png``, ``masks/<stem>_robot.png``, ``truth.jsonl``.
 
-``synth`` writes this layout and ``train --data`` reads it; truth is optional for training.
+``synth`` writes this layout and ``train --data`` reads it; truth is optional for training, and so is ``masks/<stem>_doubtful.png``:
+where the robot's label is unsure and is not trained on.
 """
 
 from __future__ import annotations
@@ -35,12 +36,13 @@ class DatasetError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Paths of one labelled frame."""
+    """Paths of one labelled frame. ``doubtful``: a mask of where the robot's label is unsure, which is not trained on; None: sure."""
 
     stem: str
     image: Path
     vessel: Path
     robot: Path
+    doubtful: Path | None = None
 
     def load(self, longer_side_px: int | None = None) -> tuple[Image, Mask, Mask]:
         """Image (H, W, 3) and both masks (H, W), scaled to `longer_side_px` if given; raises DatasetError."""
@@ -58,6 +60,18 @@ class Sample:
         size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
         vessel, robot = (_resized(mask.astype(np.uint8) * 255, size) > 127 for mask in masks)
         return _resized(image, size), vessel, robot
+
+    def load_doubtful(self, shape: tuple[int, ...]) -> Mask:
+        """Where the robot's label is unsure, (H, W) scaled to `shape`; raises DatasetError."""
+        if self.doubtful is None:
+            return np.zeros(shape[:2], bool)
+        try:
+            mask = _mask_of(self.doubtful)
+        except ImageError as error:
+            raise DatasetError(str(error)) from None
+        if mask.shape == shape[:2]:
+            return mask
+        return np.asarray(_resized(mask.astype(np.uint8) * 255, (shape[1], shape[0])) > 127)
 
 
 def _mask_of(path: Path) -> Mask:
@@ -83,7 +97,7 @@ def find_samples(folders: Sequence[Path]) -> list[Sample]:
     for folder in folders:
         images = sorted(p for p in (folder / "images").glob("*") if p.suffix.lower() in IMAGE_ENDINGS)
         masks = folder / "masks"
-        found = [Sample(p.stem, p, masks / f"{p.stem}_vessel.png", masks / f"{p.stem}_robot.png") for p in images]
+        found = [sample_at(p, masks) for p in images]
         complete = [s for s in found if s.vessel.is_file() and s.robot.is_file()]
         for first, second in pairwise(sorted(complete, key=lambda sample: sample.stem)):
             if first.stem == second.stem:
@@ -95,6 +109,12 @@ def find_samples(folders: Sequence[Path]) -> list[Sample]:
             )
         samples += complete
     return samples
+
+
+def sample_at(image: Path, masks: Path) -> Sample:
+    """The paths of an image and of its masks in the folder `masks`, whether they are there or not, but for the doubtful one."""
+    vessel, robot, doubtful = (masks / f"{image.stem}_{name}.png" for name in ("vessel", "robot", "doubtful"))
+    return Sample(image.stem, image, vessel, robot, doubtful if doubtful.is_file() else None)
 
 
 def without_masks(folders: Sequence[Path]) -> list[Path]:
@@ -248,6 +268,7 @@ class KeptFrames:
     def __init__(self, count: int) -> None:
         self._frames: dict[Hashable, tuple[Image, NDArray[np.uint8]]] = {}
         self._arrays: dict[Hashable, tuple[NDArray[Any], ...]] = {}
+        self._doubtful: dict[Path, Mask] = {}
         self._room = _free_memory() * _KEPT_SHARE
         self._room_besides = self._room - count * _FRAME_BYTES
 
@@ -265,6 +286,14 @@ class KeptFrames:
         height, width = image.shape[:2]
         masks = np.unpackbits(packed, axis=1, count=height * width).view(bool).reshape(2, height, width)
         return image, masks[0], masks[1]
+
+    def doubtful(self, sample: Sample, shape: tuple[int, ...]) -> Mask:
+        """Where the robot's label is unsure, (h, w); such frames are few and stay in memory. Raises DatasetError."""
+        if sample.doubtful is None:
+            return np.zeros(shape[:2], bool)
+        if sample.doubtful not in self._doubtful:
+            self._doubtful[sample.doubtful] = sample.load_doubtful(shape)
+        return self._doubtful[sample.doubtful]
 
     def get(self, key: Hashable, make: Callable[[], tuple[NDArray[Any], ...]]) -> tuple[NDArray[Any], ...]:
         """What was kept under `key`, or what `make` gives."""

@@ -100,22 +100,27 @@ class TrainingProgress:
 def loss_of(logits: Tensor, target: Tensor, robot_weight: float, end_weight: float = 0.0) -> tuple[Tensor, Tensor]:
     """Cross entropy + Dice of both tasks, and the plain soft Dice (2,) of both over the batch.
 
-    ``target`` (N, 2 or 3, H, W) are vessel, robot, and how near a pixel is to an end of the robot (0..1): in the loss it counts
-    ``1 + end_weight`` times there.
+    ``target`` (N, 2 to 4, H, W) are vessel, robot, how near a pixel is to an end of the robot (0..1): in the loss it counts
+    ``1 + end_weight`` times there; and where the robot's label is unsure (0, 1): there it does not count for the robot.
 
     Half of the Dice is taken over the batch, half over every crop by itself: over the batch alone, a crop whose robot is short or
     faint weighs next to nothing, and those are the crops in which a tip gets lost.
     """
     weights = logits.new_tensor([1.0, robot_weight])
     counts = 1 + end_weight * target[:, 2:3] if target.shape[1] > 2 else None
+    sure = torch.cat([torch.ones_like(target[:, 3:4]), 1 - target[:, 3:4]], dim=1) if target.shape[1] > 3 else None
+    if counts is not None and sure is not None:
+        counts = counts * sure
     target = target[:, :2]
     entropies = torch.nn.functional.binary_cross_entropy_with_logits(logits, target, weight=counts, reduction="none")
     entropy = entropies.mean(dim=(0, 2, 3))
     probability = torch.sigmoid(logits)
     both, either = probability * target, probability + target
+    if sure is not None:
+        both, either = both * sure, either * sure
     plain = (2 * both.sum(dim=(0, 2, 3)) + 1) / (either.sum(dim=(0, 2, 3)) + 1)
     if counts is not None:
-        both, either = both * counts, either * counts
+        both, either = probability * target * counts, (probability + target) * counts
     overlap, size = both.sum(dim=(2, 3)), either.sum(dim=(2, 3))
     dice = (2 * overlap.sum(dim=0) + 1) / (size.sum(dim=0) + 1)
     each = ((2 * overlap + _SMALL_AREA_PX) / (size + _SMALL_AREA_PX)).mean(dim=0)

@@ -22,7 +22,7 @@ def test_crops_keep_image_and_labels_together(tmp_path: Path) -> None:
     image, vessel, robot = find_samples([toy_set(tmp_path / "set", 1)])[0].load()
     rng = np.random.default_rng(3)
     for _ in range(20):
-        cut, cut_vessel, cut_robot = random_crop(image, vessel, robot, (64, 80), rng)
+        cut, (cut_vessel, cut_robot) = random_crop(image, (vessel, robot), (64, 80), rng)
         assert cut.shape == (64, 80, 3)
         inner = cut_robot & (
             np.roll(cut_robot, 1, 0) & np.roll(cut_robot, -1, 0) & np.roll(cut_robot, 1, 1) & np.roll(cut_robot, -1, 1)
