@@ -255,9 +255,12 @@ class Trainer:
         monitor = self.held_out if task.measures_held_out else None
         self.steps_total = max(self.steps_total, self.steps_before + plan.steps)
         self.log(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {self.notes | {'plan': plan.to_json()}}\n")
+        began_s = time.monotonic()
         crops = task.crops(plan, self.bar, self.interrupt)
         if crops is None:
             return None
+        if plan.seconds is not None:
+            plan = replace(plan, seconds=max(1.0, plan.seconds - (time.monotonic() - began_s)))
         self.log(f"{time.strftime('%H:%M:%S')} trains on the {'GPU' if torch.cuda.is_available() else 'processor'}\n")
         if monitor is not None:
             monitor.measure(task.network, 0)
@@ -269,9 +272,9 @@ class Trainer:
             dice = f"dice vessel {now.vessel_dice:.3f} robot {now.robot_dice:.3f}"
             self.log(f"{time.strftime('%H:%M:%S')} step {now.step} loss {now.loss:.4f} {dice} {now.images_per_s:.1f} images/s\n")
             if self.writer is None:
-                self.bar.update(bar_task, completed=now.step, description=f"loss {now.loss:.3f} {dice}")
+                self.bar.update(bar_task, completed=now.step, total=now.steps, description=f"loss {now.loss:.3f} {dice}")
                 return
-            left_s = round((plan.steps - now.step) * plan.batch / max(now.images_per_s, 1e-9), 1)
+            left_s = round((now.steps - now.step) * plan.batch / max(now.images_per_s, 1e-9), 1)
             steps = {"step": self.steps_before + now.step, "steps": self.steps_total}
             self.writer.write(asdict(now) | steps | {"left_s": left_s})
 

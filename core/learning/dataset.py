@@ -36,7 +36,7 @@ class DatasetError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Paths of one labelled frame. ``doubtful``: a mask of where the robot's label is unsure, which is not trained on; None: sure."""
+    """Paths of one labelled frame. ``doubtful``: a mask of where the robot's label is unsure, and not trained on; None: nowhere."""
 
     stem: str
     image: Path

@@ -87,7 +87,10 @@ def make_optimizers(network: nn.Module, learning_rate: float, weight_decay: floa
 
 @dataclass(frozen=True, slots=True)
 class TrainingProgress:
-    """State of a running training: ``loss`` smoothed, ``images_per_s`` since the last report."""
+    """State of a running training: ``loss`` smoothed, ``images_per_s`` since the last report.
+
+    ``steps`` is an estimate where the plan gives the time.
+    """
 
     step: int
     steps: int
@@ -197,10 +200,11 @@ def train(
     groups = [(group, group["lr"] / plan.learning_rate) for optimizer in optimizers for group in optimizer.param_groups]
     averaged = list(zip(average.state_dict().values(), network.state_dict().values(), strict=True))
     smooth_loss, smooth_dice = torch.zeros((), device=device), torch.zeros(2, device=device)
-    done, mark, marked = 0, time.monotonic(), 0
+    done, began, marked = 0, time.monotonic(), 0
+    mark = began
     failed: list[DatasetError] = []
     for image, target in _batches(crops, plan, device, failed):
-        rate = plan.learning_rate_at(done)
+        rate = plan.learning_rate_at(done, time.monotonic() - began)
         for group, share in groups:
             group["lr"] = share * rate
         batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
@@ -222,16 +226,17 @@ def train(
         smooth_loss.lerp_(loss.detach(), blend)
         smooth_dice.lerp_(dice, blend)
         done += 1
-        if done % report_every == 0 or done == plan.steps:
-            now = time.monotonic()
+        now = time.monotonic()
+        share = plan.share_at(done, now - began)
+        if done % report_every == 0 or share == 1.0:
             speed = (done - marked) * plan.batch / max(now - mark, 1e-9)
             vessel, robot = smooth_dice.tolist()
-            on_progress(TrainingProgress(done, plan.steps, float(smooth_loss), vessel, robot, speed))
+            on_progress(TrainingProgress(done, round(done / share), float(smooth_loss), vessel, robot, speed))
             mark, marked = now, done
-        if done % checkpoint_every == 0 and done < plan.steps:
+        if done % checkpoint_every == 0 and share < 1.0:
             # A network on a GPU is copied: the original learns on there.
             on_checkpoint(average if device.type == "cpu" else copy.deepcopy(average).to("cpu"), done)
-        if should_stop() or done in (plan.steps, plan.stop_after):
+        if should_stop() or share == 1.0 or done == plan.stop_after:
             on_last(average.to("cpu"), done)
             break
     if failed:

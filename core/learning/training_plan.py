@@ -21,6 +21,7 @@ class TrainingPlan:
     end_weight : around the robot's true ends a pixel counts ``1 + end_weight`` times: theta and state are measured there.
     keeps_statistics : the normalisation stays as it was learnt: statistics of a few frames alike would ruin it for all others.
     stop_after : step at which to end, before the learning rate has come down, for a run that another one continues.
+    seconds : time that the training takes, whatever the machine: the learning rate falls with the time, and `steps` is the most.
     workers : processes that make the crops; 0: this one. For a GPU it is as many as there are cores, up to eight.
     """
 
@@ -39,15 +40,22 @@ class TrainingPlan:
     end_weight: float = 0.0
     keeps_statistics: bool = False
     stop_after: int | None = None
+    seconds: float | None = None
     seed: int = 0
     workers: int = 1
     threads: int = 0
 
-    def learning_rate_at(self, step: int) -> float:
+    def share_at(self, step: int, elapsed_s: float) -> float:
+        """The share of the training that is done, 0..1, after `step` steps and `elapsed_s`."""
+        share = step / self.steps
+        return min(1.0, share if self.seconds is None else max(share, elapsed_s / self.seconds))
+
+    def learning_rate_at(self, step: int, elapsed_s: float = 0.0) -> float:
         """Rises over the warm-up steps, then falls linearly to a hundredth."""
         if step < self.warmup_steps:
             return self.learning_rate * (step + 1) / self.warmup_steps
-        share = (step - self.warmup_steps) / max(1, self.steps - self.warmup_steps)
+        reached = step if self.seconds is None else max(step, self.steps * elapsed_s / self.seconds)
+        share = (reached - self.warmup_steps) / max(1, self.steps - self.warmup_steps)
         return self.learning_rate * max(0.01, 1.0 - share)
 
     def to_json(self) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from core.learning import training
@@ -13,6 +14,7 @@ from core.learning.augmentation import FrameCrops
 from core.learning.dataset import (
     DatasetError,
     find_samples,
+    write_mask,
 )
 from core.learning.training import LoaderLost, TrainingProgress, computes_in_bf16, loss_of, make_optimizers, orthogonalised, train
 from core.learning.training_plan import TrainingPlan
@@ -198,3 +200,57 @@ def test_the_kernels_go_to_muon_and_the_rest_to_adamw() -> None:
     sizes = [sum(p.numel() for group in o.param_groups for p in group["params"]) for o in (muon, adamw)]
     assert sum(sizes) == sum(p.numel() for p in network.parameters())
     assert all(p.ndim == 4 and p.shape[2:] == (3, 3) for group in muon.param_groups for p in group["params"])
+
+
+@pytest.mark.parametrize("end_weight", [0.0, 4.0])
+def test_pixels_whose_label_is_unsure_do_not_count_for_the_robot(end_weight: float) -> None:
+    import torch
+
+    target = torch.zeros(1, 4, 64, 64)
+    target[0, 0, 20:44, :] = 1
+    target[0, 1, 28:36, 8:40] = 1
+    target[0, 2, 20:44, 28:52] = 1
+    target[0, 3, 24:40, 30:50] = 1
+    right = torch.where(target[:, :2] > 0, 6.0, -6.0)
+    unsure, sure, vessel = right.clone(), right.clone(), right.clone()
+    unsure[0, 1, 28:36, 32:48] *= -1
+    sure[0, 1, 28:36, 8:12] *= -1
+    vessel[0, 0, 28:36, 32:48] *= -1
+    losses = [loss_of(wrong, target, 1.5, end_weight) for wrong in (right, unsure, sure, vessel)]
+    assert losses[1][0].item() == pytest.approx(losses[0][0].item(), rel=1e-4)
+    assert losses[1][1].tolist() == pytest.approx(losses[0][1].tolist(), abs=1e-3)
+    assert losses[2][0] > losses[0][0] + 0.05
+    assert losses[3][0] > losses[0][0] + 0.05, "the vessel's label is sure there"
+
+
+def test_doubtful_masks_are_found_and_go_into_the_labels(tmp_path: Path) -> None:
+    folder = toy_set(tmp_path / "set", 4)
+    doubtful = np.zeros((96, 128), bool)
+    doubtful[:, 64:] = True
+    write_mask(folder / "masks" / "001_doubtful.png", doubtful)
+    samples = find_samples([folder])
+    assert [sample.doubtful is not None for sample in samples] == [False, True, False, False]
+    assert (samples[1].load_doubtful((96, 128)) == doubtful).all()
+    assert samples[1].load_doubtful((48, 64)).sum() == 48 * 32
+    plan = TrainingPlan(steps=4, batch=1, crop=(64, 64), workers=0, clutter_share=0.0)
+    crops = FrameCrops(samples, plan)
+    labels = {crops.place_of(index): crops[index][1] for index in range(4)}
+    assert all(label.shape == (4, 64, 64) for label in labels.values()), "all crops of a batch have the same planes"
+    assert {place for place, label in labels.items() if label[3].any()} <= {1}
+    assert FrameCrops(samples[2:], plan)[0][1].shape == (2, 64, 64)
+
+
+def test_a_training_with_a_time_ends_in_time_with_its_rate_come_down(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = itertools.count()
+    monkeypatch.setattr(training.time, "monotonic", lambda: float(next(clock)))
+    network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
+    plan = TrainingPlan(steps=1000, batch=1, crop=(64, 64), workers=0, warmup_steps=2, threads=1, seconds=30.0)
+    reports: list[TrainingProgress] = []
+    crops = FrameCrops(find_samples([toy_set(tmp_path / "set", 4)]), plan)
+    _, done = train(network, crops, plan, on_progress=reports.append, report_every=4)
+    assert 8 <= done <= 20
+    assert reports[-1].step == reports[-1].steps == done
+    assert 0.5 * done < reports[0].steps < 3 * done
+    assert plan.learning_rate_at(10, 15.0) == pytest.approx(0.5 * plan.learning_rate, rel=0.02)
+    assert plan.learning_rate_at(10, 30.0) == pytest.approx(0.01 * plan.learning_rate)
+    assert plan.share_at(500, 3.0) == 0.5
