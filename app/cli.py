@@ -29,6 +29,10 @@ COMMANDS = {
     "perceive": ("app.commands.perceive", "Vessel, robot, angle, distances and pose state of pictures or a video."),
     "synth": ("app.commands.synth", "Randomised labelled frames from the bench twin: images, masks, truth."),
     "train": ("app.commands.train", "Train or fine-tune the network; Ctrl-C keeps what was learnt."),
+    "teach": (
+        "app.commands.teach",
+        "Teach a bench in minutes: from a picture of the empty bench, one outline of the vessel, and the moving robot.",
+    ),
     "calibrate": (
         "app.commands.calibrate",
         "Teach a model what its confidence means: the share of right answers among those that it is so sure of.",

@@ -121,6 +121,16 @@ class Interrupt:
         self.asked = True
 
 
+def end_like_an_interrupt() -> None:
+    """Take a termination request, which a window sends, as Ctrl-C before ``Interrupt`` handles both."""
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, end)
+
+
 class LineOutput:
     """JSON lines, each written at once: what is done survives an interruption. A context; None is standard output."""
 

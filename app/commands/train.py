@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.commands.options import ProgressOption
-from app.commands.progress import Interrupt, console, is_same, progress_bar, progress_writer, report_progress
+from app.commands.progress import (
+    Interrupt,
+    console,
+    end_like_an_interrupt,
+    is_same,
+    progress_bar,
+    progress_writer,
+    report_progress,
+)
 from app.commands.synth import make_set
 from core.devices import UserError
 from core.learning.training_plan import TrainingPlan
@@ -128,7 +133,7 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
 
     init = options.init
     looks = _looks_to_make(options)
-    _end_like_an_interrupt()
+    end_like_an_interrupt()
     _check_choices(options, plan)
     out, began_with = _check_places(options)
     folders = list(options.data)
@@ -201,16 +206,6 @@ def _looks_to_make(options: TrainOptions) -> tuple[str, ...] | None:
     if options.synthetic and not looks:
         raise DatasetError("--without leaves no family of looks to make frames of; name fewer")
     return looks if options.without else None
-
-
-def _end_like_an_interrupt() -> None:
-    """Take a termination request, which a window sends, as Ctrl-C before ``Interrupt`` handles both."""
-
-    def end(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, end)
 
 
 def _check_choices(options: TrainOptions, plan: TrainingPlan) -> None:

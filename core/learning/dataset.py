@@ -48,7 +48,7 @@ class Sample:
         """Image (H, W, 3) and both masks (H, W), scaled to `longer_side_px` if given; raises DatasetError."""
         try:
             image = read_image(self.image)
-            masks = [_mask_of(path) for path in (self.vessel, self.robot)]
+            masks = [read_mask(path) for path in (self.vessel, self.robot)]
         except ImageError as error:
             raise DatasetError(str(error)) from None
         for path, mask in zip((self.vessel, self.robot), masks, strict=True):
@@ -66,7 +66,7 @@ class Sample:
         if self.doubtful is None:
             return np.zeros(shape[:2], bool)
         try:
-            mask = _mask_of(self.doubtful)
+            mask = read_mask(self.doubtful)
         except ImageError as error:
             raise DatasetError(str(error)) from None
         if mask.shape == shape[:2]:
@@ -74,7 +74,7 @@ class Sample:
         return np.asarray(_resized(mask.astype(np.uint8) * 255, (shape[1], shape[0])) > 127)
 
 
-def _mask_of(path: Path) -> Mask:
+def read_mask(path: Path) -> Mask:
     """A mask: grey, 255 inside. Raises ImageError, and DatasetError for one in which other values mean something."""
     pixels = read_image(path)
     mask = np.asarray(pixels[:, :, 0] > 127)

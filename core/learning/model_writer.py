@@ -22,6 +22,7 @@ from core.config.models import SegmentationConfig
 from core.files import sync_folder
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import (
+    BENCH,
     HALF_SUFFIX,
     INFO,
     ONNX,
@@ -215,6 +216,26 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
         _update(scratch, {"name": folder.resolve().name, "second_look_sha256": near.weights_sha256} | changes)
 
 
+def install_model(made: Path, folder: Path, bench: Path | None = None) -> None:
+    """Copy a finished model to its place, with the folder of its bench in it; an older model of that name is replaced last.
+
+    Raises
+    ------
+    ModelError
+        The model is damaged, the folder is something else than a model, or cannot be written.
+    """
+    info = read_model_info(made)
+    near = second_look_of(made)
+    with _put_in_place(folder) as scratch:
+        _copy(made, scratch)
+        _update(scratch, {"name": folder.resolve().name, "figures": info.figures})
+        if near is not None:
+            (scratch / SECOND_LOOK).mkdir()
+            _copy(near, scratch / SECOND_LOOK)
+        if bench is not None:
+            shutil.copytree(bench, scratch / BENCH)
+
+
 @contextmanager
 def changed(folder: Path) -> Iterator[Path]:
     """A copy of a model to work on, which takes its place in the end; whatever goes wrong leaves the model as it was.
@@ -291,6 +312,8 @@ def _carry_over(old: Path, new: Path) -> None:
         for entry in list(old.iterdir()):
             if entry.name == SECOND_LOOK and entry.is_dir() and not entry.is_symlink():
                 _carry_over(entry, new / SECOND_LOOK)
+            elif entry.name == BENCH and (new / BENCH).exists():
+                continue  # of the older model, taught before
             elif entry.name not in (WEIGHTS, ONNX, ONNX_INT8, INFO, _INFO_SCRATCH):
                 new.mkdir(exist_ok=True)
                 os.replace(entry, new / entry.name)

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 WEIGHTS, ONNX, ONNX_INT8, INFO = "weights.safetensors", "network.onnx", "network_int8.onnx", "model.json"
 SECOND_LOOK = "second_look"
 """The folder within a model that holds the network of its tip refinement, where it has one."""
+BENCH = "bench"
+"""The folder within a model that holds the bench that it was taught on, where it was."""
 ONNX_PREFIX, HALF_SUFFIX = "network.", ".half"
 """Weights of ``network.onnx`` are called as in the torch network, with this prefix; with this suffix where in half precision."""
 MODELS = RESOURCES / "models"

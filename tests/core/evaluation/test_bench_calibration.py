@@ -1,0 +1,88 @@
+"""Calibration on the few frames of one bench: the fit to a prior, the looks, and the limit of the kind of pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.config.models import PerceptionConfig
+from core.evaluation import bench_calibration as calibrating
+from core.evaluation.bench_calibration import bad_look, fit_to_prior, poses_of_masks, usual_look
+from core.evaluation.confidence import KnownPicture
+from core.learning.dataset import Sample, write_mask, write_png
+from core.perception.quality import BASIC_FEATURES, ConfidenceCalibration
+from tests.core.learning.toy_bench import SIZE, toy_picture, toy_robot, toy_vessel
+
+COUNT = len(BASIC_FEATURES)
+PRIOR = ConfidenceCalibration(
+    features=BASIC_FEATURES, mean=(0.0,) * COUNT, scale=(1.0,) * COUNT, weights=(1.0,) + (0.0,) * (COUNT - 1), offset=1.0
+)
+
+
+def _features(first: np.ndarray) -> np.ndarray:
+    return np.column_stack([first, np.zeros((len(first), COUNT - 1))])
+
+
+def test_without_answers_the_fit_is_the_prior() -> None:
+    fitted = fit_to_prior(np.zeros((0, COUNT)), np.zeros(0, bool), np.zeros(0), PRIOR)
+    assert fitted.weights == pytest.approx(PRIOR.weights)
+    assert fitted.offset == pytest.approx(PRIOR.offset)
+
+
+def test_answers_move_the_offset_first_and_the_weights_when_there_are_many() -> None:
+    rng = np.random.default_rng(1)
+    few = _features(rng.normal(0, 1, 12))
+    right = fit_to_prior(few, np.ones(12, bool), np.ones(12), PRIOR)
+    assert right.offset > PRIOR.offset + 0.5
+    assert np.abs(np.array(right.weights) - PRIOR.weights).max() < 0.3
+    wrong = fit_to_prior(few, np.zeros(12, bool), np.ones(12), PRIOR)
+    assert wrong.offset < PRIOR.offset - 1.0
+    assert fit_to_prior(few, np.zeros(12, bool), np.full(12, 1e-9), PRIOR).offset == pytest.approx(PRIOR.offset, abs=1e-3)
+    many = _features(rng.normal(0, 1, 4000))
+    true = rng.random(4000) < 1 / (1 + np.exp(-(2.5 * many[:, 0] + 0.2)))
+    learnt = fit_to_prior(many, true, np.ones(4000), PRIOR)
+    assert learnt.weights[0] == pytest.approx(2.5, abs=0.3)
+    assert learnt.offset == pytest.approx(0.2, abs=0.2)
+    assert (learnt.fitted_on["answers"], learnt.fitted_on["right"]) == (4000, int(true.sum()))
+
+
+def test_looks_change_the_picture_and_not_its_kind() -> None:
+    image, rng = toy_picture(toy_robot(0, 0.7)), np.random.default_rng(0)
+    usual = [usual_look(image, rng) for _ in range(8)]
+    bad = [bad_look(image, toy_vessel(), toy_robot(0, 0.7), rng) for _ in range(8)]
+    assert all(one.shape == image.shape and one.dtype == np.uint8 for one in (*usual, *bad))
+    changes = [np.mean([np.corrcoef(one.ravel(), image.ravel())[0, 1] for one in looks]) for looks in (usual, bad)]
+    assert changes[0] > 0.8
+    assert changes[1] < changes[0]
+
+
+def test_the_truth_is_the_pose_of_the_masks(tmp_path: Path) -> None:
+    names = [tmp_path / name for name in ("a.png", "a_vessel.png", "a_robot.png")]
+    write_png(names[0], toy_picture(toy_robot(0, 0.7)))
+    write_mask(names[1], toy_vessel())
+    write_mask(names[2], toy_robot(0, 0.7))
+    empty = tmp_path / "none.png"
+    write_mask(empty, np.zeros(SIZE[::-1], bool))
+    config = PerceptionConfig(working_size_px=SIZE[0])
+    truth = poses_of_masks([Sample("a", *names), Sample("b", *names[:2], empty)], config)
+    assert truth["b"]["state"] is None
+    true = np.argwhere(toy_robot(0, 0.7))
+    head = true[np.argmax(true[:, 1])][::-1]
+    assert np.hypot(*(np.array(truth["a"]["head_xy"]) - head)) < 6
+    assert truth["a"]["theta_deg"] < 20
+
+
+def test_the_limit_lies_between_the_bench_and_other_kinds() -> None:
+    rng = np.random.default_rng(3)
+    known = [
+        (KnownPicture(Path(f"{index}.png"), Path(), index // 4), rng.normal(0, 0.1, 24).astype(np.float32)) for index in range(80)
+    ]
+    alone = calibrating._kind_of(known, np.zeros((0, 24), np.float32), 640)
+    others = rng.normal(1.5, 0.1, (30, 24)).astype(np.float32)
+    beside = calibrating._kind_of(known, others, 640)
+    assert alone.limit < beside.limit <= 1.5 * alone.limit
+    assert (beside.distance(others) > beside.limit).all()
+    near = calibrating._kind_of(known, others / 100, 640)
+    assert near.limit == alone.limit, "pictures of other kinds do not make it narrower than the bench's own"
