@@ -58,8 +58,10 @@ _LEAST_S = 45.0
 """A shorter training does not learn a bench."""
 _FEW_STEPS = 80
 """Fewer steps than this are reported: the machine is too slow for the time given."""
-_EXPORT_S = 12.0
-"""Time to write both networks with their eight-bit copies, on two cores."""
+_EXAMPLES = 12
+"""Frames from which eight-bit copies learn: those of one bench are alike."""
+_EXPORT_PICTURES = 30.0
+"""Writing both networks with these copies takes as long as perceiving so many pictures in all orientations."""
 _PLAN = TrainingPlan(batch=8, learning_rate=2e-3, look_share=0.7, warmup_steps=20, keeps_statistics=True)
 """For a trained network and few frames, as the window "Train on my annotations" has it."""
 
@@ -96,10 +98,10 @@ def teach(
     for name, why in made.rejected:
         sys.stderr.write(f"rejected: {name}: {why}\n")
     if frames_only:
-        _print_frames(made, as_json)
+        _print_frames(made, as_json or progress_json)
         return
     result, steps = _train(made, out, init, clock)
-    _print_result(made, out, result, steps, clock.elapsed_s, as_json)
+    _print_result(made, out, result, steps, clock.elapsed_s, as_json or progress_json)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +254,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
     from core.evaluation.bench_calibration import BenchCalibration
     from core.learning.dataset import find_samples
     from core.learning.model_writer import install_model, write_figures
-    from core.perception.model_file import model_folder, read_model_info, second_look_of
+    from core.perception.model_file import load_network, model_folder, read_model_info, second_look_of
 
     twin = _twin_frames(made.folder)
     remembered = find_samples([twin])
@@ -263,7 +265,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
         prior = read_model_info(model_folder("default"))
     config = PerceptionConfig()
     calibration = BenchCalibration(network, prior, made.train, made.held_out, remembered[:_OTHERS], config)
-    reserved_s = _EXPORT_S + calibration.count_s(begin)
+    reserved_s = calibration.count_s(begin, _EXPORT_PICTURES)
     left_s = clock.left_s - reserved_s
     if left_s < _LEAST_S:
         needed = (clock.elapsed_s + reserved_s + _LEAST_S) / 60
@@ -274,19 +276,22 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
     plan = replace(_PLAN, steps=_MOST_STEPS, seconds=left_s * (1 - _TIP_SHARE if has_tip else 1.0))
     notes: dict[str, Any] = {"init": init, "frames": len(samples), "taught": {"bench": made.bench.name, "frames": len(made.train)}}
     torch.manual_seed(plan.seed)
-    task = FrameTraining(samples, begin)
+    task = FrameTraining(samples, begin, examples=_EXAMPLES)
     plan = replace(plan, crop=task.crop_size(plan.crop))
     writer = progress_writer()
     with (made.folder / "log.txt").open("a", encoding="utf-8", buffering=1) as log, Interrupt() as interrupt, progress_bar() as bar:
-        monitor = HeldOutMonitor(None, network, writer, log.write)
-        trainer = Trainer(network, notes, log.write, writer, bar, interrupt, monitor, steps_total=plan.steps)
+        monitor = HeldOutMonitor(made.folder, made.folder / "held_out", writer, log.write, made.held_out)
+        monitor.measure(task.network, 0)  # its pictures are for the window, or a look into the folder
+        off = HeldOutMonitor(None, network, writer, log.write)
+        trainer = Trainer(network, notes, log.write, writer, bar, interrupt, off, steps_total=plan.steps)
         done = trainer.run(task, plan)
         if has_tip and not interrupt.asked:
             tip_s = max(_LEAST_S / 3, clock.left_s - reserved_s)
             tip = replace(plan, steps=_MOST_STEPS // 3, batch=16, seconds=tip_s)
-            trainer.run_tip(_shown_as_often(made.train, remembered[:_OTHERS]), tip)
+            trainer.run_tip(_shown_as_often(made.train, remembered[:_OTHERS]), tip, _EXAMPLES)
         result = None
         if not interrupt.asked:
+            monitor.measure(load_network(network)[0], trainer.steps_before)
             bar_task = bar.add_task("calibration", total=calibration.count)
             result = calibration.run(lambda count, _of: bar.update(bar_task, completed=count), lambda: interrupt.asked)
     if result is None:
@@ -294,8 +299,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
             f"interrupted; frames and what was learnt are kept: go on with teach {made.folder} --out {out}", soft_wrap=True
         )
         raise KeyboardInterrupt
-    dices = {"vessel_dice": round(result.vessel_dice, 4), "robot_dice": round(result.robot_dice, 4)}
-    write_figures(network, {"set": made.folder.name, "held_out": True, "frames": len(made.held_out)} | dices)
+    write_figures(network, monitor.figures)
     install_model(network, out, made.bench)
     shutil.rmtree(network, ignore_errors=True)
     if done is not None and done < _FEW_STEPS:

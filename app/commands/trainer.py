@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -73,12 +73,23 @@ class TrainingTask(Protocol):
 
 
 class FrameTraining:
-    """The network of whole pictures: from nothing, or from the model `init`, whose tip refinement is kept."""
+    """The network of whole pictures: from nothing, or from the model `init`, whose tip refinement is kept.
+
+    `examples`: frames from which its eight-bit copy learns; None: ``_EXAMPLES``.
+    """
 
     measures_held_out = True
 
-    def __init__(self, samples: list[Sample], init: str | None, base: int | None = None, *, shallow: bool = False) -> None:
-        self._samples, self._init = samples, init
+    def __init__(
+        self,
+        samples: list[Sample],
+        init: str | None,
+        base: int | None = None,
+        *,
+        shallow: bool = False,
+        examples: int | None = None,
+    ) -> None:
+        self._samples, self._init, self._examples = samples, init, examples or _EXAMPLES
         self._tip_model: Path | None = None
         if init is None:
             self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
@@ -105,7 +116,7 @@ class FrameTraining:
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
         examples: list[Image] = []
         if whole:
-            for sample in self._samples[:: max(1, len(self._samples) // _EXAMPLES)]:
+            for sample in self._samples[:: max(1, len(self._samples) // self._examples)]:
                 with suppress(DatasetError):  # the training reports it, and keeps what it learnt without that frame
                     examples.append(sample.load(WORKING_SIZE_PX)[0])
         save_model(network, out, training=training, figures=figures, examples=examples, second_look=self._tip_model)
@@ -116,11 +127,12 @@ class TipTraining:
 
     measures_held_out = False
 
-    def __init__(self, samples: list[Sample], init: str | None) -> None:
+    def __init__(self, samples: list[Sample], init: str | None, examples: int | None = None) -> None:
         if init is None:
             raise UserError("--second-look needs --init MODEL, whose first look it looks again after")
         check_model(init)
         self._samples, self._init, self._base = samples, init, model_folder(init)
+        self._examples = examples or _EXAMPLES
         self._has_one = second_look_of(self._base) is not None
         folder = self._base / SECOND_LOOK if self._has_one else self._base
         self.network = load_network(folder)[0] if self._has_one else with_prior_planes(load_network(folder)[0])
@@ -147,7 +159,7 @@ class TipTraining:
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
         examples: list[Planes] = []
         if whole and self._crops is not None:
-            for index in range(0, len(self._crops), max(1, len(self._crops) // (4 * _EXAMPLES))):
+            for index in range(0, len(self._crops), max(1, len(self._crops) // (4 * self._examples))):
                 with suppress(DatasetError):
                     examples.append(np.ascontiguousarray(self._crops[index][0].numpy().transpose(1, 2, 0)))
         save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
@@ -172,10 +184,17 @@ def tip_plan(plan: TrainingPlan, init: str | None) -> TrainingPlan | None:
 
 
 class HeldOutMonitor:
-    """Measures the network on frames that it is not trained on; without a folder of them it does nothing."""
+    """Measures the network on frames that it is not trained on: a `folder`, or `samples` of it. Without any it does nothing."""
 
-    def __init__(self, folder: Path | None, out: Path, writer: ProgressWriter | None, log: Callable[[str], object]) -> None:
-        self._samples = find_samples([folder]) if folder is not None else []
+    def __init__(
+        self,
+        folder: Path | None,
+        out: Path,
+        writer: ProgressWriter | None,
+        log: Callable[[str], object],
+        samples: Sequence[Sample] | None = None,
+    ) -> None:
+        self._samples = samples if samples is not None else find_samples([folder]) if folder is not None else []
         self._name = folder.name if folder is not None else ""
         self._pictures = out.with_name(out.name + "_pictures")
         self._writer, self._log = writer, log
@@ -245,9 +264,9 @@ class Trainer:
     steps_total: int = 0
     has_saved: bool = False
 
-    def run_tip(self, samples: list[Sample], plan: TrainingPlan) -> int | None:
+    def run_tip(self, samples: list[Sample], plan: TrainingPlan, examples: int | None = None) -> int | None:
         """Train the tip refinement of the model that the training before wrote."""
-        task = TipTraining(samples, str(self.out))
+        task = TipTraining(samples, str(self.out), examples)
         return self.run(task, replace(plan, crop=task.crop_size(plan.crop)))
 
     def run(self, task: TrainingTask, plan: TrainingPlan) -> int | None:

@@ -209,8 +209,8 @@ class BenchCalibration:
         looked = len(self._train) + len(self._held_out)
         return 2 * len(self._held_out) * (1 + sum(self._looks)) + looked * _LOOKS + len(self._others)
 
-    def count_s(self, model: str) -> float:
-        """How long it takes here, measured with a picture and another `model` of this shape."""
+    def count_s(self, model: str, more: float = 0.0) -> float:
+        """How long it takes here, and as long as `more` pictures besides, measured with a picture and a `model` of this shape."""
         image = self._held_out[0].load(self._config.working_size_px)[0]
         segmentation = self._config.segmentation.model_copy(update={"model": model, "mirrored": "always"})
         pipeline = open_pipeline(self._config.model_copy(update={"segmentation": segmentation}), recalibrating=True)
@@ -219,7 +219,7 @@ class BenchCalibration:
         pipeline.perceive_single(Frame(0, 0.0, image))
         averaged_s = perf_counter() - began_s
         averaged = len(self._held_out) * (1 + sum(self._looks))
-        return averaged_s * (averaged + _PLAIN_SHARE * (self.count - averaged))
+        return averaged_s * (averaged + _PLAIN_SHARE * (self.count - averaged) + more)
 
     def run(self, on_progress: Progress, should_stop: Callable[[], bool] = lambda: False) -> TeachingResult | None:
         """Calibrate, and write it to the model; None when stopped, and the model is unchanged then.

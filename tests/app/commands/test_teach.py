@@ -146,9 +146,9 @@ def test_an_interrupted_training_keeps_frames_and_network_and_goes_on(
     begun_with: list[str] = []
     begin = trainer.FrameTraining.__init__
 
-    def record(task: trainer.FrameTraining, samples: list[Sample], init: str) -> None:
+    def record(task: trainer.FrameTraining, samples: list[Sample], init: str, **more: int) -> None:
         begun_with.append(init)
-        begin(task, samples, init)
+        begin(task, samples, init, **more)
 
     def run_until_asked(self: trainer.Trainer, task: trainer.FrameTraining, plan: TrainingPlan) -> int:
         assert plan.seconds is not None
@@ -190,7 +190,7 @@ def test_without_an_empty_picture_the_bench_is_what_most_pictures_show(place: Pa
 
 @pytest.mark.slow
 def test_a_bench_is_taught_from_end_to_end(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.commands.trainer._EXAMPLES", 2)
+    monkeypatch.setattr("app.commands.teach._EXAMPLES", 2)
     monkeypatch.setattr("app.commands.teach._REMEMBER", 4)
     monkeypatch.setattr("app.commands.teach._MOST_STEPS", 6)
     out = tmp_path / "own"
