@@ -14,8 +14,8 @@ from app.commands.progress import console, progress_bar
 
 def synth(
     out: Annotated[Path, typer.Option(help="folder of the set; an interrupted one is continued")],
-    count: Annotated[int, typer.Option(min=1, help="frames")],
-    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; 16 x --poses frames use one seed")] = 0,
+    count: Annotated[int, typer.Option(min=1, help="frames, or scenes")],
+    seed: Annotated[int, typer.Option(min=0, help="first phantom seed; 16 x --poses frames, or 4 scenes, use one")] = 0,
     width: Annotated[int, typer.Option(min=160, max=4096)] = 640,
     height: Annotated[int, typer.Option(min=120, max=4096)] = 480,
     family: Annotated[
@@ -29,11 +29,15 @@ def synth(
     poses: Annotated[
         int, typer.Option(min=1, max=8, help="poses of the robot in every look: more frames in the same time, but fewer looks")
     ] = 1,
+    scenes: Annotated[
+        bool, typer.Option("--scenes", help="scenes for train --scenes in place of frames: geometry that benches are painted from")
+    ] = False,
     workers: Annotated[int, typer.Option(min=1, max=64, help="processes")] = 1,
     scheduler: SchedulerOption = None,
 ) -> None:
     """Randomised labelled frames from the bench twin: images, masks, truth."""
-    make_set(out, count, seed, (width, height), tuple(family) if family else None, phantom, poses, workers, scheduler)
+    families = tuple(family) if family else None
+    make_set(out, count, seed, (width, height), families, phantom, poses, workers, scheduler, scenes=scenes)
 
 
 def make_set(
@@ -46,8 +50,10 @@ def make_set(
     poses: int = 1,
     workers: int = 1,
     scheduler: str | None = None,
+    *,
+    scenes: bool = False,
 ) -> None:
-    """Write a labelled set; raises SynthError, and ClusterError with `scheduler`."""
+    """Write a set of frames, or of scenes; raises SynthError, and ClusterError with `scheduler`."""
     from hardware.twin.catalog import LOOKS
     from hardware.twin.dataset import SynthError, SynthPlan, write_set
     from hardware.twin.phantoms import make_phantom
@@ -55,18 +61,21 @@ def make_set(
     unknown = [name for name in families or () if name not in LOOKS]
     if unknown:
         raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join(LOOKS)}")
+    if scenes and poses != 1:
+        raise SynthError("--poses is for frames: a scene has several robots already; leave it out")
     if phantom is not None:
         try:
             make_phantom(phantom)
         except ValueError as error:
             raise SynthError(str(error)) from None
-    plan = SynthPlan(out, count, seed, size, families, phantom, poses)
+    plan = SynthPlan(out, count, seed, size, families, phantom, poses, scenes)
     remote = None
     if scheduler is not None:
         from app.commands.workers import over_cluster
 
         remote = partial(over_cluster, scheduler)
     with progress_bar() as bar:
-        task = bar.add_task(f"frames -> {out}", total=count)
+        task = bar.add_task(f"{'scenes' if scenes else 'frames'} -> {out}", total=count)
         write_set(plan, workers=workers, remote=remote, on_progress=lambda frames: bar.advance(task, frames))
-    console.print(f"{count} labelled frames of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)
+    kind = "scenes" if scenes else "labelled frames"
+    console.print(f"{count} {kind} of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)

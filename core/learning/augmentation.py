@@ -36,19 +36,26 @@ def random_crop(image: Image, masks: Sequence[Mask], size: tuple[int, int], rng:
         center = float(columns[pick]), float(rows[pick])
     else:
         center = float(rng.uniform(0.2, 0.8) * robot.shape[1]), float(rng.uniform(0.2, 0.8) * robot.shape[0])
-    scale = float(np.exp(rng.uniform(np.log(0.75), np.log(1.35))))
-    angle = rng.choice((0.0, 90.0, 180.0, 270.0)) + (rng.uniform(-45, 45) if rng.random() < 0.5 else 0.0)
-    matrix = cv2.getRotationMatrix2D(center, angle, scale)
-    if rng.random() < 0.5:
-        matrix[0, :2] = -matrix[0, :2]  # the shift is set below
-    target = np.array([width, height]) * (0.5 + rng.uniform(-0.25, 0.25, 2))
-    moved = matrix @ np.array([center[0], center[1], 1.0])
-    matrix[:, 2] += target - moved
+    matrix = random_placement(center, size, rng)
     # Beyond the picture lies one colour without labels; mirrored, robots would meet their own reflection.
     fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1]))])
     cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=fill)
     moved_masks = [cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in masks]
     return np.asarray(cut, np.uint8), [np.asarray(mask) for mask in moved_masks]
+
+
+def random_placement(
+    center: Point, size: tuple[int, int], rng: Generator, scales: tuple[float, float] = (0.75, 1.35)
+) -> NDArray[np.float64]:
+    """A turn, a scale between `scales`, perhaps a mirror image, and a shift that brings `center` near a crop's middle: (2, 3)."""
+    scale = float(np.exp(rng.uniform(*np.log(scales))))
+    angle = rng.choice((0.0, 90.0, 180.0, 270.0)) + (rng.uniform(-45, 45) if rng.random() < 0.5 else 0.0)
+    matrix = np.asarray(cv2.getRotationMatrix2D(center, angle, scale))
+    if rng.random() < 0.5:
+        matrix[0, :2] = -matrix[0, :2]  # the shift is set below
+    target = np.array(size[::-1]) * (0.5 + rng.uniform(-0.25, 0.25, 2))
+    matrix[:, 2] += target - matrix @ np.array([*center, 1.0])
+    return np.asarray(matrix, np.float64)
 
 
 def with_strips(image: Image, vessel: Mask, robot: Mask, rng: Generator) -> Image:
@@ -197,9 +204,10 @@ class CropDataset(Dataset[Crop]):
 
     def __init__(self, samples: list[Sample], plan: TrainingPlan) -> None:
         self._plan, self._samples, self._kept = plan, samples, KeptFrames(len(samples))
+        self._count = len(samples)
         self._permutation: tuple[int, NDArray[np.int64]] = (-1, np.zeros(0, np.int64))
         self._has_doubt = any(sample.doubtful is not None for sample in samples)
-        if plan.end_weight > 0:
+        if plan.end_weight > 0 and samples:
             compiled.load()  # the robot's ends are found with the compiled loops: forked workers inherit them
 
     def __len__(self) -> int:
@@ -216,7 +224,7 @@ class CropDataset(Dataset[Crop]):
 
     def place_of(self, index: int) -> int:
         """The number of the sample that crop `index` shows, in a permutation that is drawn for every epoch."""
-        count = len(self._samples)
+        count = self._count
         epoch, place = divmod(index, count)
         if self._permutation[0] != epoch:
             self._permutation = epoch, np.random.default_rng((self._plan.seed, 7919, epoch)).permutation(count)
@@ -293,7 +301,7 @@ class PriorViews:
             probabilities = refine_tips(image, probabilities, near)
             last = PriorView.of(*probabilities)
         found_vessel, found_robot = (probability >= np.float32(0.5) for probability in probabilities)
-        shifted = _wrong(found_vessel, vessel, WALL_PX) & (_end_distances(robot) <= WALL_REACH_PX)
+        shifted = _wrong(found_vessel, vessel, WALL_PX) & (_distances(_true_ends(robot), robot.shape) <= WALL_REACH_PX)
         return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, EDGE_PX)) + _some_of(shifted)))
 
 
@@ -367,15 +375,20 @@ def _some_of(mask: Mask) -> list[Point]:
 
 def end_nearness(robot: Mask) -> NDArray[np.uint8]:
     """How near each pixel is to an end of the true robot, 255 there; where the crop's border cuts it off it does not end."""
-    return np.asarray(np.rint(255 * np.exp(-0.5 * (_end_distances(robot) / np.float32(END_REACH_PX)) ** 2)), np.uint8)
+    return nearness_to(_true_ends(robot), robot.shape)
 
 
-def _end_distances(robot: Mask) -> NDArray[np.float32]:
-    """Distance of each pixel from the nearest end of the true robot; infinite where it has none."""
-    rows, columns = np.ogrid[: robot.shape[0], : robot.shape[1]]
-    nearest = np.full(robot.shape, np.inf, np.float32)
-    for x, y in _true_ends(robot):
-        np.minimum(nearest, (rows - y) ** 2 + (columns - x) ** 2, out=nearest)
+def nearness_to(ends: Sequence[Point], shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    """How near each pixel is to the nearest of the `ends` (x, y), 255 there."""
+    return np.asarray(np.rint(255 * np.exp(-0.5 * (_distances(ends, shape) / np.float32(END_REACH_PX)) ** 2)), np.uint8)
+
+
+def _distances(ends: Sequence[Point], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Distance of each pixel from the nearest of the `ends`; infinite where there is none."""
+    rows, columns = (axis.astype(np.float32) for axis in np.ogrid[: shape[0], : shape[1]])
+    nearest = np.full(shape[:2], np.inf, np.float32)
+    for x, y in ends:
+        np.minimum(nearest, (rows - np.float32(y)) ** 2 + (columns - np.float32(x)) ** 2, out=nearest)
     return np.sqrt(nearest)
 
 

@@ -2,6 +2,7 @@
 
 A set consists of episodes: one random phantom (seed = first seed + episode) through which the robot is driven once, in
 ``LOOKS_PER_EPISODE`` looks. Painting a look takes far longer than painting a robot into it, so one look can serve several poses.
+A set of scenes has geometry in place of frames (``core.learning.scenes``), and pictures of every second scene alone.
 A frame depends only on the seed of its episode and on the plan: a set can be continued after an interruption, and two sets with
 disjoint seed ranges are disjoint.
 """
@@ -24,17 +25,23 @@ from core.config.models import PerceptionConfig
 from core.devices import UserError
 from core.files import is_unfinished, sweep_unfinished, write_atomic
 from core.learning.dataset import mask_png, png
+from core.learning.scenes import BenchScene
 from core.system import begin_as_worker
-from core.types import Points
+from core.types import Image, Mask, Points
 from hardware.twin.catalog import BENCH_LOOK
-from hardware.twin.phantom import Phantom
+from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
-from hardware.twin.rendering.appearance import make_view, named_appearance
+from hardware.twin.rendering.appearance import Appearance, make_view, named_appearance
 from hardware.twin.rendering.renderer import RenderedFrame, Renderer
 from hardware.twin.truth import RouteFollower, truth_of
+from hardware.twin.view import measure_lumen
 
 LOOKS_PER_EPISODE = 16
+SCENES_PER_EPISODE = 4
+_ROBOTS_PER_SCENE, _PICTURES_PER_SCENE = 6, 2
+_SCENE_REACH_PX = 20.0
+"""Distance outside the lumen up to which it is measured: painted walls are up to 5.5 px thick, in crops of 0.6 of the size."""
 _EMPTY_SHARE = 0.03  # of the frames show no robot
 _STEP_S = 0.02
 _FEED_MM_S = 40.0
@@ -43,7 +50,7 @@ _FEED_MM_S = 40.0
 @dataclass(frozen=True, slots=True)
 class SynthPlan:
     """What to write. ``families`` of ``LOOKS`` limits the looks (None: all random ones), ``phantom`` fixes the phantom (None:
-    random ones), ``poses`` is the number of poses of the robot in every look."""
+    random ones), ``poses`` is the number of poses of the robot in every look; ``scenes``: scenes instead of frames."""
 
     out: Path
     count: int
@@ -52,6 +59,7 @@ class SynthPlan:
     families: tuple[str, ...] | None = None
     phantom: str | None = None
     poses: int = 1
+    scenes: bool = False
 
     @property
     def episodes(self) -> int:
@@ -59,7 +67,7 @@ class SynthPlan:
 
     @property
     def frames_per_episode(self) -> int:
-        return LOOKS_PER_EPISODE * self.poses
+        return SCENES_PER_EPISODE if self.scenes else LOOKS_PER_EPISODE * self.poses
 
     def frames_of(self, episode: int) -> int:
         return min(self.frames_per_episode, self.count - episode * self.frames_per_episode)
@@ -131,10 +139,7 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
     for place in range(plan.frames_of(episode)):
         look, pose = divmod(place, plan.poses)
         if pose == 0:
-            family = str(rng.choice(plan.families)) if plan.families else None
-            appearance = named_appearance(family, first_look + look)
-            if family == BENCH_LOOK:
-                appearance = replace(appearance, family=BENCH_LOOK)
+            appearance = _look_of(plan, rng, first_look + look)
             view = make_view(appearance, plan.size, phantom)
             renderer = Renderer(phantom, appearance, plan.size, seed)
         moment = int(moments[place])
@@ -150,6 +155,49 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
         yield LabelledFrame(stem, picture, row | truth)
 
 
+def _look_of(plan: SynthPlan, rng: np.random.Generator, number: int) -> Appearance:
+    family = str(rng.choice(plan.families)) if plan.families else None
+    appearance = named_appearance(family, number)
+    return replace(appearance, family=BENCH_LOOK) if family == BENCH_LOOK else appearance
+
+
+def episode_scenes(plan: SynthPlan, episode: int) -> Iterator[tuple[BenchScene, dict[str, Any]]]:
+    """The scenes of one episode, in order, and what is noted of each."""
+    seed = plan.seed + episode
+    phantom = make_phantom(plan.phantom or f"random:{seed}")
+    rng = np.random.default_rng((seed, 13))
+    shapes = robot_shapes(phantom, seed, SCENES_PER_EPISODE, _ROBOTS_PER_SCENE)
+    order = np.random.default_rng((seed, 17)).permutation(len(shapes))
+    for place in range(plan.frames_of(episode)):
+        appearance = _look_of(plan, rng, seed * LOOKS_PER_EPISODE + place)
+        view = make_view(appearance, plan.size, phantom)
+        scale = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
+        lumen = measure_lumen(phantom.graph, view, view.grid_mm().astype(np.float32), appearance.wall_mm, _SCENE_REACH_PX / scale)
+        first = place * _ROBOTS_PER_SCENE
+        robots = [shapes[moment] for moment in order[first : first + _ROBOTS_PER_SCENE]]
+        pictures: list[tuple[Image, Mask]] = []
+        empty = None
+        if place % 2 == 0:  # painted boards are the slow part
+            renderer = Renderer(phantom, appearance, plan.size, seed, view)
+            for number, (points, sheath_mm, _) in enumerate(robots[:_PICTURES_PER_SCENE]):
+                seen = renderer.render(points, sheath_mm, noise_seed=number)
+                pictures.append((seen.image, seen.robot))
+            empty = renderer.render(None, 0.0, noise_seed=_PICTURES_PER_SCENE).image
+        yield (
+            BenchScene(
+                distance_px=lumen.distance_mm * np.float32(scale),
+                ratio=lumen.ratio,
+                lines=tuple(view.project(points) for points, _, _ in robots),
+                radius_px=appearance.robot_radius_mm * scale,
+                wall_px=appearance.wall_mm * scale,
+                pixels_per_mm=scale,
+                pictures=tuple(pictures),
+                empty=empty,
+            ),
+            {"seed": seed, "phantom": phantom.name, "family": appearance.family, "pictures": len(pictures)},
+        )
+
+
 def make_episode(plan: SynthPlan, number: int) -> Episode:
     """Render an episode in memory."""
     import cv2
@@ -157,6 +205,12 @@ def make_episode(plan: SynthPlan, number: int) -> Episode:
     cv2.setNumThreads(1)
     files: dict[str, bytes] = {}
     truth = []
+    if plan.scenes:
+        for place, (scene, noted) in enumerate(episode_scenes(plan, number)):
+            stem = f"{number * SCENES_PER_EPISODE + place:06d}"
+            files[f"scenes/{stem}.npz"] = scene.to_bytes()
+            truth.append(json.dumps({"stem": stem} | noted))
+        return Episode(number, files, tuple(truth))
     for frame in episode_frames(plan, number):
         files[f"images/{frame.stem}.png"] = png(frame.picture.image)
         files[f"masks/{frame.stem}_vessel.png"] = mask_png(frame.picture.vessel)
@@ -261,19 +315,23 @@ def _prepare(plan: SynthPlan) -> None:
     }
     if plan.poses != 1:
         described["poses"] = plan.poses
+    if plan.scenes:
+        described["scenes"] = True
     path = plan.out / "plan.json"
     try:
         if not path.is_file() and plan.out.is_dir() and not all(map(is_unfinished, plan.out.iterdir())):
             raise SynthFolderError(f"{plan.out}: holds something that synth did not write")
         plan.out.mkdir(parents=True, exist_ok=True)
-        if any(int(image.stem) >= plan.count for image in (plan.out / "images").glob("*.png") if image.stem.isdecimal()):
-            raise SynthFolderError(f"{plan.out}: holds more than {plan.count} frames", "ask for as many, or choose another folder")
+        made = (plan.out / "scenes").glob("*.npz") if plan.scenes else (plan.out / "images").glob("*.png")
+        if any(int(path.stem) >= plan.count for path in made if path.stem.isdecimal()):
+            kind = "scenes" if plan.scenes else "frames"
+            raise SynthFolderError(f"{plan.out}: holds more than {plan.count} {kind}", "ask for as many, or choose another folder")
         if path.is_file():
             if json.loads(path.read_text(encoding="utf-8")) != described:
                 raise SynthFolderError(f"{plan.out}: holds a set with other settings ({path.name})")
         else:
             write_atomic(path, f"{json.dumps(described)}\n".encode())  # first: it marks the folder as one of synth
-        folders = [plan.out / name for name in ("images", "masks", "episodes")]
+        folders = [plan.out / name for name in (*(("scenes",) if plan.scenes else ("images", "masks")), "episodes")]
         for folder in folders:
             folder.mkdir(exist_ok=True)
         for folder in (plan.out, *folders):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from core.learning.dataset import find_samples, read_truth
+from core.learning.scenes import find_scenes, read_scene
 from hardware.twin import dataset
 from hardware.twin.dataset import SynthError, SynthPlan, write_set
 from hardware.twin.phantoms import make_phantom
@@ -155,3 +156,42 @@ def test_a_smaller_count_is_refused_wherever_the_frames_are(tmp_path: Path) -> N
     with pytest.raises(SynthError, match="holds more than 16 frames"):
         dataset._prepare(replace(plan, count=16))
     dataset._prepare(plan)
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> SynthPlan:
+    plan = SynthPlan(tmp_path_factory.mktemp("scenes") / "set", 3, 3, size=(320, 240), scenes=True)
+    write_set(plan)
+    return plan
+
+
+def test_scenes_are_the_twins_geometry(scenes: SynthPlan) -> None:
+    truth, files = read_truth(scenes.out), find_scenes([scenes.out])
+    assert [path.stem for path in files] == list(truth) == ["000000", "000001", "000002"]
+    assert [truth[path.stem]["pictures"] for path in files] == [2, 0, 2]
+    for path in files:
+        scene = read_scene(path)
+        assert scene.ratio.shape == (240, 320)
+        assert scene.vessel.any()
+        assert (scene.vessel != (scene.ratio < 1)).mean() < 0.01
+        assert len(scene.lines) == 6
+        assert len({line.tobytes() for line in scene.lines}) > 1
+        for (image, robot), line in zip(scene.pictures, scene.lines, strict=False):
+            assert image.shape == (240, 320, 3)
+            rows, columns = np.nonzero(robot)
+            if len(rows):
+                away = np.hypot(columns[:, None] - line[:, 0], rows[:, None] - line[:, 1]).min(axis=1)
+                assert away.max() < scene.radius_px + 3
+        assert len(scene.pictures) == truth[path.stem]["pictures"]
+
+
+def test_a_set_of_scenes_goes_on_and_is_no_set_of_frames(scenes: SynthPlan, tmp_path: Path) -> None:
+    again = replace(scenes, out=tmp_path / "again", count=1)
+    write_set(again)
+    write_set(replace(again, count=3))
+    for path in find_scenes([scenes.out]):
+        assert (again.out / "scenes" / path.name).read_bytes() == path.read_bytes()
+    with pytest.raises(SynthError, match="holds more than 2 scenes"):
+        write_set(replace(again, count=2))
+    with pytest.raises(SynthError, match="other settings"):
+        write_set(replace(again, scenes=False))
