@@ -23,7 +23,7 @@ Polygons = tuple[MaskPolygon, ...]
 _CORE_SHARE = 0.6
 """Within this share of its radius from a click the region is certain."""
 _LIKELY_RADII, _REACH_RADII, _SEEN_RADII = 2.0, 3.0, 6.0
-"""A region is likely up to the first distance from the click, possible up to the second; the picture is compared up to the third."""
+"""A region is likely up to the first distance from the click, possible up to the second; colours are compared up to the third."""
 _CUT_RADIUS_PX = 14.0
 """For a larger circle the cut runs in a picture that is scaled down to this radius: it takes 0.2 s at most."""
 _CUT_ROUNDS = 2
@@ -87,22 +87,20 @@ def _cut(image: Image, mask: Mask, point: Point, radius_px: float, *, erase: boo
     core = radii < _CORE_SHARE
     # In the cut's own terms: what is to change is foreground when adding and background when erasing.
     open_part = small if erase else ~small
-    certain, likely, unlikely = (
-        (cv2.GC_BGD, cv2.GC_PR_BGD, cv2.GC_PR_FGD) if erase else (cv2.GC_FGD, cv2.GC_PR_FGD, cv2.GC_PR_BGD)
-    )
+    certain, likely, unlikely = (cv2.GC_BGD, cv2.GC_PR_BGD, cv2.GC_PR_FGD) if erase else (cv2.GC_FGD, cv2.GC_PR_FGD, cv2.GC_PR_BGD)
     labels = np.where(small, cv2.GC_FGD, cv2.GC_BGD).astype(np.uint8)
     labels[open_part & (radii < _REACH_RADII)] = unlikely
     labels[open_part & (radii < _LIKELY_RADII)] = likely
     labels[core] = certain
     if np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)).any() and np.isin(labels, (cv2.GC_BGD, cv2.GC_PR_BGD)).any():
-        models = np.zeros((1, 65)), np.zeros((1, 65))
+        background, foreground = np.zeros((1, 65)), np.zeros((1, 65))
         cv2.setRNGSeed(0)  # its colour models begin with random clusters: one click always gives one answer
-        cv2.grabCut(seen, labels, None, *models, _CUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
+        unused = (0, 0, 0, 0)  # the rectangle: the labels count
+        cv2.grabCut(seen, labels, unused, background, foreground, _CUT_ROUNDS, cv2.GC_INIT_WITH_MASK)
     is_in = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
     changed = (open_part & (~is_in if erase else is_in)) | core
-    changed = cv2.morphologyEx(changed.astype(np.uint8), cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3)))
-    changed |= core.astype(np.uint8)
-    _, parts = cv2.connectedComponents(changed)
+    solid = cv2.morphologyEx(changed.astype(np.uint8), cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))) > 0
+    _, parts = cv2.connectedComponents((solid | core).view(np.uint8))
     at = parts[min(round(middle[1]), parts.shape[0] - 1), min(round(middle[0]), parts.shape[1] - 1)]
     part = (parts == at).astype(np.float32)
     # scaled softly, so that a large picture gets smooth borders
