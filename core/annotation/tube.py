@@ -44,7 +44,7 @@ _TYPICAL_PERCENT = 60.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tube:
+class LumenTube:
     """Vessel along a line: ``middle`` (N, 2) and ``radius`` (N,), in pixels; its area is the union of the discs."""
 
     middle: Points
@@ -60,7 +60,7 @@ class Tube:
         return mask.view(np.bool_)
 
 
-def drawn_tube(stroke: Points, radius_px: FloatArray) -> Tube:
+def drawn_tube(stroke: Points, radius_px: FloatArray) -> LumenTube:
     """The tube as the hand drew it, with a point every sixth of its least radius.
 
     Parameters
@@ -71,13 +71,13 @@ def drawn_tube(stroke: Points, radius_px: FloatArray) -> Tube:
     along = geometry.arc_length(stroke)
     step = max(float(radius_px.min()) * _STEP, 0.5)
     if along[-1] < step:
-        return Tube(stroke[-1:].copy(), radius_px[-1:].copy())
+        return LumenTube(stroke[-1:].copy(), radius_px[-1:].copy())
     points = geometry.resample(stroke, step)
     moved = np.concatenate([[True], np.diff(along) > 0])
-    return Tube(points, np.interp(np.linspace(0.0, along[-1], len(points)), along[moved], radius_px[moved]))
+    return LumenTube(points, np.interp(np.linspace(0.0, along[-1], len(points)), along[moved], radius_px[moved]))
 
 
-def snapped_tube(image: Image, stroke: Points, radius_px: FloatArray, taken: Mask | None = None) -> Tube:
+def snapped_tube(image: Image, stroke: Points, radius_px: FloatArray, taken: Mask | None = None) -> LumenTube:
     """The vessel along a drag; beyond the border of the picture where an end of the drag is nearer to it than a radius.
 
     Parameters
@@ -103,20 +103,20 @@ def snapped_tube(image: Image, stroke: Points, radius_px: FloatArray, taken: Mas
     if scale < 1.0:
         seen = np.asarray(cv2.resize(seen, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
         hidden = np.asarray(cv2.resize(hidden, seen.shape[1::-1], interpolation=cv2.INTER_NEAREST), np.uint8)
-    near = Tube((tube.middle - low + 0.5) * scale - 0.5, tube.radius * scale)
+    near = LumenTube((tube.middle - low + 0.5) * scale - 0.5, tube.radius * scale)
     found = _smoothed(_fitted(seen, near, hidden, slack_px * scale), _AFTER_RADII)
-    return Tube((found.middle + 0.5) / scale - 0.5 + low, found.radius / scale)
+    return LumenTube((found.middle + 0.5) / scale - 0.5 + low, found.radius / scale)
 
 
-def _smoothed(tube: Tube, radii: float) -> Tube:
+def _smoothed(tube: LumenTube, radii: float) -> LumenTube:
     """Line and radius smoothed over so many radii."""
     sigma = radii / _STEP
     middle = geometry.smooth(tube.middle, sigma, keeps_bends=True)
     radius = cv2.GaussianBlur(tube.radius.reshape(-1, 1), (0, 0), sigmaX=1e-3, sigmaY=sigma, borderType=cv2.BORDER_REPLICATE)
-    return Tube(middle, np.asarray(radius, np.float64).ravel())
+    return LumenTube(middle, np.asarray(radius, np.float64).ravel())
 
 
-def _led_out(tube: Tube, size: tuple[int, int]) -> Tube:
+def _led_out(tube: LumenTube, size: tuple[int, int]) -> LumenTube:
     """Continued straight across the border of the picture where an end is near it and runs towards it."""
     middle, radius = tube.middle, tube.radius
     limit = np.array([size[0] - 1.0, size[1] - 1.0])
@@ -132,10 +132,10 @@ def _led_out(tube: Tube, size: tuple[int, int]) -> Tube:
             count = round(2.5 / _STEP)
             more = middle[-1] + step / length * (np.arange(1, count + 1) * _STEP * reach)[:, None]
             middle, radius = np.concatenate([middle, more]), np.concatenate([radius, np.full(count, reach)])
-    return Tube(middle, radius)
+    return LumenTube(middle, radius)
 
 
-def _fitted(image: Image, tube: Tube, taken: NDArray[np.uint8], slack_px: float) -> Tube:
+def _fitted(image: Image, tube: LumenTube, taken: NDArray[np.uint8], slack_px: float) -> LumenTube:
     """The tube with both of its walls on edges of the picture, but not on those within what is `taken` (h, w)."""
     normals, radius = geometry.normals(tube.middle), float(np.median(tube.radius))
     reach = _WIDEST + 0.5
@@ -161,7 +161,7 @@ def _fitted(image: Image, tube: Tube, taken: NDArray[np.uint8], slack_px: float)
     both = sides(_LINE_GAIN + (1.0 - _LINE_GAIN) * clear) if clear < 1.0 else plain
     to_left, to_right = _walls(both[0], both[1], steps, slack_px * (1.0 + _CLEAR_GAIN * clear) / radius)
     shift, half = 0.5 * (to_right - to_left), 0.5 * (to_right + to_left)
-    return Tube(tube.middle + normals * (shift * tube.radius)[:, None], half * tube.radius)
+    return LumenTube(tube.middle + normals * (shift * tube.radius)[:, None], half * tube.radius)
 
 
 def _edges(strip: NDArray[np.float32], radius_px: float, line_gain: float) -> FloatArray:
