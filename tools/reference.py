@@ -29,13 +29,12 @@ from pathlib import Path
 from typing import Any
 
 # The commands of each stage. All files that they write are kept: JSON, JSON lines, CSV and text as they are, pictures, videos and
-# MCAP as hashes, of others the name. The standard output goes to the file behind ">". "help" and "modules" are no commands.
+# MCAP as hashes, of others the name. The standard output goes to the file behind ">". "help" is no command.
 TRIALS = "trial --policy pursuit --policy table --policy push --json --out trials --seeds"
 ACCURACY = "benchmark --accuracy set --json > accuracy.json"
 SPEED = "benchmark --json --frames 24 > speed.json"
 QUICK_STAGES: dict[str, tuple[str, ...]] = {
     "help": ("help",),
-    "modules": ("modules",),
     "perceive": (
         "synth --out frames --count 24 --seed 7",
         "perceive frames/images --masks masks > pictures.jsonl",
@@ -63,17 +62,12 @@ LONG_STAGES = {"accuracy": ("synth --out set --count 512 --seed 900000", ACCURAC
 STAGES: dict[str, tuple[str, ...]] = QUICK_STAGES | LONG_STAGES
 # Keys whose values are measured wall-clock times, in all stages but "start".
 TIMING_KEYS = frozenset({"latency_ms", "total_ms"})
-# Commands that leave main.py for tools/, and options that are removed with them: their absence is no difference.
-MOVED_COMMANDS = frozenset({"faults", "soak", "screenshots", "ablation", "average"})
-MOVED_OPTIONS = {"train": frozenset({"--deepen", "--widen"})}
-# Packages that are slow to import: --help must not load one that it did not load before.
-HEAVY_PACKAGES = ("torch", "openvino", "numba", "mujoco", "cv2", "scipy", "PySide6")
 # Values of `benchmark --json` whose ratio is reported.
 SPEED_KEYS = ("first_frame_s", "total_ms.p50", "total_ms.p95", "after_network_ms.p50", "after_network_ms.p95", "peak_memory_mb")
 MOST_SHOWN = 12  # differences printed per file
 
 
-def run_program(root: Path, work: Path, words: Sequence[str], flags: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
+def run_program(root: Path, work: Path, words: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Run ``main.py`` of an absolute `root` in the folder `work`, which also holds its settings; raises RuntimeError."""
     python = str(root / ".venv/bin/python") if (root / ".venv/bin/python").exists() else sys.executable
     # Caches of compiled code are shared by all runs of the same root, settings are not.
@@ -81,7 +75,7 @@ def run_program(root: Path, work: Path, words: Sequence[str], flags: Sequence[st
     folders = {f"XDG_{kind}_HOME": str(work / "home" / kind) for kind in ("CONFIG", "DATA", "STATE")}
     folders["XDG_CACHE_HOME"] = str(Path(tempfile.gettempdir()) / f"lumenpilot-reference-{key}")
     fixed = {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb", "LC_ALL": "C.UTF-8", "QT_QPA_PLATFORM": "offscreen"}
-    command = [python, *flags, str(root / "main.py"), *words]
+    command = [python, str(root / "main.py"), *words]
     done = subprocess.run(command, cwd=work, env={**os.environ, **fixed, **folders}, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise RuntimeError(f"main.py {' '.join(words)}\nexit code {done.returncode}\n{done.stderr[-3000:]}")
@@ -90,8 +84,8 @@ def run_program(root: Path, work: Path, words: Sequence[str], flags: Sequence[st
 
 def _run_line(root: Path, work: Path, line: str) -> None:
     """Run a command of ``STAGES``."""
-    if line in ("help", "modules"):
-        return (_record_help if line == "help" else _record_modules)(root, work)
+    if line == "help":
+        return _record_help(root, work)
     words, _, target = line.partition(" > ")
     (work / (target or os.devnull)).write_text(run_program(root, work, words.split()).stdout, encoding="utf-8")
 
@@ -120,14 +114,6 @@ def _record_help(root: Path, work: Path) -> None:
         (work / ("-".join(words or ("main",)) + ".txt")).write_text(text, encoding="utf-8")
         listed = text.partition("\nCommands:\n")[2]
         waiting += [(*words, name) for name in re.findall(r"^  ([\w-]+)(?:\s{2}|$)", listed, re.MULTILINE)]
-
-
-def _record_modules(root: Path, work: Path) -> None:
-    """The modules that ``main.py --help`` imports, and how many of them belong to each slow package."""
-    told = run_program(root, work, ["--help"], flags=("-X", "importtime")).stderr
-    names = sorted(set(re.findall(r"^import time:\s+\d+ \|\s+\d+ \|\s+(\S+)$", told, re.MULTILINE)))
-    heavy = {package: sum(name.partition(".")[0] == package for name in names) for package in HEAVY_PACKAGES}
-    (work / "modules.json").write_text(json.dumps({"count": len(names), "heavy": heavy, "modules": names}))
 
 
 def _read_json(path: Path, without: frozenset[str] = frozenset()) -> Any:
@@ -222,28 +208,21 @@ def find_differences(a: Any, b: Any, path: str = "") -> Iterator[str]:
         yield f"{path}: {json.dumps(a, ensure_ascii=False)[:200]} | {json.dumps(b, ensure_ascii=False)[:200]}"
 
 
-def _entries(text: str, command: str) -> list[str]:
-    """Lines of a table, or of a help text without alignment and without what is known to move; of commands the name only."""
+def _entries(text: str) -> list[str]:
+    """Lines of a table, or of a help text without alignment; of commands the name only."""
     text, _, listed = text.partition("\nCommands:\n")
     entries = [" ".join(entry.split()) for entry in re.split(r"\n(?= {0,2}\S)", text)]
-    entries += re.findall(r"^  (\S+)", listed, re.MULTILINE)
-    known = MOVED_COMMANDS if command == "main" else MOVED_OPTIONS.get(command, frozenset())
-    return [entry for entry in entries if entry.split(" ")[0] not in known]
+    return entries + re.findall(r"^  (\S+)", listed, re.MULTILINE)
 
 
 def _compare_files(stage: str, a: Path, b: Path) -> list[str]:
     """Lines that tell the differences."""
-    if stage == "modules":
-        one, other = (content["heavy"] | {"all": content["count"]} for content in map(_read_json, (a, b)))
-        for name in ("all", *HEAVY_PACKAGES):
-            _print(f"modules loaded by --help: {name}: {one[name]} | {other[name]}")
-        return [f"{name}: loaded in B only" for name in HEAVY_PACKAGES if other[name] and not one[name]]
     if stage == "start":
         _print_ratios([_read_json(a)], [_read_json(b)])
         return []
     if a.suffix in (".json", ".jsonl"):
         return list(find_differences(_read_json(a), _read_json(b)))
-    before, after = (_entries(path.read_text(encoding="utf-8"), path.stem) for path in (a, b))
+    before, after = (_entries(path.read_text(encoding="utf-8")) for path in (a, b))
     return [line for line in list(difflib.unified_diff(before, after, n=0, lineterm=""))[2:] if not line.startswith("@@")]
 
 
@@ -257,7 +236,7 @@ def _compare_stage(stage: str, a: Path, b: Path) -> Iterator[tuple[str, list[str
         if (a / name).exists() and (b / name).exists():
             if lines := _compare_files(stage, a / name, b / name):
                 yield f"{stage}/{name}: A | B", lines
-        elif stage != "help" or (b / name).exists() or name.removesuffix(".txt") not in MOVED_COMMANDS:
+        else:
             yield f"{stage}/{name}: only in {'A' if (a / name).exists() else 'B'}", []
 
 
