@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.operator.recording import Recorder
-from app.operator.rig_session import RigSession
+from app.operator.rig_session import RigSession, StopOutcome
 from app.operator.stop_keys import COMMAND_MODIFIERS, application, is_stop
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, Undriven
@@ -375,16 +375,12 @@ class DriveController(QObject):
 
     @Slot()
     def stop(self) -> None:
-        """STOP, before anything else: to the pilot, or to the rig that is being opened."""
-        text = Act.STOP.value
-        if (pilot := self._rig.pilot) is None:
-            if self._rig.engine.stop_opening():
-                text = tr("stop: the rig that is being opened starts stopped")
-            elif (pilot := self._rig.pilot) is None:  # it may have been opened between the two questions
-                text = tr("stop: no rig is open, so nothing moves")
-        if pilot is not None:
-            pilot.stop()
-        self._log(text)
+        """STOP, before anything else."""
+        texts = {
+            StopOutcome.OPENING: tr("stop: the rig that is being opened starts stopped"),
+            StopOutcome.NOTHING: tr("stop: no rig is open, so nothing moves"),
+        }
+        self._log(texts.get(self._rig.stop(), Act.STOP.value))
         self._release_all()
 
     @Slot(int)
