@@ -479,7 +479,7 @@ class OperatorDevices(QObject):
     ----------
     config : sections `gamepad` and `pedal`; without a pedal's port there is no pedal.
     pilot : the running rig's pilot, None without one; called from the devices' threads.
-    stop : called instead for STOP while there is no pilot: something else may be moving the servos.
+    stop : STOP to whatever moves the servos; called from the devices' threads.
     """
 
     said = Signal(str, bool)
@@ -488,8 +488,8 @@ class OperatorDevices(QObject):
         self,
         config: Config,
         pilot: Callable[[], Pilot | None],
+        stop: Callable[[], object],
         parent: QObject | None = None,
-        stop: Callable[[], object] = lambda: None,
     ) -> None:
         super().__init__(parent)
         self._pilot, self._stop = pilot, stop
@@ -508,31 +508,19 @@ class OperatorDevices(QObject):
         if self._pedal is not None:
             self._pedal.close()
 
-    def _pilot_or_stop(self, stop: bool) -> Pilot | None:
-        """Without a pilot STOP goes to whatever else has the servos; a rig may have been opened in that moment."""
-        pilot = self._pilot()
-        if pilot is None and stop:
-            self._stop()
-            pilot = self._pilot()
-        return pilot
-
     def _on_gamepad(self, state: GamepadState) -> None:
-        pilot = self._pilot_or_stop(state.stop)
-        if pilot is None:
-            return
-        pilot.jog("gamepad", Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery))
-        if state.deadman is not None:
-            pilot.deadman("gamepad", state.deadman)
         if state.stop:
-            pilot.stop()
+            self._stop()
+        if (pilot := self._pilot()) is not None:
+            pilot.jog("gamepad", Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery))
+            if state.deadman is not None:
+                pilot.deadman("gamepad", state.deadman)
 
     def _on_pedal(self, report: PedalReport) -> None:
-        pilot = self._pilot_or_stop(report.stop)
-        if pilot is None:
-            return
-        pilot.deadman("pedal", report.deadman)
         if report.stop:
-            pilot.stop()
+            self._stop()
+        if (pilot := self._pilot()) is not None:
+            pilot.deadman("pedal", report.deadman)
 
     def _on_gamepad_device(self, name: str | None, problem: GamepadError | None) -> None:
         before, self._gamepad_name = self._gamepad_name, name

@@ -76,7 +76,7 @@ def run_window(
         LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
     rigs = RigMenuController(window)
 
-    devices = OperatorDevices(config, lambda: window.rig.pilot, window, window.rig.stop)
+    devices = OperatorDevices(config, lambda: window.rig.pilot, window.rig.stop, window)
     devices.said.connect(window.say)
     application.aboutToQuit.connect(settings.close)
     application.aboutToQuit.connect(rigs.close)

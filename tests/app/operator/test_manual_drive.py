@@ -576,20 +576,9 @@ def pedal() -> Iterator[SoftPedal]:
         yield made
 
 
-def test_a_rig_that_is_opened_while_stop_is_on_its_way_is_stopped(qtbot: QtBot) -> None:
-    there: list[FakePilot] = []
-    config = Config.model_validate({"gamepad": {"enabled": False}})
-    devices = OperatorDevices(config, lambda: there[0] if there else None, stop=lambda: there.append(FakePilot()))  # type: ignore[arg-type,return-value]
-    devices._on_gamepad(GamepadState(0.0, 0.0, 0.0, 0.0, None, False, 1.0))
-    assert there == []
-    devices._on_gamepad(GamepadState(0.0, 0.0, 0.0, 0.0, None, True, 1.0))
-    assert [pilot.acts for pilot in there] == [[Act.STOP]]
-    devices.close()
-
-
 def test_a_gamepads_state_is_a_jog_a_deadman_and_a_stop(qtbot: QtBot) -> None:
     pilot = FakePilot()
-    devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: pilot)  # type: ignore[arg-type,return-value]
+    devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: pilot, pilot.stop)  # type: ignore[arg-type,return-value]
     devices._on_gamepad(GamepadState(0.5, -0.25, 1.0, 0.0, None, False, 1.0))
     assert pilot.jogs == [Jog(0.5, -0.25, 1.0, 0.0)]
     assert pilot.deadman_said == []
@@ -600,7 +589,7 @@ def test_a_gamepads_state_is_a_jog_a_deadman_and_a_stop(qtbot: QtBot) -> None:
 
 
 def test_without_a_rig_nothing_happens(qtbot: QtBot) -> None:
-    devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: None)
+    devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: None, lambda: None)
     devices._on_gamepad(GamepadState(0.5, 0.0, 0.0, 0.0, True, True, 1.0))
     devices.close()
 
@@ -609,7 +598,7 @@ def test_without_a_rig_nothing_happens(qtbot: QtBot) -> None:
 def test_a_pedal_on_its_line_is_deadman_and_stop(qtbot: QtBot, pedal: SoftPedal) -> None:
     pilot = FakePilot()
     config = Config.model_validate({"gamepad": {"enabled": False}, "pedal": {"port": pedal.port}})
-    devices = OperatorDevices(config, lambda: pilot)  # type: ignore[arg-type,return-value]
+    devices = OperatorDevices(config, lambda: pilot, pilot.stop)  # type: ignore[arg-type,return-value]
     said: list[tuple[str, bool]] = []
     devices.said.connect(lambda text, bad: said.append((text, bad)))
     devices.start()
@@ -630,7 +619,7 @@ def test_a_pedal_on_its_line_is_deadman_and_stop(qtbot: QtBot, pedal: SoftPedal)
 
 def test_a_pedal_that_cannot_be_opened_is_told_with_what_to_do(qtbot: QtBot) -> None:
     config = Config.model_validate({"gamepad": {"enabled": False}, "pedal": {"port": "/dev/serial/by-id/none"}})
-    devices = OperatorDevices(config, lambda: None)
+    devices = OperatorDevices(config, lambda: None, lambda: None)
     with qtbot.waitSignal(devices.said) as told:
         devices.start()
     devices.close()

@@ -348,7 +348,7 @@ def test_calibrating_begins_with_what_is_known(window: OperatorWindow, opened: l
 def test_the_pedals_and_gamepads_stop_reaches_the_wizard(qtbot: QtBot) -> None:
     stops: list[str] = []
     config = Config.model_validate({"gamepad": {"enabled": False}})
-    devices = OperatorDevices(config, lambda: None, stop=lambda: stops.append("stop"))
+    devices = OperatorDevices(config, lambda: None, lambda: stops.append("stop"))
     devices._on_gamepad(GamepadState(0.0, 0.0, 0.0, 0.0, None, False, 1.0))
     assert stops == []
     devices._on_gamepad(GamepadState(0.0, 0.0, 0.0, 0.0, None, True, 1.0))
