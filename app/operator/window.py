@@ -173,15 +173,7 @@ class OperatorWindow(WindowFrame):
         bar = panels.mode_bar
         bar.stop_asked.connect(controls.stop)
         bar.deadman_changed.connect(partial(controls.deadman.hold, "mouse"))
-        for asked, step in (
-            (bar.servos_on_asked, OperatorStep.SERVOS_ON),
-            (bar.acknowledge_asked, OperatorStep.ACKNOWLEDGE),
-            (bar.arm_asked, OperatorStep.ARM),
-            (bar.hand_over_asked, OperatorStep.HAND_OVER),
-            (bar.take_back_asked, OperatorStep.TAKE_BACK),
-            (bar.disarm_asked, OperatorStep.DISARM),
-        ):
-            asked.connect(partial(self.ask_step, step))
+        bar.step_asked.connect(self.ask_step)
         panels.servos.reboot_asked.connect(controls.reboot)
         panels.servos.zero_asked.connect(controls.zero)
         panels.servos.torque_off_asked.connect(controls.torque_off)
@@ -191,6 +183,7 @@ class OperatorWindow(WindowFrame):
         self._snapshots.saved.connect(panels.toast.show_message)
         self._snapshots.failed.connect(partial(panels.toast.show_message, is_fault=True))
 
+    @Slot(object)
     def ask_step(self, step: OperatorStep) -> None:
         """A step that the operator asks for, by key, button or menu."""
         if self.rig.may_ask(step):

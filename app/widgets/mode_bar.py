@@ -377,15 +377,11 @@ _STEP_WIDTH, _DEADMAN_WIDTH, _STOP_WIDTH = (170, 270), (124, 200), (94, 180)
 class ModeBar(PaintedWidget):
     """One bar under the advice. Its places stay where they are in every mode: operators press them without looking.
 
-    The signals are requests; nothing here decides. ``deadman_changed`` carries whether the mouse holds the deadman's field.
+    The signals are requests; nothing here decides. ``step_asked`` carries the OperatorStep, ``deadman_changed`` whether the mouse
+    holds the deadman's field.
     """
 
-    servos_on_asked = Signal()
-    acknowledge_asked = Signal()
-    arm_asked = Signal()
-    hand_over_asked = Signal()
-    take_back_asked = Signal()
-    disarm_asked = Signal()
+    step_asked = Signal(object)
     stop_asked = Signal()
     deadman_changed = Signal(bool)
 
@@ -402,8 +398,8 @@ class ModeBar(PaintedWidget):
         self._text = _Line()
         self._steps = holder(line((self.main, 3), (self.second, 2), spacing=6))
         self.setLayout(line(self._steps, self.deadman, (self._text, 1), self.stop, spacing=8, margins=(12, 6, 6, 6)))
-        self.main.asked.connect(self._on_step)
-        self.second.asked.connect(self._on_step)
+        self.main.asked.connect(self.step_asked)
+        self.second.asked.connect(self.step_asked)
         self.stop.asked.connect(self.stop_asked)
         self.deadman.held_changed.connect(self.deadman_changed)
         self._set_usable(False)
@@ -452,18 +448,6 @@ class ModeBar(PaintedWidget):
     def _set_usable(self, usable: bool) -> None:
         for part in (self.main, self.second, self.deadman):
             part.setEnabled(usable)
-
-    @Slot(object)
-    def _on_step(self, step: OperatorStep) -> None:
-        signals = {
-            OperatorStep.SERVOS_ON: self.servos_on_asked,
-            OperatorStep.ACKNOWLEDGE: self.acknowledge_asked,
-            OperatorStep.ARM: self.arm_asked,
-            OperatorStep.HAND_OVER: self.hand_over_asked,
-            OperatorStep.TAKE_BACK: self.take_back_asked,
-            OperatorStep.DISARM: self.disarm_asked,
-        }
-        signals[step].emit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         share = min(1.0, max(0.0, (self.width() - _NARROW) / (_WIDE - _NARROW)))

@@ -51,6 +51,12 @@ def alert(key: AlertKey, detail: str = "", repeats: int = 0) -> Alert:
     return Alert(key, ALERTS[key], detail, repeats)
 
 
+def words(key: AlertKey) -> str:
+    """What is the matter and what to do, from the table, as two sentences."""
+    text, what_to_do = ALERTS[key].text, ALERTS[key].what_to_do
+    return f"{text}. {what_to_do[0].upper()}{what_to_do[1:]}."
+
+
 def colours_in(widget: QWidget) -> set[str]:
     """All colours of every second pixel."""
     image = widget.grab().toImage()

@@ -25,18 +25,12 @@ from core.control.faults import Cause, Fault
 from core.control.gate import RejectReason, Source
 from core.control.modes import Hindrance, Mode
 from tests.app.hand_clock import Clock
-from tests.app.widgets.conftest import Own, alert
+from tests.app.widgets.conftest import Own, alert, words
 
 LEFT = Qt.MouseButton.LeftButton
 OFF = DriveView(0.0)
 ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
 STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
-
-
-def words(key: AlertKey) -> str:
-    """What is the matter and what to do, from the table, as two sentences."""
-    text, what_to_do = ALERTS[key].text, ALERTS[key].what_to_do
-    return f"{text}. {what_to_do[0].upper()}{what_to_do[1:]}."
 
 
 def test_alerts_say_what_is_the_matter_how_much_how_often_and_what_to_do(strip: AlertStrip) -> None:

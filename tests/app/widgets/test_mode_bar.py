@@ -13,13 +13,13 @@ from pytestqt.qtbot import QtBot
 
 from app.ui.texts import STOP_KEY, OperatorStep, Undriven, next_step, who_drives
 from app.widgets.mode_bar import DOUBLE_PRESS_S, HEIGHT, MODE_LOOK, REASON_DWELL_S, ModeBadge, ModeBar
-from core.control.alerts import ALERTS, AlertKey
+from core.control.alerts import ALERTS
 from core.control.drive_view import DriveView
 from core.control.faults import CAUSES, Cause, Fault
 from core.control.gate import Source
 from core.control.modes import Hindrance, Mode
 from tests.app.hand_clock import Clock
-from tests.app.widgets.conftest import Own
+from tests.app.widgets.conftest import Own, words
 
 LEFT = Qt.MouseButton.LeftButton
 NARROWEST_AT_720 = 760
@@ -30,12 +30,6 @@ DRIVING = DriveView(0.0, Mode.AUTONOMOUS, Source.PROGRAM, servos_on=True, deadma
 HELD = DriveView(0.0, Mode.HOLD, servos_on=True, deadman=False, active=(Fault(Cause.DEADMAN),))
 STOPPED = DriveView(0.0, Mode.STOPPED, latched=Fault(Cause.TRACKING, "0.8 mm"))
 VIEWS = (OFF, READY, ARMED, DRIVING, HELD, STOPPED)
-
-
-def words(key: AlertKey) -> str:
-    """What is the matter and what to do, from the table, as two sentences."""
-    text, what_to_do = ALERTS[key].text, ALERTS[key].what_to_do
-    return f"{text}. {what_to_do[0].upper()}{what_to_do[1:]}."
 
 
 def arming_refused(*reasons: Hindrance | Cause, time_s: float = 0.0) -> DriveView:
@@ -50,8 +44,8 @@ def bar(own: Own, clock: Clock) -> ModeBar:
 def asked(bar: ModeBar) -> list[str]:
     """What the bar asks for from now on, in order."""
     heard: list[str] = []
-    for name in ("servos_on", "acknowledge", "arm", "hand_over", "take_back", "disarm", "stop"):
-        getattr(bar, f"{name}_asked").connect(lambda name=name: heard.append(name))
+    bar.step_asked.connect(lambda step: heard.append(step.name.lower()))
+    bar.stop_asked.connect(lambda: heard.append("stop"))
     return heard
 
 
