@@ -11,8 +11,9 @@ import numpy as np
 import torch
 from numpy.random import Generator
 from numpy.typing import NDArray
+from torch.utils.data import Dataset
 
-from core.learning.augmentation import BORDER_PX, Crop, CropDataset, nearness_to, random_placement
+from core.learning.augmentation import BORDER_PX, Crop, CropDataset, FrameCrops, forget_empty, nearness_to, random_placement
 from core.learning.boards import F32
 from core.learning.painting import Levels, PaintedBench, expose_pair
 from core.learning.scenes import MOST_RATIO, REACH_PX, BenchScene, read_scene
@@ -25,8 +26,6 @@ TWIN_SHARE = 0.3
 """Share of the benches that are the twin's own pictures, where the scene has some."""
 EMPTY_SHARE = 0.07
 """Share of the crops without robot."""
-UNKNOWN_SHARE, HIDDEN_SHARE = 0.5, 0.08
-"""Share of the crops without picture of the empty bench; of the others, share with a part of it not known."""
 _PAINTED_SCALES = 0.6, 1.7
 """Scales of painted crops: a painted tube is as sharp at any."""
 _ON_ROBOT_SHARE, _NEAR_TIP_SHARE = 0.7, 0.6
@@ -52,9 +51,9 @@ class SceneCrops(CropDataset):
     that are asked for in their order.
     """
 
-    def __init__(self, files: Sequence[Path], plan: TrainingPlan) -> None:
+    def __init__(self, files: Sequence[Path], plan: TrainingPlan, *, has_doubt: bool = False) -> None:
         super().__init__([], plan)
-        self._files, self._count = files, len(files)
+        self._files, self._count, self.has_doubt = files, len(files), has_doubt
         self._last: tuple[int, BenchScene | _PaintedView] | None = None
 
     def __getitem__(self, index: int) -> Crop:
@@ -69,7 +68,9 @@ class SceneCrops(CropDataset):
         labels = [vessel.astype(np.uint8), robot.astype(np.uint8)]
         if self._plan.end_weight > 0:
             labels.append(nearness_to(_ends(line, robot), robot.shape))
-        return torch.from_numpy(np.concatenate([picture, _forgotten(rng, empty)])), torch.from_numpy(np.stack(labels))
+        if self.has_doubt:
+            labels += [np.zeros_like(labels[0])] * (4 - len(labels))
+        return torch.from_numpy(np.concatenate([picture, forget_empty(rng, empty)])), torch.from_numpy(np.stack(labels))
 
     def _view(self, group: int) -> BenchScene | _PaintedView:
         """The scene whose pictures are shown, or a bench painted from it; depends on the seed and `group` alone."""
@@ -89,6 +90,20 @@ class SceneCrops(CropDataset):
         bench = PaintedBench(rng, distance, ratio)
         lines = [_moved(scene.lines[place], placement) for place in order]
         return _PaintedView(bench, bench.empty(), lines, scene.radius_px * scale)
+
+
+class MixedCrops(Dataset[Crop]):
+    """Crops of scenes, for ``plan.scene_share``, and of labelled frames with six planes."""
+
+    def __init__(self, files: Sequence[Path], frames: FrameCrops, plan: TrainingPlan) -> None:
+        self._scenes, self._frames, self._plan = SceneCrops(files, plan, has_doubt=frames.has_doubt), frames, plan
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, index: int) -> Crop:
+        drawn = np.random.default_rng((self._plan.seed, 15_485_863, index // CROPS_PER_BENCH)).random()
+        return self._scenes[index] if drawn < self._plan.scene_share else self._frames[index]
 
 
 def _center(rng: Generator, line: Points, size: tuple[int, int]) -> tuple[float, float]:
@@ -158,13 +173,3 @@ def _ends(line: Points, robot: Mask) -> list[tuple[float, float]]:
         if min(x, y, width - 1 - x, height - 1 - y) >= BORDER_PX and robot[round(y), round(x)]:
             ends.append((float(x), float(y)))
     return ends
-
-
-def _forgotten(rng: Generator, empty: Levels) -> Levels:
-    """The empty bench, not known (0) at all in half of the crops, and now and then in a part."""
-    if rng.random() < UNKNOWN_SHARE:
-        return np.zeros_like(empty)
-    if rng.random() < HIDDEN_SHARE:
-        (y, x), (down, right) = rng.integers(empty.shape[1:]), rng.integers(20, 140, 2)
-        empty[:, max(0, y - down) : y + down, max(0, x - right) : x + right] = 0
-    return empty

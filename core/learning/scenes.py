@@ -82,7 +82,7 @@ def read_scene(path: Path, *, pictures: bool = True) -> BenchScene:
         with path.open("rb") as opened, np.load(opened) as file:
             return _unpacked(file, pictures=pictures)
     except (OSError, ValueError, TypeError, LookupError, EOFError, BadZipFile, cv2.error):
-        raise DatasetError(f"{path}: damaged, or not a scene; write it again with synth --scenes") from None
+        raise DatasetError(f"{path}: damaged, or not a scene as synth --scenes writes it") from None
 
 
 def _unpacked(file: Any, *, pictures: bool) -> BenchScene:

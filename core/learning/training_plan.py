@@ -17,6 +17,7 @@ class TrainingPlan:
     look_share : share of the crops that are changed in exposure, colour, sharpness and noise.
     strip_share : share of the whole frames' crops in which clips lie over the robot.
     focus_share : share of the crops that are drawn by difficulty.
+    scene_share : share of the crops that are painted from scenes, where there are labelled frames, too.
     robot_weight : weight of the robot's loss beside the vessel's.
     end_weight : around the robot's true ends a pixel counts ``1 + end_weight`` times: theta and state are measured there.
     keeps_statistics : the normalisation stays as it was learnt: statistics of a few frames alike would ruin it for all others.
@@ -37,6 +38,7 @@ class TrainingPlan:
     look_share: float = 1.0
     strip_share: float = 0.0
     focus_share: float = 0.0
+    scene_share: float = 0.5
     end_weight: float = 0.0
     keeps_statistics: bool = False
     stop_after: int | None = None

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from torch.utils.data import DataLoader
 
-from core.learning.dataset import DatasetError
-from core.learning.scene_crops import CROPS_PER_BENCH, SceneCrops
+from core.learning.augmentation import FrameCrops
+from core.learning.dataset import DatasetError, find_samples, write_mask
+from core.learning.scene_crops import CROPS_PER_BENCH, MixedCrops, SceneCrops
 from core.learning.scenes import find_scenes, read_scene
 from core.learning.training_plan import TrainingPlan
 from tests.core.learning.toy_scene import toy_scene
+from tests.core.learning.toy_set import toy_set
 
 PLAN = TrainingPlan(steps=10, batch=6, crop=(64, 80), end_weight=2.0, workers=0)
 
@@ -60,7 +62,7 @@ def test_a_damaged_scene_is_one_line(scenes: Path, damage: str) -> None:
             path.unlink()
         case "other":
             np.savez(path, distance=np.zeros(3))
-    with pytest.raises(DatasetError, match="write it again with synth --scenes") as raised:
+    with pytest.raises(DatasetError, match="damaged, or not a scene") as raised:
         read_scene(path)
     assert str(path) in str(raised.value)
     assert len(str(raised.value).splitlines()) == 1
@@ -124,3 +126,21 @@ def test_crops_of_a_bench_share_its_board_and_labels(scenes: Path) -> None:
 def test_boards_without_a_vessel_have_no_robot(scenes: Path) -> None:
     crops = SceneCrops(find_scenes([scenes])[:1], replace(PLAN, clutter_share=1.0))
     assert not any(crops[index][1].any() for index in range(12))
+
+
+def test_scenes_stand_beside_labelled_frames(scenes: Path, tmp_path: Path) -> None:
+    folder = toy_set(tmp_path / "frames", 2)
+    write_mask(folder / "masks" / "000_doubtful.png", np.ones((96, 128), bool))
+    plan = replace(PLAN, scene_share=0.5, clutter_share=0.0, steps=20)
+    frames = FrameCrops(find_samples([folder]), plan, planes=6)
+    files = find_scenes([scenes])
+    mixed, painted = MixedCrops(files, frames, plan), SceneCrops(files, plan, has_doubt=True)
+    assert len(mixed) == 120
+    shown = 0
+    for index in range(0, 60, CROPS_PER_BENCH):
+        image, labels = mixed[index]
+        assert (image.shape, labels.shape) == ((6, 64, 80), (4, 64, 80))
+        shown += image.equal(painted[index][0])
+        assert image.equal(painted[index][0]) or image.equal(frames[index][0])
+    assert 4 < shown < 16
+    assert MixedCrops(files, frames, replace(plan, scene_share=1.0))[0][0].equal(painted[0][0])
