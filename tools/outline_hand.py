@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 import typer
 
+from app.annotator.editing import RADIUS_NOTCH
 from core import geometry
 from core.annotation.masks import polygons_of
 from core.annotation.model import Annotation, MaskTarget
@@ -36,8 +37,6 @@ from tools.run import run_tool
 NOISE_PX = 1.5
 _WOBBLE_PX = 15.0
 """Length over which the hand's error along a drag stays alike."""
-NOTCH = 1.15
-"""The wheel's factor on the radius."""
 _START_RADIUS_PX = 12.0
 _TURN_NOTCHES = 1.2
 """The hand turns the wheel when the width is off by more than this."""
@@ -154,9 +153,9 @@ class ScriptedHand:
                 self.events += 1
 
     def _turn_wheel(self, radius_px: float, most_off: float) -> None:
-        off = math.log(radius_px / self.radius_px) / math.log(NOTCH)
+        off = math.log(radius_px / self.radius_px) / math.log(RADIUS_NOTCH)
         if abs(off) > most_off:
-            self.radius_px *= NOTCH ** round(off)
+            self.radius_px *= RADIUS_NOTCH ** round(off)
             self.events += abs(round(off))
 
     def _drag(self, line: Line) -> None:

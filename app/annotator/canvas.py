@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFocusEvent,
+    QImage,
     QKeyEvent,
     QMouseEvent,
     QPainter,
@@ -17,17 +19,30 @@ from PySide6.QtGui import (
     QPen,
     QPolygonF,
     QTransform,
+    QWheelEvent,
 )
 from PySide6.QtWidgets import QSizePolicy
 
-from app.annotator.editing import AnnotationEditor, Drawing, Edit, Measure, Tool, handle_lines
+from app.annotator.editing import (
+    RADIUS_NOTCH,
+    AnnotationEditor,
+    Drawing,
+    Edit,
+    MaskGesture,
+    MaskMode,
+    Measure,
+    Tool,
+    handle_lines,
+)
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.theme import ON_PICTURE
+from app.ui.workers import Worker
 from app.widgets.image_canvas import ImageCanvas, Viewport, render
 from app.widgets.scene_overlay import foot
 from app.widgets.scene_painter import ScenePainter
 from core.annotation.model import ROBOT, VESSEL, Annotation, Line, MaskTarget, Readout, Touch, line_of
+from core.annotation.outline import Polygons
 from core.types import Image, Point, Points
 
 _MASK_COLOUR = {MaskTarget.VESSEL: ON_PICTURE.VESSEL, MaskTarget.ROBOT: ON_PICTURE.ROBOT}
@@ -261,7 +276,8 @@ class AnnotationCanvas(ImageCanvas):
 
     ``edited`` carries what was done, in words, and the new annotation. ``previewed`` carries the annotation and its readout while a
     point moves or a line grows under the cursor. ``line_ended`` carries the tool whose line was ended; ``ended`` comes when Enter
-    has nothing to end; ``tool_changed`` when a point of the other tool's line was grabbed.
+    has nothing to end; ``tool_changed`` when a point of the other tool's line was grabbed; ``outline_failed`` carries one line when
+    a tube or a region could not be computed. These are computed in a thread of their own, one after the other.
     """
 
     edited = Signal(str, object)
@@ -269,6 +285,7 @@ class AnnotationCanvas(ImageCanvas):
     line_ended = Signal(object)
     tool_changed = Signal(object)
     ended = Signal()
+    outline_failed = Signal(str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -281,8 +298,12 @@ class AnnotationCanvas(ImageCanvas):
         self.editor = AnnotationEditor()
         self._loupe = AnnotationLoupe()
         self._loupe_on = True
-        self._brush_on = False
-        self._brush_px = 6.0
+        self._mode = MaskMode.POINTS
+        self._gestures: deque[MaskGesture] = deque()
+        """Tubes and regions that are not drawn yet; the first one is being computed."""
+        self._outlining = Worker("outlining", self)
+        self._outlining.done.connect(self._on_outlined)
+        self._outlining.failed.connect(self._on_outline_failed)
         self._cursor: Point | None = None
         self._cross_by_key = False
         self._pressed_at = QPointF()
@@ -299,18 +320,21 @@ class AnnotationCanvas(ImageCanvas):
         return self.editor.held is not None or bool(self.editor.drawing.rubber_band)
 
     @property
-    def brush_on(self) -> bool:
-        return self._brush_on and self.tool.is_mask
+    def mask_mode(self) -> MaskMode:
+        """POINTS with a line tool."""
+        return self._mode if self.tool.is_mask else MaskMode.POINTS
 
     def show_image(self, levels: tuple[Image, ...], annotation: Annotation, measure: Measure) -> None:
         """Another image, the whole of it."""
         size = levels[0].shape[1], levels[0].shape[0]
         self.editor.set_image(size, annotation, measure)
-        self._brush_on = self._cross_by_key = False
+        self._mode, self._cross_by_key = MaskMode.POINTS, False
+        self._gestures.clear()
         self.show_levels(levels)
 
     def blank(self) -> None:
         """Show no image."""
+        self._gestures.clear()
         self.editor.set_image(self.view.size, Annotation(), lambda _annotation: Readout())
         self.show_levels(())
 
@@ -334,12 +358,15 @@ class AnnotationCanvas(ImageCanvas):
         self.editor.close_line()
         self.update()
 
-    def set_brush(self, on: bool) -> None:
-        self._brush_on = on
+    def set_mask_mode(self, mode: MaskMode) -> None:
+        """What a press does with a mask tool."""
+        self._mode = mode
         self.update()
 
-    def resize_brush(self, factor: float) -> None:
-        self._brush_px = min(max(self._brush_px * factor, 0.5), 200.0)
+    def resize_circle(self, factor: float) -> None:
+        """The circle of brush, region and tube; the width of a brush stays as it is during a stroke."""
+        if not (self.editor.stroke and self.mask_mode is MaskMode.BRUSH):
+            self.editor.resize_circle(factor)
         self.update()
 
     def set_loupe(self, on: bool) -> None:
@@ -362,7 +389,11 @@ class AnnotationCanvas(ImageCanvas):
 
     def complete(self) -> None:
         """Complete what is being drawn, before something else happens to the picture."""
-        self._emit_edit(self.editor.complete(self._brush_px))
+        if self.editor.stroke and self.mask_mode is not MaskMode.BRUSH:
+            self._end_gesture()
+        while self._gestures:
+            self._apply(self._gestures[0].change(self.editor.annotation.masks))
+        self._emit_edit(self.editor.complete())
 
     def undo_draft_point(self) -> bool:
         """Undo while an outline is drawn: remove its last point; False when none is drawn."""
@@ -386,7 +417,7 @@ class AnnotationCanvas(ImageCanvas):
         self._cursor, self._cross_by_key = point, False
         if button == Qt.MouseButton.MiddleButton or (button == Qt.MouseButton.LeftButton and self.is_pannable):
             self.begin_pan(event.position())
-        elif self.brush_on and button in (Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton):
+        elif self.mask_mode is not MaskMode.POINTS and button in (Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton):
             shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             self.editor.begin_stroke(point, erase=shift or button == Qt.MouseButton.RightButton)
         elif button == Qt.MouseButton.LeftButton:
@@ -408,7 +439,7 @@ class AnnotationCanvas(ImageCanvas):
         if self.is_panning:
             self.pan_to(event.position())
         elif self.editor.stroke:
-            self.editor.stroke.append(point)
+            self.editor.continue_stroke(point)
         elif self.editor.held is not None:
             self.editor.drag_to(point)
             self._emit_preview()
@@ -419,7 +450,7 @@ class AnnotationCanvas(ImageCanvas):
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         moved = event.position() - self._pressed_at
         if self.editor.stroke:
-            self._emit_edit(self.editor.end_stroke(self._brush_px))
+            self._end_stroke()
         elif self.editor.held is not None and event.button() == Qt.MouseButton.LeftButton:
             self._emit_edit(self.editor.release())
         elif self.is_panning:
@@ -435,11 +466,21 @@ class AnnotationCanvas(ImageCanvas):
         """End the line; the first of the clicks has set its last point."""
         if not self.levels:
             return
-        ends = event.button() == Qt.MouseButton.LeftButton and not self.brush_on and not self.is_pannable
+        ends = event.button() == Qt.MouseButton.LeftButton and self.mask_mode is MaskMode.POINTS and not self.is_pannable
         # Where nothing is being drawn it is a second quick grab; only Enter takes a state, or goes on.
         if not (ends and self._end()):
             self.mousePressEvent(event)
         self.update()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Size of the circle, where there is one; with Ctrl, or without a circle, zoom."""
+        turns = event.angleDelta().y() / 120.0
+        if self.mask_mode is MaskMode.POINTS or event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+            super().wheelEvent(event)
+            return
+        if turns and self.levels:
+            self.resize_circle(RADIUS_NOTCH**turns)
+        event.accept()
 
     def leaveEvent(self, event: QEvent) -> None:
         if not self._cross_by_key:
@@ -466,12 +507,51 @@ class AnnotationCanvas(ImageCanvas):
     def cancel(self) -> bool:
         """Escape: drop what is being drawn or selected; False when there was nothing."""
         was_held = self.editor.held is not None
-        had = self.editor.cancel() or self._brush_on
-        self._brush_on = False
+        had = self.editor.cancel() or self.mask_mode is not MaskMode.POINTS
+        self._mode = MaskMode.POINTS
         if was_held:
             self.edited.emit("", None)
         self.update()
         return had
+
+    # ---- tubes and regions
+
+    def _end_stroke(self) -> None:
+        if self.mask_mode is MaskMode.BRUSH:
+            self._emit_edit(self.editor.end_stroke())
+        else:
+            self._end_gesture()
+            self._compute_next()
+
+    def _end_gesture(self) -> None:
+        gesture = self.editor.end_gesture(self.mask_mode, self.levels[0])
+        if gesture is not None:
+            self._gestures.append(gesture)
+        self.update()
+
+    def _compute_next(self) -> None:
+        """The first gesture that waits, on the masks as they are now."""
+        if self._gestures:
+            gesture, masks = self._gestures[0], self.editor.annotation.masks
+            self._outlining.submit(gesture, lambda: (masks, gesture.change(masks)), once=True)
+
+    def _on_outlined(self, gesture: MaskGesture, outlined: tuple[Polygons, Polygons]) -> None:
+        if not self._gestures or self._gestures[0] is not gesture:
+            return  # of another picture, or completed meanwhile
+        before, after = outlined
+        if before == self.editor.annotation.masks:
+            self._apply(after)
+        self._compute_next()
+
+    def _apply(self, masks: Polygons) -> None:
+        self._emit_edit(self.editor.apply_masks(self._gestures.popleft().action, masks))
+
+    def _on_outline_failed(self, gesture: MaskGesture, line: str) -> None:
+        if self._gestures and self._gestures[0] is gesture:
+            self._gestures.popleft()
+            self.outline_failed.emit(line)
+            self._compute_next()
+            self.update()
 
     # ---- keys
 
@@ -490,9 +570,9 @@ class AnnotationCanvas(ImageCanvas):
             self._emit_edit(self.editor.clear())
         elif key in (Qt.Key.Key_Insert, Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
             inserts = key == Qt.Key.Key_Insert
-            if self.brush_on and self._cursor is not None:
+            if self.mask_mode is not MaskMode.POINTS and self._cursor is not None:
                 self.editor.begin_stroke(self._cursor, erase=not inserts)
-                self._emit_edit(self.editor.end_stroke(self._brush_px))
+                self._end_stroke()
             elif not inserts:
                 self._emit_edit(self.editor.delete())
             elif self._cursor is not None:
@@ -570,10 +650,10 @@ class AnnotationCanvas(ImageCanvas):
             return
         drawing = self.editor.drawing
         painter.save()
-        draw(painter, self.view.transform, replace(drawing, handles_shown=not self.brush_on), _LABEL_PX)
+        draw(painter, self.view.transform, replace(drawing, handles_shown=self.mask_mode is MaskMode.POINTS), _LABEL_PX)
         painter.restore()
-        if self.brush_on:
-            self._paint_brush(painter)
+        if self.mask_mode is not MaskMode.POINTS:
+            self._paint_circle(painter)
         if self._cross_by_key and self._cursor is not None:
             paint_cross(painter, QPointF(*self.view.to_screen(self._cursor)), 16.0)
         focus = self._loupe_point()
@@ -581,26 +661,41 @@ class AnnotationCanvas(ImageCanvas):
             self._loupe.paint(painter, self.levels, self.view, drawing, focus, self.light)
         painter.end()
 
-    def _paint_brush(self, painter: QPainter) -> None:
+    def _paint_circle(self, painter: QPainter) -> None:
+        """The circle at the cursor, what is being drawn with it, and what was drawn and is not computed yet."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        radius, stroke = self._brush_px * self.view.zoom, self.editor.stroke
-        if stroke:
-            path = QPainterPath(QPointF(*self.view.to_screen(stroke[0])))
-            for point in stroke:
-                path.lineTo(QPointF(*self.view.to_screen(point)))
-            path.lineTo(path.currentPosition() + QPointF(0.01, 0.0))
-            ink = ON_PICTURE.INK if self.editor.stroke_erases else self.tool.value.colour
-            pen = QPen(theme.colour(ink, 0.6), 2 * radius)
-            pen.setCapStyle(Qt.PenCapStyle.RoundCap)
-            pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
-            painter.setPen(pen)
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            painter.drawPath(path)
-        if self._cursor is not None:
-            painter.setBrush(Qt.BrushStyle.NoBrush)
-            for name, width in ((ON_PICTURE.INK, 3.0), (ON_PICTURE.TEXT, 1.2)):
-                painter.setPen(QPen(QColor(name), width))
-                painter.drawEllipse(QPointF(*self.view.to_screen(self._cursor)), radius, radius)
+        editor = self.editor
+        for gesture in self._gestures:
+            self._paint_stroke(painter, gesture.stroke, gesture.radii, erases=gesture.erases)
+        if editor.stroke:
+            self._paint_stroke(painter, tuple(editor.stroke), tuple(editor.stroke_radii), erases=editor.stroke_erases)
+        if self._cursor is None:
+            return
+        at, radius = QPointF(*self.view.to_screen(self._cursor)), editor.radius_px * self.view.zoom
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        for name, width in ((ON_PICTURE.INK, 3.0), (ON_PICTURE.TEXT, 1.2)):
+            painter.setPen(QPen(QColor(name), width))
+            painter.drawEllipse(at, radius, radius)
+
+    def _paint_stroke(self, painter: QPainter, stroke: Line, radii: tuple[float, ...], *, erases: bool) -> None:
+        """A band as wide as the circle was, equally translucent where it overlaps itself."""
+        ratio = self.devicePixelRatioF()
+        layer = QImage(self.size() * ratio, QImage.Format.Format_ARGB32_Premultiplied)
+        layer.setDevicePixelRatio(ratio)
+        layer.fill(Qt.GlobalColor.transparent)
+        band = QPainter(layer)
+        band.setRenderHint(QPainter.RenderHint.Antialiasing)
+        pen = QPen(QColor(ON_PICTURE.INK if erases else self.tool.value.colour))
+        pen.setCapStyle(Qt.PenCapStyle.RoundCap)
+        places = [QPointF(*self.view.to_screen(point)) for point in stroke]
+        for place, (at, radius) in enumerate(zip(places, radii, strict=True)):
+            pen.setWidthF(2.0 * radius * self.view.zoom)
+            band.setPen(pen)
+            band.drawLine(places[max(place - 1, 0)], at + QPointF(0.01, 0.0))
+        band.end()
+        painter.setOpacity(0.5)
+        painter.drawImage(QPointF(0, 0), layer)
+        painter.setOpacity(1.0)
 
     def _loupe_point(self) -> Point | None:
         """What the loupe magnifies: the held point, what lies under the cursor, or the selected point."""

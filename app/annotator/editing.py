@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
@@ -27,7 +28,8 @@ from core.annotation.model import (
     touched,
     with_line,
 )
-from core.types import Point
+from core.annotation.outline import Polygons, with_region, with_tube
+from core.types import Image, Point
 
 _POINT_REACH_PX, _EDGE_REACH_PX = 10.0, 6.0
 """How near a press must be to a point, or to an edge between two, in screen pixels."""
@@ -56,7 +58,7 @@ class ToolText:
 
 
 _LINE_HINT = mark("Enter or double click ends it · drag a point, click the line to put one in, right click takes one out")
-_MASK_HINT = mark("click the outline to put one in · T brush · S simplify · G take the model's masks")
+_MASK_HINT = mark("click the outline to put one in · R region, T brush, Y tube · S simplify · G take the model's masks")
 
 
 class Tool(Enum):
@@ -78,9 +80,73 @@ class Tool(Enum):
         return self.value.target is not None
 
 
-BRUSH_HINT = mark(
-    "Drag paints, Shift + drag or right drag takes away · [ ] size · Insert and Delete paint at the cross · T back to points"
-)
+@dataclass(frozen=True, slots=True)
+class ModeText:
+    """The key that chooses a mode and leaves it again, its name, what it does, and how it is used."""
+
+    key: str
+    label: str
+    meaning: str
+    hint: str
+
+
+class MaskMode(Enum):
+    """What a press does with a mask tool: grab points of outlines, or draw with a circle."""
+
+    POINTS = ModeText("", "", "", "")
+    REGION = ModeText(
+        "R",
+        mark("Region"),
+        mark("Add or take away what lies around a click, up to its edges"),
+        mark(
+            "Click adds the region around it, Shift + click or right click takes it away · wheel or [ ] size, Ctrl + wheel zoom · "
+            "R back to points"
+        ),
+    )
+    BRUSH = ModeText(
+        "T",
+        mark("Brush"),
+        mark("Paint the mask instead of moving its points"),
+        mark(
+            "Drag paints, Shift + drag or right drag takes away · wheel or [ ] size, Ctrl + wheel zoom · Insert and Delete paint "
+            "at the cross · T back to points"
+        ),
+    )
+    TUBE = ModeText(
+        "Y",
+        mark("Tube"),
+        mark("Drag along the middle of a vessel: both walls are found"),
+        mark(
+            "Drag along the middle, the circle as wide as the vessel: both walls are found · wheel or [ ] width, also in the drag, "
+            "Ctrl + wheel zoom · right drag takes away · Y back to points"
+        ),
+    )
+
+
+RADIUS_NOTCH = 1.15
+"""A notch of the wheel changes the circle's radius by this factor."""
+_RADIUS_RANGE_PX = (0.5, 200.0)
+_ACTIONS = {
+    MaskMode.REGION: ("add a region to the", "take a region from the"),
+    MaskMode.BRUSH: ("paint", "erase"),
+    MaskMode.TUBE: ("add a tube to the", "take a tube from the"),
+}
+"""In the journal, before the mask's name."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaskGesture:
+    """A change of the masks that takes too long for the window's thread; ``change`` may run in another one.
+
+    ``stroke`` is where the circle's middle went, ``radii`` its radius there, for showing it meanwhile.
+    """
+
+    action: str
+    stroke: Line
+    radii: tuple[float, ...]
+    erases: bool
+    change: Callable[[Polygons], Polygons]
+
 
 Measure = Callable[[Annotation], Readout]
 Edit = tuple[str, Annotation]
@@ -124,7 +190,10 @@ class AnnotationEditor:
         self.drawing = Drawing(Annotation(), Readout(), Tool.ROBOT)
         self.size = (1, 1)
         self.stroke: list[Point] = []
+        self.stroke_radii: list[float] = []
         self.stroke_erases = False
+        self.radius_px = 6.0
+        """Of the circle that draws masks."""
         self.held: Touch | None = None
         """The point that is being dragged."""
         self._measure: Measure = lambda _annotation: Readout()
@@ -253,10 +322,10 @@ class AnnotationEditor:
             return self.tool
         return None
 
-    def complete(self, radius_px: float) -> Edit | None:
+    def complete(self) -> Edit | None:
         """Complete a brush stroke, a drag, or an outline that has an inside."""
         if self.stroke:
-            return self.end_stroke(radius_px)
+            return self.end_stroke()
         if self.held is not None:
             return self.release()
         ended = self.end() if self.drawing.draft else None
@@ -347,19 +416,51 @@ class AnnotationEditor:
 
     # ---- masks
 
-    def begin_stroke(self, point: Point, *, erase: bool) -> None:
-        self.stroke, self.stroke_erases = [point], erase
+    def resize_circle(self, factor: float) -> None:
+        """Make the circle larger or smaller, also during a stroke: what follows is as wide as it is then."""
+        low, high = _RADIUS_RANGE_PX
+        self.radius_px = min(max(self.radius_px * factor, low), high)
 
-    def end_stroke(self, radius_px: float) -> Edit | None:
+    def begin_stroke(self, point: Point, *, erase: bool) -> None:
+        self.stroke, self.stroke_radii, self.stroke_erases = [point], [self.radius_px], erase
+
+    def continue_stroke(self, point: Point) -> None:
+        self.stroke.append(point)
+        self.stroke_radii.append(self.radius_px)
+
+    def end_stroke(self) -> Edit | None:
         """The brush is lifted."""
         stroke, self.stroke = np.array(self.stroke), []
         target = self.tool.value.target
         if target is None or len(stroke) == 0:
             return None
         self._change(selected=None)
-        masks = paint(self.annotation.masks, target, stroke, radius_px, self.size, erase=self.stroke_erases)
-        word = "erase" if self.stroke_erases else "paint"
-        return self._done(f"{word} {target.value} mask", replace(self.annotation, masks=masks))
+        masks = paint(self.annotation.masks, target, stroke, self.stroke_radii[0], self.size, erase=self.stroke_erases)
+        return self._done(self._mask_action(MaskMode.BRUSH), replace(self.annotation, masks=masks))
+
+    def end_gesture(self, mode: MaskMode, image: Image) -> MaskGesture | None:
+        """The stroke of a tube, or the click of a region, has ended; `image` (H, W, 3) is what the mask is fitted to."""
+        stroke, self.stroke = tuple(self.stroke), []
+        target = self.tool.value.target
+        if target is None or not stroke:
+            return None
+        self._change(selected=None)
+        radii, erase = tuple(self.stroke_radii), self.stroke_erases
+        if mode is MaskMode.REGION:
+            stroke, radii = stroke[:1], radii[:1]
+            change = partial(with_region, target=target, image=image, point=stroke[0], radius_px=radii[0], erase=erase)
+        else:
+            drawn, widths = np.array(stroke, np.float64), np.array(radii)
+            change = partial(with_tube, target=target, image=image, stroke=drawn, radius_px=widths, erase=erase)
+        return MaskGesture(self._mask_action(mode), stroke, radii, erase, change)
+
+    def apply_masks(self, action: str, masks: Polygons) -> Edit:
+        """The masks that a gesture has led to."""
+        return self._done(action, replace(self.annotation, masks=masks))
+
+    def _mask_action(self, mode: MaskMode) -> str:
+        target = self.tool.value.target
+        return f"{_ACTIONS[mode][self.stroke_erases]} {target.value if target is not None else ''} mask"
 
     def simplify(self, tolerance_px: float) -> Edit | None:
         """Fewer points on the outlines of the tool's masks."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen
@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.annotator.editing import BRUSH_HINT, Tool
+from app.annotator.editing import MaskMode, Tool
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import STATE_TITLE, side, tip
@@ -35,24 +35,31 @@ _LEGIBLE_CONTRAST = 3.0
 _SWITCHES = (
     ("L", mark("Loupe"), "TEXT", mark("The surroundings of the cursor, magnified")),
     ("K", mark("Masks"), "VESSEL", mark("Show the drawn masks")),
-    ("T", mark("Brush"), "ORANGE", mark("Paint the mask instead of moving its points")),
     ("H", mark("Algorithm"), "TEXT", mark("Show what the algorithm says: answers after it are told apart. Not in a blind study")),
 )
 
 
 class AnnotationBar(QWidget):
-    """``tool_chosen`` carries a tool; ``switched`` the key of a switch ("L", "K", "T", "H") and whether it is on."""
+    """``tool_chosen`` carries a tool; ``mode_chosen`` a mode of the mask tools, POINTS when the one that is on is left;
+    ``switched`` the key of a switch ("L", "K", "H") and whether it is on.
+
+    Parameters
+    ----------
+    blind : a study without the algorithm's answer.
+    tools : the tools that are offered; without a line tool there is no switch for the algorithm.
+    """
 
     tool_chosen = Signal(object)
+    mode_chosen = Signal(object)
     switched = Signal(str, bool)
 
-    def __init__(self, *, blind: bool) -> None:
+    def __init__(self, *, blind: bool, tools: Sequence[Tool] = tuple(Tool)) -> None:
         super().__init__()
         row = line(spacing=5)
-        self._blind = blind
+        self._has_algorithm = not blind and any(not tool.is_mask for tool in tools)
         self._tools: dict[Tool, _Chip] = {}
         group = QButtonGroup(self)
-        for tool in Tool:
+        for tool in tools:
             key, label = tool.value.key, tr(tool.value.label)
             chip = _Chip(key, label, tool.value.role, tr("{meaning}  (key {key})", meaning=label, key=key))
             chip.clicked.connect(lambda _on=False, which=tool: self.tool_chosen.emit(which))
@@ -62,30 +69,50 @@ class AnnotationBar(QWidget):
         row.addStretch(1)
         self._switches: dict[str, _Chip] = {}
         for key, label, colour, meaning in _SWITCHES:
-            if key == "H" and blind:
+            if key == "H" and not self._has_algorithm:
                 continue
             chip = _Chip(key, tr(label), colour, tr("{meaning}  (key {key})", meaning=tr(meaning), key=key))
             chip.setChecked(key in "LK")
             chip.toggled.connect(lambda on, which=key: self.switched.emit(which, on))
             row.addWidget(chip)
             self._switches[key] = chip
+        modes = line(spacing=5)
+        self._modes: dict[MaskMode, _Chip] = {}
+        for mode in MaskMode:
+            if mode is MaskMode.POINTS:
+                continue
+            key, label = mode.value.key, tr(mode.value.label)
+            chip = _Chip(key, label, "ORANGE", tr("{meaning}  (key {key})", meaning=tr(mode.value.meaning), key=key))
+            chip.clicked.connect(lambda on, which=mode: self.mode_chosen.emit(which if on else MaskMode.POINTS))
+            modes.addWidget(chip)
+            self._modes[mode] = chip
         self._hint = QLabel()
         self._hint.setObjectName("card_note")
         self._hint.setMinimumWidth(10)
-        self.setLayout(column(row, self._hint, spacing=5))
-        self.show_tool(Tool.ROBOT, brush_on=False)
+        self._hint.setWordWrap(True)
+        self._hint.setFixedHeight(_HINT_HEIGHT)
+        modes.addSpacing(7)
+        modes.addWidget(self._hint, 1)
+        self.setLayout(column(row, modes, spacing=5))
+        self.show_tool(next(iter(tools)), MaskMode.POINTS)
 
     @property
     def hint(self) -> str:
         return self._hint.text()
 
-    def show_tool(self, tool: Tool, *, brush_on: bool) -> None:
-        """The chosen tool and how it is used."""
-        self._tools[tool].setChecked(True)
-        self.set_switch("T", brush_on)
-        self._switches["T"].setEnabled(tool.is_mask)
-        hint = tr(BRUSH_HINT) if brush_on else tool.value.hint
-        self._hint.setText(hint.partition(" · G ")[0] if self._blind else hint)
+    @property
+    def mode_shown(self) -> MaskMode:
+        """Whose chip is on."""
+        return next((mode for mode, chip in self._modes.items() if chip.isChecked()), MaskMode.POINTS)
+
+    def show_tool(self, tool: Tool, mode: MaskMode) -> None:
+        """The chosen tool and mode, and how it is used."""
+        if tool in self._tools:
+            self._tools[tool].setChecked(True)
+        for which, chip in self._modes.items():
+            chip.setChecked(which is mode)
+        hint = tr(mode.value.hint) if mode is not MaskMode.POINTS else tool.value.hint
+        self._hint.setText(hint if self._has_algorithm else hint.partition(" · G ")[0])
 
     def set_switch(self, key: str, on: bool) -> None:
         """Show a switch as on or off without ``switched``."""
@@ -102,6 +129,10 @@ class AnnotationBar(QWidget):
         chip = self._switches.get(key)
         if chip is not None and chip.isEnabled():
             chip.toggle()
+
+
+_HINT_HEIGHT = 34
+"""Of two lines, so that a longer hint moves nothing."""
 
 
 class _Chip(Painted, QAbstractButton):

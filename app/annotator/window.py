@@ -10,7 +10,7 @@ from PySide6.QtCore import QEvent, QObject
 from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QMessageBox, QWidget
 
 from app.annotator.canvas import CANVAS_KEYS, AnnotationCanvas
-from app.annotator.editing import Tool
+from app.annotator.editing import RADIUS_NOTCH, MaskMode, Tool
 from app.annotator.model import AnnotationModel
 from app.annotator.panels import AnnotationBar, AnnotationHeader, AnnotationReadout, QueueList, QueueModel
 from app.player.controls import NoteField
@@ -30,7 +30,6 @@ from core.annotation.store import TAKES_LINES
 from core.types import PoseState
 
 _ZOOM_STEP = 1.3
-_BRUSH_STEP = 1.25
 
 
 def add_annotator_menus(window: AnnotatorWindow) -> None:
@@ -81,15 +80,15 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
     for action in edits[:2]:
         action.setAutoRepeat(True)
     tools = [MenuEntry(tr(t.value.label), partial(window.set_tool, t), (t.value.key,)) for t in Tool]
-    add_menu(
+    drawing = add_menu(
         window,
         tr("&Tools"),
         [
             *tools,
             None,
-            MenuEntry(tr("&Brush"), partial(bar.toggle, "T"), ("T",)),
-            MenuEntry(tr("Brush smaller"), partial(canvas.resize_brush, 1 / _BRUSH_STEP), ("[",)),
-            MenuEntry(tr("Brush larger"), partial(canvas.resize_brush, _BRUSH_STEP), ("]",)),
+            *[MenuEntry(tr(m.value.label), partial(window.toggle_mode, m), (m.value.key,)) for m in MaskMode if m.value.key],
+            MenuEntry(tr("Circle smaller"), partial(canvas.resize_circle, 1 / RADIUS_NOTCH), ("[",)),
+            MenuEntry(tr("Circle larger"), partial(canvas.resize_circle, RADIUS_NOTCH), ("]",)),
         ],
     )
     go = add_menu(
@@ -104,7 +103,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("Lis&t"), panels.queue.focus_list, ("F6",)),
         ],
     )
-    for action in (*go[:2], *view[:2], *view[4:8]):
+    for action in (*go[:2], *view[:2], *view[4:8], *drawing[-2:]):
         action.setAutoRepeat(True)
     add_help_menu(window, panels.help.toggle)
 
@@ -114,8 +113,8 @@ _MOUSE = (
     (
         (mark("Click, drag"), mark("set a point; move one")),
         (mark("Double click"), mark("end the line, take the state, go on")),
-        (mark("Right click"), mark("take a point out; the brush: take away")),
-        (mark("Wheel"), mark("zoom at the cursor")),
+        (mark("Right click"), mark("take a point out; brush, region, tube: take away")),
+        (mark("Wheel"), mark("zoom at the cursor; brush, region, tube: size, with Ctrl zoom")),
     ),
 )
 
@@ -203,10 +202,12 @@ class AnnotatorWindow(WindowFrame):
         canvas.edited.connect(self._on_edited)
         canvas.previewed.connect(self._on_previewed)
         canvas.line_ended.connect(self._on_line_ended)
-        canvas.tool_changed.connect(lambda tool: panels.bar.show_tool(tool, brush_on=False))
+        canvas.tool_changed.connect(lambda tool: panels.bar.show_tool(tool, MaskMode.POINTS))
+        canvas.outline_failed.connect(lambda line: self.show_message(line, is_fault=True))
         canvas.ended.connect(self._on_ended)
         canvas.installEventFilter(self)
         panels.bar.tool_chosen.connect(self.set_tool)
+        panels.bar.mode_chosen.connect(self.set_mode)
         panels.bar.switched.connect(self._on_switched)
         panels.light.changed.connect(canvas.set_light)
         panels.note.editingFinished.connect(self._save_note)
@@ -265,11 +266,11 @@ class AnnotatorWindow(WindowFrame):
         annotation, canvas = self.model.annotation, self.panels.canvas
         self.panels.note.setText(annotation.note)  # also while it has the focus: its text was the last picture's
         canvas.show_image(self.model.levels, annotation, self.model.measure)
-        canvas.set_brush(False)
+        canvas.set_mask_mode(MaskMode.POINTS)
         tool = Tool.VESSEL if len(annotation.robot) > 1 and len(annotation.vessel) < 2 else Tool.ROBOT
         if tool is not canvas.tool:
             canvas.set_tool(tool)
-        self.panels.bar.show_tool(canvas.tool, brush_on=False)
+        self.panels.bar.show_tool(canvas.tool, MaskMode.POINTS)
         self._hide_proposal()
         self._show_annotation()
 
@@ -394,10 +395,22 @@ class AnnotatorWindow(WindowFrame):
         """Choose a tool, by key, chip or menu."""
         self.panels.canvas.complete()
         self.panels.canvas.set_tool(tool)
-        self.panels.canvas.set_brush(False)
-        self.panels.bar.show_tool(tool, brush_on=False)
-        self.panels.canvas.setFocus()
+        self.set_mode(MaskMode.POINTS)
         self._show_annotation()
+
+    def set_mode(self, mode: MaskMode) -> None:
+        """Choose how a mask is drawn, by key, chip or menu; with a line tool the vessel's mask is meant."""
+        canvas = self.panels.canvas
+        if mode is not MaskMode.POINTS and not canvas.tool.is_mask:
+            self.set_tool(Tool.VESSEL_MASK)
+        canvas.complete()
+        canvas.set_mask_mode(mode)
+        self.panels.bar.show_tool(canvas.tool, canvas.mask_mode)
+        canvas.setFocus()
+
+    def toggle_mode(self, mode: MaskMode) -> None:
+        """Choose a mode, or leave it."""
+        self.set_mode(MaskMode.POINTS if self.panels.canvas.mask_mode is mode else mode)
 
     def _on_switched(self, key: str, on: bool) -> None:
         canvas = self.panels.canvas
@@ -405,9 +418,6 @@ class AnnotatorWindow(WindowFrame):
             canvas.set_loupe(on)
         elif key == "K":
             canvas.set_masks_shown(on)
-        elif key == "T":
-            canvas.set_brush(on)
-            self.panels.bar.show_tool(canvas.tool, brush_on=canvas.brush_on)
         elif on:
             if self.model.proposal is None:
                 self.show_message(tr("Asking the algorithm"))
@@ -502,7 +512,7 @@ class AnnotatorWindow(WindowFrame):
             self.panels.canvas.setFocus()
         elif not self.panels.canvas.cancel():
             super()._on_escape()
-        self.panels.bar.show_tool(self.panels.canvas.tool, brush_on=self.panels.canvas.brush_on)
+        self.panels.bar.show_tool(self.panels.canvas.tool, self.panels.canvas.mask_mode)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() in (QEvent.Type.MouseMove, QEvent.Type.MouseButtonPress, QEvent.Type.KeyPress, QEvent.Type.Wheel):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from app.annotator.editing import AnnotationEditor, Tool
+from app.annotator.editing import RADIUS_NOTCH, AnnotationEditor, MaskMode, Tool
 from core.annotation.model import ROBOT, VESSEL, Annotation, MaskPolygon, MaskTarget, Readout, Touch, measure_lines
 from core.config.models import PerceptionConfig
 from core.types import Point
@@ -124,9 +125,44 @@ def test_the_brush_paints_and_erases() -> None:
     made = editor(Annotation(masks=(BOX,)))
     made.set_tool(Tool.VESSEL_MASK)
     for erase, radius_px, count in ((False, 10.0, 2), (True, 14.0, 1)):
+        made.radius_px = radius_px
         made.begin_stroke((300.0, 300.0), erase=erase)
-        edit = made.end_stroke(radius_px)
+        edit = made.end_stroke()
         assert [mask.target for mask in edit[1].masks] == [MaskTarget.VESSEL] * count
+
+
+def test_a_tube_is_as_wide_as_the_circle_was_along_the_way() -> None:
+    made = editor()
+    made.set_tool(Tool.VESSEL_MASK)
+    made.begin_stroke((100.0, 100.0), erase=True)
+    made.resize_circle(RADIUS_NOTCH)
+    made.continue_stroke((200.0, 100.0))
+    gesture = made.end_gesture(MaskMode.TUBE, np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+    assert (gesture.action, gesture.erases) == ("take a tube from the vessel mask", True)
+    assert gesture.radii == pytest.approx((6.0, 6.0 * RADIUS_NOTCH))
+    assert gesture.change((BOX,)) != (BOX,) and not made.stroke
+
+
+def test_a_region_is_that_of_the_press_and_a_line_tool_has_none() -> None:
+    made = editor(Annotation(masks=(BOX,)))
+    image = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    made.begin_stroke((300.0, 300.0), erase=False)
+    assert made.end_gesture(MaskMode.REGION, image) is None
+    made.set_tool(Tool.VESSEL_MASK)
+    made.begin_stroke((300.0, 300.0), erase=False)
+    made.continue_stroke((310.0, 300.0))
+    gesture = made.end_gesture(MaskMode.REGION, image)
+    assert gesture.stroke == ((300.0, 300.0),)
+    edit = made.apply_masks(gesture.action, gesture.change(made.annotation.masks))
+    assert edit[0] == "add a region to the vessel mask" and len(edit[1].masks) == 2
+
+
+def test_the_circle_has_a_least_and_a_largest_size() -> None:
+    made = editor()
+    made.resize_circle(1e-9)
+    assert made.radius_px == 0.5
+    made.resize_circle(1e9)
+    assert made.radius_px == 200.0
 
 
 def test_hidden_masks_cannot_be_grabbed() -> None:

@@ -12,17 +12,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.annotator.canvas import AnnotationCanvas
-from app.annotator.editing import Tool
+from app.annotator.editing import RADIUS_NOTCH, MaskMode, Tool
 from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
 from core.annotation.exchange import Proposal, proposal_of
+from core.annotation.masks import fill
 from core.annotation.model import Annotation, AnnotationError, ImageView, MaskPolygon, MaskTarget, measure_lines
 from core.annotation.store import AnnotationStore, ItemKey, StoredAnnotation, find_images
 from core.config.models import PerceptionConfig
@@ -96,6 +97,11 @@ class Rater:
         QTest.mouseMove(self.canvas, self.at(end))
         QTest.mouseRelease(self.canvas, Qt.MouseButton.LeftButton, pos=self.at(end))
         self.events += 1
+
+    def wheel(self, turns: int, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+        at = QPointF(self.at((320.0, 240.0)))
+        angle, buttons, phase = QPoint(0, 120 * turns), Qt.MouseButton.NoButton, Qt.ScrollPhase.NoScrollPhase
+        QApplication.sendEvent(self.canvas, QWheelEvent(at, at, QPoint(), angle, buttons, modifier, phase, False))
 
     def press(self, *keys: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
         for key in keys:
@@ -439,6 +445,84 @@ def test_brush_and_outline(rater: Rater) -> None:
     before = sum(len(mask.points) for mask in rater.drawn.masks)
     rater.press(Key.Key_S)
     assert sum(len(mask.points) for mask in rater.drawn.masks) < before
+
+
+VESSEL_Y, VESSEL_RADIUS = 240, 20
+
+
+@pytest.fixture
+def vessel_rater(make: MakeRater, tmp_path: Path) -> Rater:
+    """Over a picture of a bright vessel across all of it, with the vessel's mask as the tool."""
+    picture = np.full((SIZE[1], SIZE[0], 3), 60, np.uint8)
+    picture[VESSEL_Y - VESSEL_RADIUS : VESSEL_Y + VESSEL_RADIUS + 1] = 180
+    write_png(tmp_path / "0.png", picture)
+    rater = make()
+    rater.press(Key.Key_4)
+    return rater
+
+
+def height_at(rater: Rater, column: int) -> int:
+    return int(fill(rater.drawn.masks, MaskTarget.VESSEL, SIZE)[:, column].sum())
+
+
+def test_a_tube_snaps_to_the_walls(vessel_rater: Rater) -> None:
+    vessel_rater.press(Key.Key_Y)
+    vessel_rater.canvas.editor.radius_px = 16.0
+    vessel_rater.drag((100.0, 243.0), (400.0, 243.0))
+    vessel_rater.qtbot.waitUntil(lambda: bool(vessel_rater.drawn.masks))
+    assert abs(height_at(vessel_rater, 250) - 2 * VESSEL_RADIUS) <= 4
+    assert height_at(vessel_rater, 60) == 0
+    vessel_rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
+    assert not vessel_rater.drawn.masks
+    assert vessel_rater.message == "Undone: add a tube to the vessel mask"
+
+
+def test_a_tube_is_kept_by_the_key_that_goes_on_before_it_is_computed(vessel_rater: Rater) -> None:
+    vessel_rater.press(Key.Key_Y)
+    vessel_rater.canvas.editor.radius_px = 18.0
+    vessel_rater.drag((100.0, 240.0), (400.0, 240.0))
+    vessel_rater.press(Key.Key_N)
+    vessel_rater.press(Key.Key_P)
+    assert height_at(vessel_rater, 250) > VESSEL_RADIUS
+    assert vessel_rater.canvas.mask_mode is MaskMode.POINTS
+
+
+def test_two_quick_gestures_are_both_kept(vessel_rater: Rater) -> None:
+    vessel_rater.press(Key.Key_R)
+    vessel_rater.canvas.editor.radius_px = 15.0
+    vessel_rater.click((100.0, 240.0), (500.0, 240.0))
+    vessel_rater.qtbot.waitUntil(lambda: len(vessel_rater.drawn.masks) == 2)
+    for column in (100, 500):
+        assert abs(height_at(vessel_rater, column) - 2 * VESSEL_RADIUS) <= 4
+    vessel_rater.click((100.0, 240.0), button=Qt.MouseButton.RightButton)
+    vessel_rater.qtbot.waitUntil(lambda: height_at(vessel_rater, 100) == 0)
+    assert height_at(vessel_rater, 500) > 0
+
+
+def test_the_wheel_is_the_circles_size_and_with_ctrl_the_zoom(vessel_rater: Rater) -> None:
+    canvas = vessel_rater.canvas
+    zoom, radius_px = canvas.view.zoom, canvas.editor.radius_px
+    vessel_rater.press(Key.Key_Y)
+    vessel_rater.wheel(1)
+    assert canvas.editor.radius_px == pytest.approx(radius_px * RADIUS_NOTCH) and canvas.view.zoom == zoom
+    vessel_rater.wheel(1, Qt.KeyboardModifier.ControlModifier)
+    assert canvas.view.zoom > zoom
+    vessel_rater.press(Key.Key_Y)
+    assert canvas.mask_mode is MaskMode.POINTS
+    radius_px = canvas.editor.radius_px
+    vessel_rater.wheel(-1)
+    assert canvas.editor.radius_px == radius_px
+
+
+def test_a_mode_with_a_line_tool_means_the_vessels_mask(rater: Rater) -> None:
+    rater.press(Key.Key_Y)
+    assert rater.canvas.tool is Tool.VESSEL_MASK and rater.canvas.mask_mode is MaskMode.TUBE
+    assert rater.window.panels.bar.hint.startswith("Drag along the middle")
+    rater.press(Key.Key_R)
+    assert rater.window.panels.bar.mode_shown is MaskMode.REGION
+    rater.press(Key.Key_Escape)
+    assert rater.window.panels.bar.mode_shown is MaskMode.POINTS
+    assert "click the outline" in rater.window.panels.bar.hint
 
 
 def test_a_hole_in_a_mask_stays_open_on_the_screen(rater: Rater) -> None:
