@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.bench.registration import BenchView
+from core.perception.segmentation import Probability
 from core.types import Image, Mask
 
 _SMOOTH_PX = 0.8
@@ -116,6 +117,21 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     rim = cv2.dilate(mask.view(np.uint8), _disc(_RIM_PX)) > 0
     doubtful = (distance > np.where(view.reachable, low, high)) & ~rim | ~view.known
     return Difference(probability.astype(np.float32), doubtful)
+
+
+def combined(network: Probability, difference: Difference, view: BenchView) -> Probability:
+    """The robot's probability (h, w): what differs from the empty bench, and what the `network` (h, w) sees beside that.
+
+    Where the empty bench is not known, the network alone counts.
+    """
+    differs = difference.probability >= np.float32(0.5)
+    beside = cv2.dilate(differs.view(np.uint8), _disc(_BESIDE_PX)) > 0
+    robot = np.where(differs, np.maximum(network, difference.probability), np.where(beside, network, np.float32(0.0)))
+    return np.asarray(np.where(view.known, robot, network), np.float32)
+
+
+_BESIDE_PX = 9
+"""Diameter of the disc around what differs within which the network adds to the robot: a part that looks like the bench."""
 
 
 def _disc(side: int) -> NDArray[np.uint8]:

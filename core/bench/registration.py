@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from core.bench.bench import Bench, reachable
 from core.messages import message
-from core.types import Image, Mask, Reason, Refusal
+from core.types import Image, Mask, Reason, Refusal, Window
 
 MAX_SHIFT_PX, MAX_ROTATION_DEG, MAX_SCALING = 10.0, 2.0, 0.03
 """A camera that moved by more has to be taken for another place: the bench must be made again."""
@@ -166,6 +166,21 @@ def register(image: Image, bench: Bench, previous: BenchView | None = None) -> B
     if slope / power < _SOFT_SLOPE:
         empty = blurred_alike(empty, image, known)
     return BenchView(empty, known, vessel, area, noise, shift, rotation, gain, found, likeness, placed)
+
+
+def window_of(view: BenchView, window: Window) -> BenchView:
+    """The part of a view that a window (x, y, width, height) shows; ``matrix`` is still that of the whole picture."""
+    x, y, width, height = window
+    part = np.s_[y : y + height, x : x + width]
+    return replace(
+        view,
+        empty=view.empty[part],
+        known=view.known[part],
+        vessel=view.vessel[part] if view.vessel is not None else None,
+        reachable=view.reachable[part],
+        noise=view.noise[part],
+        placed=view.placed[part],
+    )
 
 
 def _moved(values: NDArray[Any], matrix: NDArray[np.float64], how: int, outside: int | None = None) -> NDArray[Any]:

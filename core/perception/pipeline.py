@@ -11,6 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core.bench.bench import Bench, reachable
+from core.bench.difference import combined, robot_by_difference
+from core.bench.registration import BenchView, register, window_of
 from core.config.models import PathConfig, PerceptionConfig
 from core.perception import compiled, quality, robot_path, segmentation, skeleton
 from core.perception.centerline import find as find_centerline
@@ -21,7 +24,7 @@ from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.pose import measure_pose
 from core.perception.quality import ConfidenceCalibration, confidence_features
 from core.perception.roi import Background, segment_roi
-from core.perception.segmentation import OrientationAverage, Segmenter, to_working
+from core.perception.segmentation import OrientationAverage, Segmenter, inner_area, to_working
 from core.perception.tip_refinement import MAX_PASSES, TipRefinement
 from core.perception.tracking import RouteMemory, StreamState, check_in_view, check_jump, recall, track
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
@@ -93,6 +96,16 @@ class _Structures:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _DrawnVessel:
+    """A bench's vessel with its skeleton and graph; ``mask`` is the view's own object, by which it is known again."""
+
+    mask: Mask
+    probability: NDArray[np.float32]
+    skeleton: Mask
+    graph: VesselGraph
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Located:
     """The robot's path, the piece of centerline beside its head, and the vectors of both."""
 
@@ -111,6 +124,8 @@ class _Run:
     scene: Scene
     watch: _Stopwatch
     state: StreamState | None = None
+    view: BenchView | None = None
+    drawn: _DrawnVessel | None = None
 
     def add(self, **found: object) -> None:
         self.scene = replace(self.scene, **found)  # type: ignore[arg-type]
@@ -123,6 +138,9 @@ class Pipeline:
     refused, and the state is filtered. ``perceive_single`` uses no other frames and leaves the stream's state unchanged; it may use
     another segmenter, `single`, which takes more time. With `roi`, a segmenter that can be given a part of a picture, most frames
     of a stream are segmented only around the robot's head, and the vessel is the average over full frames (``roi.py``).
+
+    With a `bench`, each full frame is registered against it: a vessel that was drawn takes the place of the segmented one, the
+    robot is what differs from the empty bench and what the network sees there, and a picture of another place is refused.
     """
 
     def __init__(
@@ -132,6 +150,7 @@ class Pipeline:
         *,
         single: CalibratedSegmenter | None = None,
         roi: CalibratedSegmenter | None = None,
+        bench: Bench | None = None,
     ) -> None:
         compiled.load()  # not with the first picture
         self._stream = stream if isinstance(stream, CalibratedSegmenter) else CalibratedSegmenter(stream)
@@ -140,6 +159,13 @@ class Pipeline:
         self._roi = roi if config.tracking.window_px else None
         self._config = config
         self._state = StreamState(config)
+        self._bench = bench
+        self._drawn: _DrawnVessel | None = None
+
+    @property
+    def bench(self) -> Bench | None:
+        """What is known of the bench."""
+        return self._bench
 
     @property
     def engine(self) -> str:
@@ -148,7 +174,7 @@ class Pipeline:
 
     def with_config(self, config: PerceptionConfig) -> Pipeline:
         """The same networks under other thresholds, at the start of a stream; ``config.segmentation`` is not read."""
-        return Pipeline(self._stream, config, single=self._single, roi=self._offered_roi)
+        return Pipeline(self._stream, config, single=self._single, roi=self._offered_roi, bench=self._bench)
 
     def follow_on(self, before: Pipeline) -> None:
         """Continue the stream that `before` perceives, under other thresholds; may be called while it does.
@@ -226,9 +252,40 @@ class Pipeline:
                 roi = state.roi.choose(image, frame.captured_s, state.refresh_s)
         scene = Scene(frame.index, frame.captured_s, (width, height), scale_xy[0 if width >= height else 1], scale_xy=scale_xy)
         run = _Run(image, target, scene, watch, state)
+        if refusal is None and self._bench is not None:
+            with watch.stage("bench"):
+                refusal = self._register(run, self._bench, is_full=roi is None)
         if refusal is None:
             refusal = self._run_stages(run, segmenter, roi)
         return replace(run.scene, refusal=refusal)
+
+    def _register(self, run: _Run, bench: Bench, *, is_full: bool) -> Refusal | None:
+        """Where the bench is in this picture. A window follows a full frame from which the picture has not changed."""
+        state = run.state
+        before = state.view if state is not None else None
+        if is_full or before is None:
+            found = register(run.image, bench, before)
+            if isinstance(found, Refusal):
+                return found
+            before = found
+            if state is not None:
+                state.view = found
+        run.view = before
+        if before.vessel is not None:
+            drawn = self._drawn
+            if drawn is None or drawn.mask is not before.vessel:
+                self._drawn = drawn = self._trace_drawn(before.vessel)
+            run.drawn = drawn
+            return quality.check_graph(drawn.graph, self._config.vectors)
+        return None
+
+    def _trace_drawn(self, mask: Mask) -> _DrawnVessel:
+        """Skeleton and graph of a drawn vessel (h, w), once for each place of the camera."""
+        config = self._config
+        probability = soft_edged(mask)
+        empty = Masks(mask, np.zeros_like(mask), probability, np.zeros_like(probability))
+        skeletons = skeleton.repair(skeleton.thin_masks(empty, config), config.gaps)
+        return _DrawnVessel(mask, probability, skeletons.vessel, build_graph(skeletons.vessel, mask, config.cleaning, probability))
 
     def _run_stages(self, run: _Run, segmenter: CalibratedSegmenter, roi: tuple[Background, Window] | None) -> Refusal | None:
         if roi is not None and self._roi is not None:
@@ -239,6 +296,8 @@ class Pipeline:
         state, novelty = run.state, run.scene.novelty
         refused_before = state is not None and state.is_unfamiliar
         unfamiliar = quality.check_kind(novelty, self._config.quality, refused_before=refused_before)
+        if run.view is not None:  # a picture of the bench is known, whatever it looks like
+            unfamiliar = None
         if state is not None and novelty is not None:  # a region of interest has no novelty
             state.is_unfamiliar = unfamiliar is not None
         if isinstance(structures, Refusal):
@@ -256,7 +315,7 @@ class Pipeline:
         """Masks, skeletons and vessel graph of the whole working image (h, w, 3)."""
         state = run.state
         average = None
-        if state is not None and self._roi is not None and not self._roi.all_orientations:
+        if state is not None and self._roi is not None and not self._roi.all_orientations and run.drawn is None:
             average = state.begin_full_frame()
         with run.watch.stage("network"):
             image = run.image if average is None else average.orient(run.image)
@@ -268,7 +327,15 @@ class Pipeline:
         with run.watch.stage("masks"):
             if average is not None and state is not None:
                 vessel = average.add(vessel, robot, state.roi.cells, state.roi.noise)
+            if run.drawn is not None:
+                vessel = run.drawn.probability
+        if run.view is not None:
+            with run.watch.stage("bench"):
+                robot = self._with_bench(run.view, run.image, robot, vessel)
+        with run.watch.stage("masks"):
             masks = segmentation.clean(vessel, robot, self._config)
+            if run.drawn is not None:
+                masks = replace(masks, vessel=run.drawn.mask)
             if state is not None:
                 masks = replace(masks, robot=state.artefacts.remove(masks.robot, run.image, run.scene.captured_s))
             known = segmenter.known
@@ -277,12 +344,27 @@ class Pipeline:
                 run.add(novelty=known.novelty(signature) if signature is not None else None)
         return self._trace(run, masks)
 
+    def _with_bench(
+        self, view: BenchView, image: Image, robot: NDArray[np.float32], vessel: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """The robot's probability (h, w) of the network and of the difference to the empty bench."""
+        if view.vessel is None:  # where it was not drawn, the robot lies in the vessel that the network sees
+            view = replace(view, reachable=reachable(vessel >= self._config.segmentation.vessel_threshold))
+        return combined(robot, robot_by_difference(image, view), view)
+
     def _trace(self, run: _Run, masks: Masks) -> _Structures | Refusal:
-        """Skeletons and vessel graph of masks."""
-        config = self._config
+        """Skeletons and vessel graph of masks; those of a drawn vessel are known."""
+        config, drawn = self._config, run.drawn
         run.add(masks=masks)
         if (refusal := quality.check_masks(masks)) is not None:
             return refusal
+        if drawn is not None:
+            with run.watch.stage("skeletons"):
+                skeletons = Skeletons(vessel=drawn.skeleton, robot=skeleton.thin_robot(masks.robot, config))
+            with run.watch.stage("gaps"):
+                skeletons = skeleton.repair(skeletons, config.gaps)
+            run.add(skeletons=skeletons, vessel_graph=drawn.graph)
+            return _Structures(masks, skeletons, drawn.graph)
         with run.watch.stage("skeletons"):
             skeletons = skeleton.thin_masks(masks, config)
         with run.watch.stage("gaps"):
@@ -302,6 +384,16 @@ class Pipeline:
         run.add(window=window)
         with run.watch.stage("network"):
             robot_probability = segment_roi(self._roi.segment, run.image, window, background)
+        if run.view is not None:
+            with run.watch.stage("bench"):
+                x, y, width, height = window
+                rows, columns = inner_area(window, (run.image.shape[1], run.image.shape[0]))
+                part = np.s_[y : y + height, x : x + width]
+                inner = np.s_[rows.start - y : rows.stop - y, columns.start - x : columns.stop - x]
+                seen = self._with_bench(
+                    window_of(run.view, window), run.image[part], robot_probability[part], background.vessel_probability[part]
+                )
+                robot_probability[rows, columns] = seen[inner]
         if (broken := quality.check_finite(robot_probability)) is not None:
             return self._refuse_output(run, background.vessel_probability, robot_probability, broken)
         with run.watch.stage("masks"):
@@ -379,8 +471,7 @@ class Pipeline:
         if segmenter.sensitivity:
             with run.watch.stage("sensitivity"):
                 others = [
-                    self._answer_to(segmentation.clean(*shifted, config), run, before)
-                    for shifted in quality.shifted_probabilities(believed)
+                    self._answer_to(self._cleaned(shifted, run), run, before) for shifted in quality.shifted_probabilities(believed)
                 ]
                 theta, head = quality.threshold_sensitivity((path.head, pose.theta_signed_deg), others)
                 features = replace(features, theta_swing=theta, head_swing=head)
@@ -394,16 +485,30 @@ class Pipeline:
             run.add(pose=replace(pose, confidence=confidence))
         return refusal
 
+    def _cleaned(self, probabilities: tuple[NDArray[np.float32], NDArray[np.float32]], run: _Run) -> Masks:
+        masks = segmentation.clean(*probabilities, self._config)
+        if run.drawn is None:
+            return masks
+        return replace(masks, vessel=run.drawn.mask, vessel_probability=run.drawn.probability)
+
     def _answer_to(self, masks: Masks, run: _Run, before: PreviousPath) -> quality.Answer | None:
         """Head and signed theta of the same frame with other masks; None for a refusal."""
         scene = run.scene
         bare = Scene(scene.frame_index, scene.captured_s, scene.source_size, scene.scale, scale_xy=scene.scale_xy)
-        other = _Run(run.image, run.target, bare, _Stopwatch())
+        other = _Run(run.image, run.target, bare, _Stopwatch(), drawn=run.drawn)
         structures = self._trace(other, masks)
         located = structures if isinstance(structures, Refusal) else self._locate(other, structures, before, None)
         if isinstance(located, Refusal):
             return None
         return located.path.head, measure_pose(located.robot, located.vessel, self._config.pose).theta_signed_deg
+
+
+def soft_edged(mask: Mask) -> NDArray[np.float32]:
+    """A drawn mask (h, w) as a probability: 0.5 on its edge, and soft over a pixel or two."""
+    whole = np.ascontiguousarray(mask).view(np.uint8)
+    inside, outside = (cv2.distanceTransform(one, cv2.DIST_L2, 5) for one in (whole, 1 - whole))
+    depth = np.maximum(inside - 0.5, 0.0) - np.maximum(outside - 0.5, 0.0)
+    return np.asarray(1.0 / (1.0 + np.exp(-2.0 * np.clip(depth, -20.0, 20.0))), np.float32)
 
 
 def _without_artefacts(masks: Masks, removed: Mask | None) -> Masks:
@@ -426,12 +531,12 @@ def _port(config: PathConfig, image: Image) -> Point | None:
     return config.port_x_share * (width - 1), config.port_y_share * (height - 1)
 
 
-def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False) -> Pipeline:
+def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False, bench: Bench | None = None) -> Pipeline:
     """Load the configured model and build the pipeline around it; raises ModelError. `recalibrating`: see ``open_calibrated``."""
     plain, averaged = open_calibrated(config, recalibrating=recalibrating)
     stream = averaged if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else averaged
-    return Pipeline(stream, config, single=single, roi=stream)
+    return Pipeline(stream, config, single=single, roi=stream, bench=bench)
 
 
 def open_calibrated(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[CalibratedSegmenter, CalibratedSegmenter]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core import geometry
+from core.bench.registration import BenchView
 from core.config.models import PerceptionConfig, TrackingConfig
 from core.messages import message
 from core.perception.head_tail import ALONG_STEP_PX, STILL_HEAD_PX, PreviousPath, goes_along_px, may_go_on_outside
@@ -470,6 +471,8 @@ class StreamState:
         self.roi = RoiSelector(config.tracking)
         self.vessel_average = VesselAverage()
         self.pose_filter = StateFilter(config.pose)
+        self.view: BenchView | None = None
+        """Where the bench was in the last full frame."""
         self.is_unfamiliar = False
         """Whether the last full frame was of a kind that the model does not know."""
 
