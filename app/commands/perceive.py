@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,9 +18,11 @@ import typer
 from app.commands.options import ConfigOption, ModelOption, PresetOption
 from app.commands.progress import LineOutput, check_apart, check_no_input, is_same, make_folder, progress_bar
 from app.ui.display import check_qt
+from core.bench.bench import Bench, bench_from_pictures, read_bench
 from core.config.models import choose_model, load_config
 from core.control.policies import table_policy
 from core.devices import UserError
+from core.files import ImageError, read_image
 from core.learning.dataset import write_mask, write_png
 from core.session.codec import scene_to_json, unread_to_json
 from core.types import Frame, Image, Point, Scene
@@ -42,11 +45,17 @@ def perceive(
     model: ModelOption = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
+    empty: Annotated[
+        list[Path] | None, typer.Option(metavar="<picture>", help="the same bench without the robot; may be given more than once")
+    ] = None,
+    vessel: Annotated[Path | None, typer.Option(metavar="<mask>", help="the vessel of that bench, white on black")] = None,
+    bench: Annotated[Path | None, typer.Option(metavar="<folder>", help="the bench as it was saved, instead of --empty")] = None,
 ) -> None:
     """Vessel, robot, angle, distances and pose state of pictures or a video."""
     from core.perception.pipeline import open_pipeline
 
     settings = load_config(config, preset, choose_model(model))
+    known = _read_bench(bench, empty or [], vessel, settings.perception.working_size_px)
     points = _Targets(_read_targets(targets))
     files = expand(images)
     if not files:
@@ -55,7 +64,7 @@ def perceive(
         check_qt("leave --overlay out")
     lines_to = None if jsonl == "-" else Path(jsonl)  # ./- is a file
     if lines_to is not None:
-        read = (path for path in (*files, targets, config) if path is not None)
+        read = (path for path in (*files, *(empty or ()), targets, config, vessel) if path is not None)
         check_no_input(lines_to, read, "--jsonl")
     for folder, option, endings in ((masks, "--masks", _MASK_ENDINGS), (overlay, "--overlay", _OVERLAY_ENDINGS)):
         if folder is not None:
@@ -64,7 +73,9 @@ def perceive(
             if lines_to is not None and is_written(lines_to.name):
                 check_apart(lines_to, [folder / lines_to.name], "--jsonl", option)
             make_folder(folder)
-    pipeline = open_pipeline(settings.perception)
+    pipeline = open_pipeline(settings.perception, bench=known)
+    if known is not None and empty:
+        _check_empty(pipeline, known, files, settings.perception.working_size_px)
     done, report = 0, _Report()
     with LineOutput(lines_to) as lines, progress_bar() as bar:
         task = bar.add_task("pictures", total=None if any(is_video(f) for f in files) else len(files))
@@ -89,6 +100,41 @@ def perceive(
                 report.problems.append(f"{error.filename or picture.stem}: cannot be written ({error.strerror or error})")
             bar.advance(task)
     report.print(done, [stem for stem in points if stem not in points.used])
+
+
+def _read_bench(folder: Path | None, empty: list[Path], vessel: Path | None, working_size_px: int) -> Bench | None:
+    """The bench of the options; None without one. Raises UserError."""
+    if folder is not None:
+        if empty or vessel is not None:
+            raise UserError("--bench already has empty picture and vessel: leave --empty and --vessel out")
+        return read_bench(folder)
+    if not empty:
+        if vessel is not None:
+            raise UserError("--vessel needs --empty: a picture of the same bench without the robot")
+        return None
+    drawn = read_image(vessel).max(axis=2) > _WHITE if vessel is not None else None
+    return bench_from_pictures([read_image(path) for path in empty], drawn, empty[0].stem, working_size_px)
+
+
+_WHITE = 127
+"""Grey level above which a mask is set."""
+_CHECKED = 5
+"""Pictures that an empty one is compared with."""
+
+
+def _check_empty(pipeline: Pipeline, bench: Bench, files: list[Path], working_size_px: int) -> None:
+    """Raise BenchError where the robot lies in the empty picture."""
+    from core.bench.difference import check_without_robot
+    from core.perception.segmentation import to_working
+
+    stills = [file for file in files if not is_video(file)]
+    frames = []
+    for file in stills[:: max(1, len(stills) // _CHECKED)][:_CHECKED]:
+        with suppress(ImageError):  # reported when it is perceived
+            frames.append(to_working(read_image(file), working_size_px)[0])
+    masks = pipeline.with_bench(None).perceive_single(Frame(0, 0.0, bench.empty)).masks
+    if masks is not None and frames:
+        check_without_robot(bench, masks.robot_probability, frames)
 
 
 def _hint_inner(paths: list[Path]) -> str:

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
+from core.bench.bench import BenchError
 from core.config.models import Config, PerceptionConfig
 from core.config.rig_file import as_calibrated
 from core.control.engine import Engine, Perceive
@@ -104,17 +105,17 @@ class EngineMaker:
             ahead.end()
 
     def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
-        if isinstance(self._perceive, Pipeline) and self._loaded is not None and _same_network(self._loaded, config):
-            self._perceive = self._perceive.with_config(config)
-            self._loaded = config
-        elif self._perceive is None or self._loaded != config:
-            try:
+        try:
+            if isinstance(self._perceive, Pipeline) and self._loaded is not None and _same_network(self._loaded, config):
+                self._perceive = self._perceive.with_config(config)
+                self._loaded = config
+            elif self._perceive is None or self._loaded != config:
                 self._perceive = open_pipeline(config)
                 self._perceive.warm_up()
                 self._loaded = config
-            except ModelError as error:
-                # Not kept: once the model is restored, starting the rig again is enough.
-                return NoPerception(str(error)), ModelReport(False, str(error))
+        except (ModelError, BenchError) as error:
+            # Not kept: once the model or the bench is restored, starting the rig again is enough.
+            return NoPerception(str(error)), ModelReport(False, str(error))
         assert self._perceive is not None
         return self._perceive, ModelReport(True)
 
@@ -147,4 +148,5 @@ def quick_sight(config: Config) -> Perceive:
     """Perception of single frames as the calibration wants it: quickly, with a core left for servos and camera."""
     perception = leaving_a_core(config.perception)
     plain = perception.segmentation.model_copy(update={"mirrored": "never"})
-    return open_pipeline(perception.model_copy(update={"segmentation": plain})).perceive_single
+    # the camera may have been moved for the calibration: no bench
+    return open_pipeline(perception.model_copy(update={"segmentation": plain, "bench": None})).perceive_single

@@ -158,6 +158,8 @@ def bench_from_pictures(
             empty = np.where((unlike & ~glare[0])[:, :, None], base, empty)
             empty = np.where((glare[0] & ~glare[1])[:, :, None], other, empty)
     drawn = _drawn_vessel(vessel, base.shape[:2])
+    if drawn is not None and len(images) > 1 and any(_is_robot(_differs(one, base, noise), drawn) for one in others):
+        raise BenchError("the empty pictures differ along the vessel: take them without the robot")
     return _bench(name, empty, noise, known, drawn)
 
 
@@ -317,6 +319,19 @@ def _differs(one: NDArray[np.floating] | Image, other: NDArray[np.floating] | Im
     size = np.abs(apart - cv2.blur(apart, (81, 81))).max(axis=2)
     seeds = size > np.maximum(_DIFFERENT_SIGMAS * noise / 7.0, _DIFFERENT_LEVELS)  # a Gaussian of 2 px averages 50 pixels
     return np.asarray(cv2.dilate(seeds.view(np.uint8), np.ones((9, 9), np.uint8)) > 0)
+
+
+def _is_robot(unlike: Mask, vessel: Mask) -> bool:
+    """Whether two pictures differ by something long that lies in the vessel."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(unlike.view(np.uint8), connectivity=8)
+    inside = np.bincount(labels[vessel], minlength=len(stats))
+    longest = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+    robots = (longest > _ROBOT_SHARE * vessel.shape[1]) & (inside > _INSIDE_SHARE * stats[:, cv2.CC_STAT_AREA])
+    return bool(robots[1:].any())
+
+
+_ROBOT_SHARE, _INSIDE_SHARE = 0.12, 0.5
+"""Least length of a robot, of the picture's width, and least share of its area, widened, in the vessel."""
 
 
 def _mean_without_glare(pictures: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.bench.registration import BenchView
+from core.bench.bench import Bench, BenchError
+from core.bench.registration import BenchView, register
 from core.perception.segmentation import Probability
 from core.types import Image, Mask
 
@@ -117,6 +119,30 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     rim = cv2.dilate(mask.view(np.uint8), _disc(_RIM_PX)) > 0
     doubtful = (distance > np.where(view.reachable, low, high)) & ~rim | ~view.known
     return Difference(probability.astype(np.float32), doubtful)
+
+
+def check_without_robot(bench: Bench, robot: Probability, frames: Sequence[Image]) -> None:
+    """Raise BenchError where a robot lay in the empty picture.
+
+    Parameters
+    ----------
+    robot : the network's robot probability (h, w) of ``bench.empty``, which may be wrong.
+    frames : RGB (h, w, 3) at working size. A robot that lay in the empty picture has moved since in most of them.
+    """
+    seen = (robot >= np.float32(0.5)) & bench.known
+    if np.count_nonzero(seen) < _LEAST_ROBOT_PX:
+        return
+    moved = []
+    for frame in frames:
+        if isinstance(view := register(frame, bench), BenchView):
+            differs = robot_by_difference(frame, view).probability >= np.float32(0.5)
+            moved.append(float(np.mean(differs[seen])))
+    if moved and float(np.median(moved)) > _MOVED_SHARE:
+        raise BenchError("the robot lies in the empty picture: take another without it")
+
+
+_LEAST_ROBOT_PX, _MOVED_SHARE = 400, 0.5
+"""Least area of what the network takes for a robot, and the share of it that has changed when it was one."""
 
 
 def combined(network: Probability, difference: Difference, view: BenchView) -> Probability:

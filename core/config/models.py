@@ -336,6 +336,7 @@ class PerceptionConfig(ConfigSection):
     pose: PoseConfig = PoseConfig()
     quality: QualityConfig = QualityConfig()
     tracking: TrackingConfig = TrackingConfig()
+    bench: str | None = Field(None, min_length=1, description="folder of the bench that the camera sees; empty: not known")
 
 
 class AdviceConfig(ConfigSection):

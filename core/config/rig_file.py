@@ -52,6 +52,7 @@ class RigFile(ConfigSection):
     twin: TwinConfig | None = None
     servos: ServosConfig = ServosConfig()
     calibration: CalibrationConfig | None = None
+    bench: str | None = Field(None, min_length=1, description="folder of the bench, from the rig file's own folder")
 
     @model_validator(mode="after")
     def _check_parts(self) -> Self:
@@ -262,14 +263,21 @@ def read_again(running: Config, settings: Config) -> Config:
     return with_rig(running, rig, path)
 
 
+def _rig_in_use(config: Config) -> tuple[Path, RigFile] | None:
+    """The rig file of the configured rig; None without one, and for recordings. Raises RigFileError."""
+    if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
+        return None
+    path = Path(config.rig.file)
+    return path, read_rig(path)
+
+
 def calibration_of(config: Config) -> CalibrationConfig | None:
     """The calibration of the configured rig; None without a rig file, and for recordings, whose pictures are undistorted already.
 
     Raises RigFileError.
     """
-    if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
-        return None
-    return read_rig(Path(config.rig.file)).calibration
+    found = _rig_in_use(config)
+    return found[1].calibration if found is not None else None
 
 
 def scaled(config: Config, known: CalibrationConfig | None) -> Config:
@@ -285,14 +293,24 @@ def scaled(config: Config, known: CalibrationConfig | None) -> Config:
 
 
 def as_calibrated(config: Config) -> Config:
-    """The configuration with scale and insertion port of its rig file. Raises RigFileError."""
-    known = calibration_of(config)
+    """The configuration with scale, insertion port and bench of its rig file. Raises RigFileError."""
+    found = _rig_in_use(config)
+    known = found[1].calibration if found is not None else None
     config = scaled(config, known)
+    if found is not None and found[1].bench is not None:
+        bench = str(found[0].parent / found[1].bench)  # an absolute one stays
+        config = config.model_copy(update={"perception": config.perception.model_copy(update={"bench": bench})})
     if known is None or known.port is None:
         return config
     place = {"port_x_share": known.port.x_share, "port_y_share": known.port.y_share}
     path = config.perception.path.model_copy(update=place)
     return config.model_copy(update={"perception": config.perception.model_copy(update={"path": path})})
+
+
+def set_bench(path: Path, folder: Path | None) -> None:
+    """Name the bench's folder in a rig file; None: not known. Raises RigFileError."""
+    bench = str(folder.absolute()) if folder is not None else None
+    write_rig(read_rig(path).model_copy(update={"bench": bench}), path, keeps_older=False)
 
 
 def set_port(path: Path, port: PortConfig | None) -> None:

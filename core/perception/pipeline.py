@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from time import perf_counter
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.bench.bench import Bench, reachable
+from core.bench.bench import Bench, BenchError, reachable, read_bench
 from core.bench.difference import combined, robot_by_difference
 from core.bench.registration import BenchView, register, window_of
 from core.config.models import PathConfig, PerceptionConfig
+from core.messages import message
 from core.perception import compiled, quality, robot_path, segmentation, skeleton
 from core.perception.centerline import find as find_centerline
 from core.perception.centerline import route_or_reason
@@ -173,8 +175,16 @@ class Pipeline:
         return self._stream.segment.engine
 
     def with_config(self, config: PerceptionConfig) -> Pipeline:
-        """The same networks under other thresholds, at the start of a stream; ``config.segmentation`` is not read."""
-        return Pipeline(self._stream, config, single=self._single, roi=self._offered_roi, bench=self._bench)
+        """The same networks under other thresholds, at the start of a stream; ``config.segmentation`` is not read.
+
+        Raises BenchError for another bench that cannot be read.
+        """
+        bench = self._bench if config.bench == self._config.bench else _bench_of(config)
+        return Pipeline(self._stream, config, single=self._single, roi=self._offered_roi, bench=bench)
+
+    def with_bench(self, bench: Bench | None) -> Pipeline:
+        """The same networks with another bench, at the start of a stream."""
+        return Pipeline(self._stream, self._config, single=self._single, roi=self._offered_roi, bench=bench)
 
     def follow_on(self, before: Pipeline) -> None:
         """Continue the stream that `before` perceives, under other thresholds; may be called while it does.
@@ -532,11 +542,33 @@ def _port(config: PathConfig, image: Image) -> Point | None:
 
 
 def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False, bench: Bench | None = None) -> Pipeline:
-    """Load the configured model and build the pipeline around it; raises ModelError. `recalibrating`: see ``open_calibrated``."""
+    """Load the configured model, and the configured bench unless another is given, and build the pipeline around them.
+
+    Raises ModelError and BenchError. `recalibrating`: see ``open_calibrated``.
+    """
+    if bench is None:
+        bench = _bench_of(config)
     plain, averaged = open_calibrated(config, recalibrating=recalibrating)
     stream = averaged if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else averaged
     return Pipeline(stream, config, single=single, roi=stream, bench=bench)
+
+
+def _bench_of(config: PerceptionConfig) -> Bench | None:
+    """The configured bench; raises BenchError."""
+    if config.bench is None:
+        return None
+    bench = read_bench(Path(config.bench))
+    if max(bench.size) != config.working_size_px:
+        raise BenchError(
+            message(
+                "{path}: was made for a working size of {a} px, and {b} px are set; make the bench again",
+                path=config.bench,
+                a=max(bench.size),
+                b=config.working_size_px,
+            )
+        )
+    return bench
 
 
 def open_calibrated(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[CalibratedSegmenter, CalibratedSegmenter]:

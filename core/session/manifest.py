@@ -19,6 +19,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from core.bench.bench import BenchError, bench_sha256, read_bench
 from core.config.calibration import CalibrationConfig
 from core.config.models import Config
 from core.config.rig_file import RigFileError, calibration_of
@@ -53,13 +54,14 @@ class NewerVersion(SessionError):
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """Where the pictures come from. ``calibration`` is the rig's (None: not calibrated)."""
+    """Where the pictures come from. ``calibration`` is the rig's (None: not calibrated), ``bench`` its bench's name and hash."""
 
     kind: Kind
     rig: str
     config: dict[str, Any] = field(default_factory=dict)
     model: dict[str, str | None] = field(default_factory=dict)
     calibration: dict[str, Any] | None = None
+    bench: dict[str, str] | None = None
 
 
 class Counts(BaseModel):
@@ -106,6 +108,7 @@ class Manifest(BaseModel):
     model: dict[str, str | None] = {}
     versions: dict[str, str] = {}
     calibration: dict[str, Any] | None = None
+    bench: dict[str, str] | None = None
     config: dict[str, Any] = {}
     closed: bool = False
     ended_utc: datetime | None = None
@@ -137,7 +140,17 @@ def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] 
         with contextlib.suppress(RigFileError):  # reported when the rig is opened
             known = calibration_of(config)
             calibration = known.model_dump(mode="json") if known is not None else None
-    return About(kind, rig, config.model_dump(mode="json"), model, calibration)
+    return About(kind, rig, config.model_dump(mode="json"), model, calibration, _about_bench(config.perception.bench))
+
+
+def _about_bench(folder: str | None) -> dict[str, str] | None:
+    """Name and hash of the bench in a folder, or what is wrong with it; None without one."""
+    if folder is None:
+        return None
+    try:
+        return {"name": read_bench(Path(folder)).name, "sha256": bench_sha256(Path(folder))}
+    except BenchError as error:
+        return {"problem": str(error)}
 
 
 def package_versions() -> dict[str, str]:
@@ -163,6 +176,7 @@ def new_manifest(about: About, session_id: str, started: datetime, monotonic_s: 
         model=about.model,
         versions=package_versions(),
         calibration=about.calibration,
+        bench=about.bench,
         config=about.config,
     )
 
