@@ -19,7 +19,7 @@ from tests.core.session_data import record, tick_of
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
-    "gui", "perceive", "synth", "train", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
+    "gui", "perceive", "synth", "train", "teach", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
     "play", "doctor", "session", "rig",
 )  # fmt: skip
 INNER = {"session": ("info", "recover", "export"), "rig": ("list", "show", "calibrate", "board")}
