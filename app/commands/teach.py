@@ -142,7 +142,9 @@ def _check_places(source: Path, out: Path, folder: Path, init: str) -> None:
 
 def _frames_of(source: Path, folder: Path, empty: Sequence[Path], vessel: Path | None, count: int, init: str) -> TeachingSet:
     """The set of frames: made from the pictures, or made before and perhaps corrected."""
+    from core.config.models import PerceptionConfig, SegmentationConfig
     from core.learning import teaching
+    from core.perception.pipeline import open_calibrated
 
     if teaching.is_teaching_set(source):
         if empty or vessel is not None:
@@ -150,9 +152,11 @@ def _frames_of(source: Path, folder: Path, empty: Sequence[Path], vessel: Path |
         return teaching.read_teaching_set(source)
     name = source.resolve().name
     bench = _bench_of(empty, vessel, name, init) if empty else _bench_without_picture(source, vessel, name, init)
+    segment = open_calibrated(PerceptionConfig(segmentation=SegmentationConfig(model=init)))[0].segment
     with progress_bar() as bar:
         pictures, seen = _pick(source, bench, count, bar)
-        proposed = [teaching.propose(picture, bench) for picture in bar.track(pictures, description="masks by difference")]
+        tracked = bar.track(pictures, description="masks by difference")
+        proposed = [teaching.propose(picture, bench, segment) for picture in tracked]
     checked = teaching.check(proposed, bench, has_pictures=bool(empty))
     chosen = teaching.choose(checked, count)
     return teaching.write_teaching_set(folder, bench, chosen, [frame for frame in checked if frame.reason], seen)

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from core.bench.bench import Bench, read_bench, write_bench
-from core.bench.difference import robot_by_difference
-from core.bench.registration import register
+from core.bench.difference import distance_to_empty, robot_by_difference
+from core.bench.registration import BenchView, register
 from core.config.section import first_problem
 from core.devices import UserError
 from core.files import write_atomic
 from core.learning.dataset import IMAGE_ENDINGS, DatasetError, Sample, sample_at, write_mask, write_png
 from core.messages import message
+from core.perception.segmentation import Segmenter
 from core.types import Image, Mask, Refusal
 
 FEWEST = 8
@@ -49,6 +50,12 @@ MOST_COMPONENTS, LARGEST_SHARE = 4, 0.6
 """A robot's mask has no more components, and the largest one has this share of its area."""
 LEAST_INSIDE, INSIDE_MARGIN_PX = 0.6, 4
 """Share of a robot's mask that lies in the vessel, widened by the margin."""
+_SPECK_SHARE = 0.05
+"""A component of the robot's mask with a smaller share of its area is left out."""
+_COMPLETED_PX = 6
+"""So far beside the robot by difference a network completes it."""
+_LEAST_DIFFERENCE, _DIFFERENCE_SIGMAS = 4.0, 2.0
+"""There it must differ by so many grey levels of Lab, and deviations of the noise, at least."""
 _CELL_PX, _KNOWN_SHARE = 40, 0.5
 """Side of a cell in which structure is compared, and the share of it that must be known."""
 _STRONG_SHARE, _LEAST_STRUCTURE = 0.9, 0.009
@@ -216,8 +223,11 @@ def farthest(robots: Sequence[NDArray[np.float32]], count: int) -> list[int]:
     return chosen
 
 
-def propose(picture: TeachingPicture, bench: Bench) -> TeachingFrame:
-    """A frame with masks by difference; one that is of another bench, is blurred, shows a hand or no robot is rejected."""
+def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = None) -> TeachingFrame:
+    """A frame with masks by difference; one that is of another bench, is blurred, shows a hand or no robot is rejected.
+
+    `segment`: a network that completes what differs little, such as a grey robot on grey.
+    """
     shape = picture.image.shape[:2]
     blank = np.zeros(shape, bool)
     view = register(picture.image, bench)
@@ -226,6 +236,10 @@ def propose(picture: TeachingPicture, bench: Bench) -> TeachingFrame:
     difference = robot_by_difference(picture.image, view)
     vessel = view.vessel if view.vessel is not None else blank
     robot, doubtful = difference.probability >= np.float32(0.5), difference.doubtful
+    if segment is not None:
+        robot = completed(robot, segment(picture.image)[1] >= np.float32(0.5), picture.image, view)
+    specks = _specks(robot)
+    robot, doubtful = robot & ~specks, doubtful | _widened(specks, 2)
     focus, hidden = structure_of(picture.image, view.placed, view.known)
     frame = TeachingFrame(picture, vessel, robot, doubtful, focus, hidden)
     if focus < _LEAST_FOCUS:
@@ -235,6 +249,25 @@ def propose(picture: TeachingPicture, bench: Bench) -> TeachingFrame:
     if robot.sum() < _LEAST_AREA_PX:
         return replace(frame, reason="no robot: nothing in the vessel differs from the empty bench")
     return frame
+
+
+def completed(robot: Mask, found: Mask, image: Image, view: BenchView) -> Mask:
+    """The `robot` by difference, with what a network `found` beside it and what differs a little, all (h, w)."""
+    distance = distance_to_empty(image, view)
+    usual = distance[view.reachable & view.known]
+    noise = 1.4826 * float(np.median(usual)) if usual.size else 0.0
+    beside = found & _widened(robot, _COMPLETED_PX) & (distance > max(_LEAST_DIFFERENCE, _DIFFERENCE_SIGMAS * noise))
+    core = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+    return np.asarray(cv2.morphologyEx((robot | beside).view(np.uint8), cv2.MORPH_OPEN, core) > 0)
+
+
+def _specks(robot: Mask) -> Mask:
+    """Components that are a small share of the mask (h, w): dust, glare, or a piece of robot; nothing is learnt from them."""
+    count, labels, statistics, _ = cv2.connectedComponentsWithStats(robot.view(np.uint8), connectivity=8)
+    areas = statistics[:, cv2.CC_STAT_AREA]
+    small = areas < _SPECK_SHARE * max(1, int(robot.sum()))
+    small[0] = False
+    return np.asarray(small[labels]) if count > 1 else np.zeros_like(robot)
 
 
 def structure_of(image: Image, empty: Image, known: Mask) -> tuple[float, float]:

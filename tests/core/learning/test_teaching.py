@@ -30,7 +30,8 @@ from core.learning.teaching import (
     read_teaching_set,
     write_teaching_set,
 )
-from core.types import Image
+from core.perception.segmentation import Probability, Segmenter
+from core.types import Image, Mask
 from tests.core.learning.toy_bench import SIZE, toy_picture, toy_robot, toy_stream, toy_vessel
 
 
@@ -233,3 +234,39 @@ def test_a_full_disk_is_one_line(
     with pytest.raises(TeachingError, match=r"\.png: cannot be written \(No space left on device\); make room") as raised:
         write_teaching_set(tmp_path / "set", bench, choose(frames, 8), [], 16)
     assert len(str(raised.value).splitlines()) == 1
+
+
+class _Sees(Segmenter):
+    """Finds what it is told, wherever."""
+
+    def __init__(self, robot: Mask) -> None:
+        self._robot = robot.astype(np.float32)
+
+    def __call__(self, image: Image) -> tuple[Probability, Probability]:
+        return np.zeros_like(self._robot), self._robot
+
+
+def test_a_network_completes_what_differs_little_beside_the_robot_and_nothing_else(bench: Bench) -> None:
+    body, shadow = toy_robot(0, 0.8), np.roll(toy_robot(0, 0.8), 7, axis=0)
+    image = toy_picture(body, seed=3).astype(np.float32)
+    image[shadow & ~body] += 8.0  # the paler half of a robot
+    picture = TeachingPicture("pale", "pale", np.clip(image, 0, 255).astype(np.uint8))
+    whole = body | shadow
+    elsewhere = toy_robot(1, 0.95) & ~_around(whole)
+    alone = propose(picture, bench)
+    together = propose(picture, bench, _Sees(whole | elsewhere))
+    assert dice(together.robot, whole) > dice(alone.robot, whole) + 0.05
+    assert not (together.robot & elsewhere).any(), "a network alone makes no robot"
+
+
+def _around(mask: Mask) -> Mask:
+    return np.asarray(cv2.dilate(mask.view(np.uint8), np.ones((25, 25), np.uint8)) > 0)
+
+
+def test_specks_are_left_out_and_not_trained_on(bench: Bench, frames: list[TeachingFrame]) -> None:
+    image = frames[6].picture.image.copy()
+    branch = np.argwhere(toy_robot(1, 0.95))[-200][::-1]
+    cv2.circle(image, (int(branch[0]), int(branch[1])), 3, (20, 20, 20), -1)
+    frame = propose(replace(frames[6].picture, image=image), bench)
+    assert not frame.robot[branch[1], branch[0]]
+    assert dice(frame.robot, frames[6].robot) > 0.98
