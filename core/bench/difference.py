@@ -49,11 +49,12 @@ class Difference:
     """What differs from the empty bench.
 
     ``probability``: of the robot, float32 (h, w). ``doubtful``: bool (h, w), places that count neither as robot nor as background
-    when a network is trained.
+    when a network is trained. ``glare``: bool (h, w), around a lamp's reflection, where a difference says nothing.
     """
 
     probability: NDArray[np.float32]
     doubtful: Mask
+    glare: Mask
 
 
 def distance_to_empty(image: Image, view: BenchView) -> NDArray[np.float32]:
@@ -83,42 +84,95 @@ def _light(apart: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def robot_by_difference(image: Image, view: BenchView) -> Difference:
     """The robot in `image` (h, w, 3), a picture at working size that was registered as `view`."""
-    allowed = view.reachable & view.known
+    probability, doubtful = np.zeros(image.shape[:2], np.float32), ~view.known
+    x, y, width, height = cv2.boundingRect(view.reachable.view(np.uint8))
+    if not width:
+        return Difference(probability, doubtful, np.zeros_like(doubtful))
     distance = distance_to_empty(image, view)
-    inside = distance[allowed]
+    glare = _glare(image)
+    box = np.s_[y : y + height, x : x + width]
+    allowed = view.reachable[box] & view.known[box] & ~glare[box]
+    inside = distance[box][allowed]
     noise = 1.4826 * float(np.median(inside)) if inside.size else 0.0
     high, low = max(_LEAST_HIGH, _HIGH_SIGMAS * noise), max(_LEAST_LOW, _LOW_SIGMAS * noise)
-    strong = np.where(allowed, distance, np.float32(0.0))
+    strong = np.where(allowed, distance[box], np.float32(0.0))
     contrast = cv2.blur(cv2.dilate(strong, _disc(_CONTRAST_PX)), (5, 5))
-    cut = np.maximum(_EDGE_SHARE * contrast, low)
-    candidate = (strong > cut).view(np.uint8)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(candidate, connectivity=8)
-    peaks = np.zeros(count, np.float32)
-    np.maximum.at(peaks, labels[candidate > 0], strong[candidate > 0])
-    sure = np.zeros(count, np.bool_)
-    strong_enough = peaks >= high
-    for label in np.flatnonzero(strong_enough & (stats[:, cv2.CC_STAT_AREA] >= _LEAST_AREA_PX)):
-        if label == 0:
-            continue
-        x, y, w, h, area = stats[label].tolist()
-        part = np.pad((labels[y : y + h, x : x + w] == label).view(np.uint8), 1)
-        width = 2.0 * float(cv2.distanceTransform(part, cv2.DIST_L2, 3).max())
-        sure[label] = area >= _LEAST_ELONGATION * width**2
-    keep = sure.copy()
-    if sure.any():
-        # short parts of a robot that something covers lie near a long one, and are as clear
-        near = cv2.dilate(sure[labels].view(np.uint8), _disc(2 * _GAP_PX + 1)) > 0
-        clear = _CLEAR_SHARE * float(np.median(peaks[sure]))
-        for label in np.unique(labels[near]).tolist():
-            keep[label] |= label > 0 and peaks[label] >= max(high, clear) and stats[label, cv2.CC_STAT_AREA] >= _LEAST_AREA_PX // 2
-    found = keep[labels]
-    probability = np.clip(0.5 + (strong - cut) / (2.0 * cut), 0.0, 1.0)
-    mask = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0
+    cut = np.maximum(_EDGE_SHARE * contrast, np.float32(low))
+    mask = _robot_parts(strong, strong > cut, high)
+    mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0
+    values = np.clip(0.5 + (strong - cut) / (2.0 * cut), 0.0, 1.0)
     around = cv2.dilate(mask.view(np.uint8), _disc(5)) > 0
-    probability = np.where(mask, np.maximum(probability, 0.6), np.where(around, np.minimum(probability, 0.49), 0.0))
-    rim = cv2.dilate(mask.view(np.uint8), _disc(_RIM_PX)) > 0
-    doubtful = (distance > np.where(view.reachable, low, high)) & ~rim | ~view.known
-    return Difference(probability.astype(np.float32), doubtful)
+    probability[box] = np.where(mask, np.maximum(values, 0.6), np.where(around, np.minimum(values, 0.49), 0.0))
+    if view.window is None:
+        _continue_to_border(probability, view.reachable)
+    rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
+    doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | glare
+    return Difference(probability, doubtful, glare)
+
+
+def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> Mask:
+    """Of what differs (h, w), the long parts that are clear somewhere, and the short ones near them that are as clear."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(candidate.view(np.uint8), connectivity=8)
+    has_clear = np.bincount(labels[candidate & (strong >= high)], minlength=count) > 0
+    peaks, result = {}, np.zeros(candidate.shape, np.bool_)
+    for label in range(1, count):
+        x, y, width, height, area = stats[label].tolist()
+        if not has_clear[label] or area < _LEAST_AREA_PX // 2:
+            continue
+        box = np.s_[y : y + height, x : x + width]
+        part = labels[box] == label
+        depth = cv2.distanceTransform(np.pad(part.view(np.uint8), 1), cv2.DIST_L2, 3)
+        peaks[label] = float(strong[box][part].max())
+        if area >= max(_LEAST_AREA_PX, _LEAST_ELONGATION * (2.0 * float(depth.max())) ** 2):
+            # what is much thinner than the robot is a shadow's edge that touches it; a strip's mean depth is a quarter of its width
+            side = round(_THIN_SHARE * 4.0 * float(depth[depth > 0].mean()))
+            if side >= 3:
+                whole = cv2.morphologyEx(np.pad(part.view(np.uint8), side, mode="edge"), cv2.MORPH_OPEN, _disc(side))
+                part &= whole[side:-side, side:-side] > 0
+            result[box] |= part
+            peaks[label] = -peaks[label]  # taken
+    clear = [-peak for peak in peaks.values() if peak < 0.0]
+    if clear:
+        near = cv2.dilate(result.view(np.uint8), _disc(2 * _GAP_PX + 1)) > 0
+        least = max(high, _CLEAR_SHARE * float(np.median(clear)))
+        for label in {label for label in np.unique(labels[near]).tolist() if peaks.get(label, 0.0) >= least}:
+            result |= labels == label
+    return result
+
+
+def _glare(image: Image) -> Mask:
+    """Where a lamp is reflected, bool (h, w): what is overexposed and round; a white robot is long."""
+    bright = (image.min(axis=2) > _GLARE_LEVEL).view(np.uint8)
+    result = np.zeros(bright.shape, np.uint8)
+    if not bright.any():
+        return result > 0
+    bright = cv2.morphologyEx(bright, cv2.MORPH_OPEN, _disc(7))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(bright, connectivity=8)
+    for label in range(1, count):
+        x, y, width, height, area = stats[label].tolist()
+        part = np.pad((labels[y : y + height, x : x + width] == label).view(np.uint8), 1)
+        if area < _LEAST_ELONGATION * (2.0 * float(cv2.distanceTransform(part, cv2.DIST_L2, 3).max())) ** 2:
+            result[y : y + height, x : x + width] |= part[1:-1, 1:-1]
+    return np.asarray(cv2.dilate(result, _disc(_HALO_PX)) > 0)
+
+
+def _continue_to_border(probability: NDArray[np.float32], reachable: Mask) -> None:
+    """Continue a robot that ends just before the picture's border, where a frame or a collimator hides it, straight to it."""
+    for turn in range(4):
+        turned, area = np.rot90(probability, turn), np.rot90(reachable, turn)  # views: the left border of each is one of the four
+        inner, strip = turned[:, _BORDER_PX], turned[:, :_BORDER_PX]
+        reaches = cv2.dilate((strip[:, 0] >= 0.5).astype(np.uint8)[:, None], np.ones((41, 1), np.uint8))[:, 0] > 0
+        goes_on = (inner >= 0.5) & ~reaches
+        if goes_on.any():
+            strip[goes_on] = np.where(area[goes_on, :_BORDER_PX], np.maximum(strip[goes_on], inner[goes_on, None]), strip[goes_on])
+
+
+_GLARE_LEVEL, _HALO_PX = 240, 41
+"""Grey level of all channels in a lamp's reflection, and the diameter of the disc by which its halo is wider."""
+_THIN_SHARE = 0.4
+"""Of the robot's width: thinner parts are no robot."""
+_BORDER_PX = 12
+"""Width of the picture's rim across which a robot is continued."""
 
 
 def check_without_robot(bench: Bench, robot: Probability, frames: Sequence[Image]) -> None:
@@ -148,12 +202,12 @@ _LEAST_ROBOT_PX, _MOVED_SHARE = 400, 0.5
 def combined(network: Probability, difference: Difference, view: BenchView) -> Probability:
     """The robot's probability (h, w): what differs from the empty bench, and what the `network` (h, w) sees beside that.
 
-    Where the empty bench is not known, the network alone counts.
+    Where the empty bench is not known, and in glare, the network alone counts.
     """
     differs = difference.probability >= np.float32(0.5)
     beside = cv2.dilate(differs.view(np.uint8), _disc(_BESIDE_PX)) > 0
     robot = np.where(differs, np.maximum(network, difference.probability), np.where(beside, network, np.float32(0.0)))
-    return np.asarray(np.where(view.known, robot, network), np.float32)
+    return np.asarray(np.where(view.known & ~difference.glare, robot, network), np.float32)
 
 
 _BESIDE_PX = 9

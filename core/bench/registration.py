@@ -85,6 +85,8 @@ class BenchView:
     likeness: float
     placed: Image
     """The bench's empty picture at this place, in the bench's own light."""
+    window: Window | None = None
+    """The part of the picture that is meant; None: all of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,6 +182,7 @@ def window_of(view: BenchView, window: Window) -> BenchView:
         reachable=view.reachable[part],
         noise=view.noise[part],
         placed=view.placed[part],
+        window=window,
     )
 
 
