@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from core.bench.bench import Bench
     from core.evaluation.bench_calibration import TeachingResult
     from core.learning.dataset import Sample
-    from core.learning.teaching import TeachingPicture, TeachingSet
+    from core.learning.teaching import FrameSelection, TeachingPicture, TeachingSet
     from core.types import Image, Mask
 
 _REMEMBER = 80
@@ -154,12 +154,12 @@ def _frames_of(source: Path, folder: Path, empty: Sequence[Path], vessel: Path |
     bench = _bench_of(empty, vessel, name, init) if empty else _bench_without_picture(source, vessel, name, init)
     segment = open_calibrated(PerceptionConfig(segmentation=SegmentationConfig(model=init)))[0].segment
     with progress_bar() as bar:
-        pictures, seen = _pick(source, bench, count, bar)
-        tracked = bar.track(pictures, description="masks by difference")
+        selection = _pick(source, bench, count, bar)
+        tracked = bar.track(selection.pictures(), description="masks by difference")
         proposed = [teaching.propose(picture, bench, segment) for picture in tracked]
-    checked = teaching.check(proposed, bench, has_pictures=bool(empty))
+    checked = [*teaching.check(proposed, bench, has_pictures=bool(empty)), *selection.refused]
     chosen = teaching.choose(checked, count)
-    return teaching.write_teaching_set(folder, bench, chosen, [frame for frame in checked if frame.reason], seen)
+    return teaching.write_teaching_set(folder, bench, chosen, [frame for frame in checked if frame.reason], selection.seen)
 
 
 def _bench_of(empty: Sequence[Path], vessel: Path | None, name: str, init: str) -> Bench:
@@ -236,8 +236,8 @@ def _pictures_of(source: Path, bar: Progress | None = None) -> Iterator[Teaching
         sys.stderr.write(f"note: {len(problems)} pictures could not be read; the first: {problems[0]}\n")
 
 
-def _pick(source: Path, bench: Bench, count: int, bar: Progress) -> tuple[list[TeachingPicture], int]:
-    """Diverse pictures of the source, and how many there were."""
+def _pick(source: Path, bench: Bench, count: int, bar: Progress) -> FrameSelection:
+    """Diverse pictures of the source."""
     from core.learning.teaching import FrameSelection, TeachingError
 
     selection = FrameSelection(bench, count)
@@ -246,7 +246,7 @@ def _pick(source: Path, bench: Bench, count: int, bar: Progress) -> tuple[list[T
             sizes = [f"{one.shape[1]}x{one.shape[0]}" for one in (picture.image, bench.empty)]
             raise TeachingError(f"{picture.name}: {sizes[0]} px at working size, the empty picture {sizes[1]}: take both alike")
         selection.add(picture)
-    return selection.pictures(), selection.seen
+    return selection
 
 
 def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[TeachingResult, int]:

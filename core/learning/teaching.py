@@ -41,6 +41,8 @@ _QUICK_CONTRAST = 0.06
 """Change of a pixel's logarithmic brightness beyond that of its surroundings that shows a robot in a small picture."""
 _SAME_SHARE = 0.04
 """Distance of two small pictures' robots (0..1) below which they are near-duplicates."""
+_MOVED_SHARE = 0.35
+"""Share of the vessel that a camera changes when it is moved by more than some pixels; pictures that change more are registered."""
 _STILL_SHARE = 0.15
 """Distance of the two most different robots below which it has not moved."""
 _SHADE = 8.0
@@ -140,16 +142,23 @@ class FrameSelection:
     def __init__(self, bench: Bench, count: int) -> None:
         self._bench = bench
         self._empty = _small_logarithm(bench.empty)
-        self._near = None if bench.vessel is None else _small(_widened(bench.vessel, 2 * INSIDE_MARGIN_PX).astype(np.uint8)) > 0
+        near = np.ones(bench.known.shape, bool) if bench.vessel is None else _widened(bench.vessel, 2 * INSIDE_MARGIN_PX)
+        self._near = _small(near.astype(np.uint8)) > 0
         self._room = 2 * count + _SPARE
         self._kept: list[tuple[TeachingPicture, NDArray[np.float32]]] = []
         self.seen = 0
         """Pictures that were added."""
+        self.refused: list[TeachingFrame] = []
+        """The first pictures that are of another bench, or taken after the camera was moved."""
 
     def add(self, picture: TeachingPicture) -> bool:
         """Whether it is kept for now; raises ValueError for a picture of another size than the bench's."""
         robot = self._quick_robot(picture.image)
         self.seen += 1
+        if robot.sum() > _MOVED_SHARE * self._near.sum() and isinstance(refusal := register(picture.image, self._bench), Refusal):
+            if len(self.refused) < self._room:
+                self.refused.append(_rejected(picture, str(refusal)))
+            return False
         if any(_distance(robot, other) < _SAME_SHARE for _, other in self._kept[-self._room :]):
             return False
         self._kept.append((picture, robot))
@@ -166,6 +175,9 @@ class FrameSelection:
             There is none, they are of another bench, or the robot lies still in all of them.
         """
         if not self._kept:
+            if self.refused:
+                first = self.refused[0]
+                raise TeachingError(f"the empty picture does not fit {first.picture.name}: {first.reason}")
             raise TeachingError("no picture shows the bench: give a session, a video or a folder of pictures of it")
         robots = [robot for _, robot in self._kept]
         if max(_distance(robots[0], other) for other in robots) < _STILL_SHARE:
@@ -179,9 +191,7 @@ class FrameSelection:
         """Blurred robot of a small picture, (h, w) 0..1: what changes beyond its surroundings, as shadows do not."""
         change = _small_logarithm(image) - self._empty
         change -= cv2.blur(change, (25, 25))
-        found = np.abs(change).max(axis=2) > _QUICK_CONTRAST
-        if self._near is not None:
-            found &= self._near
+        found = (np.abs(change).max(axis=2) > _QUICK_CONTRAST) & self._near
         return np.asarray(cv2.GaussianBlur(found.astype(np.float32), (0, 0), 1.5))
 
 
@@ -223,18 +233,22 @@ def farthest(robots: Sequence[NDArray[np.float32]], count: int) -> list[int]:
     return chosen
 
 
+def _rejected(picture: TeachingPicture, reason: str) -> TeachingFrame:
+    """A frame without masks."""
+    blank = np.zeros(picture.image.shape[:2], bool)
+    return TeachingFrame(picture, blank, blank, blank, reason=reason)
+
+
 def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = None) -> TeachingFrame:
     """A frame with masks by difference; one that is of another bench, is blurred, shows a hand or no robot is rejected.
 
     `segment`: a network that completes what differs little, such as a grey robot on grey.
     """
-    shape = picture.image.shape[:2]
-    blank = np.zeros(shape, bool)
     view = register(picture.image, bench)
     if isinstance(view, Refusal):
-        return TeachingFrame(picture, blank, blank, blank, reason=str(view))
+        return _rejected(picture, str(view))
     difference = robot_by_difference(picture.image, view)
-    vessel = view.vessel if view.vessel is not None else blank
+    vessel = view.vessel if view.vessel is not None else np.zeros(picture.image.shape[:2], bool)
     robot, doubtful = difference.probability >= np.float32(0.5), difference.doubtful
     if segment is not None:
         robot = completed(robot, segment(picture.image)[1] >= np.float32(0.5), picture.image, view)

@@ -88,6 +88,15 @@ def test_a_robot_that_never_moves_is_one_line(bench: Bench) -> None:
         FrameSelection(bench, 8).pictures()
 
 
+def test_a_camera_that_was_moved_half_way_does_not_displace_the_frames_before(bench: Bench) -> None:
+    selection = FrameSelection(bench, 8)
+    for index, picture in enumerate(toy_stream(40)):
+        selection.add(replace(picture, image=_moved(picture.image)) if index % 20 >= 10 else picture)
+    assert {int(picture.stem) % 20 < 10 for picture in selection.pictures()} == {True}
+    assert {int(frame.picture.stem) % 20 >= 10 for frame in selection.refused} == {True}
+    assert all(frame.reason for frame in selection.refused)
+
+
 def _hand(image: Image) -> Image:
     covered = image.copy()
     cv2.ellipse(covered, (200, 200), (110, 80), 20, 0, 360, (225, 180, 150), -1, cv2.LINE_AA)
