@@ -25,8 +25,8 @@ from core.annotation.model import AnnotationError
 from core.annotation.store import DEFAULT_NAME, AnnotationStore, FoundImage, StoredAnnotation, find_images, image_sha256
 from core.files import ImageError, read_image
 from core.learning.dataset import write_png
-from core.session.reader import Take, is_of_session, session_video, times_of
-from core.session.video import NoPictures, decoded, is_avi, open_video, pictures_of, upright
+from core.session.reader import SessionReader, Take, check_is_session, is_of_session, session_video, times_of
+from core.session.video import NoPictures, decoded, is_avi, open_video, pictures_of, upright, video_number
 from core.types import Image
 from hardware.cameras.picture_files import expand, is_video
 
@@ -58,6 +58,8 @@ class AnnotateOptions:
     study: StudyOptions = StudyOptions()
     frames: int | None = None
     """Of each video; None: those that were extracted before, or ``FRAMES`` new ones."""
+    rows: str | None = None
+    """Of one session instead: row numbers with commas between, or ``REFUSED``."""
     report: bool = False
     export: str | None = None
     imports: tuple[Path, ...] = ()
@@ -75,6 +77,8 @@ class AnnotateOptions:
 
 FRAMES = 48
 """Pictures extracted of a video by default."""
+REFUSED = "refused"
+"""Instead of row numbers: rows without a pose, at most ``FRAMES``, evenly over their number."""
 _VIDEO_RECORD = "video.json"
 """In a folder of pictures: the fingerprint of their video."""
 _FRAMES_SUFFIX = "_frames"
@@ -306,6 +310,60 @@ def image_files(paths: Sequence[Path], frames: int | None, *, reuse: bool = Fals
     if not files:
         raise AnnotationError(f"{paths[0]}: no picture or video in it")
     return files
+
+
+def session_rows(session: Path, chosen: str) -> list[Path]:
+    """Pictures of single rows of a session, which lie in folders beside its videos afterwards.
+
+    Parameters
+    ----------
+    session : its folder.
+    chosen : row numbers with commas between, or ``REFUSED``.
+
+    Raises
+    ------
+    AnnotationError
+        No such row, no row that was refused, or a picture cannot be read.
+    SessionError
+        There is no session.
+    """
+    check_is_session(session)
+    with SessionReader(session) as reader:
+        reader.wait()
+        known, videos = reader.timeline(), {video_number(path): path for path in reader.videos}
+    if chosen == REFUSED:
+        refused = np.flatnonzero(known.state < 0)
+        places = [int(refused[place]) for place in _evenly(FRAMES)(len(refused))] if len(refused) else []
+        if not places:
+            raise AnnotationError(f"{session}: every row has a pose; give row numbers, such as --rows 12,40")
+    else:
+        places = _places_of_rows(session, chosen, known.row.tolist())
+    files: list[Path] = []
+    for number in sorted({int(known.video[place]) for place in places}):
+        if number not in videos:
+            print_warnings([f"{session}: the video file {number} is missing; its rows are left out"])
+            continue
+        times = {time_ms: index for index, time_ms in enumerate(times_of(videos[number]))}
+        pictures = [times.get(int(known.pts_ms[place])) for place in places if known.video[place] == number]
+        there = sorted({index for index in pictures if index is not None})
+        if len(there) < len(pictures):
+            print_warnings([f"{videos[number]}: {len(pictures) - len(there)} chosen rows have no picture of their own: left out"])
+        files += extract_frames(videos[number], lambda _total, there=there: there) if there else []  # type: ignore[misc]
+    if not files:
+        raise AnnotationError(f"{session}: none of the chosen rows has a picture")
+    return files
+
+
+def _places_of_rows(session: Path, chosen: str, rows: list[int]) -> list[int]:
+    texts = [text.strip() for text in chosen.split(",") if text.strip()]
+    if not texts or not all(text.isascii() and text.isdigit() for text in texts):
+        raise AnnotationError(f"--rows {chosen}: must be row numbers with commas between, such as 12,40, or {REFUSED}")
+    places = {row: place for place, row in enumerate(rows)}
+    missing = [text for text in texts if int(text) not in places]
+    if missing:
+        there = f"its rows are {rows[0]} to {rows[-1]}" if rows else "it has none"
+        raise AnnotationError(f"{session}: no row {missing[0]}; {there}")
+    return sorted({places[int(text)] for text in texts})
 
 
 def _existing(path: Path) -> list[Path]:

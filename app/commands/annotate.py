@@ -22,6 +22,7 @@ from app.annotator.sources import (
     print_warnings,
     rater_name,
     read_annotated,
+    session_rows,
 )
 from app.commands.options import ConfigOption, JsonOption, ModelOption
 from app.commands.progress import check_can_write, progress_bar
@@ -274,6 +275,9 @@ def annotate(
         int | None,
         typer.Option(min=1, max=100_000, help="pictures taken of each video, evenly; default: those taken before, or 48"),
     ] = None,
+    rows: Annotated[
+        str | None, typer.Option(help="of one session: row numbers such as 12,40, or refused: those without a pose")
+    ] = None,
     report: Annotated[bool, typer.Option("--report", help="agreement within and between raters, instead of the window")] = False,
     export: Annotated[str | None, typer.Option(help="dataset (for train), csv (for evaluate) or coco, to --out")] = None,
     import_: Annotated[list[Path] | None, typer.Option("--import", help="labelme or COCO file or folder; may be repeated")] = None,
@@ -297,6 +301,7 @@ def annotate(
         store=store,
         study=StudyOptions(study, rater, repeats, mirror, turn, seed, order),
         frames=frames,
+        rows=rows,
         report=report,
         export=export,
         imports=tuple(import_ or ()),
@@ -325,6 +330,8 @@ def run_annotate(options: AnnotateOptions) -> int:
         raise AnnotationError("--export needs --out: a folder for dataset, a file for csv and coco")
     if options.as_json and not options.report:
         raise AnnotationError("--json is for --report; leave it out")
+    if options.rows is not None:
+        _check_rows(options)
     config = load_config(options.config_path, overrides=choose_model(options.model))
     given = options.paths or (Path(),)
     store_path = options.store or (given[0] if given[0].suffix == ".sqlite" else default_store(given))
@@ -342,6 +349,16 @@ def run_annotate(options: AnnotateOptions) -> int:
     return _window(store_path, paths, options, config)
 
 
+def _check_rows(options: AnnotateOptions) -> None:
+    """Raise AnnotationError where single rows of a session cannot be chosen."""
+    if len(options.paths) != 1 or options.frames is not None:
+        raise AnnotationError("--rows is for one session: give its folder, and no --frames")
+    if options.study.name:
+        raise AnnotationError("--rows is for annotations outside a study: leave out --study")
+    if options.report or options.export is not None or options.imports or options.joins or options.salvage:
+        raise AnnotationError("--rows is for the window; leave it out")
+
+
 def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
     from app.ui.display import check_display
 
@@ -349,7 +366,7 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     from app.ui.window_base import make_application, run_until_closed
 
     rater = rater_name(options.study)
-    files = image_files(paths, options.frames)
+    files = session_rows(paths[0], options.rows) if options.rows is not None else image_files(paths, options.frames)
     with AnnotationStore(store_path) as store:
         images = listed_images(files, store)
         items = queue_of(store, images, rater, options.study, config)

@@ -300,6 +300,10 @@ def run_replay(options: ReplayOptions, out: Path | None = None, *, as_json: bool
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
     else:
         print_replay(result, done.changes, with_diff=options.diff)
+        changed = changed_most(done.changes, MOST_SHOWN) if options.diff else []
+        if changed:
+            rows = ",".join(str(row) for row in sorted(change.row for change in changed))
+            sys.stderr.write(f"draw them by hand: annotate {name_as_text(options.session)} --rows {rows}\n")
     for note in result["notes"]:
         sys.stderr.write(f"note: {note}\n")
     if result["without_picture"] or result["without_row"]:

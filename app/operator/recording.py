@@ -15,6 +15,7 @@ from typing import Any, Protocol
 from PySide6.QtCore import QObject, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
 
+from app.annotator.sources import REFUSED
 from app.operator.rig_session import RigSession
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.workers import NOT_STARTED, ChildProcess, Worker, command_of
@@ -452,6 +453,10 @@ class AfterSession(QObject):
         """The annotation tool on pictures evenly over the session."""
         options = ("--frames", str(FRAMES), "--order", "even")
         self._open(tr("Opening the annotation tool: {name}", name=session.name), "annotate", str(session), *options)
+
+    def annotate_refused(self, session: Path) -> None:
+        """The annotation tool on pictures without a pose."""
+        self._open(tr("Opening the annotation tool: {name}", name=session.name), "annotate", str(session), "--rows", REFUSED)
 
     def play(self, session: Path) -> None:
         """The player."""

@@ -9,6 +9,8 @@ from functools import partial
 from html import escape
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Slot
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPlainTextEdit, QVBoxLayout, QWidget
@@ -25,6 +27,7 @@ from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import pictures_folder
 from app.ui.theme import ON_PICTURE
 from app.ui.window_base import WindowFrame
+from app.ui.workers import ChildProcess, command_of
 from app.widgets.basics import Card, card_note, column, holder, line
 from app.widgets.command_panel import Provenance, ProvenanceTable
 from app.widgets.live_view import HeadLoupe, LiveView
@@ -54,6 +57,10 @@ def add_player_menus(window: PlayerWindow) -> None:
             None,
             MenuEntry(tr("Selection as &video"), window.export_clip, ("E",)),
             MenuEntry(tr("&Note"), window.begin_note, ("M",)),
+            None,
+            MenuEntry(tr("&Annotate this frame"), window.annotate_frame, ("A",)),
+            MenuEntry(tr("Annotate &refused frames"), window.annotate_refused),
+            *([MenuEntry(tr("Annotate the &differences"), window.annotate_differences)] if window.has_replay else []),
         ]
     )
     view = add_scene_view_menu(
@@ -304,6 +311,8 @@ class _CornerLabel(QLabel):
         return False
 
 
+_MOST_ANNOTATED = 48
+"""Frames that are annotated at once, as the annotation tool takes of a whole session."""
 _TURN_MS = 15
 _STOP_WITHIN_MS = 10_000
 
@@ -334,6 +343,7 @@ class PlayerWindow(WindowFrame):
         self._shown: Decoded | None = None
         self._note_s = 0.0
         self._refused_notes: deque[Event] = deque()
+        self._annotators: list[ChildProcess] = []
         self._decoder = FrameDecoder(reader, self)
         self.session = PlayedSession(reader, pictures_folder(config.window.pictures_folder), self)
         self._turn = QTimer(self, interval=_TURN_MS, timerType=Qt.TimerType.PreciseTimer)
@@ -346,6 +356,11 @@ class PlayerWindow(WindowFrame):
     @property
     def course(self) -> Course:
         return self.session.course
+
+    @property
+    def has_replay(self) -> bool:
+        """Whether results of a replay are shown beside the recording."""
+        return self._against is not None
 
     def _connect(self) -> None:
         panels, bar, session = self.panels, self.panels.bar, self.session
@@ -575,6 +590,49 @@ class PlayerWindow(WindowFrame):
         else:
             self.session.save_snapshot(tick)
 
+    # ---- annotation, in a window of its own
+
+    def annotate_frame(self) -> None:
+        """The frame that is shown."""
+        self.pause()
+        if len(self.course):
+            self._annotate(np.array([max(0, self._requested)]), "")
+
+    def annotate_refused(self) -> None:
+        """Frames without a pose, of the selection or of the whole session."""
+        self._annotate(self._selected(np.flatnonzero(self.course.states < 0)), tr("No frame without a pose here"))
+
+    def annotate_differences(self) -> None:
+        """Frames at which the replay begins to differ, of the selection or of the whole session."""
+        differs = self.course.differs
+        self._annotate(self._selected(differs) if differs is not None else np.zeros(0, np.int64), tr("No difference here"))
+
+    def _selected(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
+        if self.selection is None:
+            return places
+        times_s = self.course.times_s[places]
+        return places[(times_s >= self.selection[0]) & (times_s <= self.selection[1])]
+
+    def _annotate(self, places: NDArray[np.int64], why_none: str) -> None:
+        """Open the annotation tool on these places of the course, on so many evenly among them where there are more."""
+        if not len(places):
+            self.show_message(why_none)
+            return
+        if len(places) > _MOST_ANNOTATED:
+            places = places[np.unique(np.round(np.linspace(0, len(places) - 1, _MOST_ANNOTATED)).astype(int))]
+        rows = ",".join(str(row) for row in self.course.rows[places].tolist())
+        child = ChildProcess(command_of("annotate", str(self._reader.folder), "--rows", rows), self, priority=0)
+        child.ended.connect(lambda code, line, one=child: self._on_annotated(one, code, line))
+        self._annotators.append(child)
+        self.show_message(tr("Opening the annotation tool: {count} frames", count=len(places)))
+        child.start()
+
+    def _on_annotated(self, child: ChildProcess, code: int, line: str) -> None:
+        self._annotators.remove(child)
+        child.deleteLater()
+        if code != 0:
+            self.show_message(tr_text(line) or tr("That window ended with exit code {code}", code=code), is_fault=True)
+
     # ---- notes
 
     @Slot()
@@ -659,6 +717,8 @@ class PlayerWindow(WindowFrame):
         return super()._may_close()
 
     def _let_go(self) -> None:
+        for child in self._annotators:
+            child.leave()  # people work in these windows
         self._turn.stop()
         self.session.stop_polling()
         self.panels.notice.clear()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from app.annotator.comparison import groups_of
-from app.annotator.sources import default_store, image_files
+from app.annotator.sources import default_store, image_files, session_rows
 from core.annotation.store import DEFAULT_NAME
 from core.devices import UserError
 from core.learning.dataset import write_png
@@ -134,3 +134,31 @@ def test_pictures_of_one_recording_are_one_group(tmp_path: Path) -> None:
     assert groups_of([plain / "a.png", plain / "b.png"]) == {plain / "a.png": None, plain / "b.png": None}
     mixed = groups_of([*of_session, plain / "a.png"])
     assert list(mixed.values()) == ["session_1", "session_1", "pictures"]
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    """Twelve rows; without a pose from the fourth to the sixth."""
+    return record(tmp_path, [tick_of(k, 10.0 + 0.1 * k, full=not 4 <= k < 7) for k in range(12)])
+
+
+def test_rows_of_a_session_become_pictures(session: Path) -> None:
+    files = session_rows(session, "2, 9,2")
+    assert [path.name for path in files] == ["video_0000_000002.png", "video_0000_000009.png"]
+    assert [path.name for path in session_rows(session, "refused")] == [f"video_0000_00000{k}.png" for k in (4, 5, 6)]
+    assert len(image_files([session], None)) == 5, "all that were extracted are gone on with"
+
+
+@pytest.mark.parametrize(
+    ("chosen", "message"),
+    [("2,99", "no row 99; its rows are 0 to 11"), ("first", "must be row numbers"), (",", "must be row numbers")],
+)
+def test_rows_that_are_not_there_are_named(session: Path, chosen: str, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        session_rows(session, chosen)
+    assert not list(session.glob("*_frames"))
+
+
+def test_rows_are_those_of_a_session(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such session"):
+        session_rows(tmp_path / "gone", "1")

@@ -330,6 +330,10 @@ def test_an_empty_name_is_no_model() -> None:
         ({"joins": (Path("a.sqlite"),), "study": StudyOptions(rater="ben")}, "--join takes all raters of a file"),
         ({"joins": (Path("a.sqlite"),), "report": True}, "give one of them"),
         ({"names": ("user=ben",)}, "give --join FILE, too"),
+        ({"rows": "1,2"}, "nothing of a session|not a session|no session"),
+        ({"rows": "1,2", "frames": 4}, "--rows is for one session"),
+        ({"rows": "1,2", "study": StudyOptions("first")}, "leave out --study"),
+        ({"rows": "1,2", "report": True}, "--rows is for the window"),
         ({"study": StudyOptions("first", rater="b\udcff")}, r"--rater 'b\\udcff': is no UTF-8; give the name in plain letters"),
     ],
 )

@@ -628,6 +628,36 @@ def test_results_that_do_not_belong_here_are_refused(
     at(qtbot, window, 0)  # the recording plays all the same
 
 
+def test_frames_are_annotated_in_a_window_of_their_own(
+    open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str, ...]] = []
+
+    def command(*arguments: str) -> list[str]:
+        asked.append(arguments)
+        return [sys.executable, "-c", "import sys; sys.exit('error: no such file')"]
+
+    monkeypatch.setattr("app.player.window.command_of", command)
+    again = tmp_path / "again.jsonl"
+    replayed_file(session, again)
+    window = open_player(session, again)
+    until(qtbot, lambda: len(window.course) == COUNT and window.course.differs is not None)
+    window.go(7)
+    press(window, Key.Key_A)
+    assert asked == [("annotate", str(session), "--rows", "7")]
+    until(qtbot, lambda: window.panels.toast.text() == "no such file")
+    window.annotate_refused()
+    assert asked[-1][-1] == "30,31,32,33"
+    window.annotate_differences()
+    assert asked[-1][-1] == "12,20"
+    window.select((0.0, 1.5))
+    window.annotate_differences()
+    assert asked[-1][-1] == "12"
+    window.annotate_refused()
+    assert len(asked) == 4 and window.panels.toast.text() == "No frame without a pose here"
+    until(qtbot, lambda: not window._annotators)
+
+
 def test_the_command_refuses_what_is_no_session_in_one_line(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, str(MAIN), "play", str(tmp_path)], capture_output=True, text=True, check=False)
     assert (done.returncode, "not a session" in done.stderr, "Traceback" in done.stderr) == (2, True, False)
