@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     from app.commands.trainer import TrainingTask
     from core.learning.dataset import Sample
 
+_STEPS = TrainingPlan().steps
+"""Of a training whose time is not given."""
+_MOST_STEPS = 1_000_000
+"""Of a training whose time is given: more than any machine does."""
+
 
 @dataclass(frozen=True, slots=True)
 class TrainOptions:
@@ -42,6 +47,7 @@ class TrainOptions:
     synthetic : frames to make besides.
     without : families of looks that are left out of both.
     held_out : labelled frames that stay out of training and say whether it helped.
+    scenes : folders of scenes, from which crops are painted.
     init : the model to begin with; None: a new network, plain of width ``base``, or as the shipped one, or ``shallow``.
     tip : train the network of the tip refinement of ``init``.
     """
@@ -55,11 +61,22 @@ class TrainOptions:
     base: int | None = None
     shallow: bool = False
     tip: bool = False
+    scenes: Sequence[Path] = ()
 
 
 def train(
     out: Annotated[Path, typer.Option(help="folder of the new model")],
     data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
+    scenes: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="folder of synth --scenes: crops of benches painted from them, with a picture of the empty bench in half of them; "
+            "may be repeated"
+        ),
+    ] = None,
+    scene_share: Annotated[
+        float, typer.Option(min=0, max=1, help="share of the crops painted from --scenes where there is --data, too")
+    ] = 0.5,
     synthetic: Annotated[int, typer.Option(min=0, help="also make this many frames with the twin")] = 0,
     init: Annotated[str | None, typer.Option(help="start from this model instead of from nothing")] = None,
     remember: Annotated[
@@ -73,7 +90,10 @@ def train(
     second_look: Annotated[
         bool, typer.Option("--second-look", help="train the network of the --init model's second look, near the robot's ends")
     ] = False,
-    steps: Annotated[int, typer.Option(min=1)] = 6000,
+    steps: Annotated[int | None, typer.Option(min=1, help=f"{_STEPS} without --minutes")] = None,
+    minutes: Annotated[
+        float | None, typer.Option(min=0.01, help="train for so long; the rate falls with the time, and --steps is the most")
+    ] = None,
     stop_after: Annotated[int | None, typer.Option(min=1, help="end after so many of the steps, to go on with --init")] = None,
     batch: Annotated[int, typer.Option(min=1, max=512)] = 12,
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 1e-2,
@@ -102,6 +122,9 @@ def train(
     """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
     if remember and (synthetic or not data or init is None):
         raise UserError("--remember N is for --data DIR and --init MODEL, without --synthetic")
+    if minutes is not None and (remember or stop_after is not None):
+        raise UserError(f"--minutes is for a training without {'--remember' if remember else '--stop-after'}; give --steps")
+    steps = steps or (_STEPS if minutes is None else _MOST_STEPS)
     plan = TrainingPlan(
         steps=steps,
         batch=batch,
@@ -114,18 +137,21 @@ def train(
         end_weight=end_weight,
         robot_weight=robot_weight,
         keeps_statistics=remember > 0,
+        scene_share=scene_share,
         stop_after=stop_after,
+        seconds=None if minutes is None else 60 * minutes,
         seed=seed,
         threads=threads,
     )
     if progress_json:
         report_progress()
     frames = synthetic or remember
-    run_train(TrainOptions(out, data or (), frames, without or (), held_out, init, base, shallow, second_look), plan)
+    without, scenes = without or [], scenes or []
+    run_train(TrainOptions(out, data or (), frames, without, held_out, init, base, shallow, second_look, scenes), plan)
 
 
 def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
-    """Train on labelled folders and, if asked, on frames made now; writes the model folder `out` and `out`.log.
+    """Train on labelled folders, scenes and, if asked, frames made now; writes the model folder `out` and `out`.log.
 
     Where the plan keeps the normalisation, ``data`` is shown as often as the frames made now, and the tip refinement is trained.
     """
@@ -138,6 +164,7 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
     out, began_with = _check_places(options)
     folders = list(options.data)
     samples = [sample for folder in folders for sample in _samples_of(folder, options.without)]
+    scenes = [path for folder in options.scenes for path in _scenes_of(folder, options.without)]
     if left_out := without_masks(folders):
         first = left_out[0]
         masks = f"masks/{first.stem}_vessel.png and masks/{first.stem}_robot.png"
@@ -156,11 +183,15 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
         samples += made
     torch.manual_seed(plan.seed)
     task: TrainingTask = (
-        TipTraining(samples, init) if options.tip else FrameTraining(samples, init, options.base, shallow=options.shallow)
+        TipTraining(samples, init)
+        if options.tip
+        else FrameTraining(samples, init, options.base, shallow=options.shallow, scenes=scenes)
     )
     plan = replace(plan, crop=task.crop_size(plan.crop))
     then = None if options.tip else tip_plan(plan, init)
     notes: dict[str, Any] = {"init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
+    if scenes:
+        notes |= {"scenes": len(scenes), "scene_sets": [_described(folder) for folder in options.scenes]}
     if without := _never_seen(options.without, began_with):
         notes |= {"without": without}
     try:
@@ -189,7 +220,10 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
     steps, done = trainer.steps_total, trainer.steps_before
     if writer is not None:
         writer.write({"model": str(out), "steps_done": done, "steps": steps})
-    ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
+    if plan.seconds is not None:
+        ending = f" (interrupted after {done} steps; go on with --init {out})" if interrupt.asked else f" ({done} steps)"
+    else:
+        ending = "" if done == steps else f" (interrupted after {done} of {steps} steps; go on with --init {out})"
     console.print(f"model written to {out}{ending}", soft_wrap=True)
 
 
@@ -222,6 +256,8 @@ def _check_choices(options: TrainOptions, plan: TrainingPlan) -> None:
         (tip and first, f"{first} is for the first look; with --second-look leave it out"),
         (init and first, f"{first} shapes a new network; the one of --init {init} has its shape: leave one of them out"),
         (init is None and plan.focus_share > 0, "--focus needs --init MODEL, which tells what is hard"),
+        (plan.focus_share > 0 and not (options.data or options.synthetic), "--focus is for labelled frames; give --data DIR, too"),
+        (tip and options.scenes, "--scenes is for whole pictures; with --second-look leave it out"),
         (tip and plan.strip_share > 0, "--strips is for whole pictures; with --second-look leave it out"),
         (tip and plan.crop != default.crop, windows),
         (plan.stop_after is not None and plan.stop_after >= plan.steps, late),
@@ -242,15 +278,15 @@ def _check_places(options: TrainOptions) -> tuple[Path, Path | None]:
         raise DatasetError("--held-out measures whole pictures; after --second-look measure with benchmark --accuracy")
     if held_out is not None and any(is_same(held_out, folder) for folder in options.data):
         raise DatasetError(f"{held_out}: is trained on, so that it cannot judge; give --held-out another folder")
-    if not options.data and not options.synthetic:
-        raise DatasetError("nothing to train on: give --data DIR (a labelled folder) or --synthetic N")
+    if not options.data and not options.synthetic and not options.scenes:
+        raise DatasetError("nothing to train on: give --data DIR (a labelled folder), --scenes DIR or --synthetic N")
     out = Path(os.path.realpath(options.out))
     began_with = model_folder(options.init) if options.init is not None else None  # refused before frames are made
     check_outside(out, [began_with] if began_with is not None else [])
     if (out / INFO).is_file() and (began_with is None or not is_same(began_with, out)):
         raise DatasetError(f"{out}: is a model already; choose another --out, or give --init {options.out} to go on with it")
     check_can_write(out)
-    for read in [*options.data, *([held_out] if held_out is not None else [])]:
+    for read in [*options.data, *options.scenes, *([held_out] if held_out is not None else [])]:
         if out in (place := Path(os.path.realpath(read)), *place.parents):
             raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
     if held_out is not None:
@@ -287,6 +323,14 @@ def _samples_of(folder: Path, without: Sequence[str]) -> list[Sample]:
     from core.learning.dataset import find_samples, leave_out_looks
 
     found = find_samples([folder])
+    return leave_out_looks(folder, found, without) if without else found
+
+
+def _scenes_of(folder: Path, without: Sequence[str]) -> list[Path]:
+    from core.learning.dataset import leave_out_looks
+    from core.learning.scenes import find_scenes
+
+    found = find_scenes([folder])
     return leave_out_looks(folder, found, without) if without else found
 
 

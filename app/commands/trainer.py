@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -13,26 +13,30 @@ import cv2
 import numpy as np
 import torch
 from rich.progress import Progress
+from torch.utils.data import Dataset
 
 from app.commands.progress import Interrupt, ProgressWriter
 from app.ui import palette
 from core.config.models import SegmentationConfig
 from core.devices import UserError
 from core.evaluation.accuracy import difficulty
-from core.learning.augmentation import CropDataset, FrameCrops, PriorViews, TipCrops
-from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample, find_samples, write_png
+from core.learning.augmentation import Crop, CropDataset, FrameCrops, PriorViews, TipCrops
+from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample, find_samples, with_empty, write_png
 from core.learning.model_writer import save_model, save_with_second_look
+from core.learning.scene_crops import CROPS_PER_BENCH, MixedCrops, SceneCrops
 from core.learning.training import HeldOutFrame, HeldOutResult, TrainingProgress, measure_held_out, train
 from core.learning.training_plan import TrainingPlan
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import SECOND_LOOK, ModelError, check_model, load_network, model_folder, second_look_of
 from core.perception.segmentation import OrientationAverage
 from core.perception.tip_refinement import WINDOW_PX, Planes
-from core.perception.unet import DualUNet, UNetShape, with_prior_planes
+from core.perception.unet import DualUNet, UNetShape, with_empty_planes, with_prior_planes
 from core.types import Image
 
 _EXAMPLES = 40
-"""Training frames from which an eight-bit network learns its ranges; of tip windows four times as many."""
+"""Training frames from which an eight-bit network learns its ranges."""
+_CROPS_A_FRAME = 4
+"""Crops, or tip windows, that stand for one of these frames."""
 _MOST_THREADS = 64
 """As many as perception takes (``perception.segmentation.threads``)."""
 _REPORT_EVERY = 2
@@ -75,6 +79,7 @@ class TrainingTask(Protocol):
 class FrameTraining:
     """The network of whole pictures: from nothing, or from the model `init`, whose tip refinement is kept.
 
+    With `scenes`, files of ``core.learning.scenes``, or samples with a picture of the empty bench, the network takes that, too.
     `examples`: frames from which its eight-bit copy learns; None: ``_EXAMPLES``.
     """
 
@@ -88,38 +93,58 @@ class FrameTraining:
         *,
         shallow: bool = False,
         examples: int | None = None,
+        scenes: Sequence[Path] = (),
     ) -> None:
-        self._samples, self._init, self._examples = samples, init, examples or _EXAMPLES
+        self._samples, self._init, self._examples, self._scenes = samples, init, examples or _EXAMPLES, scenes
         self._tip_model: Path | None = None
+        self._crops: Dataset[Crop] | None = None
+        compares = bool(scenes) or any(sample.empty is not None for sample in samples)
         if init is None:
-            self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
+            shape = UNetShape.of_base(base) if base else default_shape(deep=not shallow)
+            self.network = DualUNet(replace(shape, inputs=6) if compares else shape)
         else:
             check_model(init)  # a damaged tip refinement is refused before hours of training, too
-            self.network = load_network(model_folder(init))[0]
+            network = load_network(model_folder(init))[0]
+            self.network = with_empty_planes(network) if compares and network.shape.inputs == 3 else network
             self._tip_model = second_look_of(model_folder(init))
 
     def crop_size(self, crop: tuple[int, int]) -> tuple[int, int]:
         stride = self.network.shape.stride
         return -(-crop[0] // stride) * stride, -(-crop[1] // stride) * stride
 
-    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> CropDataset | None:
-        if self._init is None or plan.focus_share == 0:
-            return FrameCrops(self._samples, plan)
-        segment = open_segmenter(_segmentation(self._init, plan))
-        found = []
-        for sample in bar.track(self._samples, description="finding hard frames"):
-            if interrupt.asked:
-                return None
-            found.append(difficulty(sample, segment))
-        return FrameCrops(self._samples, plan, np.array(found))
+    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> Dataset[Crop] | None:
+        if not self._samples:
+            self._crops = SceneCrops(self._scenes, plan)
+            return self._crops
+        weights: np.ndarray | None = None
+        if self._init is not None and plan.focus_share > 0:
+            segment = open_segmenter(_segmentation(self._init, plan))
+            found = []
+            for sample in bar.track(self._samples, description="finding hard frames"):
+                if interrupt.asked:
+                    return None
+                found.append(difficulty(sample, segment))
+            weights = np.array(found)
+        frames = FrameCrops(self._samples, plan, weights, self.network.shape.inputs)
+        self._crops = MixedCrops(self._scenes, frames, plan) if self._scenes else frames
+        return self._crops
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
-        examples: list[Image] = []
-        if whole:
-            for sample in self._samples[:: max(1, len(self._samples) // self._examples)]:
-                with suppress(DatasetError):  # the training reports it, and keeps what it learnt without that frame
-                    examples.append(sample.load(WORKING_SIZE_PX)[0])
+        examples = list(self._example_planes()) if whole else []
         save_model(network, out, training=training, figures=figures, examples=examples, second_look=self._tip_model)
+
+    def _example_planes(self) -> Iterator[Planes]:
+        """Whole frames, every second one with the empty bench where it is known; with scenes, crops of the training."""
+        if self._scenes and self._crops is not None:
+            for number in range(_CROPS_A_FRAME * self._examples):
+                with suppress(DatasetError):  # the training reports it, and keeps what it learnt without that one
+                    yield np.ascontiguousarray(self._crops[number * CROPS_PER_BENCH][0].numpy().transpose(1, 2, 0))
+            return
+        for number, sample in enumerate(self._samples[:: max(1, len(self._samples) // self._examples)]):
+            with suppress(DatasetError):
+                image = sample.load(WORKING_SIZE_PX)[0]
+                knows = number % 2 == 1 and self.network.shape.inputs == 6 and sample.empty is not None
+                yield with_empty(image, sample.load_empty(image.shape)) if knows else image
 
 
 class TipTraining:
@@ -159,7 +184,7 @@ class TipTraining:
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
         examples: list[Planes] = []
         if whole and self._crops is not None:
-            for index in range(0, len(self._crops), max(1, len(self._crops) // (4 * self._examples))):
+            for index in range(0, len(self._crops), max(1, len(self._crops) // (_CROPS_A_FRAME * self._examples))):
                 with suppress(DatasetError):
                     examples.append(np.ascontiguousarray(self._crops[index][0].numpy().transpose(1, 2, 0)))
         save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
@@ -334,7 +359,9 @@ class Trainer:
             should_stop=lambda: self.interrupt.asked or (self.writer is not None and not self.writer.is_read),
             # The bar of a training of few steps moves, too.
             report_every=max(1, min(_SHOW_EVERY, plan.steps // 10)) if self.writer is None else _REPORT_EVERY,
-            checkpoint_every=max(_REPORT_EVERY, plan.steps // _HELD_OUT_TIMES) if self.held_out.is_on else _KEEP_EVERY,
+            checkpoint_every=min(_KEEP_EVERY, max(_REPORT_EVERY, plan.steps // _HELD_OUT_TIMES))
+            if self.held_out.is_on
+            else _KEEP_EVERY,
         )
         self.steps_before += done
         return done

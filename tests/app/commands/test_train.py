@@ -270,3 +270,53 @@ def test_a_display_that_has_gone_is_named(monkeypatch: pytest.MonkeyPatch) -> No
         check_display()
     monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")  # which needs no display
     check_display()
+
+
+def test_scenes_are_trained_on_beside_frames_for_a_given_time(frames: Path, tmp_path: Path) -> None:
+    done = run("synth", "--scenes", "--out", tmp_path / "set", "--count", 2, "--seed", 5, "--width", 160, "--height", 120)
+    assert done.returncode == 0, done.stderr
+    assert "2 scenes of phantom seeds 5 to 5" in done.stderr
+    few = ("--batch", 3, "--crop", 64, "--threads", 1)
+    out = tmp_path / "painted"
+    done = run("train", "--scenes", tmp_path / "set", "--out", out, "--base", 4, "--minutes", 0.02, *few)
+    assert done.returncode == 0, done.stderr
+    info = read_model_info(out)
+    assert (info.planes, info.training["scenes"], info.training["scene_sets"][0]["scenes"]) == (6, 2, True)
+    assert f"({info.training['steps_done']} steps)" in done.stderr
+    both = ("--data", frames, "--scenes", tmp_path / "set", "--held-out", Path(shutil.copytree(frames, tmp_path / "held_out")))
+    done = run("train", *both, "--init", out, "--out", tmp_path / "both", "--steps", 2, *few)
+    assert done.returncode == 0, done.stderr
+    info = read_model_info(tmp_path / "both")
+    assert (info.planes, info.training["frames"], info.figures["held_out"]) == (6, 6, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--scenes", "nowhere"), "nowhere: no scenes; needs scenes/NUMBER.npz"),
+        (("--scenes", "nowhere", "--second-look", "--init", "default"), "--scenes is for whole pictures"),
+        (("--scenes", "nowhere", "--focus", 0.5, "--init", "default"), "--focus is for labelled frames"),
+        (
+            ("--data", "nowhere", "--remember", 5, "--init", "default", "--minutes", 1),
+            "--minutes is for a training without --remember",
+        ),
+    ],
+)
+def test_options_of_scenes_that_fit_nothing_are_refused(options: tuple[object, ...], words: str, tmp_path: Path) -> None:
+    done = run("train", "--out", tmp_path / "out", *options)
+    assert (done.returncode, words in done.stderr) == (2, True), done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_damaged_scene_ends_a_training_with_one_line(tmp_path: Path) -> None:
+    (tmp_path / "set" / "scenes").mkdir(parents=True)
+    (tmp_path / "set" / "scenes" / "000000.npz").write_bytes(b"no scene")
+    done = run("train", "--scenes", tmp_path / "set", "--out", tmp_path / "out", "--base", 4, "--steps", 2, "--crop", 64)
+    assert done.returncode == 2
+    assert "000000.npz: damaged, or not a scene as synth --scenes writes it; mend this frame, or remove it" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_several_poses_of_a_scene_are_refused(tmp_path: Path) -> None:
+    done = run("synth", "--scenes", "--out", tmp_path / "x", "--count", 1, "--poses", 2)
+    assert (done.returncode, "--poses is for frames" in done.stderr) == (2, True)
