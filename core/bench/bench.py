@@ -316,7 +316,8 @@ def _local_deviation(sizes: NDArray[np.floating]) -> NDArray[np.float32]:
 def _differs(one: NDArray[np.floating] | Image, other: NDArray[np.floating] | Image, noise: NDArray[np.float32]) -> Mask:
     """Where two pictures of one light show different things: smoothed, beyond noise, focus and slow changes of light."""
     apart = cv2.GaussianBlur(np.asarray(one, np.float32) - np.asarray(other, np.float32), (0, 0), 2.0)
-    size = np.abs(apart - cv2.blur(apart, (81, 81))).max(axis=2)
+    slow = cv2.blur(np.clip(apart, -_DIFFERENT_LEVELS, _DIFFERENT_LEVELS), (81, 81))  # no halo around what differs much
+    size = np.abs(apart - slow).max(axis=2)
     seeds = size > np.maximum(_DIFFERENT_SIGMAS * noise / 7.0, _DIFFERENT_LEVELS)  # a Gaussian of 2 px averages 50 pixels
     return np.asarray(cv2.dilate(seeds.view(np.uint8), np.ones((9, 9), np.uint8)) > 0)
 

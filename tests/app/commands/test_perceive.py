@@ -250,9 +250,30 @@ def test_a_folder_of_folders_says_in_which_there_are_pictures(picture: Path, tmp
         assert words in done.stderr
 
 
+def test_with_an_empty_picture_and_the_vessel_the_bench_is_known(picture: Path, world: TwinWorld, tmp_path: Path) -> None:
+    empty, vessel = tmp_path / "empty.png", tmp_path / "vessel.png"
+    cv2.imwrite(str(empty), TwinWorld(TwinConfig(phantom="tree")).frame().image[:, :, ::-1])
+    mask = world.picture(world.physics.robot_points_mm()).vessel
+    cv2.imwrite(str(vessel), mask.astype(np.uint8) * 255)
+    out, masks = tmp_path / "o.jsonl", tmp_path / "masks"
+    done = run("perceive", picture, "--empty", empty, "--vessel", vessel, "--jsonl", out, "--masks", masks)
+    assert done.returncode == 0, done.stderr
+    assert rows(out)[0]["state"] is not None
+    assert np.array_equal(read_image(masks / "photo_vessel.png")[:, :, 0] > 127, mask)
+    other = tmp_path / "other.png"
+    cv2.imwrite(str(other), np.roll(cv2.imread(str(picture)), 40, axis=1))
+    done = run("perceive", other, "--empty", empty, "--jsonl", out)
+    assert done.returncode == 0, done.stderr
+    assert rows(out)[0]["reason"].startswith(("camera or phantom moved", "not this bench"))
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["perceive", "{picture}", "--vessel", "{picture}"], "--vessel needs --empty"),
+        (["perceive", "{picture}", "--empty", "{tmp}/none.png"], "none.png: cannot be read"),
+        (["perceive", "{picture}", "--bench", "{tmp}/empty_folder"], "bench.json: cannot be read"),
+        (["perceive", "{picture}", "--bench", "{tmp}/b", "--empty", "{picture}"], "leave --empty and --vessel out"),
         (["perceive", "{tmp}/none.png"], "none of 1 pictures could be read"),
         (["perceive", "{tmp}/empty_folder"], "no pictures or videos there"),
         (["perceive", "{picture}", "--model", "nope"], "no model 'nope'"),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
-from core.bench.bench import Bench, bench_from_pictures
-from core.bench.difference import Difference, robot_by_difference
+from core.bench.bench import Bench, BenchError, bench_from_pictures
+from core.bench.difference import Difference, check_without_robot, combined, robot_by_difference
 from core.bench.registration import BenchView, register
 from core.types import Image, Mask
 from tests.core.bench.drawn_bench import SIZE, board, noisy, tube, with_line
@@ -71,3 +73,41 @@ def test_the_way_from_the_vessels_end_to_the_border_may_hold_the_robot() -> None
     bench = bench_from_pictures([noisy(board(), 2.0, 1)], vessel, "b", 320)
     image = noisy(with_line(board(), *ROBOT), 2.0, 3)
     assert dice(found(image, bench).probability >= 0.5, line(*ROBOT)) > 0.9
+
+
+def test_a_robot_in_the_empty_picture_is_named(bench: Bench) -> None:
+    robot = line(*ROBOT).astype(np.float32)
+    frames = [noisy(with_line(board(), (0, 114), (x, 116)), 2.0, x) for x in (40, 90, 140)]
+    with_robot = bench_from_pictures([noisy(with_line(board(), *ROBOT), 2.0, 1)], tube(), "b", 320)
+    with pytest.raises(BenchError, match="robot lies in the empty picture"):
+        check_without_robot(with_robot, robot, frames)
+    check_without_robot(bench, robot, frames)  # what the network sees there has not moved: no robot
+    with pytest.raises(BenchError, match="differ along the vessel"):
+        bench_from_pictures([noisy(board(), 2.0, 1), noisy(with_line(board(), *ROBOT), 2.0, 2)], tube(), "b", 320)
+
+
+def test_a_lamps_reflection_is_left_to_the_network(bench: Bench) -> None:
+    image = cv2.circle(with_line(board(), *ROBOT), (260, 126), 14, (255, 255, 255), cv2.FILLED)
+    image = noisy(np.asarray(image, np.uint8), 2.0, 3)
+    view = register(image, bench)
+    assert isinstance(view, BenchView)
+    difference = robot_by_difference(image, view)
+    assert not (difference.probability[100:150, 240:280] >= 0.5).any()
+    assert difference.doubtful[126, 260]
+    network = np.zeros(difference.probability.shape, np.float32)
+    network[120:132, 250:270] = 0.9
+    both = combined(network, difference, view)
+    assert both[126, 260] == np.float32(0.9)
+    assert (both[line((20, 123), (180, 129), 5)] >= 0.5).mean() > 0.9
+
+
+def test_the_network_adds_beside_the_difference_and_nowhere_else(bench: Bench) -> None:
+    image = noisy(with_line(board(), *ROBOT), 2.0, 3)
+    view = register(image, bench)
+    assert isinstance(view, BenchView)
+    difference = robot_by_difference(image, view)
+    robot = combined(np.full(difference.probability.shape, 0.9, np.float32), difference, view)
+    assert robot[line((20, 123), (180, 129), 9)].min() >= np.float32(0.6)
+    assert robot[60, 160] == 0.0
+    unknown = replace(view, known=np.zeros_like(view.known))
+    assert (combined(np.full(difference.probability.shape, 0.9, np.float32), difference, unknown) == np.float32(0.9)).all()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from core.bench.bench import bench_from_pictures, bench_sha256, write_bench
 from core.config.calibration import CalibrationConfig, LensConfig, PortConfig, ScaleConfig
 from core.config.models import Config, load_config
 from core.config.rig_file import (
@@ -24,11 +25,13 @@ from core.config.rig_file import (
     rigs_folder,
     scaled,
     sections_of_rig,
+    set_bench,
     set_port,
     with_rig,
     write_rig,
 )
 from core.session.manifest import Manifest, about_rig
+from tests.core.bench.drawn_bench import board
 
 MADE = datetime(2025, 3, 4, 5, 6, 7, tzinfo=UTC)
 LENS = LensConfig(k1=-0.1, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
@@ -172,6 +175,29 @@ def test_the_insertion_port_is_kept_in_the_rig_file_and_reaches_perception() -> 
 def test_a_port_of_the_configuration_holds_for_rigs_that_tell_none() -> None:
     config = load_config(overrides={"perception": {"path": {"port_x_share": 0.2, "port_y_share": 0.3}}})
     assert as_calibrated(config).perception.path.port_x_share == 0.2
+
+
+def test_the_bench_is_kept_in_the_rig_file_and_reaches_perception_and_the_session(tmp_path: Path) -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    config = with_rig(load_config(), read_rig(path), path)
+    assert as_calibrated(config).perception.bench is None
+    write_bench(bench_from_pictures([board()], None, "lab", 640), tmp_path / "lab")
+    set_bench(path, tmp_path / "lab")
+    found = as_calibrated(config)
+    assert found.perception.bench == str(tmp_path / "lab")
+    assert read_rig(path).calibration == KNOWN
+    assert about_rig(found, "LIVE", "bench 1").bench == {"name": "lab", "sha256": bench_sha256(tmp_path / "lab")}
+    (tmp_path / "lab" / "bench.json").unlink()
+    about = about_rig(found, "LIVE", "bench 1").bench
+    assert about is not None
+    assert "cannot be read" in about["problem"]
+    set_bench(path, None)
+    assert as_calibrated(config).perception.bench is None
+
+
+def test_a_bench_beside_its_rig_file_is_found_from_there() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", None).model_copy(update={"bench": "lab"}))
+    assert as_calibrated(with_rig(load_config(), read_rig(path), path)).perception.bench == str(path.parent / "lab")
 
 
 def test_a_session_tells_its_calibration_again() -> None:
