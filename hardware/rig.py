@@ -41,10 +41,6 @@ class Rig:
     robot: GuardedRobot | None
     world: TwinWorld | None = None
 
-    @property
-    def is_live(self) -> bool:
-        return self.kind is RigKind.LIVE
-
     def close(self) -> None:
         try:
             if self.robot is not None:

@@ -256,7 +256,6 @@ class _TwinServos(LockStepServos):
 
 class _Camera:
     name = "bench twin"
-    is_live = False
 
     def __init__(self, render: Callable[[], Frame]) -> None:
         self._render = render

@@ -1,8 +1,8 @@
 """STOP keys: Space and Pause stop the robot, in any window and with any focus.
 
-Pause, and Space with Ctrl, Alt or Meta, always; Space alone except while a text is typed and nothing can move. The press goes to
-``Pilot.stop`` (``core/control/pilot.py``): one byte in the STOP pipe of the servo bus process, whose ``BusLoop._handle_stop``
-(``hardware/servos/bus_process.py``) holds all servos, and the mode STOPPED until the operator acknowledges it.
+Pause, and Space with Ctrl, Alt or Meta, always; Space alone except while a text is typed and nothing can move. The press goes by
+``RigSession.stop`` to ``Pilot.stop`` (``core/control/pilot.py``): one byte in the STOP pipe of the servo bus process, whose
+``BusLoop._handle_stop`` (``hardware/servos/bus_process.py``) holds all servos, and the mode STOPPED until it is acknowledged.
 """
 
 from __future__ import annotations

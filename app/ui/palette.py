@@ -51,10 +51,6 @@ class Scheme:
     LIVE: str = "#D55E00"
     PLAYBACK: str = "#56B4E9"
 
-    @property
-    def is_dark(self) -> bool:
-        return contrast(self.WINDOW, "#FFFFFF") > contrast(self.WINDOW, "#000000")
-
 
 DARK = Scheme()
 LIGHT = Scheme(

@@ -95,10 +95,6 @@ class ImageFolder:
     def name(self) -> str:
         return self._path.name
 
-    @property
-    def is_live(self) -> bool:
-        return False
-
     def open(self) -> None:
         if self._watch is not None:
             self._watch.begin()
@@ -214,10 +210,6 @@ class VideoFile:
     @property
     def name(self) -> str:
         return self._path.name
-
-    @property
-    def is_live(self) -> bool:
-        return False
 
     def open(self) -> None:
         self._count, self._lost, self._first_s, self._end_s, self._pacer = 0, 0, None, 0.0, Pacer()

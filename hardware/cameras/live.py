@@ -78,10 +78,6 @@ class LiveCamera:
         return self._sensor.name
 
     @property
-    def is_live(self) -> bool:
-        return True
-
-    @property
     def reconnects(self) -> int:
         """How often the camera came back since it was opened."""
         return self._reader.reconnects if self._reader is not None else 0

@@ -282,10 +282,6 @@ class RealSenseRecording:
     def name(self) -> str:
         return self._path.name
 
-    @property
-    def is_live(self) -> bool:
-        return False
-
     def open(self) -> None:
         self.close()
         if not self._path.is_file():

@@ -27,10 +27,6 @@ class UndistortedCamera:
     def name(self) -> str:
         return self._camera.name
 
-    @property
-    def is_live(self) -> bool:
-        return self._camera.is_live
-
     def open(self) -> None:
         self._camera.open()
 

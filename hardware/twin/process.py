@@ -79,8 +79,6 @@ class RemoteTwin:
     Raises DeviceError when it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
 
-    is_live = False
-
     def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
         self._number = 0
         self._closed = False

@@ -243,8 +243,6 @@ class TwinWorld:
 class TwinCamera:
     """A ``Camera`` over a ``TwinWorld``. In lock-step every read advances the world by one frame period."""
 
-    is_live = False
-
     def __init__(self, world: TwinWorld, *, lock_step: bool = False) -> None:
         self._world = world
         self._lock_step = lock_step

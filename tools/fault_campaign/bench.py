@@ -73,7 +73,6 @@ class BenchCamera:
     """Pictures of the twin by the bench's clock; late, altered or missing as the hooks say."""
 
     name = "bench twin"
-    is_live = False
 
     def __init__(self, bench: FaultBench) -> None:
         self._bench = bench

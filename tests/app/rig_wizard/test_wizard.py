@@ -36,7 +36,7 @@ from tests.app.fakes import make_scene, until
 
 
 class StillCamera:
-    name, is_live = "still camera", False
+    name = "still camera"
 
     def open(self) -> None: ...
 

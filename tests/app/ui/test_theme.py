@@ -84,8 +84,6 @@ def test_names_of_the_module_are_those_of_the_scheme_in_use() -> None:
         assert theme.current() is scheme
         for role in ROLES:
             assert getattr(theme, role) == getattr(scheme, role) == theme.of(role)
-    assert LIGHT.is_dark is False
-    assert DARK.is_dark
 
 
 def test_every_table_names_roles_that_there_are() -> None:

@@ -12,7 +12,7 @@ from tests.core.pilot_bench import Bench, scene_at
 
 
 class _Camera:
-    name, is_live = "test", False
+    name = "test"
 
     def __init__(self, indices: list[int]) -> None:
         self._indices = indices

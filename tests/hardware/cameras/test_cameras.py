@@ -91,7 +91,6 @@ def test_contract(kind: str, tmp_path: Path) -> None:
     with ExitStack() as undo:
         camera = MAKERS[kind](tmp_path, undo)
         assert camera.name
-        assert camera.is_live == (kind in {"RealSense", "webcam"})
         camera.open()
         try:
             frames = []
@@ -110,7 +109,7 @@ def test_contract(kind: str, tmp_path: Path) -> None:
         assert frame.image.ndim == 3
         assert frame.image.shape[2] == 3
         assert frame.image.flags.c_contiguous
-        assert frame.lost == 0 or camera.is_live  # a machine that stands still for a moment loses some
+        assert frame.lost == 0 or kind in {"RealSense", "webcam"}  # a machine that stands still for a moment loses some
     assert len({frame.image.ctypes.data for frame in frames}) == 3  # nobody writes to a picture once it was given
 
 

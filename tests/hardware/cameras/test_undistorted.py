@@ -20,7 +20,7 @@ LENS = LensConfig(k1=-0.12, center_px=(319.5, 239.5), size_px=(640, 480), residu
 class ScriptedCamera:
     """Gives what it is told: frames, None, or errors."""
 
-    name, is_live = "scripted camera", True
+    name = "scripted camera"
 
     def __init__(self, *script: Frame | Exception | None) -> None:
         self._script = list(script)

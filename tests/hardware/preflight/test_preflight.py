@@ -359,7 +359,7 @@ def test_webcams(dev: Path, sys_: Path, plugged: list[RealSenseInfo]) -> None:
 class _Camera:
     """Gives `image` `rate` times a second, by its own count of time."""
 
-    name, is_live = "soft", True
+    name = "soft"
 
     def __init__(self, image: Image, rate: float = 30.0, problem: str | None = None) -> None:
         self._image, self._rate, self._problem = image, rate, problem
