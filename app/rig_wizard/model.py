@@ -83,7 +83,7 @@ class RigWizardModel(QObject):
             then(result)
         self.changed.emit()
 
-    def open_camera(self, config: Config, then: Callable[[object], None] | None = None) -> None:
+    def open_camera(self, config: Config) -> None:
         """Open another bench instead of the one that is open; what was found with that is lost."""
         self.config = config
         known = self._still_valid(config)
@@ -99,7 +99,7 @@ class RigWizardModel(QObject):
                 self.draft = RigDraft(self.bench, config, known, self.message.emit)
                 undo.pop_all()
 
-        self.run(tr("opening the camera"), job, then)
+        self.run(tr("opening the camera"), job)
 
     def _still_valid(self, config: Config) -> CalibrationConfig | None:
         """The earlier calibration, as far as it is valid for the bench that is opened now.

@@ -210,10 +210,10 @@ def _patterns() -> tuple[tuple[str, re.Pattern[str]], ...]:
     return tuple((template, _pattern(template)) for template in templates)
 
 
-def templates_below(language: str = CHINESE) -> set[str]:
+def templates_below() -> set[str]:
     """The templates of core and hardware that a translation has."""
     found = set(TEMPLATES)
-    path = FOLDER / f"lumenpilot_{LOCALE[language]}.ts"
+    path = FOLDER / f"lumenpilot_{LOCALE[CHINESE]}.ts"
     for entry in ET.parse(path).getroot().iter("message") if path.is_file() else ():  # our own file
         place, source = entry.find("location"), entry.findtext("source") or ""
         is_below = place is not None and place.get("filename", "").startswith(("../../core/", "../../hardware/"))

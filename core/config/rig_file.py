@@ -93,20 +93,19 @@ def check_rig_name(name: str) -> str:
     return name
 
 
-def rig_path(name: str, folder: Path | None = None) -> Path:
+def rig_path(name: str) -> Path:
     """The file of a rig of this name: an existing one, also in another case, or a new one."""
-    folder = folder if folder is not None else rigs_folder()
-    path = folder / f"{name.strip()}{_ENDING}"
+    path = rigs_folder() / f"{name.strip()}{_ENDING}"
     if path.exists():
         return path
-    alike = (one.path for one in list_rigs(folder) if one.path.name.casefold() == path.name.casefold())
+    alike = (one.path for one in list_rigs() if one.path.name.casefold() == path.name.casefold())
     return next(alike, path)
 
 
-def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
+def list_rigs() -> tuple[ListedRig, ...]:
     """All rigs by name, including those that cannot be used. A folder that cannot be read has none."""
     try:
-        paths = [path for path in (folder or rigs_folder()).glob(f"*{_ENDING}") if not path.name.endswith(_OLDER)]
+        paths = [path for path in rigs_folder().glob(f"*{_ENDING}") if not path.name.endswith(_OLDER)]
     except OSError:
         paths = []
     found = []
@@ -120,12 +119,12 @@ def list_rigs(folder: Path | None = None) -> tuple[ListedRig, ...]:
     return tuple(found)
 
 
-def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
+def find_rig(name: str) -> tuple[Path, RigFile]:
     """The rig of this name, whatever its case. Raises RigFileError, which lists the known ones.
 
     The file's name goes before the one inside, which a copy of the file keeps, and the exact name before another case.
     """
-    listed, wanted = list_rigs(folder), name.strip()
+    listed, wanted = list_rigs(), name.strip()
     folded = wanted.casefold()
     for rank in range(4):
         for rig in listed:
@@ -141,10 +140,10 @@ def find_rig(name: str, folder: Path | None = None) -> tuple[Path, RigFile]:
     raise RigFileError(f"unknown rig {name!r}; known: {known}")
 
 
-def has_rig(name: str, folder: Path | None = None) -> bool:
+def has_rig(name: str) -> bool:
     """Whether there is a file of this name, valid or not, whatever its case."""
     wanted = name.strip().casefold()
-    return any(wanted in {rig.name.casefold(), (rig.rig.name if rig.rig else "").casefold()} for rig in list_rigs(folder))
+    return any(wanted in {rig.name.casefold(), (rig.rig.name if rig.rig else "").casefold()} for rig in list_rigs())
 
 
 def read_rig(path: Path) -> RigFile:

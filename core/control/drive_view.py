@@ -86,6 +86,8 @@ _STRAIGHT_DEG = 3.0
 """An advised turn below this is no turn: keeping the head still follows it."""
 _LEAST_TICKS = 25
 """Half a second of motion, before which there is no share."""
+_ADHERENCE_S = 10.0
+"""Motion of so many seconds counts."""
 _MOST_LATENCIES = 100
 
 
@@ -95,13 +97,12 @@ class AdviceAdherence:
     A tick counts half for a feed forward or backward as advised, and half for steering that is not against an advised turn.
     """
 
-    def __init__(self, window_s: float = 10.0) -> None:
-        self._window_s = window_s
+    def __init__(self) -> None:
         self._ticks: deque[tuple[float, float]] = deque()
 
     def update(self, jog: Jog, advice: Advice | None, now_s: float) -> float | None:
         """The share, 0..1; None as long as the operator moved too little."""
-        while self._ticks and not 0.0 <= now_s - self._ticks[0][0] <= self._window_s:
+        while self._ticks and not 0.0 <= now_s - self._ticks[0][0] <= _ADHERENCE_S:
             self._ticks.popleft()
         if advice is not None and not (jog.bend == 0.0 and jog.advance == 0.0):
             if jog.advance == 0.0:

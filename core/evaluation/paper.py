@@ -154,17 +154,16 @@ def against_paper(metrics: Mapping[str, Any]) -> dict[str, str | None]:
     return found
 
 
-def choose_images(states: Mapping[str, str], seed: int, count: int = PAPER_IMAGES) -> list[str]:
-    """Images of states B, C and D in the paper's shares (13 : 26 : 5), drawn by `seed`, sorted by name.
+def choose_images(states: Mapping[str, str], seed: int) -> list[str]:
+    """As many images as the paper has, of states B, C and D in the paper's shares (13 : 26 : 5), drawn by `seed`, sorted by name.
 
     Parameters
     ----------
-    states : true state by image.
-    count : images wanted; a state of which the set has too few gives all it has, and the others are not filled up.
+    states : true state by image; one of which the set has too few gives all it has, and the others are not filled up.
     """
     rng = np.random.default_rng(seed)
     chosen: list[str] = []
-    for label, wanted in wanted_images(count).items():
+    for label, wanted in wanted_images().items():
         having = sorted(image for image, state in states.items() if state == label)
         chosen += [having[place] for place in rng.permutation(len(having))[:wanted]]
     return sorted(chosen)

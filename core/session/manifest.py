@@ -124,8 +124,8 @@ class Manifest(BaseModel):
         return None
 
 
-def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] | None = None) -> About:
-    """What is known of a rig from its configuration; a model that cannot be read has no hashes. `calibration`: the rig file's."""
+def about_rig(config: Config, kind: Kind, rig: str) -> About:
+    """What is known of a rig from its configuration and its file; a model that cannot be read has no hashes."""
     name = config.perception.segmentation.model
     model: dict[str, str | None] = {"name": name}
     try:
@@ -136,10 +136,10 @@ def about_rig(config: Config, kind: Kind, rig: str, calibration: dict[str, Any] 
         model["sha256"] = info.weights_sha256
         model["onnx_sha256"], model["onnx_int8_sha256"] = info.onnx_sha256, info.onnx_int8_sha256
         model["second_look_sha256"] = info.second_look_sha256
-    if calibration is None:
-        with contextlib.suppress(RigFileError):  # reported when the rig is opened
-            known = calibration_of(config)
-            calibration = known.model_dump(mode="json") if known is not None else None
+    known = None
+    with contextlib.suppress(RigFileError):  # reported when the rig is opened
+        known = calibration_of(config)
+    calibration = known.model_dump(mode="json") if known is not None else None
     return About(kind, rig, config.model_dump(mode="json"), model, calibration, _about_bench(config.perception.bench))
 
 
