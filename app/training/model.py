@@ -192,22 +192,11 @@ class TrainingJob(QObject):
         child.start()
 
     def _on_progress(self, record: dict[str, Any]) -> None:
-        state = self.state
-        try:
-            if "loss" in record:
-                point = int(record["step"]), float(record["loss"]), float(record["vessel_dice"]), float(record["robot_dice"])
-                steps = int(record.get("steps", state.steps))  # more than requested where the tip refinement learns, too
-                state = replace(state, curve=(*state.curve, point), steps=steps, left_s=record.get("left_s"))
-            elif "held_out_step" in record:
-                dices = float(record["vessel_dice"]), float(record["robot_dice"])
-                held_out = HeldOutDice(int(record["held_out_step"]), *dices, tuple(record.get("pictures", ())))
-                state = replace(state, held_out=(*state.held_out, held_out))
-            else:
-                self._outcome.update(record)
-                return
-        except (KeyError, TypeError, ValueError):  # a line of another version
-            return
-        self._show(state)
+        state = with_record(self.state, record)
+        if state is not None:
+            self._show(state)
+        else:
+            self._outcome.update(record)
 
     def _on_ended(self, code: int, line: str) -> None:
         self._child = None
@@ -236,6 +225,22 @@ class TrainingJob(QObject):
             robot=tr("robot {before:.2f} → {after:.2f}", before=first.robot_dice, after=last.robot_dice),
             verdict=tr("It is WORSE than before on the held-out pictures") if worse else tr("Choose it in the Model menu"),
         )
+
+
+def with_record(state: TrainingState, record: dict[str, Any]) -> TrainingState | None:
+    """The state after a line of ``--progress-json``; None for a line that is no progress, and the same for one that is damaged."""
+    try:
+        if "loss" in record:
+            point = int(record["step"]), float(record["loss"]), float(record["vessel_dice"]), float(record["robot_dice"])
+            steps = int(record.get("steps", state.steps))  # more than requested where the tip refinement learns, too
+            return replace(state, curve=(*state.curve, point), steps=steps, left_s=record.get("left_s"))
+        if "held_out_step" in record:
+            dices = float(record["vessel_dice"]), float(record["robot_dice"])
+            held_out = HeldOutDice(int(record["held_out_step"]), *dices, tuple(record.get("pictures", ())))
+            return replace(state, held_out=(*state.held_out, held_out))
+    except (KeyError, TypeError, ValueError):  # a line of another version
+        return state
+    return None
 
 
 def collect_from_file(path: Path) -> tuple[Sequence[StoredAnnotation], Sequence[FoundImage]]:

@@ -10,7 +10,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -209,6 +209,14 @@ def bench_from_frames(
     known = (count >= _AGREED_SHARE * np.maximum(usable.sum(axis=0), 1)) & (count >= 2)
     empty = np.where((count > 0)[:, :, None], mean, middle)
     return _bench(name, empty, noise, known, _drawn_vessel(vessel, base.shape[:2]))
+
+
+def with_vessel(bench: Bench, vessel: Mask) -> Bench:
+    """The bench with another vessel, drawn at its empty picture's size or the camera's, bool (H, W).
+
+    Raises BenchError where the mask cannot be a vessel.
+    """
+    return replace(bench, vessel=_drawn_vessel(vessel, bench.known.shape))
 
 
 def _without(values: Sequence[float], index: int) -> list[float]:

@@ -1,0 +1,782 @@
+"""The steps of the window that teaches a bench, one page each, with the picture or drawing that each shows at the right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QListWidgetItem,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.annotator.canvas import AnnotationCanvas
+from app.annotator.editing import Tool
+from app.rig_wizard.pages_base import WizardPicture, button, enable, note, set_main_button, set_note
+from app.teaching.folder import (
+    ENOUGH_BENDS,
+    ENOUGH_FRAMES,
+    PLACES,
+    Look,
+    LookKind,
+    TakenFrame,
+    TeachingStep,
+    TeachingView,
+    middle_of,
+    moved_place,
+)
+from app.teaching.model import MINUTES, TeachingModel, free_name, look_line
+from app.training.dialog import BeforeAfter
+from app.training.model import TrainingPhase, TrainingState
+from app.ui import theme
+from app.ui.i18n import mark, tr, tr_text
+from app.widgets.basics import column, line
+from app.widgets.image_canvas import halvings
+from core.annotation.masks import fill, polygons_of
+from core.annotation.model import Annotation, History, MaskTarget, Readout
+from core.annotation.outline import VesselOutline
+from core.bench.coverage import Side, VesselBranch
+from core.types import Image, Mask
+
+_LINE_PX, _UNDER_PX = 5.0, 8.0
+"""Widths of the vessel map's lines, and of what is dark behind them, on the screen."""
+_VEIL = 110
+"""Opacity, 0..255, of what is not known of the empty bench."""
+_SIDE_TEXT = {
+    Side.UPPER_LEFT: mark("the branch at the upper left"),
+    Side.TOP: mark("the branch at the top"),
+    Side.UPPER_RIGHT: mark("the branch at the upper right"),
+    Side.LEFT: mark("the left branch"),
+    Side.MIDDLE: mark("the branch in the middle"),
+    Side.RIGHT: mark("the right branch"),
+    Side.LOWER_LEFT: mark("the branch at the lower left"),
+    Side.BOTTOM: mark("the branch at the bottom"),
+    Side.LOWER_RIGHT: mark("the branch at the lower right"),
+}
+
+
+class BenchPicture(WizardPicture):
+    """The picture with the vessel tree over it: green where the robot has been, orange the branch that is asked for next."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._branches: tuple[VesselBranch, ...] = ()
+        self._wanted: VesselBranch | None = None
+        self._outlines: tuple[NDArray[np.int32], ...] = ()
+        self._veil: QImage | None = None
+        self._working = (1, 1)
+        self._caption = ""
+
+    def show_bench(
+        self,
+        working: tuple[int, int],
+        branches: Sequence[VesselBranch] = (),
+        wanted: VesselBranch | None = None,
+        outlines: Sequence[NDArray[np.int32]] = (),
+        unknown: Mask | None = None,
+        caption: str = "",
+    ) -> None:
+        """What is drawn over the picture, in pixels of a picture of size `working` (width, height)."""
+        self._working, self._branches, self._wanted, self._outlines = working, tuple(branches), wanted, tuple(outlines)
+        self._veil = _veil_of(unknown) if unknown is not None and unknown.any() else None
+        self._caption = caption
+        self.update()
+
+    @property
+    def caption(self) -> str:
+        return self._caption
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if self._image is None:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        box, _ = self._place(self._image)
+        if self._veil is not None:
+            painter.drawImage(box, self._veil)
+        scale = box.width() / self._working[0]
+
+        def polygon(points: NDArray[np.generic]) -> QPolygonF:
+            return QPolygonF([QPointF(box.left() + (x + 0.5) * scale, box.top() + (y + 0.5) * scale) for x, y in points.tolist()])
+
+        round_ends = (Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+        lines = [(polygon(cell), done, branch is self._wanted) for branch in self._branches for cell, done in _cells(branch)]
+        painter.setPen(QPen(QColor(0, 0, 0, 120), _UNDER_PX, *round_ends))
+        for shape, _, _ in lines:
+            painter.drawPolyline(shape)
+        for shape, done, is_wanted in lines:
+            ink = theme.ON_PICTURE.ROUTE if done else theme.ON_PICTURE.SIM if is_wanted else theme.ON_PICTURE.TEXT
+            painter.setPen(QPen(theme.colour(ink, 1.0 if done or is_wanted else 0.45), _LINE_PX if done else 3.0, *round_ends))
+            painter.drawPolyline(shape)
+        for outline in self._outlines:
+            for pen in (QPen(QColor(0, 0, 0, 150), 4.0), QPen(QColor(theme.ON_PICTURE.SIM), 2.0)):
+                painter.setPen(pen)
+                painter.drawPolygon(polygon(outline))
+        if self._caption:
+            self._paint_caption(painter)
+        painter.end()
+
+    def _paint_caption(self, painter: QPainter) -> None:
+        assert self._image is not None
+        box, _ = self._place(self._image)
+        font = theme.semi_bold(13)
+        painter.setFont(font)
+        width = painter.fontMetrics().horizontalAdvance(self._caption) + 20
+        frame = box.adjusted(10, 10, 0, 0)
+        frame.setSize(QSize(width, 28).toSizeF())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(0, 0, 0, 150))
+        painter.drawRoundedRect(frame, 6, 6)
+        painter.setPen(QColor(theme.ON_PICTURE.TEXT))
+        painter.drawText(frame, Qt.AlignmentFlag.AlignCenter, self._caption)
+
+
+def _cells(branch: VesselBranch) -> list[tuple[NDArray[np.float64], bool]]:
+    return list(zip(branch.lines, branch.covered, strict=True))
+
+
+def _veil_of(unknown: Mask) -> QImage:
+    """A dark veil over what is not known (h, w)."""
+    height, width = unknown.shape
+    pixels = np.zeros((height, width, 4), np.uint8)
+    pixels[unknown] = (0, 0, 0, _VEIL)
+    return QImage(pixels.tobytes(), width, height, 4 * width, QImage.Format.Format_RGBA8888)
+
+
+def to_pixmap(image: Image) -> QPixmap:
+    height, width = image.shape[:2]
+    return QPixmap.fromImage(QImage(image.tobytes(), width, height, 3 * width, QImage.Format.Format_RGB888))
+
+
+class TeachingPage(QWidget):
+    """One step. ``name`` stands in the list of steps; ``right``: what is shown at the right of it."""
+
+    name = ""
+    hint = ""
+    step = TeachingStep.EMPTY
+
+    def __init__(self, model: TeachingModel, right: QWidget) -> None:
+        super().__init__()
+        self.model, self.right = model, right
+        self.main: QPushButton | None = None
+        """The button of the step; it stands out until that is done."""
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(theme.GAP)
+        title = QLabel(tr(self.name))
+        title.setFont(theme.semi_bold(18))
+        self.column.addWidget(title)
+        if self.hint:
+            self.column.addWidget(note(tr(self.hint)))
+
+    @property
+    def view(self) -> TeachingView:
+        return self.model.view
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing more is asked for here."""
+        return self.view.step > self.step
+
+    @property
+    def may_leave(self) -> bool:
+        return self.view.may_leave
+
+    @property
+    def is_live(self) -> bool:
+        """Whether the picture at the right is the live one."""
+        return False
+
+    def enter(self) -> None:
+        """The page comes to the front."""
+
+    def leave(self) -> None:
+        """Another page comes to the front, or the window is closed."""
+
+    def next(self, step: TeachingStep) -> None:
+        """Keep what was done here, and go on."""
+        self.model.go(step)
+
+    def refresh(self) -> None:
+        """Show what there is now."""
+
+
+class EmptyPage(TeachingPage):
+    """The empty picture, or three places of the robot from which it is computed."""
+
+    name = mark("Empty bench")
+    hint = mark(
+        "Draw the robot back until none of it is in the vessel, and take your hands out of the picture. Camera and phantom stay as "
+        "they are from here on. In the bench twin hold the arrow down until the robot is back at the port."
+    )
+    step = TeachingStep.EMPTY
+
+    def __init__(self, model: TeachingModel, picture: BenchPicture, is_twin: bool) -> None:
+        super().__init__(model, picture)
+        self._picture = picture
+        self.take = self.main = button(tr("&Take picture"), model.take_empty, tr("Takes eight pictures within a second"))
+        self.place = button(tr("Take &place"), model.take_place, tr("One picture with the robot in another place"))
+        self.thumb = QLabel(tr("not taken yet"))
+        self.thumb.setFixedSize(232, 174)
+        self.thumb.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.thumb.setAccessibleName(tr("The empty picture that was taken"))
+        theme.set_sheet(self.thumb, "background: @WINDOW; color: @TEXT_FAINT; border: 1px solid @LINE; border-radius: 6px;")
+        self.found = note("")
+        self.found.setMinimumHeight(84)
+        self.found.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.column.addLayout(line(self.take, spacing=theme.GAP))
+        self.column.addWidget(self.thumb, 0, Qt.AlignmentFlag.AlignLeft)
+        self.column.addWidget(self.found)
+        self.column.addStretch(1)
+        self.column.addWidget(
+            note(
+                tr(
+                    "The robot cannot be taken out? Lay it in {count} different places and take each: the empty bench is computed.",
+                    count=PLACES,
+                )
+            )
+        )
+        self.column.addWidget(self.place)
+
+    @property
+    def is_live(self) -> bool:
+        return True
+
+    @property
+    def is_done(self) -> bool:
+        return self.view.empty is not None
+
+    def refresh(self) -> None:
+        view, busy = self.view, self.model.is_busy
+        enable(not busy, self.take, self.place)
+        count = len(view.places)
+        numbered = tr("Take &place {number} of {count}", number=count + 1, count=PLACES)
+        self.place.setText(numbered if count < PLACES else tr("Take one more &place"))
+        self.take.setText(tr("&Take it again") if view.empty is not None else tr("&Take picture"))
+        if view.empty is None:
+            self.thumb.setText(tr("not taken yet"))
+        else:
+            pixmap = to_pixmap(view.empty)
+            keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
+            self.thumb.setPixmap(pixmap.scaled(self.thumb.size() - QSize(2, 2), keep, smooth))
+        self.found.setText(self._words(view))
+        size = (view.empty.shape[1], view.empty.shape[0]) if view.empty is not None else (640, 480)
+        unknown = ~view.known if view.known is not None else None
+        self._picture.show_bench(size, outlines=view.robot_like, unknown=unknown, caption=tr("Live"))
+
+    def _words(self, view: TeachingView) -> str:
+        if view.empty is None:
+            return tr("{count} places taken", count=len(view.places)) if view.places else ""
+        if view.robot_like:
+            x, y = middle_of(view.robot_like[0])
+            return tr(
+                "The present model sees a robot near ({x:.0f}, {y:.0f}), outlined in the picture. If it is one, draw it back and "
+                "take the picture again; if not, go on.",
+                x=x,
+                y=y,
+            )
+        if view.known is not None and not view.known.all():
+            share = 100.0 * float(1.0 - view.known.mean())
+            return tr("{share:.1f} % of the picture are not known (dark): there the robot lay in all pictures.", share=share)
+        return tr("Good: the empty bench is known.")
+
+
+class VesselPage(TeachingPage):
+    """The vessel's outline, drawn once, beginning with the network's proposal."""
+
+    name = mark("Vessel")
+    hint = mark("Blue is the vessel as the model sees it. Correct it once; small errors of a pixel do no harm.")
+    step = TeachingStep.VESSEL
+
+    def __init__(self, model: TeachingModel, canvas: AnnotationCanvas) -> None:
+        super().__init__(model, canvas)
+        self.canvas = canvas
+        self.outline: VesselOutline | None = None
+        self._is_asked = False
+        self.brush = button(tr("&Brush"), self._on_brush, tr("Drag paints, right drag takes away"))
+        self.points = button(tr("&Points"), self._on_points, tr("Drag the outline's points, or draw another outline"))
+        for tool in (self.brush, self.points):
+            tool.setCheckable(True)
+        self.undo, self.again = button(tr("&Undo"), self._on_undo), button(tr("Propose &again"), self._ask_proposal)
+        self.smaller = button("\N{MINUS SIGN}", lambda: canvas.resize_brush(0.8))
+        self.larger = button("+", lambda: canvas.resize_brush(1.25))
+        self.smaller.setAccessibleName(tr("Smaller brush"))
+        self.larger.setAccessibleName(tr("Larger brush"))
+        self.column.addLayout(line(self.brush, self.smaller, self.larger, self.points))
+        self.column.addLayout(line(self.undo, self.again))
+        self.words = note("")
+        self.words.setMinimumHeight(60)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.column.addWidget(self.words)
+        self.column.addStretch(1)
+        canvas.edited.connect(self._on_edited)
+        model.proposed.connect(self._on_proposed)
+
+    @property
+    def may_leave(self) -> bool:
+        return self.outline is not None and bool(self.outline.annotation.masks)
+
+    @property
+    def is_done(self) -> bool:
+        return self.view.vessel is not None
+
+    def enter(self) -> None:
+        view = self.view
+        assert view.empty is not None
+        self.outline = VesselOutline(view.empty, view.vessel)
+        self._show_all(view.empty)
+        if view.vessel is None and not self._is_asked:
+            self._ask_proposal()
+
+    def next(self, step: TeachingStep) -> None:
+        assert self.outline is not None
+        self.canvas.complete()
+        self.model.set_vessel(self.outline.mask, step)
+
+    def refresh(self) -> None:
+        ready = self.outline is not None and not self.model.is_busy
+        enable(ready, self.brush, self.points, self.again, self.smaller, self.larger, self.canvas)
+        self.undo.setEnabled(ready and self.outline is not None and bool(self.outline.undo_action))
+        self.words.setText(self._words())
+
+    def _words(self) -> str:
+        if self.outline is None:
+            return ""
+        if not self.outline.annotation.masks:
+            return tr("The model sees no vessel here: paint it with the brush.")
+        return tr("Next keeps it. The robot may be anywhere in it later; the tube's wall does not belong to it.")
+
+    def _ask_proposal(self) -> None:
+        self._is_asked = True
+        self.model.propose_vessel()
+
+    def _on_proposed(self, vessel: Mask) -> None:
+        if self.outline is not None:
+            self.outline.edit("proposal", Annotation(masks=polygons_of(vessel, MaskTarget.VESSEL)))
+            self.canvas.show_annotation(self.outline.annotation)
+
+    def _show_all(self, image: Image) -> None:
+        assert self.outline is not None
+        self.canvas.show_image(halvings(image), self.outline.annotation, lambda _annotation: Readout())
+        self.canvas.set_tool(Tool.VESSEL_MASK)
+        self._on_brush()
+
+    def _on_edited(self, action: str, annotation: Annotation | None) -> None:
+        if self.outline is not None and self.isVisible():
+            if annotation is not None:
+                self.outline.edit(action, annotation)
+            self.canvas.show_annotation(self.outline.annotation)
+            self.refresh()
+
+    def _on_undo(self) -> None:
+        if self.outline is not None:
+            self.outline.undo()
+            self.canvas.show_annotation(self.outline.annotation)
+            self.refresh()
+
+    def _on_brush(self) -> None:
+        self._set_brush(True)
+
+    def _on_points(self) -> None:
+        self._set_brush(False)
+
+    def _set_brush(self, on: bool) -> None:
+        self.canvas.set_brush(on)
+        self.brush.setChecked(on)
+        self.points.setChecked(not on)
+
+
+class _Goal(QWidget):
+    """A bar with what it counts, before and after it."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._name, self._bar, self._value = QLabel(name), QProgressBar(), QLabel()
+        self._bar.setTextVisible(False)
+        self._bar.setFixedHeight(8)
+        self._bar.setAccessibleName(name)
+        self._name.setFixedWidth(76)
+        self._value.setFixedWidth(64)
+        self._value.setAlignment(Qt.AlignmentFlag.AlignRight)
+        theme.set_sheet(self._value, "color: @TEXT_DIM;")
+        self.setLayout(line(self._name, (self._bar, 1), self._value))
+
+    def show_share(self, share: float, text: str) -> None:
+        self._bar.setRange(0, 1000)
+        self._bar.setValue(round(1000 * min(1.0, max(0.0, share))))
+        self._value.setText(text)
+
+
+_STRIP = 3
+"""Small pictures of the newest frames beside each other."""
+
+
+class MovePage(TeachingPage):
+    """The robot is moved through the vessel, and frames are taken by themselves."""
+
+    name = mark("Move the robot")
+    hint = mark(
+        "Move the robot slowly through all branches, and bend its head both ways at some places; with the keys here, or by hand. "
+        "Frames are taken by themselves, and the map fills where it has been."
+    )
+    step = TeachingStep.MOVE
+
+    def __init__(self, model: TeachingModel, picture: BenchPicture) -> None:
+        super().__init__(model, picture)
+        self._picture = picture
+        self.said = QLabel()
+        self.said.setWordWrap(True)
+        self.said.setFixedHeight(62)
+        self.said.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
+        self.said.setAccessibleName(tr("What became of the newest picture"))
+        self.places, self.bends, self.frames = _Goal(tr("Vessel")), _Goal(tr("Bends")), _Goal(tr("Frames"))
+        self.lacks = note("")
+        self.lacks.setFixedHeight(58)
+        self.lacks.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.pause = button(tr("&Pause"), self._on_pause, tr("Take no frames for a while"))
+        self.pause.setCheckable(True)
+        self._thumbs = [QLabel() for _ in range(_STRIP)]
+        strip = QHBoxLayout()
+        strip.setSpacing(6)
+        for thumb in self._thumbs:
+            thumb.setFixedSize(116, 87)
+            thumb.setScaledContents(True)
+            theme.set_sheet(thumb, "background: @WINDOW; border-radius: 4px;")
+            strip.addWidget(thumb)
+        strip.addStretch(1)
+        for part in (self.said, self.places, self.bends, self.frames, self.lacks):
+            self.column.addWidget(part)
+        self.column.addStretch(1)
+        self.column.addLayout(strip)
+        self.column.addWidget(self.pause, 0, Qt.AlignmentFlag.AlignLeft)
+        self._shown: tuple[str, ...] = ()
+        model.looked.connect(self._on_looked)
+
+    @property
+    def is_live(self) -> bool:
+        return True
+
+    @property
+    def is_done(self) -> bool:
+        return self.view.is_enough
+
+    def enter(self) -> None:
+        self.pause.setChecked(False)
+        self._say(tr("Waiting for the robot to move"), "TEXT_DIM")
+        self.model.watch(True)
+
+    def leave(self) -> None:
+        self.model.watch(False)
+
+    def refresh(self) -> None:
+        view = self.view
+        if view.empty is None:
+            return
+        missing = view.missing
+        size = view.empty.shape[1], view.empty.shape[0]
+        self._picture.show_bench(size, view.branches, missing[0] if missing else None, caption=tr("Live"))
+        ends = [branch for branch in view.branches if branch.is_wanted and branch.is_end] or view.branches
+        self.places.show_share(view.share, tr("{done} of {count}", done=sum(one.is_done for one in ends), count=len(ends)))
+        bends = tr("{done} of {count}", done=min(view.bends, ENOUGH_BENDS), count=ENOUGH_BENDS)
+        self.bends.show_share(view.bends / ENOUGH_BENDS, bends)
+        self.frames.show_share(view.used / ENOUGH_FRAMES, str(view.used))
+        self.lacks.setText(lacks_line(view))
+        newest = tuple(taken.stem for taken in view.frames[-_STRIP:])
+        if newest != self._shown:
+            self._shown = newest
+            for label, taken in zip(self._thumbs, view.frames[-_STRIP:], strict=False):
+                label.setPixmap(to_pixmap(taken.thumb))
+
+    def _on_looked(self, look: Look) -> None:
+        if look.kind is LookKind.STILL:
+            return  # what was said last stays: nothing flickers while the robot rests
+        taken = look.kind in (LookKind.PLACE, LookKind.BEND)
+        text = look_line(look, self.view.used)
+        if moved_place(look.reason):
+            text += tr(". Put it back, or take the empty picture again (Back)")
+        self._say(text, "ALLOWED" if taken else "SIM" if look.kind is LookKind.REJECTED else "TEXT_DIM")
+
+    def _say(self, text: str, role: str) -> None:
+        theme.set_sheet(self.said, f"color: @{role}; font-size: 15px; font-weight: 600;")
+        self.said.setText(text)
+
+    def _on_pause(self) -> None:
+        self.model.watch(not self.pause.isChecked())
+        if self.pause.isChecked():
+            self._say(tr("Paused"), "TEXT_DIM")
+
+
+def lacks_line(view: TeachingView) -> str:
+    """What is missing, in words."""
+    if view.is_enough:
+        return tr("Nothing is missing. Next shows the frames; more may be taken.")
+    names = list(dict.fromkeys(tr(_SIDE_TEXT[branch.side]) for branch in view.missing))
+    if view.bends < ENOUGH_BENDS:
+        names.append(tr("a bend of the head"))
+    if not names:
+        names.append(tr("{count} more frames", count=ENOUGH_FRAMES - view.used))
+    return tr("Missing: {what}", what=", ".join(names[:4]))
+
+
+class FramesPage(TeachingPage):
+    """The frames as small pictures: to leave out, or to correct at the right."""
+
+    name = mark("Look through")
+    hint = mark("Orange must be the robot, all of it and nothing else. Leave out what is wrong, or correct it at the right.")
+    step = TeachingStep.FRAMES
+
+    def __init__(self, model: TeachingModel, canvas: AnnotationCanvas) -> None:
+        super().__init__(model, canvas)
+        self.canvas = canvas
+        self._history = History()
+        self._open: str | None = None
+        self._has_edits = False
+        self.list = QListWidget()
+        self.list.setViewMode(QListWidget.ViewMode.IconMode)
+        self.list.setIconSize(QSize(176, 132))
+        self.list.setGridSize(QSize(190, 160))
+        self.list.setResizeMode(QListWidget.ResizeMode.Adjust)
+        self.list.setMovement(QListWidget.Movement.Static)
+        self.list.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.list.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.list.setAccessibleName(tr("Frames"))
+        self.list.currentRowChanged.connect(self._on_row)
+        self.list.itemDoubleClicked.connect(lambda _item: self._toggle())
+        self.out = button(tr("&Leave out"), self._toggle, tr("A double click does it, too"))
+        self.undo = button(tr("&Undo"), self._on_undo)
+        self.why = note("")
+        self.why.setFixedHeight(40)
+        self.column.addWidget(self.list, 1)
+        self.column.addWidget(self.why)
+        self.column.addLayout(line(self.out, self.undo))
+        canvas.edited.connect(self._on_edited)
+
+    @property
+    def is_done(self) -> bool:
+        return self.view.step > self.step
+
+    def enter(self) -> None:
+        self._open = None
+        self.list.clear()
+        for _ in self.view.frames:
+            self.list.addItem(QListWidgetItem())
+        self.refresh()
+        doubtful = next((row for row, taken in enumerate(self.view.frames) if not taken.is_used), 0)
+        self.list.setCurrentRow(doubtful if self.view.frames else -1)
+
+    def leave(self) -> None:
+        self._keep()
+
+    def next(self, step: TeachingStep) -> None:
+        self.model.go(step)
+
+    def refresh(self) -> None:
+        frames = self.view.frames
+        for row, taken in enumerate(frames[: self.list.count()]):
+            item = self.list.item(row)
+            words = frame_words(taken)
+            if item.data(Qt.ItemDataRole.UserRole) != (key := f"{taken.stem} {words} {id(taken.thumb)}"):
+                item.setData(Qt.ItemDataRole.UserRole, key)
+                item.setIcon(QIcon(_thumb_pixmap(taken)))
+                item.setText(words)
+                item.setToolTip(tr_text(taken.frame.reason) or words)
+        taken_now = self._current
+        enable(taken_now is not None and not self.model.is_busy, self.out)
+        self.undo.setEnabled(self._history.undo_action not in ("", "begin"))
+        if taken_now is not None:
+            self.out.setText(tr("&Take in again") if taken_now.is_left_out else tr("&Leave out"))
+            self.why.setText(tr("Rejected: {why}", why=tr_text(taken_now.frame.reason)) if taken_now.frame.reason else "")
+
+    @property
+    def _current(self) -> TakenFrame | None:
+        row = self.list.currentRow()
+        return self.view.frames[row] if 0 <= row < len(self.view.frames) else None
+
+    def _on_row(self, _row: int) -> None:
+        taken = self._current
+        if taken is None or not self.isVisible():
+            return
+        self._keep()
+        self._open, self._history = taken.stem, History()
+        self._history.edit("begin", Annotation(masks=polygons_of(taken.frame.robot, MaskTarget.ROBOT)))
+        self.canvas.show_image(halvings(taken.frame.picture.image), self._history.current, lambda _annotation: Readout())
+        self.canvas.set_tool(Tool.ROBOT_MASK)
+        self.canvas.set_brush(True)
+        self.refresh()
+
+    def _toggle(self) -> None:
+        taken = self._current
+        if taken is not None:
+            self.model.leave_out(taken.stem, not taken.is_left_out)
+
+    def _on_edited(self, action: str, annotation: Annotation | None) -> None:
+        if not self.isVisible():
+            return
+        if annotation is not None:
+            self._history.edit(action, annotation)
+            self._has_edits = True
+        self.canvas.show_annotation(self._history.current)
+        self._keep()
+        self.refresh()
+
+    def _on_undo(self) -> None:
+        self._history.undo()
+        self._has_edits = True
+        self.canvas.show_annotation(self._history.current)
+        self._keep()
+        self.refresh()
+
+    def _keep(self) -> None:
+        """Keep the mask that was drawn."""
+        if not self._has_edits or self._open is None:
+            return
+        taken = next((one for one in self.view.frames if one.stem == self._open), None)
+        if taken is not None and not self.model.is_busy:
+            self._has_edits = False
+            height, width = taken.frame.robot.shape
+            self.model.correct(taken.stem, fill(self._history.current.masks, MaskTarget.ROBOT, (width, height)))
+
+
+def frame_words(taken: TakenFrame) -> str:
+    """What a frame is used for, in a word or two."""
+    if taken.is_left_out:
+        return tr("left out")
+    if taken.frame.reason:
+        return tr("rejected")
+    if taken.is_corrected:
+        return tr("corrected")
+    return tr("place") if taken.kind is LookKind.PLACE else tr("bend")
+
+
+def _thumb_pixmap(taken: TakenFrame) -> QPixmap:
+    """The small picture; one that is not used is dim and crossed out."""
+    pixmap = to_pixmap(taken.thumb)
+    if not taken.is_used:
+        painter = QPainter(pixmap)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.fillRect(pixmap.rect(), QColor(0, 0, 0, 150))
+        painter.setPen(QPen(QColor(theme.ON_PICTURE.FAULT if taken.frame.reason else theme.ON_PICTURE.TEXT_DIM), 3.0))
+        right, bottom = pixmap.width(), pixmap.height()
+        painter.drawLine(QPointF(right * 0.38, bottom * 0.34), QPointF(right * 0.62, bottom * 0.66))
+        painter.drawLine(QPointF(right * 0.62, bottom * 0.34), QPointF(right * 0.38, bottom * 0.66))
+        painter.end()
+    return pixmap
+
+
+class TrainPage(TeachingPage):
+    """The training, how it goes, and what to expect of the model."""
+
+    name = mark("Train")
+    hint = mark("It trains beside the window, which may be closed meanwhile. The present model stays, and can be chosen again.")
+    step = TeachingStep.TRAIN
+
+    def __init__(self, model: TeachingModel, pictures: BeforeAfter) -> None:
+        super().__init__(model, pictures)
+        self._pictures = pictures
+        self.model_name, self.minutes = QLineEdit(free_name(model.rig)), QSpinBox()
+        self.model_name.setMaxLength(40)
+        self.model_name.setAccessibleName(tr("Name of the new model"))
+        self.minutes.setRange(1, 120)
+        self.minutes.setValue(MINUTES)
+        self.minutes.setSuffix(tr(" min"))
+        self.minutes.setAccessibleName(tr("Time for the training"))
+        self.start = self.main = button(tr("&Train"), self._on_start)
+        self.stop = button(tr("&Stop"), model.stop_training, tr("Frames and what was learnt are kept"))
+        self.bar = QProgressBar()
+        self.bar.setTextVisible(False)
+        self.bar.setFixedHeight(8)
+        self.bar.setAccessibleName(tr("Training"))
+        self.words = note("")
+        self.words.setFixedHeight(80)
+        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.table = QLabel()
+        self.table.setTextFormat(Qt.TextFormat.RichText)
+        self.table.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.table.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+        name_label, minutes_label = QLabel(tr("New model")), QLabel(tr("for"))
+        name_label.setBuddy(self.model_name)
+        minutes_label.setBuddy(self.minutes)
+        self.column.addLayout(line(name_label, (self.model_name, 1), minutes_label, self.minutes))
+        self.column.addLayout(line(self.start, self.stop))
+        self.column.addLayout(column(self.bar, self.words, (self.table, 1)))
+
+    @property
+    def is_done(self) -> bool:
+        return bool(self.view.model)
+
+    def refresh(self) -> None:
+        state = self.model.training
+        enable(not state.is_busy and not self.model.is_busy, self.start, self.model_name, self.minutes)
+        self.stop.setEnabled(state.phase is TrainingPhase.RUNNING)
+        if state.phase is TrainingPhase.DONE and self.model_name.text() == state.name:
+            self.model_name.setText(free_name(self.model.rig))
+        self.bar.setRange(0, state.steps if state.step or not state.is_busy else 0)
+        self.bar.setValue(state.steps if state.phase is TrainingPhase.DONE else state.step)
+        self.words.setText(self._words(state))
+        self.table.setText(self._table())
+        if state.held_out:
+            after = state.held_out[-1].pictures if len(state.held_out) > 1 else ()
+            self._pictures.show_pictures(state.held_out[0].pictures, after)
+
+    def _words(self, state: TrainingState) -> str:
+        if state.is_busy and state.step:
+            left = tr(", about {minutes:.0f} min left", minutes=max(1.0, state.left_s / 60)) if state.left_s is not None else ""
+            return tr("Step {step} of {steps}{left}", step=state.step, steps=state.steps, left=left)
+        if state.line:
+            return tr_text(state.line)
+        if self.view.model:
+            used = tr(" It is in use.") if self.view.is_used else tr(" Use it puts it into force, with this bench.")
+            return tr("Model {name} is there.{more}", name=self.view.model, more=used)
+        return tr("{count} frames to learn from; a quarter of them is held out, to judge by.", count=self.view.used)
+
+    def _table(self) -> str:
+        result = self.model.result
+        if result is None or not self.view.model:
+            return ""
+        rows = [(tr("answered"), tr("{answered} of {count} held-out frames", answered=result.answered, count=result.frames))]
+        rows.append((tr("right"), tr("{right} of these", right=result.right)))
+        if result.robot_dice is not None:
+            rows.append((tr("robot (Dice)"), f"{result.robot_dice:.3f}"))
+        if result.head_px is not None:
+            rows.append((tr("head"), f"{result.head_px:.1f} px"))
+        if result.theta_deg is not None:
+            rows.append((tr("theta"), f"{result.theta_deg:.1f}°"))
+        rows.append((tr("time"), tr("{minutes:.1f} min", minutes=result.time_s / 60)))
+        cells = "".join(
+            f'<tr><td style="color:{theme.TEXT_DIM}; padding-right:16px; padding-bottom:4px">{name}</td><td>{value}</td></tr>'
+            for name, value in rows
+        )
+        return f"<b>{tr('What to expect on this bench')}</b><table>{cells}</table>"
+
+    def _on_start(self) -> None:
+        self.model.train(self.model_name.text().strip(), self.minutes.value())
+
+
+ShowMain = Callable[[QPushButton, bool], None]
+
+
+def show_main(page: TeachingPage, next_button: QPushButton) -> None:
+    """One button stands out: that of the step, until it is done, else the one that leads on."""
+    done = page.is_done and page.may_leave
+    if page.main is not None:
+        set_main_button(page.main, not done)
+    set_main_button(next_button, done if page.main is not None else page.may_leave)
+
+
+def show_words(label: QLabel, text: str) -> None:
+    set_note(label, text)

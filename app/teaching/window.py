@@ -1,0 +1,278 @@
+"""The window that teaches a bench: empty picture, vessel, moving the robot, frames, training; it can be left at any step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QStackedWidget, QWidget
+
+from app.annotator.canvas import AnnotationCanvas
+from app.operator.manual_drive import JogKeys
+from app.rig_wizard.pages_base import button, note
+from app.teaching.folder import TeachingStep
+from app.teaching.model import NewestFrame, TeachingModel
+from app.teaching.pages import (
+    BenchPicture,
+    EmptyPage,
+    FramesPage,
+    MovePage,
+    TeachingPage,
+    TrainPage,
+    VesselPage,
+    show_main,
+)
+from app.training.dialog import BeforeAfter
+from app.ui import theme
+from app.ui.i18n import tr, tr_text
+from app.widgets.basics import Card, StillWheel, column, line, takes_enter
+from app.widgets.messages import QuestionStrip
+from app.widgets.mode_bar import StopButton
+from core.control.motion import Jog
+
+_SIZE = QSize(1240, 660)
+_FRAME = QSize(16, 56)
+"""Room that the desktop needs for title bar and borders."""
+_STEPS_PX, _CONTROLS_PX = 170, 400
+_STEP_LINE_PX = 30
+_PICTURE_EVERY_MS = 50
+
+
+class TeachingDriver:
+    """How the window moves the robot: what held keys do, and STOP.
+
+    Parameters
+    ----------
+    drive : moves the robot as held keys do.
+    stop : STOP.
+    can_move : whether anything can move now.
+    """
+
+    def __init__(self, drive: Callable[[Jog], object], stop: Callable[[], object], can_move: Callable[[], bool]) -> None:
+        self.drive, self.stop, self.can_move = drive, stop, can_move
+
+
+class TeachingWindow(QDialog):
+    """Shows a teaching. It is not modal; closing it hides it, and everything goes on from there.
+
+    ``used`` carries the name of the model that is to be used from now on.
+
+    Parameters
+    ----------
+    model : lives longer than the window is shown; a training goes on while it is hidden.
+    newest : the live picture.
+    driver : keys that move the robot while it is to be moved.
+    is_twin : whether the bench is the twin.
+    """
+
+    used = Signal(str)
+
+    def __init__(
+        self, model: TeachingModel, newest: NewestFrame, driver: TeachingDriver, is_twin: bool, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.model, self._newest, self._driver = model, newest, driver
+        self._keys: JogKeys | None = None
+        self._shown_index = -1
+        self.setWindowTitle(tr("Teach this bench: {name}", name=model.rig))
+        self.setModal(False)
+        theme.set_sheet(self, theme.FORM_SHEET)
+        self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
+        self.picture = BenchPicture()
+        self.picture.show_text(tr("No live picture"))
+        vessel_canvas, robot_canvas, self.before_after = AnnotationCanvas(), AnnotationCanvas(), BeforeAfter()
+        self.empty_page = EmptyPage(model, self.picture, is_twin)
+        self.vessel_page = VesselPage(model, vessel_canvas)
+        self.move_page = MovePage(model, self.picture)
+        self.frames_page = FramesPage(model, robot_canvas)
+        self.train_page = TrainPage(model, self.before_after)
+        self.pages: tuple[TeachingPage, ...] = (
+            self.empty_page,
+            self.vessel_page,
+            self.move_page,
+            self.frames_page,
+            self.train_page,
+        )
+        self.steps, self.stack, self.right = QListWidget(), QStackedWidget(), QStackedWidget()
+        self.stop_button = StopButton()
+        self.stop_button.asked.connect(driver.stop)
+        self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
+        self.over_button = button(tr("Start &over"), self._ask_to_start_over, tr("Forget what was taken of this bench"))
+        self.close_button = button(tr("&Close"), self.close, tr("What was taken is kept; the menu Model opens it again"))
+        self.line = note("")
+        self.question = QuestionStrip()
+        self.question.closed.connect(lambda: self._show_question(False))
+        self._lay_out()
+        StillWheel(self)
+        self._page: TeachingPage = self.empty_page
+        model.changed.connect(self._refresh)
+        model.said.connect(self.say)
+        self._timer = QTimer(self, interval=_PICTURE_EVERY_MS)
+        self._timer.timeout.connect(self._update_picture)
+
+    @property
+    def page(self) -> TeachingPage:
+        """The page in front."""
+        return self._page
+
+    @property
+    def message(self) -> str:
+        """The line at the foot."""
+        return self.line.text()
+
+    def _lay_out(self) -> None:
+        self.steps.setFixedWidth(_STEPS_PX)
+        self.steps.setAccessibleName(tr("Steps"))
+        self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
+        for number, page in enumerate(self.pages, 1):
+            item = QListWidgetItem(f"{number}  {tr(page.name)}")
+            item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
+            self.steps.addItem(item)
+            self.stack.addWidget(page)
+            if self.right.indexOf(page.right) < 0:
+                self.right.addWidget(page.right)
+        self.stack.setFixedWidth(_CONTROLS_PX)
+        middle = line(self.steps, Card("", self.stack), (self.right, 1))
+        foot = line(self.stop_button, (self.line, 1), (self.question, 1))
+        for part in (self.over_button, self.close_button, self.back_button, self.next_button):
+            foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
+        for message in (self.line, self.question):
+            message.setMinimumHeight(44)
+        self.question.hide()
+        self.setLayout(column((middle, 1), foot, margins=(14, 12, 14, 12)))
+
+    # ---- opening and closing
+
+    def open(self) -> None:
+        """Show it at the step where it was left."""
+        if not self.model.is_loaded and not self.model.is_busy:
+            self.model.load()
+        self.show()
+        self.raise_()
+        self.activateWindow()
+        self._timer.start()
+        self._enter(self.pages[self.model.view.step])
+
+    def end(self) -> None:
+        """The window behind it closes."""
+        self._leave()
+        self.model.close()
+        self.close()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self._leave()
+        super().closeEvent(event)
+
+    def reject(self) -> None:
+        self.close()
+
+    def _leave(self) -> None:
+        self._timer.stop()
+        self._page.leave()
+        self._set_keys(False)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not takes_enter(self, event):
+            super().keyPressEvent(event)
+
+    # ---- steps
+
+    def next(self) -> None:
+        """Keep what was done, and go on; on the last page: use the model."""
+        if self.model.is_busy or not self._page.may_leave:
+            return
+        if self._page is self.train_page:
+            self.model.keep_used()
+            self.used.emit(self.model.view.model)
+        else:
+            self._page.next(TeachingStep(self._page.step + 1))
+
+    def back(self) -> None:
+        """To the step before; nothing is lost."""
+        if not self.model.is_busy and self._page.step > 0:
+            self.model.go(TeachingStep(self._page.step - 1))
+
+    def _enter(self, page: TeachingPage) -> None:
+        self._page = page
+        self.stack.setCurrentWidget(page)
+        self.right.setCurrentWidget(page.right)
+        self.say("")
+        self._shown_index = -1
+        page.enter()
+        self._set_keys(page.is_live)
+        self._refresh()
+
+    def _set_keys(self, on: bool) -> None:
+        """The arrows move the robot only where it is to be moved."""
+        if on is (self._keys is not None):
+            return
+        if on:
+            self._keys = JogKeys(self, self._driver.can_move)
+            self._keys.changed.connect(self._driver.drive)
+            self._keys.stop_pressed.connect(self._driver.stop)
+        elif self._keys is not None:
+            self._keys.detach()
+            self._keys.deleteLater()
+            self._keys = None
+
+    def _ask_to_start_over(self) -> None:
+        self._show_question(True)
+        self.question.ask(tr("Forget pictures, vessel and frames of this bench?"), tr("Forget"), self.model.start_over)
+
+    def _show_question(self, on: bool) -> None:
+        self.question.setVisible(on)
+        self.line.setVisible(not on)
+
+    # ---- what is shown
+
+    @Slot()
+    def _refresh(self) -> None:
+        if not self.isVisible():
+            return
+        model, view = self.model, self.model.view
+        if not model.is_busy and self._page.step is not view.step:
+            self._page.leave()
+            self._enter(self.pages[view.step])
+            return
+        self._page.refresh()
+        for row, page in enumerate(self.pages):
+            item = self.steps.item(row)
+            font = item.font()
+            font.setBold(page is self._page)
+            item.setFont(font)
+            done = "\N{CHECK MARK}" if page.step < view.step or (page is self._page and page.is_done) else str(row + 1)
+            item.setText(f"{done}  {tr(page.name)}")
+        is_last = self._page is self.train_page
+        self.next_button.setText(tr("&Use it") if is_last else tr("&Next"))
+        self.next_button.setEnabled(self._page.may_leave and not model.is_busy and not (is_last and model.is_training))
+        self.back_button.setEnabled(self._page.step > 0 and not model.is_busy and not model.is_training)
+        self.over_button.setEnabled(not model.is_busy and not model.is_training)
+        self.close_button.setText(tr("&Close, go on training") if model.is_training else tr("&Close"))
+        show_main(self._page, self.next_button)
+        if model.is_busy:
+            work = tr_text(model.busy)
+            self.say(f"{work[0].upper()}{work[1:]} ...")
+        elif self.message.endswith(" ..."):
+            self.say("")
+
+    @Slot(str, bool)
+    def say(self, text: str, is_fault: bool = False) -> None:
+        theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
+        self.line.setText(tr_text(text))
+        self.line.setAccessibleName(text)
+
+    def follow_theme(self) -> None:
+        self._refresh()
+
+    @Slot()
+    def _update_picture(self) -> None:
+        if not self._page.is_live:
+            return
+        frame = self._newest()
+        if frame is None:
+            self.picture.show_text(tr("No live picture: start the rig (F5 in the operator window)"))
+        elif frame.index != self._shown_index:
+            self._shown_index = frame.index
+            self.picture.show_image(frame.image)
