@@ -13,6 +13,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from core.learning.teaching import TeachingFrame, TeachingPicture
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -25,7 +26,6 @@ from core.devices import UserError
 from core.files import read_image, write_atomic
 from core.learning import teaching
 from core.learning.dataset import WORKING_SIZE_PX, mask_png, png, read_mask
-from core.learning.teaching import TeachingFrame, TeachingPicture
 from core.messages import message
 from core.perception.segmentation import Probability, clean_mask, to_working
 from core.types import Image, Mask, Point, Reason
@@ -44,10 +44,12 @@ PLACES = 3
 """Places of the robot from which an empty picture is computed."""
 _NEW_CELLS = 2
 """A frame in which the robot covers so many new cells of the vessel is taken."""
-_BEND_SHARE = 0.3
+_OTHER_SHARE = 0.15
 """A frame whose robot differs this much (0..1) from that of each frame taken is taken, too."""
-_STILL_LEVELS, _STILL_SHARE = 24, 4e-4
-"""Pictures of which a smaller share differs by more than these grey levels show the same: the robot has not moved."""
+_SAME_CELLS = 1
+"""Of a bend: so many cells, at most, that the robot of another frame does not cover, or covers alone."""
+_STILL_LEVELS, _STILL_SHARE = 10, 4e-4
+"""Pictures of which, a quarter as large, a smaller share differs by more than these grey levels show the same."""
 _BUSY_SHARE = 2e-3
 """Share of the picture that changes while an empty picture is taken, when a hand or the robot moves."""
 _LEAST_ROBOT_PX = 220
@@ -117,7 +119,7 @@ class TeachingView:
     places : pictures with the robot in other places, from which the empty one is computed.
     robot_like : outlines (N, 2) of what the model takes for a robot in the empty picture.
     frames : those taken, in their order.
-    branches : the vessel tree with where the robot has been.
+    branches, tree : the vessel tree with where the robot has been; see ``VesselCoverage``.
     share : of the tree, 0..1.
     bends : frames that show a bend.
     model : name of the model that was trained, "" before that.
@@ -132,6 +134,7 @@ class TeachingView:
     robot_like: tuple[NDArray[np.int32], ...] = ()
     frames: tuple[TakenFrame, ...] = ()
     branches: tuple[VesselBranch, ...] = ()
+    tree: NDArray[np.uint8] | None = None
     share: float = 0.0
     bends: int = 0
     model: str = ""
@@ -212,7 +215,7 @@ class TeachingFolder:
         self._frames: list[TakenFrame] = []
         self._blurred: list[NDArray[np.float32]] = []
         self._coverage: VesselCoverage | None = None
-        self._last: NDArray[np.uint8] | None = None
+        self._last: Image | None = None
 
     # ---- from disk
 
@@ -272,6 +275,7 @@ class TeachingFolder:
             self._robot_like,
             tuple(self._frames),
             coverage.branches() if coverage is not None else (),
+            coverage.tree() if coverage is not None else None,
             coverage.share if coverage is not None else 0.0,
             sum(taken.kind is LookKind.BEND and taken.is_used for taken in self._frames),
             record.model,
@@ -392,24 +396,25 @@ class TeachingFolder:
         if len(self._frames) >= MOST_FRAMES:
             return Look(LookKind.FULL)
         image = to_working(picture, WORKING_SIZE_PX)[0]
-        small = np.asarray(cv2.resize(image, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA), np.uint8)
-        if self._last is not None and self._last.shape == small.shape and _changed_share(small, self._last) < _STILL_SHARE:
+        if self._last is not None and self._last.shape == image.shape and _changed_share(image, self._last) < _STILL_SHARE:
             return Look(LookKind.STILL)
-        self._last = small
+        self._last = image
         stem = f"{self._record.next_stem:04d}"
         frame = teaching.propose(TeachingPicture(stem, stem, image), bench)
         if frame.reason:
             return Look(LookKind.REJECTED, frame.reason)
         blurred = _blurred(frame.robot)
-        is_place = coverage.new_cells(frame.robot) >= _NEW_CELLS or not self._frames
-        if not is_place and any(_apart(blurred, other) < _BEND_SHARE for other in self._blurred):
+        is_new = coverage.new_cells(frame.robot) >= _NEW_CELLS or not self._frames
+        if not is_new and any(_apart(blurred, other) < _OTHER_SHARE for other in self._blurred):
             return Look(LookKind.SEEN)
         usable = [taken.frame for taken in self._frames if taken.is_used]
         if len(usable) >= _CHECK_FROM:
             reason = teaching.check([*usable, frame], bench)[-1].reason
             if reason:
                 return Look(LookKind.REJECTED, reason)
-        kind = LookKind.PLACE if is_place else LookKind.BEND
+        cells = coverage.cells_under(frame.robot)
+        apart = [int((cells ^ coverage.cells_under(taken.frame.robot)).sum()) for taken in self._frames]
+        kind = LookKind.BEND if not is_new and min(apart) <= _SAME_CELLS else LookKind.PLACE
         self._write("frames", stem, png(image))
         self._frames.append(TakenFrame(frame, kind, thumb_of(frame)))
         self._blurred.append(blurred)
@@ -529,9 +534,11 @@ def _with_robot(frame: TeachingFrame, robot: Mask) -> TeachingFrame:
 
 def _changed_share(one: Image, other: Image) -> float:
     """Share of two pictures (h, w, 3) that differs, beyond noise and a change of light."""
-    first, second = (cv2.blur(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), (3, 3)).astype(np.int16) for image in (one, other))
+    small = [cv2.resize(image, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA) for image in (one, other)]
+    first, second = (image.astype(np.int16) for image in small)
     apart = second - first
-    return float(np.mean(np.abs(apart - np.int16(np.median(apart[::4, ::4]))) > _STILL_LEVELS))
+    apart -= np.median(apart[::2, ::2], axis=(0, 1)).astype(np.int16)
+    return float(np.mean(np.abs(apart).max(axis=2) > _STILL_LEVELS))
 
 
 def _blurred(robot: Mask) -> NDArray[np.float32]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QSize, Qt
-from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QTransform
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -43,18 +44,19 @@ from app.training.dialog import BeforeAfter
 from app.training.model import TrainingPhase, TrainingState
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.palette import ON_PICTURE
 from app.widgets.basics import column, line
 from app.widgets.image_canvas import halvings
 from core.annotation.masks import fill, polygons_of
 from core.annotation.model import Annotation, History, MaskTarget, Readout
 from core.annotation.outline import VesselOutline
-from core.bench.coverage import Side, VesselBranch
+from core.bench.coverage import ASKED, COVERED, Side
 from core.types import Image, Mask
 
-_LINE_PX, _UNDER_PX = 5.0, 8.0
-"""Widths of the vessel map's lines, and of what is dark behind them, on the screen."""
+_INK_OF = {COVERED: (ON_PICTURE.VESSEL, 120), ASKED: (ON_PICTURE.SIM, 90)}
+"""Colour and opacity (0..255) of the vessel map: where the robot has been, and the branch that is asked for next."""
 _VEIL = 110
-"""Opacity, 0..255, of what is not known of the empty bench."""
+"""Opacity of what is not known of the empty bench."""
 _SIDE_TEXT = {
     Side.UPPER_LEFT: mark("the branch at the upper left"),
     Side.TOP: mark("the branch at the top"),
@@ -69,13 +71,11 @@ _SIDE_TEXT = {
 
 
 class BenchPicture(WizardPicture):
-    """The picture with the vessel tree over it: green where the robot has been, orange the branch that is asked for next."""
+    """The picture with the vessel tree over it: blue where the robot has been, orange the branch that is asked for next."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._branches: tuple[VesselBranch, ...] = ()
-        self._wanted: VesselBranch | None = None
-        self._outlines: tuple[NDArray[np.int32], ...] = ()
+        self._outlines: list[tuple[QPolygonF, str]] = []
         self._veil: QImage | None = None
         self._working = (1, 1)
         self._caption = ""
@@ -83,16 +83,31 @@ class BenchPicture(WizardPicture):
     def show_bench(
         self,
         working: tuple[int, int],
-        branches: Sequence[VesselBranch] = (),
-        wanted: VesselBranch | None = None,
+        tree: NDArray[np.uint8] | None = None,
         outlines: Sequence[NDArray[np.int32]] = (),
         unknown: Mask | None = None,
         caption: str = "",
     ) -> None:
-        """What is drawn over the picture, in pixels of a picture of size `working` (width, height)."""
-        self._working, self._branches, self._wanted, self._outlines = working, tuple(branches), wanted, tuple(outlines)
-        self._veil = _veil_of(unknown) if unknown is not None and unknown.any() else None
-        self._caption = caption
+        """What is drawn over the picture, in pixels of a picture of size `working` (width, height).
+
+        Parameters
+        ----------
+        tree : the vessel map, see ``VesselCoverage.tree``.
+        outlines : (N, 2), of what is pointed out.
+        unknown : bool (h, w), what is not known of the empty bench.
+        caption : in the corner.
+        """
+        self._working, self._caption = working, caption
+        self._outlines = [(_polygon(outline), ON_PICTURE.SIM) for outline in outlines]
+        pixels = np.zeros((working[1], working[0], 4), np.uint8)
+        if unknown is not None:
+            pixels[unknown] = (0, 0, 0, _VEIL)
+        if tree is not None:
+            for kind, (ink, opacity) in _INK_OF.items():
+                pixels[tree == kind] = (*theme.rgb(ink), opacity)
+            walls, _ = cv2.findContours((tree > 0).view(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+            self._outlines += [(_polygon(wall[:, 0]), ON_PICTURE.TEXT) for wall in walls]
+        self._veil = QImage(pixels.tobytes(), *working, 4 * working[0], QImage.Format.Format_RGBA8888) if pixels.any() else None
         self.update()
 
     @property
@@ -110,52 +125,29 @@ class BenchPicture(WizardPicture):
         if self._veil is not None:
             painter.drawImage(box, self._veil)
         scale = box.width() / self._working[0]
-
-        def polygon(points: NDArray[np.generic]) -> QPolygonF:
-            return QPolygonF([QPointF(box.left() + (x + 0.5) * scale, box.top() + (y + 0.5) * scale) for x, y in points.tolist()])
-
-        round_ends = (Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
-        lines = [(polygon(cell), done, branch is self._wanted) for branch in self._branches for cell, done in _cells(branch)]
-        painter.setPen(QPen(QColor(0, 0, 0, 120), _UNDER_PX, *round_ends))
-        for shape, _, _ in lines:
-            painter.drawPolyline(shape)
-        for shape, done, is_wanted in lines:
-            ink = theme.ON_PICTURE.ROUTE if done else theme.ON_PICTURE.SIM if is_wanted else theme.ON_PICTURE.TEXT
-            painter.setPen(QPen(theme.colour(ink, 1.0 if done or is_wanted else 0.45), _LINE_PX if done else 3.0, *round_ends))
-            painter.drawPolyline(shape)
-        for outline in self._outlines:
-            for pen in (QPen(QColor(0, 0, 0, 150), 4.0), QPen(QColor(theme.ON_PICTURE.SIM), 2.0)):
+        to_widget = QTransform(scale, 0.0, 0.0, scale, box.left() + 0.5 * scale, box.top() + 0.5 * scale)
+        for outline, ink in self._outlines:
+            shape = to_widget.map(outline)
+            for pen in (QPen(QColor(0, 0, 0, 130), 3.0), QPen(theme.colour(ink, 0.9), 1.2 if ink == ON_PICTURE.TEXT else 2.0)):
                 painter.setPen(pen)
-                painter.drawPolygon(polygon(outline))
+                painter.drawPolygon(shape)
         if self._caption:
-            self._paint_caption(painter)
+            self._paint_caption(painter, box)
         painter.end()
 
-    def _paint_caption(self, painter: QPainter) -> None:
-        assert self._image is not None
-        box, _ = self._place(self._image)
-        font = theme.semi_bold(13)
-        painter.setFont(font)
+    def _paint_caption(self, painter: QPainter, box: QRectF) -> None:
+        painter.setFont(theme.semi_bold(13))
         width = painter.fontMetrics().horizontalAdvance(self._caption) + 20
-        frame = box.adjusted(10, 10, 0, 0)
-        frame.setSize(QSize(width, 28).toSizeF())
+        frame = QRectF(box.left() + 10, box.top() + 10, width, 28)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(0, 0, 0, 150))
         painter.drawRoundedRect(frame, 6, 6)
-        painter.setPen(QColor(theme.ON_PICTURE.TEXT))
+        painter.setPen(QColor(ON_PICTURE.TEXT))
         painter.drawText(frame, Qt.AlignmentFlag.AlignCenter, self._caption)
 
 
-def _cells(branch: VesselBranch) -> list[tuple[NDArray[np.float64], bool]]:
-    return list(zip(branch.lines, branch.covered, strict=True))
-
-
-def _veil_of(unknown: Mask) -> QImage:
-    """A dark veil over what is not known (h, w)."""
-    height, width = unknown.shape
-    pixels = np.zeros((height, width, 4), np.uint8)
-    pixels[unknown] = (0, 0, 0, _VEIL)
-    return QImage(pixels.tobytes(), width, height, 4 * width, QImage.Format.Format_RGBA8888)
+def _polygon(points: NDArray[np.int32]) -> QPolygonF:
+    return QPolygonF([QPointF(x, y) for x, y in points.tolist()])
 
 
 def to_pixmap(image: Image) -> QPixmap:
@@ -221,8 +213,8 @@ class EmptyPage(TeachingPage):
 
     name = mark("Empty bench")
     hint = mark(
-        "Draw the robot back until none of it is in the vessel, and take your hands out of the picture. Camera and phantom stay as "
-        "they are from here on. In the bench twin hold the arrow down until the robot is back at the port."
+        "Draw the robot back until none of it is in the vessel, and take your hands out of the picture. From here on camera and "
+        "phantom stay where they are."
     )
     step = TeachingStep.EMPTY
 
@@ -239,7 +231,9 @@ class EmptyPage(TeachingPage):
         self.found = note("")
         self.found.setMinimumHeight(84)
         self.found.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.column.addLayout(line(self.take, spacing=theme.GAP))
+        if is_twin:
+            self.column.addWidget(note(tr("Bench twin: hold the key arrow down until the robot is back at the port.")))
+        self.column.addWidget(self.take)
         self.column.addWidget(self.thumb, 0, Qt.AlignmentFlag.AlignLeft)
         self.column.addWidget(self.found)
         self.column.addStretch(1)
@@ -487,9 +481,8 @@ class MovePage(TeachingPage):
         view = self.view
         if view.empty is None:
             return
-        missing = view.missing
         size = view.empty.shape[1], view.empty.shape[0]
-        self._picture.show_bench(size, view.branches, missing[0] if missing else None, caption=tr("Live"))
+        self._picture.show_bench(size, view.tree, caption=tr("Live"))
         ends = [branch for branch in view.branches if branch.is_wanted and branch.is_end] or view.branches
         self.places.show_share(view.share, tr("{done} of {count}", done=sum(one.is_done for one in ends), count=len(ends)))
         bends = tr("{done} of {count}", done=min(view.bends, ENOUGH_BENDS), count=ENOUGH_BENDS)
@@ -670,7 +663,7 @@ def _thumb_pixmap(taken: TakenFrame) -> QPixmap:
         painter = QPainter(pixmap)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.fillRect(pixmap.rect(), QColor(0, 0, 0, 150))
-        painter.setPen(QPen(QColor(theme.ON_PICTURE.FAULT if taken.frame.reason else theme.ON_PICTURE.TEXT_DIM), 3.0))
+        painter.setPen(QPen(QColor(ON_PICTURE.FAULT if taken.frame.reason else ON_PICTURE.TEXT_DIM), 3.0))
         right, bottom = pixmap.width(), pixmap.height()
         painter.drawLine(QPointF(right * 0.38, bottom * 0.34), QPointF(right * 0.62, bottom * 0.66))
         painter.drawLine(QPointF(right * 0.62, bottom * 0.34), QPointF(right * 0.38, bottom * 0.66))

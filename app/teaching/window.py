@@ -34,7 +34,7 @@ from core.control.motion import Jog
 _SIZE = QSize(1240, 660)
 _FRAME = QSize(16, 56)
 """Room that the desktop needs for title bar and borders."""
-_STEPS_PX, _CONTROLS_PX = 170, 400
+_STEPS_PX, _CONTROLS_PX = 156, 352
 _STEP_LINE_PX = 30
 _PICTURE_EVERY_MS = 50
 

@@ -23,6 +23,8 @@ _DONE_SHARE = 0.7
 """A branch is done when so many of its cells are covered: the last of a narrow end cannot be reached."""
 _SIDE_SHARE = 0.33
 """An end this far from the middle of the tree, as a share of half its extent, is at the left, right, upper or lower side."""
+OUTSIDE, OPEN, COVERED, ASKED = range(4)
+"""What a pixel of ``VesselCoverage.tree`` is: no vessel, not covered yet, covered, in the branch that is asked for next."""
 _SHORTEST_CELLS = 2
 """A branch of fewer cells is a bulge of the mask, and is not asked for."""
 
@@ -51,14 +53,12 @@ class VesselBranch:
 
     Attributes
     ----------
-    lines : the centerline of each cell, (N, 2) working pixels.
     covered : whether the robot has been in each cell.
     side : where the branch ends.
     is_end : it ends in the picture or at its border, not at a junction.
     is_wanted : long enough to be asked for.
     """
 
-    lines: tuple[Points, ...]
     covered: tuple[bool, ...]
     side: Side
     is_end: bool
@@ -81,10 +81,10 @@ class VesselCoverage:
     def __init__(self, vessel: Mask, known: Mask | None = None) -> None:
         cleaning = CleaningConfig()
         graph = build_graph(skeleton.thin(vessel), vessel, cleaning)
-        self._lines, self._edge_of = _cells_of(graph)
+        lines, self._edge_of = _cells_of(graph)
         self._edges = _ends_of(graph, vessel)
-        self._cell_of = _nearest_cell(self._lines, vessel)
-        count = len(self._lines)
+        self._cell_of = _nearest_cell(lines, vessel)
+        count = len(lines)
         self._covered = np.zeros(count, bool)
         if known is not None and count:
             all_px = np.bincount(self._cell_of.ravel(), minlength=count + 1)[1:]
@@ -96,13 +96,18 @@ class VesselCoverage:
         """Share of the cells that are covered, 0..1; 1 for a mask without a centerline."""
         return float(self._covered.mean()) if len(self._covered) else 1.0
 
+    def cells_under(self, robot: Mask) -> NDArray[np.bool_]:
+        """The cells (K,) that the robot's mask (h, w) covers."""
+        counts = np.bincount(self._cell_of[robot], minlength=len(self._covered) + 1)[1:]
+        return np.asarray(counts >= _LEAST_PX)
+
     def new_cells(self, robot: Mask) -> int:
         """How many cells that were not covered the robot's mask (h, w) covers."""
-        return int((self._cells_under(robot) & ~self._covered).sum())
+        return int((self.cells_under(robot) & ~self._covered).sum())
 
     def add(self, robot: Mask) -> int:
         """Cover the cells under the robot's mask (h, w); returns how many were not covered before."""
-        under = self._cells_under(robot)
+        under = self.cells_under(robot)
         count = int((under & ~self._covered).sum())
         self._covered |= under
         return count
@@ -113,13 +118,17 @@ class VesselCoverage:
         for edge, (side, is_end) in enumerate(self._edges):
             cells = np.flatnonzero(self._edge_of == edge)
             covered = tuple(bool(self._covered[cell]) for cell in cells)
-            lines = tuple(self._lines[cell] for cell in cells)
-            found.append(VesselBranch(lines, covered, side, is_end, len(cells) >= _SHORTEST_CELLS))
+            found.append(VesselBranch(covered, side, is_end, len(cells) >= _SHORTEST_CELLS))
         return tuple(found)
 
-    def _cells_under(self, robot: Mask) -> NDArray[np.bool_]:
-        counts = np.bincount(self._cell_of[robot], minlength=len(self._lines) + 1)[1:]
-        return np.asarray(counts >= _LEAST_PX)
+    def tree(self) -> NDArray[np.uint8]:
+        """The vessel (h, w) as it is shown: OUTSIDE, OPEN, COVERED, or ASKED for the first branch that is missing."""
+        kinds = np.where(self._covered, COVERED, OPEN).astype(np.uint8)
+        branches = self.branches()
+        asked = next((place for place, branch in enumerate(branches) if branch in missing(branches)[:1]), None)
+        if asked is not None:
+            kinds[(self._edge_of == asked) & ~self._covered] = ASKED
+        return np.concatenate([np.array([OUTSIDE], np.uint8), kinds])[self._cell_of]
 
 
 def missing(branches: tuple[VesselBranch, ...]) -> tuple[VesselBranch, ...]:
