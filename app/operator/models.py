@@ -91,6 +91,7 @@ class ModelMenu(QObject):
     current : the name of the model in use.
     hindrance : why no other one may be chosen now, "" when one may.
     cost : what choosing another one costs now, as a sentence.
+    teach : opens the window that teaches a bench.
     train : opens the training.
     """
 
@@ -104,13 +105,15 @@ class ModelMenu(QObject):
         current: Callable[[], str],
         hindrance: Callable[[], str],
         cost: Callable[[], str],
+        teach: Callable[[], object],
         train: Callable[[], object],
     ) -> None:
         super().__init__(window)
         self._window, self._offers = window, offers
         self._current, self._hindrance, self._cost = current, hindrance, cost
-        (self._train,) = add_menu(window, tr("&Model"), [MenuEntry(tr("&Train on my annotations..."), train)])
-        menu = self._train.associatedObjects()
+        entries = [MenuEntry(tr("Teach this &bench..."), teach), MenuEntry(tr("&Train on my annotations..."), train)]
+        self._below = add_menu(window, tr("&Model"), entries)[0]
+        menu = self._below.associatedObjects()
         self._menu = next(one for one in menu if isinstance(one, QMenu))
         self._menu.setToolTipsVisible(True)
         self._actions: list[QAction] = []
@@ -132,7 +135,7 @@ class ModelMenu(QObject):
         current = self._current()
         for model in installed_models():
             self._add(model, model.name == current or str(model.folder) == current)
-        separator = self._menu.insertSeparator(self._train)
+        separator = self._menu.insertSeparator(self._below)
         self._actions.append(separator)
 
     def _add(self, model: InstalledModel, is_current: bool) -> None:
@@ -144,7 +147,7 @@ class ModelMenu(QObject):
         action.setToolTip(str(model.folder))
         action.triggered.connect(partial(self._on_chosen, model.name))
         self._group.addAction(action)
-        self._menu.insertAction(self._train, action)
+        self._menu.insertAction(self._below, action)
         self._actions.append(action)
 
     def _on_chosen(self, name: str, _checked: bool = False) -> None:

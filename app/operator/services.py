@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import platformdirs
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
@@ -16,6 +17,7 @@ from app.operator.models import ModelMenu
 from app.operator.preflight import PreflightModel
 from app.operator.preflight_list import PreflightList
 from app.operator.recording import AfterSession, Declined, RecoveryController, open_file
+from app.operator.rig_engine import leaving_a_core
 from app.operator.rig_session import StopOutcome
 from app.operator.window import OperatorWindow
 from app.training.dialog import TrainingDialog
@@ -27,11 +29,24 @@ from app.ui.texts import OperatorStep
 from app.widgets.messages import Offer, OfferButton
 from core.config.models import sessions_folder
 from core.control.modes import ARMED_MODES, Mode
+from core.perception.quality import UNKNOWN_KIND
 from core.session.writer import RecordStatus
+from core.types import Reason, Refusal
+from hardware.rig import RigKind
+from hardware.twin.catalog import look_of
+
+if TYPE_CHECKING:
+    from app.teaching.folder import Segment
+    from app.teaching.window import TeachingWindow
+    from core.config.models import PerceptionConfig
 
 _SEARCH_AFTER_MS = 1500
 """The rig is opened first; a search must not delay that."""
 _CRASH = "crash"
+_TAUGHT = "taught"
+_FAMILIARITY_EVERY_MS = 1000
+_UNFAMILIAR_S = 5
+"""Pictures that are refused for so long as unlike the training data are not a hand that passes."""
 
 
 class WindowServices(QObject):
@@ -58,8 +73,15 @@ class WindowServices(QObject):
         )
         self.preflight = PreflightModel(lambda: window.rig.config, lambda: window.controls.view, self)
         self.checks = PreflightList(self.preflight, window, window.panels.mode_bar.stop)
-        self.models = ModelMenu(window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.train)
+        self.models = ModelMenu(
+            window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.teach, self.train
+        )
         self.training: TrainingDialog | None = None
+        self.teaching: TeachingWindow | None = None
+        self._unfamiliar_s = 0
+        self._was_offered: set[str] = set()
+        self._familiarity = QTimer(self, interval=_FAMILIARITY_EVERY_MS)
+        self._familiarity.timeout.connect(self._look_for_unfamiliar)
         self._saved: Path | None = None
         self._is_recording = False
         self._stopped = StopOutcome.UNKNOWN
@@ -100,6 +122,7 @@ class WindowServices(QObject):
     def start(self) -> None:
         """Offer what the last run left: cut sessions, a crash report."""
         QTimer.singleShot(_SEARCH_AFTER_MS, self, self.recovery.search)
+        self._familiarity.start()
         crash = crash_of_last_run(self._state / "crashes")
         if crash is not None and crash.report is not None:
             self._offer_report(tr("The last run of the program crashed"), crash)
@@ -109,8 +132,11 @@ class WindowServices(QObject):
         for part in (self.recovery, self.preflight, self.after):
             part.close()
         self.checks.close()
+        self._familiarity.stop()
         if self.training is not None:
             self.training.end()
+        if self.teaching is not None:
+            self.teaching.end()
 
     # ---- sessions
 
@@ -194,6 +220,75 @@ class WindowServices(QObject):
         self.training.job.installed.connect(self._on_installed)
         self.training.show()
 
+    # ---- teaching
+
+    def teach(self) -> None:
+        """The window that teaches the bench that the camera sees, at the step where it was left."""
+        from app.teaching.model import TeachingModel, teaching_folder  # loads OpenCV and statistics
+        from app.teaching.window import TeachingDriver, TeachingWindow
+
+        window = self._window
+        if window.rig.kind is RigKind.PLAYBACK:
+            window.say(tr("A recording is played: start with a camera or the twin, or use the command teach"), True)
+            return
+        bench = self._bench_name()
+        if self.teaching is not None and self.teaching.model.rig != bench:
+            self.teaching.end()
+            self.teaching.deleteLater()
+            self.teaching = None
+        if self.teaching is None:
+            controls = window.controls
+            model = TeachingModel(
+                teaching_folder(bench), bench, lambda: window.live_frame, partial(_open_proposals, window.rig.config.perception)
+            )
+            model.trained.connect(self._on_taught)
+            driver = TeachingDriver(controls.drive, controls.stop, lambda: controls.can_move)
+            is_twin = window.rig.kind is RigKind.SIM
+            self.teaching = TeachingWindow(model, lambda: window.live_frame, driver, self._use_taught, is_twin, window)
+            model.setParent(self.teaching)
+        self.teaching.open()
+
+    def _bench_name(self) -> str:
+        """What the camera sees: a rig, and of the twin a phantom in a look."""
+        config = self._window.rig.config
+        if self._window.rig.kind is not RigKind.SIM:
+            return config.rig.name
+        return f"{config.rig.name}_{config.twin.phantom}_{look_of(config.twin) or config.twin.appearance_seed}"
+
+    def _use_taught(self, name: str) -> str:
+        """Use a taught model with its bench; why that cannot be done now, or ""."""
+        if why := self._against_another_model() or self._window.rig.work_in_progress():
+            return why
+        self._use_model(name)
+        return ""
+
+    def _on_taught(self, name: str) -> None:
+        """A training has ended: said where its window is hidden."""
+        teaching = self.teaching
+        if teaching is None or teaching.isVisible():
+            return
+        use = OfferButton(tr("Look at it"), self.teach)
+        self._offers.offer(Offer(_TAUGHT, tr("This bench is taught: model {name}", name=name), "", (use,)))
+
+    def _look_for_unfamiliar(self) -> None:
+        """Offer once for each bench to teach it, when its pictures are refused for long because the model does not know them."""
+        window, tick = self._window, self._window.shown_tick
+        refusal = tick.scene.refusal if tick is not None and window.live_frame is not None else None
+        view = window.controls.view
+        is_calm = view is None or view.mode not in ARMED_MODES
+        is_shown = self.teaching is not None and self.teaching.isVisible()
+        if refusal is None or not is_teachable(refusal) or not is_calm or is_shown or window.rig.kind is RigKind.PLAYBACK:
+            self._unfamiliar_s = 0
+            return
+        self._unfamiliar_s += _FAMILIARITY_EVERY_MS // 1000
+        bench = self._bench_name()
+        if self._unfamiliar_s < _UNFAMILIAR_S or bench in self._was_offered:
+            return
+        self._was_offered.add(bench)
+        answers = (OfferButton(tr("Teach this bench"), self.teach), OfferButton(tr("Not now"), lambda: None))
+        detail = tr("An empty picture, the vessel's outline and a minute of moving the robot; then five minutes of waiting.")
+        self._offers.offer(Offer(_TAUGHT, tr("The model does not know such pictures"), detail, answers))
+
     def _on_installed(self, name: str) -> None:
         self._window.say(tr("Model {name} is installed; choose it in the Model menu", name=name), False)
 
@@ -255,6 +350,22 @@ class WindowServices(QObject):
         self._offers.offer(
             Offer(_CRASH, text, tr("{what}. The report: {report}", what=crash.what, report=report), (show,), is_fault=True)
         )
+
+
+_TEACHABLE = frozenset({Reason.UNLIKE_TRAINING, Reason.BENCH_MOVED, Reason.OTHER_BENCH})
+
+
+def is_teachable(refusal: Refusal) -> bool:
+    """Whether the picture was refused because model or bench do not fit it; also by the hint of a robot that was not found."""
+    return refusal.reason in _TEACHABLE or UNKNOWN_KIND in refusal.detail
+
+
+def _open_proposals(config: PerceptionConfig) -> Segment:
+    """The present network in all orientations, with a core left for the rig."""
+    from core.perception.inference import open_segmenter
+    from core.perception.segmentation import OrientationAverage
+
+    return OrientationAverage(open_segmenter(leaving_a_core(config).segmentation))
 
 
 _SEEN = "tour/seen"

@@ -27,7 +27,7 @@ from app.widgets.event_log import LogKind
 from app.widgets.scene_panels import add_scene_view_menu
 from app.widgets.tour_overlay import TourOverlay
 from core.config.models import Config, PerceptionConfig
-from core.types import Point, Scene, Tick
+from core.types import Frame, Point, Scene, Tick
 from hardware.rig import RigKind
 
 SHOW_EVERY_S = 1.0 / 30.0
@@ -112,6 +112,12 @@ class OperatorWindow(WindowFrame):
         self._twin = TwinMenuController(self, self.rig, self.panels, self.say) if self.panels.picker is not None else None
         self._wire()
         self._show_kind()
+
+    @property
+    def live_frame(self) -> Frame | None:
+        """What the camera shows now; None where the picture is not live."""
+        is_live = self.rig.phase is EnginePhase.RUNNING and not self._is_stale
+        return self.shown_tick.frame if is_live and self.shown_tick is not None else None
 
     @Slot(str, bool)
     def say(self, message: str, is_fault: bool = False) -> None:

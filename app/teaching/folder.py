@@ -13,7 +13,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from core.learning.teaching import TeachingFrame, TeachingPicture
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -26,6 +25,7 @@ from core.devices import UserError
 from core.files import read_image, write_atomic
 from core.learning import teaching
 from core.learning.dataset import WORKING_SIZE_PX, mask_png, png, read_mask
+from core.learning.teaching import TeachingFrame, TeachingPicture
 from core.messages import message
 from core.perception.segmentation import Probability, clean_mask, to_working
 from core.types import Image, Mask, Point, Reason
@@ -46,17 +46,17 @@ _NEW_CELLS = 2
 """A frame in which the robot covers so many new cells of the vessel is taken."""
 _OTHER_SHARE = 0.15
 """A frame whose robot differs this much (0..1) from that of each frame taken is taken, too."""
-_SAME_CELLS = 1
-"""Of a bend: so many cells, at most, that the robot of another frame does not cover, or covers alone."""
+_SAME_CELLS, _SAME_AREA = 1, 0.06
+"""Robots are as far inserted when so many cells, at most, are covered by one alone, and their areas differ by this share."""
 _STILL_LEVELS, _STILL_SHARE = 10, 4e-4
 """Pictures of which, a quarter as large, a smaller share differs by more than these grey levels show the same."""
 _BUSY_SHARE = 2e-3
 """Share of the picture that changes while an empty picture is taken, when a hand or the robot moves."""
 _LEAST_ROBOT_PX = 220
 """Area of what the model takes for a robot in the empty picture, above which it is pointed out."""
-_CHECK_FROM = 5
-"""Frames, at least, from which they are compared with each other."""
-_THUMB_WIDTH_PX = 176
+_CHECK_FROM, _CHECK_WITH = 5, 12
+"""Frames, at least and at most, with which another one is compared before it is taken."""
+_THUMB_WIDTH_PX = 152
 _STATE, _BENCH, _VESSEL, _SET = "teaching.json", "bench", "vessel.png", "set"
 _OURS = ("empty", "places", "frames", "corrected")
 
@@ -84,10 +84,17 @@ class LookKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What became of a picture; ``reason`` says why it was rejected."""
+    """What became of a picture.
+
+    Attributes
+    ----------
+    reason : why it was rejected.
+    needs_empty : no frame will do until the empty picture is taken again, or the camera is where it was.
+    """
 
     kind: LookKind
     reason: str = ""
+    needs_empty: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -332,6 +339,7 @@ class TeachingFolder:
             bench = bench_from_frames(places, self._name, WORKING_SIZE_PX, None, robots)
         self._write("places", f"{len(places) - 1:02d}", png(image))
         self._places = places
+        self._keep()
         if bench is not None:
             self._use_bench(bench, is_computed=True)
             self._robot_like = ()
@@ -402,25 +410,38 @@ class TeachingFolder:
         stem = f"{self._record.next_stem:04d}"
         frame = teaching.propose(TeachingPicture(stem, stem, image), bench)
         if frame.reason:
-            return Look(LookKind.REJECTED, frame.reason)
+            is_moved = frame.reason.startswith((Reason.BENCH_MOVED.value, Reason.OTHER_BENCH.value))
+            return Look(LookKind.REJECTED, frame.reason, needs_empty=is_moved)
         blurred = _blurred(frame.robot)
         is_new = coverage.new_cells(frame.robot) >= _NEW_CELLS or not self._frames
         if not is_new and any(_apart(blurred, other) < _OTHER_SHARE for other in self._blurred):
             return Look(LookKind.SEEN)
-        usable = [taken.frame for taken in self._frames if taken.is_used]
+        usable = [taken.frame for taken in self._frames if taken.is_used][-_CHECK_WITH:]
         if len(usable) >= _CHECK_FROM:
-            reason = teaching.check([*usable, frame], bench)[-1].reason
+            try:
+                reason = teaching.check([*usable, frame], bench)[-1].reason
+            except teaching.TeachingError as error:
+                return Look(LookKind.REJECTED, str(error), needs_empty=True)
             if reason:
                 return Look(LookKind.REJECTED, reason)
-        cells = coverage.cells_under(frame.robot)
-        apart = [int((cells ^ coverage.cells_under(taken.frame.robot)).sum()) for taken in self._frames]
-        kind = LookKind.BEND if not is_new and min(apart) <= _SAME_CELLS else LookKind.PLACE
+        kind = LookKind.BEND if not is_new and self._lay_there(frame.robot) else LookKind.PLACE
         self._write("frames", stem, png(image))
         self._frames.append(TakenFrame(frame, kind, thumb_of(frame)))
         self._blurred.append(blurred)
         coverage.add(frame.robot)
         self._keep(frames=True, next_stem=self._record.next_stem + 1, model="", used=False)
         return Look(kind)
+
+    def _lay_there(self, robot: Mask) -> bool:
+        """Whether the robot lay in the same part of the vessel before, as far inserted: then its head is bent otherwise."""
+        coverage = self._coverage
+        assert coverage is not None
+        cells, area = coverage.cells_under(robot), int(robot.sum())
+        for taken in self._frames:
+            other = taken.frame.robot
+            if abs(int(other.sum()) - area) <= _SAME_AREA * area and (cells ^ coverage.cells_under(other)).sum() <= _SAME_CELLS:
+                return True
+        return False
 
     def leave_out(self, stem: str, on: bool) -> None:
         """Leave a frame out, or take it in again."""
@@ -560,11 +581,6 @@ def thumb_of(frame: TeachingFrame) -> Image:
     cover = cv2.resize(robot.astype(np.float32), size, interpolation=cv2.INTER_AREA)[:, :, None]
     ink = np.array(rgb(ON_PICTURE.ROBOT), np.float32)
     return np.asarray(small * (1 - 0.8 * cover) + ink * 0.8 * cover, np.uint8)
-
-
-def moved_place(reason: str) -> bool:
-    """Whether a rejection says that camera or phantom was moved: then no frame will do until the bench is made again."""
-    return reason.startswith((Reason.BENCH_MOVED.value, Reason.OTHER_BENCH.value))
 
 
 def middle_of(outline: NDArray[np.int32]) -> Point:

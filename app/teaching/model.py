@@ -26,7 +26,8 @@ BURST = 8
 _POLL_MS = 40
 _BURST_WITHIN_MS = 4000
 """So many pictures come in this time, or the camera gives none."""
-_LOOK_EVERY_MS = 120
+_LOOK_EVERY_MS = 250
+"""A look takes a fifth of a second of a processor core, and perception goes on beside it."""
 _END_WITHIN_MS = 5000
 _INTERRUPTED = 130
 """Exit code of ``teach`` that was stopped."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QTransform
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -26,7 +26,7 @@ from PySide6.QtWidgets import (
 
 from app.annotator.canvas import AnnotationCanvas
 from app.annotator.editing import Tool
-from app.rig_wizard.pages_base import WizardPicture, button, enable, note, set_main_button, set_note
+from app.rig_wizard.pages_base import WizardPicture, button, enable, note, set_main_button
 from app.teaching.folder import (
     ENOUGH_BENDS,
     ENOUGH_FRAMES,
@@ -37,7 +37,6 @@ from app.teaching.folder import (
     TeachingStep,
     TeachingView,
     middle_of,
-    moved_place,
 )
 from app.teaching.model import MINUTES, TeachingModel, free_name, look_line
 from app.training.dialog import BeforeAfter
@@ -106,7 +105,7 @@ class BenchPicture(WizardPicture):
             for kind, (ink, opacity) in _INK_OF.items():
                 pixels[tree == kind] = (*theme.rgb(ink), opacity)
             walls, _ = cv2.findContours((tree > 0).view(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-            self._outlines += [(_polygon(wall[:, 0]), ON_PICTURE.TEXT) for wall in walls]
+            self._outlines += [(_polygon(np.asarray(wall[:, 0], np.int32)), ON_PICTURE.TEXT) for wall in walls]
         self._veil = QImage(pixels.tobytes(), *working, 4 * working[0], QImage.Format.Format_RGBA8888) if pixels.any() else None
         self.update()
 
@@ -156,8 +155,12 @@ def to_pixmap(image: Image) -> QPixmap:
 
 
 class TeachingPage(QWidget):
-    """One step. ``name`` stands in the list of steps; ``right``: what is shown at the right of it."""
+    """One step. ``name`` stands in the list of steps; ``right``: what is shown at the right of it.
 
+    ``edited`` comes when what was drawn has changed, and with it whether the page may be left.
+    """
+
+    edited = Signal()
     name = ""
     hint = ""
     step = TeachingStep.EMPTY
@@ -375,13 +378,13 @@ class VesselPage(TeachingPage):
             if annotation is not None:
                 self.outline.edit(action, annotation)
             self.canvas.show_annotation(self.outline.annotation)
-            self.refresh()
+            self.edited.emit()
 
     def _on_undo(self) -> None:
         if self.outline is not None:
             self.outline.undo()
             self.canvas.show_annotation(self.outline.annotation)
-            self.refresh()
+            self.edited.emit()
 
     def _on_brush(self) -> None:
         self._set_brush(True)
@@ -500,8 +503,8 @@ class MovePage(TeachingPage):
             return  # what was said last stays: nothing flickers while the robot rests
         taken = look.kind in (LookKind.PLACE, LookKind.BEND)
         text = look_line(look, self.view.used)
-        if moved_place(look.reason):
-            text += tr(". Put it back, or take the empty picture again (Back)")
+        if look.needs_empty:
+            text += tr(" (Back leads to the empty picture; the frames stay)")
         self._say(text, "ALLOWED" if taken else "SIM" if look.kind is LookKind.REJECTED else "TEXT_DIM")
 
     def _say(self, text: str, role: str) -> None:
@@ -541,8 +544,8 @@ class FramesPage(TeachingPage):
         self._has_edits = False
         self.list = QListWidget()
         self.list.setViewMode(QListWidget.ViewMode.IconMode)
-        self.list.setIconSize(QSize(176, 132))
-        self.list.setGridSize(QSize(190, 160))
+        self.list.setIconSize(QSize(152, 114))
+        self.list.setGridSize(QSize(162, 140))
         self.list.setResizeMode(QListWidget.ResizeMode.Adjust)
         self.list.setMovement(QListWidget.Movement.Static)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -585,7 +588,7 @@ class FramesPage(TeachingPage):
             words = frame_words(taken)
             if item.data(Qt.ItemDataRole.UserRole) != (key := f"{taken.stem} {words} {id(taken.thumb)}"):
                 item.setData(Qt.ItemDataRole.UserRole, key)
-                item.setIcon(QIcon(_thumb_pixmap(taken)))
+                item.setIcon(_icon_of(taken))
                 item.setText(words)
                 item.setToolTip(tr_text(taken.frame.reason) or words)
         taken_now = self._current
@@ -656,7 +659,7 @@ def frame_words(taken: TakenFrame) -> str:
     return tr("place") if taken.kind is LookKind.PLACE else tr("bend")
 
 
-def _thumb_pixmap(taken: TakenFrame) -> QPixmap:
+def _icon_of(taken: TakenFrame) -> QIcon:
     """The small picture; one that is not used is dim and crossed out."""
     pixmap = to_pixmap(taken.thumb)
     if not taken.is_used:
@@ -668,7 +671,9 @@ def _thumb_pixmap(taken: TakenFrame) -> QPixmap:
         painter.drawLine(QPointF(right * 0.38, bottom * 0.34), QPointF(right * 0.62, bottom * 0.66))
         painter.drawLine(QPointF(right * 0.62, bottom * 0.34), QPointF(right * 0.38, bottom * 0.66))
         painter.end()
-    return pixmap
+    icon = QIcon(pixmap)
+    icon.addPixmap(pixmap, QIcon.Mode.Selected)  # not tinted: the frame shows the selection
+    return icon
 
 
 class TrainPage(TeachingPage):
@@ -760,16 +765,9 @@ class TrainPage(TeachingPage):
         self.model.train(self.model_name.text().strip(), self.minutes.value())
 
 
-ShowMain = Callable[[QPushButton, bool], None]
-
-
 def show_main(page: TeachingPage, next_button: QPushButton) -> None:
     """One button stands out: that of the step, until it is done, else the one that leads on."""
     done = page.is_done and page.may_leave
     if page.main is not None:
         set_main_button(page.main, not done)
     set_main_button(next_button, done if page.main is not None else page.may_leave)
-
-
-def show_words(label: QLabel, text: str) -> None:
-    set_note(label, text)

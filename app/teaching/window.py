@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QSize, Qt, QTimer, Slot
 from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QStackedWidget, QWidget
 
@@ -31,7 +31,7 @@ from app.widgets.messages import QuestionStrip
 from app.widgets.mode_bar import StopButton
 from core.control.motion import Jog
 
-_SIZE = QSize(1240, 660)
+_SIZE = QSize(1440, 800)
 _FRAME = QSize(16, 56)
 """Room that the desktop needs for title bar and borders."""
 _STEPS_PX, _CONTROLS_PX = 156, 352
@@ -56,23 +56,26 @@ class TeachingDriver:
 class TeachingWindow(QDialog):
     """Shows a teaching. It is not modal; closing it hides it, and everything goes on from there.
 
-    ``used`` carries the name of the model that is to be used from now on.
-
     Parameters
     ----------
     model : lives longer than the window is shown; a training goes on while it is hidden.
     newest : the live picture.
     driver : keys that move the robot while it is to be moved.
+    use : puts a model of this name, with its bench, into force; returns why it cannot be done now, or "".
     is_twin : whether the bench is the twin.
     """
 
-    used = Signal(str)
-
     def __init__(
-        self, model: TeachingModel, newest: NewestFrame, driver: TeachingDriver, is_twin: bool, parent: QWidget | None = None
+        self,
+        model: TeachingModel,
+        newest: NewestFrame,
+        driver: TeachingDriver,
+        use: Callable[[str], str],
+        is_twin: bool,
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.model, self._newest, self._driver = model, newest, driver
+        self.model, self._newest, self._driver, self._use = model, newest, driver, use
         self._keys: JogKeys | None = None
         self._shown_index = -1
         self.setWindowTitle(tr("Teach this bench: {name}", name=model.rig))
@@ -131,6 +134,7 @@ class TeachingWindow(QDialog):
             item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
             self.steps.addItem(item)
             self.stack.addWidget(page)
+            page.edited.connect(self._refresh)
             if self.right.indexOf(page.right) < 0:
                 self.right.addWidget(page.right)
         self.stack.setFixedWidth(_CONTROLS_PX)
@@ -184,10 +188,16 @@ class TeachingWindow(QDialog):
         if self.model.is_busy or not self._page.may_leave:
             return
         if self._page is self.train_page:
-            self.model.keep_used()
-            self.used.emit(self.model.view.model)
+            self.use_model()
         else:
             self._page.next(TeachingStep(self._page.step + 1))
+
+    def use_model(self) -> None:
+        """Put the model that was trained into force, with its bench."""
+        if why := self._use(self.model.view.model):
+            self.say(tr("Not used: {why}", why=tr_text(why)), is_fault=True)
+        else:
+            self.model.keep_used()
 
     def back(self) -> None:
         """To the step before; nothing is lost."""

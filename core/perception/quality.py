@@ -293,11 +293,15 @@ def check_kind(novelty: float | None, config: QualityConfig, *, refused_before: 
     )
 
 
+UNKNOWN_KIND = "it does not know such pictures"
+"""Begins the hint that ``hinted`` adds to a refusal."""
+
+
 def hinted(refusal: Refusal, unlike: Refusal | None) -> Refusal:
     """The refusal, with the hint that a robot may not have been found because the picture is of an unknown kind."""
     if unlike is None or refusal.reason is not Reason.NO_ROBOT:
         return refusal
-    return replace(refusal, detail=f"{refusal.detail}; it does not know such pictures: {unlike.detail}")
+    return replace(refusal, detail=f"{refusal.detail}; {UNKNOWN_KIND}: {unlike.detail}")
 
 
 def check_graph(graph: VesselGraph, config: VectorConfig) -> Refusal | None:

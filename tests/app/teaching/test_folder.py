@@ -1,0 +1,279 @@
+"""What was taken of a bench: on disk at once, taken up again, and each bad input one line that loses nothing."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.teaching import folder as folder_module
+from app.teaching.folder import Look, LookKind, TeachingFolder, TeachingStep
+from core.bench.bench import BenchError
+from core.learning.teaching import FEWEST, TeachingError, read_teaching_set
+from core.perception.segmentation import Probability
+from core.types import Image, Mask
+from tests.core.learning.toy_bench import toy_picture, toy_robot, toy_vessel
+
+
+def large(mask: Mask) -> Mask:
+    """At working size."""
+    return cv2.resize(mask.astype(np.uint8), (640, 480), interpolation=cv2.INTER_NEAREST) > 0
+
+
+def segment(_image: Image) -> tuple[Probability, Probability]:
+    """A network that sees the vessel, and no robot."""
+    return large(toy_vessel()).astype(np.float32), np.zeros((480, 640), np.float32)
+
+
+def empties(*, seed: int = 50) -> list[Image]:
+    return [toy_picture(seed=seed + number) for number in range(3)]
+
+
+def robot_picture(branch: int, share: float, *, seed: int = 7) -> Image:
+    return toy_picture(toy_robot(branch, share), seed=seed)
+
+
+def opened(path: Path) -> TeachingFolder:
+    work = TeachingFolder(path / "teaching", "toy", lambda: segment)
+    work.load()
+    return work
+
+
+@pytest.fixture
+def work(tmp_path: Path) -> TeachingFolder:
+    """Empty bench and vessel are known."""
+    work = opened(tmp_path)
+    work.add_empty(empties())
+    work.set_vessel(work.proposed_vessel())
+    work.go(TeachingStep.MOVE)
+    return work
+
+
+def drive(work: TeachingFolder, count: int = 5) -> list[Look]:
+    """Push the robot into both branches in so many steps each."""
+    return [
+        work.look(robot_picture(branch, 0.2 + 0.75 * number / (count - 1), seed=10 * branch + number))
+        for branch in (0, 1)
+        for number in range(count)
+    ]
+
+
+# ---- the way through
+
+
+def test_the_steps_need_what_comes_before_them(tmp_path: Path) -> None:
+    work = opened(tmp_path)
+    assert not work.view().may_leave
+    work.add_empty(empties())
+    assert work.view().may_leave
+    work.go(TeachingStep.VESSEL)
+    assert not work.view().may_leave
+    work.set_vessel(work.proposed_vessel())
+    assert work.view().may_leave
+    work.go(TeachingStep.MOVE)
+    assert not work.view().may_leave
+    drive(work)
+    assert work.view().may_leave
+
+
+def test_frames_are_taken_where_the_robot_is_new_and_the_map_fills(work: TeachingFolder) -> None:
+    shares = []
+    for branch in (0, 1):
+        for number in range(6):
+            assert work.look(robot_picture(branch, 0.25 + 0.14 * number, seed=number)).kind in (LookKind.PLACE, LookKind.SEEN)
+            shares.append(work.view().share)
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.9
+    assert work.view().missing == ()
+    assert work.look(robot_picture(0, 0.6, seed=99)).kind is LookKind.SEEN
+
+
+def test_a_robot_that_does_not_move_is_not_taken_again(work: TeachingFolder) -> None:
+    assert work.look(robot_picture(0, 0.6)).kind is LookKind.PLACE
+    assert work.look(robot_picture(0, 0.6, seed=8)).kind is LookKind.STILL
+
+
+def test_a_bend_at_the_same_depth_is_taken_as_a_bend(work: TeachingFolder) -> None:
+    work.look(robot_picture(0, 0.4))
+    shifted = np.roll(toy_robot(0, 0.4), 7, axis=0)
+    assert work.look(toy_picture(shifted, seed=3)).kind is LookKind.BEND
+    assert work.view().bends == 1
+
+
+def test_frames_become_a_set_that_teach_reads(work: TeachingFolder) -> None:
+    drive(work)
+    made = read_teaching_set(work.teaching_set())
+    assert len(made.train) + len(made.held_out) == work.view().used
+    assert made.bench.is_dir()
+
+
+# ---- taken up again
+
+
+def test_everything_is_there_again_after_the_window_was_closed(work: TeachingFolder, tmp_path: Path) -> None:
+    drive(work)
+    before = work.view()
+    work.leave_out(before.frames[2].stem, True)
+    mask = large(toy_robot(1, 0.5))
+    work.correct(before.frames[3].stem, mask)
+    work.go(TeachingStep.FRAMES)
+    again = opened(tmp_path).view()
+    assert again.step is TeachingStep.FRAMES
+    assert np.array_equal(again.vessel, before.vessel)
+    assert [taken.stem for taken in again.frames] == [taken.stem for taken in before.frames]
+    assert [taken.kind for taken in again.frames] == [taken.kind for taken in before.frames]
+    assert again.frames[2].is_left_out
+    assert again.frames[3].is_corrected
+    assert np.array_equal(again.frames[3].frame.robot, mask)
+    assert again.share == pytest.approx(work.view().share)
+
+
+def test_places_are_taken_up_again(tmp_path: Path) -> None:
+    opened(tmp_path).add_place(robot_picture(0, 0.5))
+    work = opened(tmp_path)
+    assert len(work.view().places) == 1
+    work.add_place(robot_picture(0, 0.95))
+    work.add_place(robot_picture(1, 0.95))
+    view = work.view()
+    assert view.is_computed
+    assert view.empty is not None
+
+
+def test_another_empty_picture_keeps_vessel_and_frames(work: TeachingFolder) -> None:
+    drive(work)
+    before = work.view()
+    work.add_empty(empties(seed=80))
+    after = work.view()
+    assert np.array_equal(after.vessel, before.vessel)
+    assert len(after.frames) == len(before.frames)
+
+
+def test_starting_over_removes_all_of_it(work: TeachingFolder, tmp_path: Path) -> None:
+    drive(work)
+    work.start_over()
+    assert work.view().empty is None
+    assert opened(tmp_path).view().frames == ()
+
+
+def test_what_was_trained_before_a_change_is_not_taken_for_the_present_frames(work: TeachingFolder) -> None:
+    drive(work)
+    work.keep_model("toy_1")
+    assert work.view().model == "toy_1"
+    work.leave_out(work.view().frames[0].stem, True)
+    assert work.view().model == ""
+
+
+# ---- bad input: one line, nothing lost
+
+
+def test_something_that_moves_while_the_empty_picture_is_taken(work: TeachingFolder) -> None:
+    before = work.view().empty
+    with pytest.raises(BenchError, match="something moved while the pictures were taken"):
+        work.add_empty([toy_picture(seed=1), toy_picture(toy_robot(0, 0.9), seed=2)])
+    assert work.view().empty is before
+
+
+def test_a_blurred_empty_picture(work: TeachingFolder) -> None:
+    before = work.view().empty
+    blurred = [cv2.GaussianBlur(picture, (0, 0), 9.0) for picture in empties()]
+    with pytest.raises(BenchError, match="blurred"):
+        work.add_empty(blurred)
+    assert work.view().empty is before
+
+
+def test_what_looks_like_a_robot_in_the_empty_picture_is_pointed_out(tmp_path: Path) -> None:
+    robot = toy_robot(0, 0.6)
+
+    def sees_one(_image: Image) -> tuple[Probability, Probability]:
+        return large(toy_vessel()).astype(np.float32), large(robot).astype(np.float32)
+
+    work = TeachingFolder(tmp_path / "teaching", "toy", lambda: sees_one)
+    work.add_empty([toy_picture(robot, seed=number) for number in range(3)])
+    (outline,) = work.view().robot_like
+    assert outline[:, 0].max() > 200
+
+
+def test_an_empty_picture_with_the_robot_in_it_is_found_by_the_frames_and_can_be_taken_again(work: TeachingFolder) -> None:
+    work.add_empty([toy_picture(toy_robot(0, 0.9), seed=number) for number in range(3)])
+    looks = [work.look(robot_picture(1, 0.25 + 0.07 * number, seed=number)) for number in range(10)]
+    assert looks[-1].needs_empty
+    assert looks[-1].reason.startswith("the empty picture shows the robot near")
+    taken = len(work.view().frames)
+    assert taken >= 4
+    work.add_empty(empties())
+    assert len(work.view().frames) == taken
+    drive(work)
+    assert work.view().used >= FEWEST
+    assert work.teaching_set().is_dir()
+
+
+def test_a_robot_that_lies_still_for_the_computed_picture(tmp_path: Path) -> None:
+    work = opened(tmp_path)
+    work.add_place(robot_picture(0, 0.5, seed=1))
+    with pytest.raises(BenchError, match="lies where it lay before"):
+        work.add_place(robot_picture(0, 0.5, seed=2))
+    assert len(work.view().places) == 1
+
+
+def test_a_vessel_that_cannot_be_one(work: TeachingFolder) -> None:
+    before = work.view().vessel
+    with pytest.raises(BenchError, match="empty"):
+        work.set_vessel(np.zeros((480, 640), bool))
+    with pytest.raises(BenchError, match="white must be the vessel"):
+        work.set_vessel(~before)
+    assert work.view().vessel is before
+
+
+def test_a_bench_that_was_moved_is_rejected_by_name(work: TeachingFolder) -> None:
+    moved = np.roll(robot_picture(0, 0.6), 25, axis=1)
+    look = work.look(moved)
+    assert look.kind is LookKind.REJECTED
+    assert look.needs_empty
+
+
+def test_another_bench_is_rejected_by_name(work: TeachingFolder) -> None:
+    look = work.look(toy_picture(toy_robot(0, 0.6), board=5))
+    assert look.kind is LookKind.REJECTED
+    assert look.needs_empty
+
+
+def test_a_hand_in_the_picture_is_rejected(work: TeachingFolder) -> None:
+    picture = robot_picture(0, 0.6)
+    cv2.circle(picture, (240, 120), 90, (200, 150, 120), -1)
+    look = work.look(picture)
+    assert look.kind is LookKind.REJECTED
+    assert work.view().frames == ()
+
+
+def test_a_full_disk_loses_nothing(work: TeachingFolder, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    drive(work, 4)
+    before = len(work.view().frames)
+
+    def full(*_args: object, **_kwargs: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(folder_module, "write_atomic", full)
+        with pytest.raises(BenchError, match="No space left on device"):
+            work.look(toy_picture(np.roll(toy_robot(0, 0.55), 8, axis=0), seed=3))
+    assert len(work.view().frames) == before
+    assert len(opened(tmp_path).view().frames) == before
+
+
+def test_a_damaged_record_is_one_line_and_can_be_started_over(work: TeachingFolder, tmp_path: Path) -> None:
+    (tmp_path / "teaching" / "teaching.json").write_text("{")
+    again = TeachingFolder(tmp_path / "teaching", "toy", lambda: segment)
+    with pytest.raises(BenchError, match=r"teaching\.json: damaged"):
+        again.load()
+    again.start_over()
+    assert opened(tmp_path).view().empty is None
+
+
+def test_too_few_frames_are_said(work: TeachingFolder) -> None:
+    work.look(robot_picture(0, 0.6))
+    with pytest.raises(TeachingError, match="usable"):
+        work.teaching_set()

@@ -1,0 +1,343 @@
+"""The window that teaches a bench: the whole way with its input events, left and taken up again, faults as one line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from app.teaching import model as model_module
+from app.teaching.folder import TeachingStep
+from app.teaching.model import TeachingModel, free_name, teaching_folder
+from app.training.model import TrainingPhase
+from core.perception.segmentation import Probability
+from core.types import Image
+from tests.app.teaching.bench_hand import LONG_MS, BenchHand, PictureFeed
+from tests.app.teaching.test_folder import drive, large, opened, segment
+from tests.core.learning.toy_bench import toy_picture, toy_robot, toy_vessel
+
+OpenHand = Callable[..., BenchHand]
+TEACHES = """
+import json, sys
+from pathlib import Path
+source, out = sys.argv[1], Path(sys.argv[3])
+assert (Path(source) / "teaching.json").is_file()
+picture = str(next(Path(source, "images").glob("*.png")))
+dice = {"vessel_dice": 0.9, "robot_dice": 0.5}
+print(json.dumps({"held_out_step": 0, "pictures": [picture]} | dice))
+print(json.dumps({"step": 10, "steps": 20, "loss": 0.5, "left_s": 60} | dice))
+print(json.dumps({"step": 20, "steps": 20, "loss": 0.3, "left_s": 0} | dice))
+print(json.dumps({"held_out_step": 20, "pictures": [picture]} | dice | {"robot_dice": 0.95}))
+held_out = {"frames": 5, "answered": 5, "right": 4, "vessel_dice": 0.9, "robot_dice": 0.95, "head_px": 1.2, "theta_deg": 0.8}
+print(json.dumps({"model": str(out), "time_s": 290.0, "steps": 20, "held_out": held_out}))
+"""
+"""Stands for ``teach``: tells what a training tells, in a moment."""
+
+
+def stands_for_teach(monkeypatch: pytest.MonkeyPatch, script: str) -> None:
+    monkeypatch.setattr(model_module, "command_of", lambda _name, *arguments: [sys.executable, "-c", script, *arguments])
+
+
+@pytest.fixture(scope="session")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which all is taken, at the step of moving the robot."""
+    folder = tmp_path_factory.mktemp("driven")
+    work = opened(folder)
+    work.add_empty([toy_picture(seed=number) for number in range(8)])
+    work.set_vessel(work.proposed_vessel())
+    drive(work, 6)
+    work.go(TeachingStep.MOVE)
+    return folder / "teaching"
+
+
+@pytest.fixture
+def open_hand(qtbot: QtBot, tmp_path: Path) -> Iterator[OpenHand]:
+    """Opens the window on the toy bench, on a copy of a folder; again: another run of the program on the same one."""
+    hands: list[BenchHand] = []
+
+    def make(before: Path | None = None, step: TeachingStep = TeachingStep.MOVE) -> BenchHand:
+        if before is not None:
+            shutil.copytree(before, tmp_path / "teaching")
+            record = tmp_path / "teaching" / "teaching.json"
+            record.write_text(json.dumps(json.loads(record.read_text()) | {"step": int(step)}))
+        feed = PictureFeed([toy_picture(seed=number) for number in range(9)])
+        hand = BenchHand(qtbot, tmp_path / "teaching", feed, segment)
+        hands.append(hand)
+        hand.open()
+        return hand
+
+    yield make
+    for hand in hands:
+        hand.end()
+
+
+def to_the_robot(hand: BenchHand) -> None:
+    """Empty picture and vessel, to the page on which the robot is moved."""
+    window = hand.window
+    hand.click(window.empty_page.take)
+    hand.click(window.next_button)
+    hand.click(window.next_button)
+    assert window.page is window.move_page
+
+
+def move_robot(hand: BenchHand, count: int = 6) -> None:
+    for branch in (0, 1):
+        for number in range(count):
+            hand.show(toy_picture(toy_robot(branch, 0.2 + 0.75 * number / (count - 1)), seed=10 * branch + number))
+
+
+# ---- the whole way
+
+
+def test_the_whole_way_to_a_model_in_use(open_hand: OpenHand, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> None:
+    stands_for_teach(monkeypatch, TEACHES)
+    hand = open_hand()
+    window, page = hand.window, hand.window.train_page
+    assert window.page is window.empty_page
+    assert not window.next_button.isEnabled()
+    to_the_robot(hand)
+    move_robot(hand)
+    hand.click(window.next_button)
+    assert window.frames_page.list.count() == len(hand.model.view.frames)
+    hand.click(window.next_button)
+    assert not window.next_button.isEnabled()
+    hand.click(page.start)
+    qtbot.waitUntil(lambda: hand.model.training.phase is TrainingPhase.DONE, timeout=LONG_MS)
+    hand.wait()
+    assert "4 of these" in page.table.text()
+    assert window.next_button.text() == "&Use it"
+    hand.click(window.next_button)
+    assert hand.used == [hand.model.view.model]
+    assert hand.model.view.is_used
+    assert hand.events == 7
+
+
+def test_each_step_says_what_it_is_for(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    names = [hand.window.steps.item(row).text().partition("  ")[2] for row in range(5)]
+    assert names == ["Empty bench", "Vessel", "Move the robot", "Look through", "Train"]
+    assert not hand.window.isModal()
+
+
+# ---- left and taken up again
+
+
+def test_closed_at_any_step_it_opens_there_again(open_hand: OpenHand, driven: Path) -> None:
+    hand = open_hand(driven)
+    taken = [frame.stem for frame in hand.model.view.frames]
+    hand.window.close()
+    assert not hand.model.is_watching
+    hand.window.open()
+    assert hand.window.page is hand.window.move_page
+    assert hand.model.is_watching
+    hand.end()
+    again = open_hand()
+    assert again.window.page is again.window.move_page
+    assert [frame.stem for frame in again.model.view.frames] == taken
+
+
+def test_back_and_on_lose_nothing(open_hand: OpenHand, driven: Path) -> None:
+    hand = open_hand(driven)
+    count = len(hand.model.view.frames)
+    hand.click(hand.window.back_button)
+    hand.click(hand.window.back_button)
+    assert hand.window.page is hand.window.empty_page
+    hand.click(hand.window.next_button)
+    hand.click(hand.window.next_button)
+    assert hand.window.page is hand.window.move_page
+    assert len(hand.model.view.frames) == count
+
+
+def test_starting_over_is_asked_first(open_hand: OpenHand, driven: Path) -> None:
+    hand = open_hand(driven)
+    hand.click(hand.window.over_button)
+    assert hand.window.question.text == "Forget pictures, vessel and frames of this bench?"
+    hand.window.question._yes.click()
+    hand.wait()
+    assert hand.window.page is hand.window.empty_page
+    assert hand.model.view.empty is None
+
+
+# ---- the pages
+
+
+def test_three_places_make_an_empty_picture(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    page = hand.window.empty_page
+    for branch, share in ((0, 0.95), (1, 0.95), (0, 0.4)):
+        hand.feed.pictures = [toy_picture(toy_robot(branch, share), seed=number) for number in range(3)]
+        hand.click(page.place)
+    assert hand.model.view.is_computed
+    assert hand.window.next_button.isEnabled()
+    assert "not known (dark)" in page.found.text() or "Good" in page.found.text()
+
+
+def test_what_looks_like_a_robot_in_the_empty_picture_is_shown(qtbot: QtBot, tmp_path: Path) -> None:
+    def sees_one(_image: Image) -> tuple[Probability, Probability]:
+        return large(toy_vessel()).astype(np.float32), large(toy_robot(0, 0.6)).astype(np.float32)
+
+    hand = BenchHand(qtbot, tmp_path / "teaching", PictureFeed([toy_picture(seed=number) for number in range(9)]), sees_one)
+    hand.open()
+    hand.click(hand.window.empty_page.take)
+    assert "sees a robot near" in hand.window.empty_page.found.text()
+    assert hand.window.next_button.isEnabled()
+    hand.end()
+
+
+def test_a_vessel_that_the_network_does_not_see_is_painted(qtbot: QtBot, tmp_path: Path) -> None:
+    def sees_none(_image: Image) -> tuple[Probability, Probability]:
+        return np.zeros((480, 640), np.float32), np.zeros((480, 640), np.float32)
+
+    hand = BenchHand(qtbot, tmp_path / "teaching", PictureFeed([toy_picture(seed=number) for number in range(9)]), sees_none)
+    hand.open()
+    window, page = hand.window, hand.window.vessel_page
+    hand.click(window.empty_page.take)
+    hand.click(window.next_button)
+    assert "sees no vessel" in page.words.text()
+    assert not window.next_button.isEnabled()
+    for _ in range(4):
+        hand.click(page.larger)
+    canvas = page.canvas
+    hand.drag(canvas, [canvas.view.to_screen(point) for point in ((10, 240), (240, 240), (400, 190), (560, 110))])
+    assert window.next_button.isEnabled()
+    hand.click(page.undo)
+    assert not window.next_button.isEnabled()
+    hand.drag(canvas, [canvas.view.to_screen(point) for point in ((10, 240), (240, 240), (400, 190), (560, 110))])
+    hand.click(window.next_button)
+    assert window.page is window.move_page
+    assert hand.model.view.vessel[240, 100]
+    hand.end()
+
+
+def test_what_is_missing_and_what_was_rejected_is_said(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    to_the_robot(hand)
+    page = hand.window.move_page
+    hand.show(toy_picture(toy_robot(0, 0.95), seed=1))
+    assert page.said.text() == "Frame 1 taken: a new place"
+    assert "the branch at the lower right" in page.lacks.text()
+    assert "a bend of the head" in page.lacks.text()
+    hand.show(np.roll(toy_picture(toy_robot(0, 0.6), seed=2), 30, axis=1))
+    assert page.said.text().startswith("Not taken: ")
+    assert "the frames stay" in page.said.text()
+    hand.click(page.pause)
+    assert not hand.model.is_watching
+
+
+def test_a_frame_is_left_out_and_its_mask_corrected(open_hand: OpenHand, driven: Path) -> None:
+    hand = open_hand(driven, TeachingStep.FRAMES)
+    page, view = hand.window.frames_page, hand.model.view
+    page.list.setCurrentRow(1)
+    hand.click(page.out)
+    assert hand.model.view.frames[1].is_left_out
+    assert page.list.item(1).text() == "left out"
+    assert page.out.text() == "&Take in again"
+    page.list.setCurrentRow(2)
+    before = view.frames[2].frame.robot
+    canvas = page.canvas
+    hand.drag(canvas, [canvas.view.to_screen(point) for point in ((300, 60), (340, 60))])
+    after = hand.model.view.frames[2]
+    assert after.is_corrected
+    assert after.frame.robot[60, 320]
+    assert not before[60, 320]
+    hand.click(page.undo)
+    assert not hand.model.view.frames[2].frame.robot[60, 320]
+
+
+# ---- faults: one line, nothing lost
+
+
+def test_a_picture_that_is_not_live(open_hand: OpenHand, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> None:
+    monkeypatch.setattr(model_module, "_BURST_WITHIN_MS", 80)
+    hand = open_hand()
+    hand.feed.is_live = False
+    hand.click(hand.window.empty_page.take)
+    assert hand.window.message.startswith("The picture is not live")
+    assert hand.window.empty_page.take.isEnabled()
+
+
+def test_something_that_moves_in_the_empty_picture(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    hand.feed.pictures = [toy_picture(toy_robot(0, 0.1 * number), seed=number) for number in range(9)]
+    hand.click(hand.window.empty_page.take)
+    assert hand.window.message.startswith("something moved while the pictures were taken")
+    assert hand.model.view.empty is None
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("import sys; sys.stderr.write('error: no room\\n'); sys.exit(2)", "Training failed: no room"),
+        ("import sys; sys.exit(130)", "Stopped. Frames and what was learnt are kept"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "Training failed: it was ended by signal 9"),
+    ],
+)
+def test_a_training_that_fails_loses_no_frame(
+    script: str, said: str, open_hand: OpenHand, driven: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    stands_for_teach(monkeypatch, script)
+    hand = open_hand(driven, TeachingStep.TRAIN)
+    count = len(hand.model.view.frames)
+    hand.click(hand.window.train_page.start)
+    qtbot.waitUntil(lambda: hand.model.training.phase is TrainingPhase.FAILED, timeout=LONG_MS)
+    assert hand.window.train_page.words.text().startswith(said)
+    assert hand.window.train_page.start.isEnabled()
+    assert not hand.window.next_button.isEnabled()
+    assert len(hand.model.view.frames) == count
+
+
+def test_a_training_is_stopped_and_goes_on_while_the_window_is_closed(
+    open_hand: OpenHand, driven: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    stands_for_teach(monkeypatch, "import time; time.sleep(60)")
+    hand = open_hand(driven, TeachingStep.TRAIN)
+    hand.click(hand.window.train_page.start)
+    assert hand.window.close_button.text() == "&Close, go on training"
+    hand.window.close()
+    assert hand.model.is_training
+    hand.window.open()
+    hand.click(hand.window.train_page.stop)
+    qtbot.waitUntil(lambda: not hand.model.is_training, timeout=LONG_MS)
+    assert hand.model.training.line.startswith("Stopped")
+
+
+def test_a_model_that_cannot_be_used_now_says_why(
+    open_hand: OpenHand, driven: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    stands_for_teach(monkeypatch, TEACHES)
+    hand = open_hand(driven, TeachingStep.TRAIN)
+    hand.click(hand.window.train_page.start)
+    qtbot.waitUntil(lambda: hand.model.training.phase is TrainingPhase.DONE, timeout=LONG_MS)
+    hand.wait()
+    hand.refusal = "the program is armed"
+    hand.click(hand.window.next_button)
+    assert hand.window.message == "Not used: the program is armed"
+    assert not hand.model.view.is_used
+
+
+def test_enter_presses_the_focused_button(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    hand.window.empty_page.take.setFocus()
+    QTest.keyClick(hand.window, Qt.Key.Key_Return)
+    hand.wait()
+    assert hand.model.view.empty is not None
+    assert hand.model.view.step is TeachingStep.EMPTY
+
+
+def test_names_of_folder_and_model() -> None:
+    assert teaching_folder("my rig/2").name == "my_rig_2"
+    assert free_name("Bench ü 2").startswith("Bench_2")
+
+
+def test_a_line_of_another_version_is_no_result() -> None:
+    assert model_module.taught_result({"held_out": {"frames": 3}}) is None
+    assert model_module.taught_result(json.loads("{}")) is None
+    assert isinstance(TeachingModel, type)
