@@ -28,17 +28,19 @@ from app.ui.i18n import tr
 from app.ui.texts import OperatorStep
 from app.widgets.messages import Offer, OfferButton
 from core.config.models import sessions_folder
+from core.config.rig_file import RigFileError, set_bench
 from core.control.modes import ARMED_MODES, Mode
+from core.perception.model_file import BENCH, own_models
 from core.perception.quality import UNKNOWN_KIND
 from core.session.writer import RecordStatus
 from core.types import Reason, Refusal
-from hardware.rig import RigKind
+from hardware.rig import RigKind, kind_of
 from hardware.twin.catalog import look_of
 
 if TYPE_CHECKING:
     from app.teaching.folder import Segment
     from app.teaching.window import TeachingWindow
-    from core.config.models import PerceptionConfig
+    from core.config.models import Config, PerceptionConfig
 
 _SEARCH_AFTER_MS = 1500
 """The rig is opened first; a search must not delay that."""
@@ -78,6 +80,7 @@ class WindowServices(QObject):
         )
         self.training: TrainingDialog | None = None
         self.teaching: TeachingWindow | None = None
+        self._taught = ""
         self._unfamiliar_s = 0
         self._was_offered: set[str] = set()
         self._familiarity = QTimer(self, interval=_FAMILIARITY_EVERY_MS)
@@ -101,6 +104,7 @@ class WindowServices(QObject):
         window.recorder.changed.connect(self._on_recording)
         window.rig.phase_changed.connect(self._on_phase)
         window.rig.add_guard(self.preflight.may_ask)
+        window.rig.add_config_source(self._without_other_bench)
         self.preflight.asked.connect(self._on_not_armed)
         self.checks.arm_asked.connect(partial(window.ask_step, OperatorStep.ARM))
         self.models.chosen.connect(self._use_model)
@@ -231,7 +235,7 @@ class WindowServices(QObject):
         if window.rig.kind is RigKind.PLAYBACK:
             window.say(tr("A recording is played: start with a camera or the twin, or use the command teach"), True)
             return
-        bench = self._bench_name()
+        bench = self._bench_name(window.rig.config)
         if self.teaching is not None and self.teaching.model.rig != bench:
             self.teaching.end()
             self.teaching.deleteLater()
@@ -248,19 +252,36 @@ class WindowServices(QObject):
             model.setParent(self.teaching)
         self.teaching.open()
 
-    def _bench_name(self) -> str:
+    def _bench_name(self, config: Config) -> str:
         """What the camera sees: a rig, and of the twin a phantom in a look."""
-        config = self._window.rig.config
-        if self._window.rig.kind is not RigKind.SIM:
+        if kind_of(config.rig) is not RigKind.SIM:
             return config.rig.name
         return f"{config.rig.name}_{config.twin.phantom}_{look_of(config.twin) or config.twin.appearance_seed}"
 
     def _use_taught(self, name: str) -> str:
         """Use a taught model with its bench; why that cannot be done now, or ""."""
-        if why := self._against_another_model() or self._window.rig.work_in_progress():
+        rig = self._window.rig
+        if why := self._against_another_model() or rig.work_in_progress():
             return why
-        self._use_model(name)
+        bench, config = own_models() / name / BENCH, rig.config
+        if config.rig.file is not None:
+            try:
+                set_bench(Path(config.rig.file), bench, name)
+            except RigFileError as error:
+                return str(error)
+        self._taught = self._bench_name(config)
+        segmentation = config.perception.segmentation.model_copy(update={"model": name})
+        perception = config.perception.model_copy(update={"segmentation": segmentation, "bench": str(bench)})
+        self._window.say(tr("Model {name} and its bench from now on; the menu Model has the one before", name=name), False)
+        rig.use_config(config.model_copy(update={"perception": perception}))
         return ""
+
+    def _without_other_bench(self, config: Config) -> Config:
+        """A taught bench is that of one rig, or of one phantom and look of the twin: another one is opened without it."""
+        if not self._taught or config.perception.bench is None or self._bench_name(config) == self._taught:
+            return config
+        self._taught = ""
+        return config.model_copy(update={"perception": config.perception.model_copy(update={"bench": None})})
 
     def _on_taught(self, name: str) -> None:
         """A training has ended: said where its window is hidden."""
@@ -281,7 +302,7 @@ class WindowServices(QObject):
             self._unfamiliar_s = 0
             return
         self._unfamiliar_s += _FAMILIARITY_EVERY_MS // 1000
-        bench = self._bench_name()
+        bench = self._bench_name(window.rig.config)
         if self._unfamiliar_s < _UNFAMILIAR_S or bench in self._was_offered:
             return
         self._was_offered.add(bench)

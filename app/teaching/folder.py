@@ -54,6 +54,8 @@ _BUSY_SHARE = 2e-3
 """Share of the picture that changes while an empty picture is taken, when a hand or the robot moves."""
 _LEAST_ROBOT_PX = 220
 """Area of what the model takes for a robot in the empty picture, above which it is pointed out."""
+_LEAST_PIECE = 0.08
+"""Pieces of a proposed vessel that are smaller, against the largest one, are left out."""
 _CHECK_FROM, _CHECK_WITH = 5, 12
 """Frames, at least and at most, with which another one is compared before it is taken."""
 _THUMB_WIDTH_PX = 152
@@ -368,7 +370,9 @@ class TeachingFolder:
         assert self._bench is not None
         vessel, _ = self._network()(self._bench.empty)
         cleaning = PerceptionConfig().cleaning
-        return clean_mask(vessel >= 0.5, cleaning.min_vessel_area_px, cleaning.max_hole_area_px)
+        mask = clean_mask(vessel >= 0.5, cleaning.min_vessel_area_px, cleaning.max_hole_area_px)
+        areas = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)[2][1:, cv2.CC_STAT_AREA]
+        return clean_mask(mask, int(_LEAST_PIECE * areas.max()), 0) if len(areas) else mask
 
     def set_vessel(self, vessel: Mask) -> None:
         """The vessel as it was drawn, (h, w). Raises BenchError where it cannot be one."""

@@ -25,7 +25,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.annotator.canvas import AnnotationCanvas
-from app.annotator.editing import Tool
+from app.annotator.editing import MaskMode, Tool
+from app.annotator.outline_editor import VesselOutlineEditor
 from app.rig_wizard.pages_base import WizardPicture, button, enable, note, set_main_button
 from app.teaching.folder import (
     ENOUGH_BENDS,
@@ -48,12 +49,17 @@ from app.widgets.basics import column, line
 from app.widgets.image_canvas import halvings
 from core.annotation.masks import fill, polygons_of
 from core.annotation.model import Annotation, History, MaskTarget, Readout
-from core.annotation.outline import VesselOutline
 from core.bench.coverage import ASKED, COVERED, Side
 from core.types import Image, Mask
 
 _INK_OF = {COVERED: (ON_PICTURE.VESSEL, 120), ASKED: (ON_PICTURE.SIM, 90)}
 """Colour and opacity (0..255) of the vessel map: where the robot has been, and the branch that is asked for next."""
+_MODE_TEXT = {
+    MaskMode.REGION: mark("a click adds what lies around it, a right click takes it away."),
+    MaskMode.TUBE: mark("drag along the middle of a branch, the circle as wide as it; the wheel sets the width."),
+    MaskMode.BRUSH: mark("drag paints, right drag takes away."),
+}
+"""What a press does, in a line."""
 _VEIL = 110
 """Opacity of what is not known of the empty bench."""
 _SIDE_TEXT = {
@@ -297,36 +303,33 @@ class VesselPage(TeachingPage):
     """The vessel's outline, drawn once, beginning with the network's proposal."""
 
     name = mark("Vessel")
-    hint = mark("Blue is the vessel as the model sees it. Correct it once; small errors of a pixel do no harm.")
+    hint = mark(
+        "Blue is the vessel as the model sees it in the empty picture. Correct it once; errors of a pixel or two do no harm. The "
+        "tube's wall does not belong to it."
+    )
     step = TeachingStep.VESSEL
 
-    def __init__(self, model: TeachingModel, canvas: AnnotationCanvas) -> None:
-        super().__init__(model, canvas)
-        self.canvas = canvas
-        self.outline: VesselOutline | None = None
+    def __init__(self, model: TeachingModel, editor: VesselOutlineEditor) -> None:
+        super().__init__(model, editor)
+        self.editor = editor
         self._is_asked = False
-        self.brush = button(tr("&Brush"), self._on_brush, tr("Drag paints, right drag takes away"))
-        self.points = button(tr("&Points"), self._on_points, tr("Drag the outline's points, or draw another outline"))
-        for tool in (self.brush, self.points):
-            tool.setCheckable(True)
-        self.undo, self.again = button(tr("&Undo"), self._on_undo), button(tr("Propose &again"), self._ask_proposal)
-        self.smaller = button("\N{MINUS SIGN}", lambda: canvas.resize_brush(0.8))
-        self.larger = button("+", lambda: canvas.resize_brush(1.25))
-        self.smaller.setAccessibleName(tr("Smaller brush"))
-        self.larger.setAccessibleName(tr("Larger brush"))
-        self.column.addLayout(line(self.brush, self.smaller, self.larger, self.points))
-        self.column.addLayout(line(self.undo, self.again))
+        self.undo = button(tr("&Undo"), editor.undo)
+        tip = tr("The model's proposal instead of what was drawn; Undo brings that back")
+        self.again = button(tr("Propose &again"), self._ask_proposal, tip)
         self.words = note("")
         self.words.setMinimumHeight(60)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        for mode in (MaskMode.REGION, MaskMode.TUBE, MaskMode.BRUSH):
+            self.column.addWidget(note(f"<b>{tr(mode.value.label)}</b> ({mode.value.key}): {tr(_MODE_TEXT[mode])}"))
+        self.column.addLayout(line(self.undo, self.again))
         self.column.addWidget(self.words)
         self.column.addStretch(1)
-        canvas.edited.connect(self._on_edited)
+        editor.changed.connect(self.edited)
         model.proposed.connect(self._on_proposed)
 
     @property
     def may_leave(self) -> bool:
-        return self.outline is not None and bool(self.outline.annotation.masks)
+        return self.editor.outline is not None and bool(self.editor.outline.annotation.masks)
 
     @property
     def is_done(self) -> bool:
@@ -335,67 +338,34 @@ class VesselPage(TeachingPage):
     def enter(self) -> None:
         view = self.view
         assert view.empty is not None
-        self.outline = VesselOutline(view.empty, view.vessel)
-        self._show_all(view.empty)
+        self.editor.show_image(view.empty, view.vessel)
+        self.editor.set_mode(MaskMode.REGION)
         if view.vessel is None and not self._is_asked:
             self._ask_proposal()
 
     def next(self, step: TeachingStep) -> None:
-        assert self.outline is not None
-        self.canvas.complete()
-        self.model.set_vessel(self.outline.mask, step)
+        vessel = self.editor.vessel_mask
+        assert vessel is not None
+        self.model.set_vessel(vessel, step)
 
     def refresh(self) -> None:
-        ready = self.outline is not None and not self.model.is_busy
-        enable(ready, self.brush, self.points, self.again, self.smaller, self.larger, self.canvas)
-        self.undo.setEnabled(ready and self.outline is not None and bool(self.outline.undo_action))
-        self.words.setText(self._words())
-
-    def _words(self) -> str:
-        if self.outline is None:
-            return ""
-        if not self.outline.annotation.masks:
-            return tr("The model sees no vessel here: paint it with the brush.")
-        return tr("Next keeps it. The robot may be anywhere in it later; the tube's wall does not belong to it.")
+        outline, busy = self.editor.outline, self.model.is_busy
+        enable(outline is not None and not busy, self.again, self.editor)
+        self.undo.setEnabled(not busy and outline is not None and bool(outline.undo_action))
+        is_empty = outline is not None and not outline.annotation.masks and not busy
+        self.words.setText(tr("The model sees no vessel here: drag a tube along the middle of each branch.") if is_empty else "")
 
     def _ask_proposal(self) -> None:
         self._is_asked = True
         self.model.propose_vessel()
 
     def _on_proposed(self, vessel: Mask) -> None:
-        if self.outline is not None:
-            self.outline.edit("proposal", Annotation(masks=polygons_of(vessel, MaskTarget.VESSEL)))
-            self.canvas.show_annotation(self.outline.annotation)
-
-    def _show_all(self, image: Image) -> None:
-        assert self.outline is not None
-        self.canvas.show_image(halvings(image), self.outline.annotation, lambda _annotation: Readout())
-        self.canvas.set_tool(Tool.VESSEL_MASK)
-        self._on_brush()
-
-    def _on_edited(self, action: str, annotation: Annotation | None) -> None:
-        if self.outline is not None and self.isVisible():
-            if annotation is not None:
-                self.outline.edit(action, annotation)
-            self.canvas.show_annotation(self.outline.annotation)
-            self.edited.emit()
-
-    def _on_undo(self) -> None:
-        if self.outline is not None:
-            self.outline.undo()
-            self.canvas.show_annotation(self.outline.annotation)
-            self.edited.emit()
-
-    def _on_brush(self) -> None:
-        self._set_brush(True)
-
-    def _on_points(self) -> None:
-        self._set_brush(False)
-
-    def _set_brush(self, on: bool) -> None:
-        self.canvas.set_brush(on)
-        self.brush.setChecked(on)
-        self.points.setChecked(not on)
+        outline = self.editor.outline
+        if outline is not None:
+            outline.edit("proposal", Annotation(masks=polygons_of(vessel, MaskTarget.VESSEL)))
+            self.editor.canvas.show_annotation(outline.annotation)
+            if not vessel.any():
+                self.editor.set_mode(MaskMode.TUBE)
 
 
 class _Goal(QWidget):
@@ -612,7 +582,7 @@ class FramesPage(TeachingPage):
         self._history.edit("begin", Annotation(masks=polygons_of(taken.frame.robot, MaskTarget.ROBOT)))
         self.canvas.show_image(halvings(taken.frame.picture.image), self._history.current, lambda _annotation: Readout())
         self.canvas.set_tool(Tool.ROBOT_MASK)
-        self.canvas.set_brush(True)
+        self.canvas.set_mask_mode(MaskMode.BRUSH)
         self.refresh()
 
     def _toggle(self) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QStackedWidget, QWidget
 
 from app.annotator.canvas import AnnotationCanvas
+from app.annotator.outline_editor import VesselOutlineEditor
 from app.operator.manual_drive import JogKeys
 from app.rig_wizard.pages_base import button, note
 from app.teaching.folder import TeachingStep
@@ -84,9 +85,10 @@ class TeachingWindow(QDialog):
         self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.picture = BenchPicture()
         self.picture.show_text(tr("No live picture"))
-        vessel_canvas, robot_canvas, self.before_after = AnnotationCanvas(), AnnotationCanvas(), BeforeAfter()
+        vessel_editor, robot_canvas, self.before_after = VesselOutlineEditor(), AnnotationCanvas(), BeforeAfter()
+        vessel_editor.said.connect(self.say)
         self.empty_page = EmptyPage(model, self.picture, is_twin)
-        self.vessel_page = VesselPage(model, vessel_canvas)
+        self.vessel_page = VesselPage(model, vessel_editor)
         self.move_page = MovePage(model, self.picture)
         self.frames_page = FramesPage(model, robot_canvas)
         self.train_page = TrainPage(model, self.before_after)

@@ -53,6 +53,7 @@ class RigFile(ConfigSection):
     servos: ServosConfig = ServosConfig()
     calibration: CalibrationConfig | None = None
     bench: str | None = Field(None, min_length=1, description="folder of the bench, from the rig file's own folder")
+    model: str | None = Field(None, min_length=1, description="model that was taught on this bench; empty: as in the settings")
 
     @model_validator(mode="after")
     def _check_parts(self) -> Self:
@@ -227,11 +228,14 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
 
 
 def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
-    """The configuration with the rig's camera, servos and twin. Its name is the file's."""
+    """The configuration with the rig's camera, servos, twin and taught model. Its name is the file's."""
     chosen = RigConfig(name=path.stem, camera=rig.kind, robot=rig.robot, file=str(path))
     update: dict[str, Any] = {"rig": chosen, "camera": rig.camera, "servos": rig.servos}
     if rig.twin is not None:
         update["twin"] = rig.twin
+    if rig.model is not None:
+        segmentation = base.perception.segmentation.model_copy(update={"model": rig.model})
+        update["perception"] = base.perception.model_copy(update={"segmentation": segmentation})
     return base.model_copy(update=update)
 
 
@@ -248,8 +252,8 @@ def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:
 def read_again(running: Config, settings: Config) -> Config:
     """The running configuration with camera, servos and twin as the rig file, which may have been edited, has them now.
 
-    A phantom that was picked stays. Settings that name the file themselves keep their own sections, as do the twin, another camera
-    or a recording that was chosen instead of them. Raises RigFileError.
+    A phantom or a model that was picked stays. Settings that name the file themselves keep their own sections, as do the twin,
+    another camera or a recording that was chosen instead of them. Raises RigFileError.
     """
     if running.rig.file is None or not sections_of_rig(running, settings):
         return running
@@ -259,7 +263,7 @@ def read_again(running: Config, settings: Config) -> Config:
     rig = read_rig(path)
     if rig.twin is not None and running.rig.camera == "twin":
         rig = rig.model_copy(update={"twin": rig.twin.model_copy(update={"phantom": running.twin.phantom})})
-    return with_rig(running, rig, path)
+    return with_rig(running, rig, path).model_copy(update={"perception": running.perception})
 
 
 def _rig_in_use(config: Config) -> tuple[Path, RigFile] | None:
@@ -306,10 +310,10 @@ def as_calibrated(config: Config) -> Config:
     return config.model_copy(update={"perception": config.perception.model_copy(update={"path": path})})
 
 
-def set_bench(path: Path, folder: Path | None) -> None:
-    """Name the bench's folder in a rig file; None: not known. Raises RigFileError."""
+def set_bench(path: Path, folder: Path | None, model: str | None = None) -> None:
+    """Name the bench's folder in a rig file, and the model that was taught on it; None: not known. Raises RigFileError."""
     bench = str(folder.absolute()) if folder is not None else None
-    write_rig(read_rig(path).model_copy(update={"bench": bench}), path, keeps_older=False)
+    write_rig(read_rig(path).model_copy(update={"bench": bench, "model": model}), path, keeps_older=False)
 
 
 def set_port(path: Path, port: PortConfig | None) -> None:

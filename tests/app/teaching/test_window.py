@@ -14,12 +14,20 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from app.annotator.editing import MaskMode
 from app.teaching import model as model_module
 from app.teaching.folder import TeachingStep
 from app.teaching.model import TeachingModel, free_name, teaching_folder
 from app.training.model import TrainingPhase
-from core.perception.segmentation import Probability
+from core import geometry
+from core.config.models import PerceptionConfig
+from core.perception.inference import open_segmenter
+from core.perception.segmentation import OrientationAverage, Probability
 from core.types import Image
+from hardware.twin.phantoms import make_phantom
+from hardware.twin.rendering.appearance import named_appearance
+from hardware.twin.rendering.renderer import Renderer
+from hardware.twin.truth import way_from_port
 from tests.app.teaching.bench_hand import LONG_MS, BenchHand, PictureFeed
 from tests.app.teaching.test_folder import drive, large, opened, segment
 from tests.core.learning.toy_bench import toy_picture, toy_robot, toy_vessel
@@ -201,16 +209,18 @@ def test_a_vessel_that_the_network_does_not_see_is_painted(qtbot: QtBot, tmp_pat
     window, page = hand.window, hand.window.vessel_page
     hand.click(window.empty_page.take)
     hand.click(window.next_button)
+    assert page.editor.canvas.mask_mode is MaskMode.TUBE
     assert "sees no vessel" in page.words.text()
     assert not window.next_button.isEnabled()
-    for _ in range(4):
-        hand.click(page.larger)
-    canvas = page.canvas
-    hand.drag(canvas, [canvas.view.to_screen(point) for point in ((10, 240), (240, 240), (400, 190), (560, 110))])
-    assert window.next_button.isEnabled()
+    canvas = page.editor.canvas
+    canvas.resize_circle(26.0 / canvas.editor.radius_px)
+    course = [canvas.view.to_screen(point) for point in ((4, 240), (240, 242), (320, 240), (400, 190), (480, 140), (580, 100))]
+    hand.drag(canvas, course)
+    qtbot.waitUntil(window.next_button.isEnabled, timeout=LONG_MS)  # walls are found beside the window
     hand.click(page.undo)
     assert not window.next_button.isEnabled()
-    hand.drag(canvas, [canvas.view.to_screen(point) for point in ((10, 240), (240, 240), (400, 190), (560, 110))])
+    hand.drag(canvas, course)
+    qtbot.waitUntil(window.next_button.isEnabled, timeout=LONG_MS)
     hand.click(window.next_button)
     assert window.page is window.move_page
     assert hand.model.view.vessel[240, 100]
@@ -341,3 +351,51 @@ def test_a_line_of_another_version_is_no_result() -> None:
     assert model_module.taught_result({"held_out": {"frames": 3}}) is None
     assert model_module.taught_result(json.loads("{}")) is None
     assert isinstance(TeachingModel, type)
+
+
+# ---- input events
+
+
+def twin_frames(look: str) -> tuple[list[Image], list[Image]]:
+    """Empty pictures of the twin's tree with five ends, and the robot on its way into each, bent to both sides at three depths."""
+    phantom = make_phantom("tree")
+    renderer = Renderer(phantom, named_appearance(look, 7), (640, 480), seed=3)
+    frames = []
+    for target in phantom.targets:
+        route = way_from_port(phantom, target)
+        length = float(geometry.arc_length(route)[-1])
+        for depth in np.arange(0.2, 0.97, 6.0 / length):
+            line = geometry.cut(route, 0.0, depth * length)
+            bends = (-1.5, 0.0, 1.5) if 0.5 < depth < 0.6 else (0.0,)
+            for bend in bends:
+                left = np.clip(1.0 - (geometry.arc_length(line)[-1] - geometry.arc_length(line)) / 10.0, 0.0, 1.0)[:, None]
+                frames.append(renderer.render(line + bend * left**2 * geometry.normals(line), noise_seed=len(frames)).image)
+    return [renderer.render(None, noise_seed=1000 + number).image for number in range(9)], frames
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("look", ["tank", "glow"])
+def test_a_tree_with_five_ends_takes_few_input_events(
+    look: str, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record_property: Callable[[str, object], None]
+) -> None:
+    """The network proposes the vessel, the robot is moved by hand, and nothing has to be corrected."""
+    stands_for_teach(monkeypatch, TEACHES)
+    empty, frames = twin_frames(look)
+    network = OrientationAverage(open_segmenter(PerceptionConfig().segmentation))
+    hand = BenchHand(qtbot, tmp_path / "teaching", PictureFeed(empty), network)
+    hand.open()
+    window = hand.window
+    to_the_robot(hand)
+    for frame in frames:
+        hand.show(frame)
+    assert hand.model.view.missing == (), window.move_page.lacks.text()
+    hand.click(window.next_button)
+    hand.click(window.next_button)
+    hand.click(window.train_page.start)
+    qtbot.waitUntil(lambda: hand.model.training.phase is TrainingPhase.DONE, timeout=LONG_MS)
+    hand.wait()
+    hand.click(window.next_button)
+    assert hand.used
+    record_property("input_events", hand.events)
+    assert hand.events <= 40
+    hand.end()
