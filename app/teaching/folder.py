@@ -85,7 +85,7 @@ class LookKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class TakenLook:
     """What became of a picture.
 
     Attributes
@@ -400,41 +400,41 @@ class TeachingFolder:
 
     # ---- frames
 
-    def look(self, picture: Image) -> Look:
+    def look(self, picture: Image) -> TakenLook:
         """Take a picture of the moving robot if it shows a new place or bend, and say what became of it."""
         bench, coverage = self._bench, self._coverage
         if bench is None or bench.vessel is None or coverage is None:
-            return Look(LookKind.STILL)
+            return TakenLook(LookKind.STILL)
         if len(self._frames) >= MOST_FRAMES:
-            return Look(LookKind.FULL)
+            return TakenLook(LookKind.FULL)
         image = to_working(picture, WORKING_SIZE_PX)[0]
         if self._last is not None and self._last.shape == image.shape and _changed_share(image, self._last) < _STILL_SHARE:
-            return Look(LookKind.STILL)
+            return TakenLook(LookKind.STILL)
         self._last = image
         stem = f"{self._record.next_stem:04d}"
         frame = teaching.propose(TeachingPicture(stem, stem, image), bench)
         if frame.reason:
             is_moved = frame.reason.startswith((Reason.BENCH_MOVED.value, Reason.OTHER_BENCH.value))
-            return Look(LookKind.REJECTED, frame.reason, needs_empty=is_moved)
+            return TakenLook(LookKind.REJECTED, frame.reason, needs_empty=is_moved)
         blurred = _blurred(frame.robot)
         is_new = coverage.new_cells(frame.robot) >= _NEW_CELLS or not self._frames
         if not is_new and any(_apart(blurred, other) < _OTHER_SHARE for other in self._blurred):
-            return Look(LookKind.SEEN)
+            return TakenLook(LookKind.SEEN)
         usable = [taken.frame for taken in self._frames if taken.is_used][-_CHECK_WITH:]
         if len(usable) >= _CHECK_FROM:
             try:
                 reason = teaching.check([*usable, frame], bench)[-1].reason
             except teaching.TeachingError as error:
-                return Look(LookKind.REJECTED, str(error), needs_empty=True)
+                return TakenLook(LookKind.REJECTED, str(error), needs_empty=True)
             if reason:
-                return Look(LookKind.REJECTED, reason)
+                return TakenLook(LookKind.REJECTED, reason)
         kind = LookKind.BEND if not is_new and self._lay_there(frame.robot) else LookKind.PLACE
         self._write("frames", stem, png(image))
         self._frames.append(TakenFrame(frame, kind, thumb_of(frame)))
         self._blurred.append(blurred)
         coverage.add(frame.robot)
         self._keep(frames=True, next_stem=self._record.next_stem + 1, model="", used=False)
-        return Look(kind)
+        return TakenLook(kind)
 
     def _lay_there(self, robot: Mask) -> bool:
         """Whether the robot lay in the same part of the vessel before, as far inserted: then its head is bent otherwise."""

@@ -12,7 +12,7 @@ from typing import Any
 import platformdirs
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from app.teaching.folder import Look, LookKind, Segment, TeachingFolder, TeachingStep, TeachingView
+from app.teaching.folder import LookKind, Segment, TakenLook, TeachingFolder, TeachingStep, TeachingView
 from app.training.model import TrainingPhase, TrainingState, name_problem, with_record
 from app.ui.i18n import tr, tr_text
 from app.ui.workers import ChildProcess, Worker, command_of
@@ -89,8 +89,8 @@ class TeachingModel(QObject):
     """One teaching. All signals come in the window's thread.
 
     ``changed`` comes when anything that is shown has changed. ``said`` carries a line and whether it is a fault. ``looked`` carries
-    the ``Look`` of a picture of the moving robot. ``proposed`` carries the network's vessel, a mask. ``trained`` carries the name
-    of a model that is there now.
+    the ``TakenLook`` of a picture of the moving robot. ``proposed`` carries the network's vessel, a mask. ``trained`` carries the
+    name of a model that is there now.
 
     Parameters
     ----------
@@ -341,7 +341,7 @@ class TeachingModel(QObject):
         self._work.wait(_END_WITHIN_MS)
 
 
-def look_line(look: Look, count: int) -> str:
+def look_line(look: TakenLook, count: int) -> str:
     """What became of a picture, for people; `count` frames are taken."""
     texts = {
         LookKind.STILL: tr("The robot does not move"),

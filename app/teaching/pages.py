@@ -32,9 +32,9 @@ from app.teaching.folder import (
     ENOUGH_BENDS,
     ENOUGH_FRAMES,
     PLACES,
-    Look,
     LookKind,
     TakenFrame,
+    TakenLook,
     TeachingStep,
     TeachingView,
     middle_of,
@@ -468,7 +468,7 @@ class MovePage(TeachingPage):
             for label, taken in zip(self._thumbs, view.frames[-_STRIP:], strict=False):
                 label.setPixmap(to_pixmap(taken.thumb))
 
-    def _on_looked(self, look: Look) -> None:
+    def _on_looked(self, look: TakenLook) -> None:
         if look.kind is LookKind.STILL:
             return  # what was said last stays: nothing flickers while the robot rests
         taken = look.kind in (LookKind.PLACE, LookKind.BEND)

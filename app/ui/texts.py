@@ -237,9 +237,7 @@ REASON_TEXT = {
     ),
     Reason.AMBIGUOUS_BRANCH: ReasonText(mark("Two branches fit"), mark("click the destination in the picture")),
     Reason.LOW_CONFIDENCE: ReasonText(mark("Not sure enough to answer"), mark("better light or focus helps")),
-    Reason.UNLIKE_TRAINING: ReasonText(
-        mark("Picture of an unknown kind"), mark("teach this bench (menu Model)")
-    ),
+    Reason.UNLIKE_TRAINING: ReasonText(mark("Picture of an unknown kind"), mark("teach this bench (menu Model)")),
     Reason.HEAD_JUMP: ReasonText(mark("The head jumped"), mark("wait for the next frames")),
     Reason.BENCH_MOVED: ReasonText(mark("The camera or the phantom was moved"), mark("put it back, or make the bench again")),
     Reason.OTHER_BENCH: ReasonText(

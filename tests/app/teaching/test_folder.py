@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app.teaching import folder as folder_module
-from app.teaching.folder import Look, LookKind, TeachingFolder, TeachingStep
+from app.teaching.folder import LookKind, TakenLook, TeachingFolder, TeachingStep
 from core.bench.bench import BenchError
 from core.learning.teaching import FEWEST, TeachingError, read_teaching_set
 from core.perception.segmentation import Probability
@@ -53,7 +53,7 @@ def work(tmp_path: Path) -> TeachingFolder:
     return work
 
 
-def drive(work: TeachingFolder, count: int = 5) -> list[Look]:
+def drive(work: TeachingFolder, count: int = 5) -> list[TakenLook]:
     """Push the robot into both branches in so many steps each."""
     return [
         work.look(robot_picture(branch, 0.2 + 0.75 * number / (count - 1), seed=10 * branch + number))
