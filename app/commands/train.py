@@ -66,7 +66,12 @@ class TrainOptions:
 
 def train(
     out: Annotated[Path, typer.Option(help="folder of the new model")],
-    data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
+    data: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="labelled folder as synth writes it, perhaps with empty/NAME.png: the bench without robot; may be repeated"
+        ),
+    ] = None,
     scenes: Annotated[
         list[Path] | None,
         typer.Option(
