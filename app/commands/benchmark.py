@@ -25,6 +25,7 @@ from core.devices import UserError
 from core.types import Frame, Image, Scene
 
 if TYPE_CHECKING:
+    from core.bench.bench import Bench
     from core.evaluation.accuracy import FrameScore
     from core.evaluation.paper_baseline import PaperBaseline
     from core.perception.pipeline import Pipeline
@@ -39,7 +40,13 @@ _WARM_UP = 3
 
 def benchmark(
     json: JsonOption = False,
-    accuracy: Annotated[Path | None, typer.Option(help="measure accuracy on this synth set instead of speed")] = None,
+    accuracy: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="measure accuracy on this labelled set instead of speed; if it has a folder bench, with this bench, too; "
+            "may be repeated: sets stand side by side"
+        ),
+    ] = None,
     window: Annotated[float | None, typer.Option(hidden=True)] = None,
     recording: Annotated[bool, typer.Option("--recording", hidden=True)] = False,
     player: Annotated[float | None, typer.Option(hidden=True)] = None,
@@ -54,15 +61,17 @@ def benchmark(
     for name, given in {"window": window is not None, "player": player is not None, "recording": recording}.items():
         if given:
             raise UserError(f"benchmark --{name} is a development tool now: .venv/bin/python -m tools.benchmarks {name}")
-    if accuracy is None and (store or true_masks):
+    if not accuracy and (store or true_masks):
         raise UserError(f"{'--store' if store else '--true-masks'} is for --accuracy SET")
     if store and (true_masks or preset is not None or config is not None):
         raise UserError("--store keeps figures of the model as it is shipped: leave --true-masks, --preset and --config out")
     check_masks(model, true_masks=true_masks)
-    if frames is not None and accuracy is not None:
+    if frames is not None and accuracy:
         raise UserError("--frames is for speed: leave it out with --accuracy")
+    if store and accuracy and len(accuracy) > 1:
+        raise UserError("--store keeps the figures of one set: give one --accuracy SET")
     settings = load_config(config, preset, choose_model(model))
-    if accuracy is None:
+    if not accuracy:
         # The window takes the configuration's model: start-up with another one is not measured.
         first_frame_s = _first_frame_s(config) if model is None and preset is None else None
         print_figures(measure_speed(settings, frames or _FRAMES, first_frame_s), json, "speed")
@@ -188,26 +197,68 @@ def use_offscreen(environment: MutableMapping[str, str]) -> None:
         environment.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
-def measure_accuracy(folder: Path, config: Config, *, as_json: bool, store: bool = False, true_masks: bool = False) -> None:
-    """Perceive every frame of a synth set as a single image and compare with its truth.
+def measure_accuracy(
+    folders: Sequence[Path], config: Config, *, as_json: bool, store: bool = False, true_masks: bool = False
+) -> None:
+    """Perceive every frame of labelled sets as a single image and compare with its truth; where a set has a bench, with it, too.
 
-    `store` keeps the result in model.json; with `true_masks` the geometry alone is measured, without the network: not both.
-    After an interruption (Ctrl-C) the figures of the frames until then are shown, and nothing is stored.
+    `store` keeps the result of one set in model.json; with `true_masks` the geometry alone is measured, without the network: not
+    both. After an interruption (Ctrl-C) the figures of the frames until then are shown, and nothing is stored.
     """
+    from core.bench.bench import read_bench
     from core.learning.dataset import POSE_KEYS, find_labelled
     from core.learning.model_writer import check_can_change, write_figures
-    from core.perception.model_file import model_folder, sha256_of, trained_without
+    from core.perception.model_file import model_folder, sha256_of
 
+    model = config.perception.segmentation.model
     if store:
-        check_can_change(config.perception.segmentation.model)
-    samples, truth = find_labelled(folder, POSE_KEYS)
+        check_can_change(model)
+    sets: list[tuple[str, Path, Bench | None]] = []
+    for folder in folders:  # all are read before the first is measured
+        find_labelled(folder, POSE_KEYS)
+        sets.append((str(folder), folder, None))
+        if not true_masks and (folder / _BENCH).is_dir():
+            sets.append((f"{folder} with its bench", folder, read_bench(folder / _BENCH)))
+    results: dict[str, dict[str, Any]] = {}
+    interrupted = False
+    for name, folder, bench in sets:
+        figures, interrupted = _accuracy_of(folder, config, bench, true_masks=true_masks)
+        if figures:
+            results[name] = figures
+        if interrupted:
+            break
+    if not results:
+        raise KeyboardInterrupt
+    try:
+        if len(sets) == 1:
+            (figures,) = results.values()
+            part = f", interrupted after {figures['frames']} of {figures['frames_of_set']} frames" if interrupted else ""
+            print_figures(figures, as_json, f"accuracy on {folders[0]}{part}")
+        else:
+            print_side_by_side(results, as_json)
+    finally:  # stored where it cannot be printed, too
+        if store and not interrupted:
+            described = {"set": folders[0].name, "truth_sha256": sha256_of(folders[0] / "truth.jsonl")}
+            write_figures(model_folder(model), described | results[str(folders[0])])
+    if interrupted:
+        raise KeyboardInterrupt
 
+
+_BENCH = "bench"
+"""Folder within a labelled set that holds its bench."""
+
+
+def _accuracy_of(folder: Path, config: Config, bench: Bench | None, *, true_masks: bool) -> tuple[dict[str, Any], bool]:
+    """Figures of a set, empty where no frame was measured, and whether it was interrupted."""
     from core.evaluation.accuracy import TrueMasks, score_set, summarise, summarise_looks
     from core.evaluation.confidence import describe_confidence, describe_gates
+    from core.learning.dataset import POSE_KEYS, find_labelled
+    from core.perception.model_file import model_folder, trained_without
     from core.perception.pipeline import Pipeline, open_pipeline
 
+    samples, truth = find_labelled(folder, POSE_KEYS)
     masks, left_out = TrueMasks(), LeftOut()
-    pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception)
+    pipeline = Pipeline(masks, config.perception) if true_masks else open_pipeline(config.perception, bench=bench)
     scores: list[FrameScore] = []
     interrupted = False
     with progress_bar() as bar:
@@ -218,7 +269,7 @@ def measure_accuracy(folder: Path, config: Config, *, as_json: bool, store: bool
         except KeyboardInterrupt:
             interrupted = True
     if interrupted and not scores:
-        raise KeyboardInterrupt
+        return {}, True
     left_out.print_note(len(scores))
     confident_from = config.perception.quality.confident_from
     figures = summarise(scores, confident_from) | describe_confidence(scores) | {"stricter_gates": describe_gates(scores)}
@@ -230,15 +281,36 @@ def measure_accuracy(folder: Path, config: Config, *, as_json: bool, store: bool
     if scores and all(score.stem in looks for score in scores):
         without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
         figures |= summarise_looks(scores, looks, without, confident_from)
-    part = f", interrupted after {len(scores)} of {len(samples)} frames" if interrupted else ""
-    try:
-        print_figures(figures, as_json, f"accuracy on {folder}{part}")
-    finally:  # stored where it cannot be printed, too
-        if store and not interrupted:
-            described = {"set": folder.name, "truth_sha256": sha256_of(folder / "truth.jsonl")}
-            write_figures(model_folder(config.perception.segmentation.model), described | figures)
-    if interrupted:
-        raise KeyboardInterrupt
+    return figures, interrupted
+
+
+_SIDE_BY_SIDE = {
+    "frames": "frames",
+    "answered": "answered_share",
+    "states right": "state_agreement",
+    "answered and wrong": "answered_and_wrong_share",
+    "Dice vessel": "vessel_dice",
+    "Dice robot": "robot_dice",
+    "head, px": "head_error_px",
+    "theta, deg": "theta_error_deg",
+    "frames without robot": "empty_frames",
+    "answered of these": "answers_on_empty_frames",
+}
+"""Rows of the table of several sets; errors as medians."""
+
+
+def print_side_by_side(results: dict[str, dict[str, Any]], as_json: bool) -> None:
+    """The main figures of several sets, a column each; all of them as JSON."""
+    if as_json:
+        sys.stdout.write(json.dumps({"sets": results}, allow_nan=False) + "\n")
+        return
+    table = Table(title="accuracy; errors are medians")
+    for name in ("", *results):
+        table.add_column(name, overflow="fold")
+    for row, key in _SIDE_BY_SIDE.items():
+        values = [figures[key] for figures in results.values()]
+        table.add_row(row, *(_text(value["median"] if isinstance(value, dict) else value) for value in values))
+    Console(markup=False, emoji=False).print(table)
 
 
 def print_figures(result: dict[str, Any], as_json: bool, title: str) -> None:

@@ -16,7 +16,7 @@ from core.learning.dataset import UNMEASURED, WORKING_SIZE_PX, DatasetError, Sam
 from core.perception.pipeline import Pipeline
 from core.perception.pose import room_px
 from core.perception.segmentation import Segmenter
-from core.types import Frame, Image, Mask, Point, Reason, Scene
+from core.types import Frame, Image, Mask, Point, Pose, Reason, Scene
 
 WRONG_DEG, WRONG_PX = 10.0, 15.0  # an answer whose theta or head is off by more is wrong
 TOSS_UP_PX = 0.25  # a pose that is so near to another state is a toss-up
@@ -87,10 +87,12 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         head_xy, theta_signed = truth.get("head_xy"), truth.get("theta_signed_deg")
         if head_xy is None or theta_signed is None:
             raise DatasetError(f"frame {stem}: truth.jsonl has theta_deg of it, but not head_xy and theta_signed_deg; add them")
+        line = _nearest_line(pose, truth)
+        theta_signed, state, theta = line["theta_signed_deg"], line["state"], line["theta_deg"]
         true_head: Point = scene.to_working((float(head_xy[0]), float(head_xy[1])))
         head_error = float(np.hypot(scene.path.head[0] - true_head[0], scene.path.head[1] - true_head[1]))
         # Signed and wrapped: a robot that points left by as much as it should point right is wrong, and would be steered wrongly.
-        theta_error = (pose.theta_signed_deg - float(theta_signed) + 180.0) % 360.0 - 180.0
+        theta_error = _turn(pose.theta_signed_deg, float(theta_signed))
     c_head, c_tail, room = truth.get("c_head_px"), truth.get("c_tail_px"), None
     if theta is not None and c_head is not None and c_tail is not None:
         room = room_px(float(c_head), float(c_tail), float(theta), _STATES, _LENGTH_PX)
@@ -112,6 +114,25 @@ def score_frame(stem: str, scene: Scene, vessel: Mask, robot: Mask, truth: dict[
         is_measured=truth.get("reason") != UNMEASURED,
         true_room_px=room,
     )
+
+
+_STATE_COSTS_DEG = 4.0
+"""In the choice between several true vessel lines, another state than the answer's counts as so many degrees."""
+
+
+def _nearest_line(pose: Pose, truth: dict[str, Any]) -> dict[str, Any]:
+    """The truth, or of its ``alternatives`` (other vessel lines that a person accepts beside a branch) the nearest one."""
+
+    def distance(line: dict[str, Any]) -> float:
+        is_other = bool(pose.state.value != line["state"])
+        return abs(_turn(pose.theta_signed_deg, float(line["theta_signed_deg"]))) + _STATE_COSTS_DEG * is_other
+
+    return min([truth, *truth.get("alternatives", ())], key=distance)
+
+
+def _turn(found_deg: float, true_deg: float) -> float:
+    """The angle between two directions, -180 to 180."""
+    return (found_deg - true_deg + 180.0) % 360.0 - 180.0
 
 
 def score_set(

@@ -156,6 +156,14 @@ def without_masks(folders: Sequence[Path]) -> list[Path]:
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
+class _TruthLine(BaseModel):
+    """Another vessel line that a person accepts, beside a branch."""
+
+    theta_deg: _Number
+    theta_signed_deg: _Number
+    state: Literal["A", "B", "C", "D"]
+
+
 class _TruthRow(BaseModel):
     """What every row of ``truth.jsonl`` must satisfy; other keys are allowed."""
 
@@ -169,6 +177,7 @@ class _TruthRow(BaseModel):
     tail_xy: tuple[_Number, _Number] | None = None
     c_head_px: _Number | None = None
     c_tail_px: _Number | None = None
+    alternatives: tuple[_TruthLine, ...] = ()
 
     @field_validator("state")
     @classmethod
@@ -185,6 +194,7 @@ _WANTED = {
     "state": "must be A, B, C, D or null",
     "head_xy": "must be two finite numbers, or null",
     "tail_xy": "must be two finite numbers, or null",
+    "alternatives": "must be a list of objects with theta_deg, theta_signed_deg and state",
 }
 """Texts of errors about values; all others must be finite numbers, or null."""
 

@@ -179,7 +179,7 @@ def test_any_damaged_file_is_said_before_the_work(frames: Path, model: Path, nam
     with pytest.raises(ModelError, match=told):
         calibrate(frames, str(model))
     with pytest.raises(ModelError, match=told):
-        benchmark(accuracy=frames, model=str(model), store=True)
+        benchmark(accuracy=[frames], model=str(model), store=True)
     assert not looked_at
 
 
@@ -191,7 +191,7 @@ def test_a_model_that_cannot_be_written_is_said_before_the_work(
     with pytest.raises(ModelError, match="cannot be written; copy the model to a folder of yours"):
         calibrate(frames, str(model))
     with pytest.raises(ModelError, match="cannot be written; copy the model to a folder of yours"):
-        benchmark(accuracy=frames, model=str(model), store=True)
+        benchmark(accuracy=[frames], model=str(model), store=True)
     assert not looked_at
 
 

@@ -20,6 +20,7 @@ import pytest
 
 from app.commands.benchmark import benchmark
 from app.ui.display import check_display
+from core.bench.bench import bench_from_pictures, write_bench
 from core.devices import UserError
 from core.evaluation.accuracy import FrameScore, score_set
 from core.learning.augmentation import FrameCrops
@@ -175,7 +176,7 @@ def test_an_interrupted_accuracy_tells_the_frames_until_then_and_stores_nothing(
 
         monkeypatch.setattr("core.evaluation.accuracy.score_set", cut)
         with pytest.raises(KeyboardInterrupt):
-            benchmark(as_json, frames, model=str(own), store=True)
+            benchmark(as_json, [frames], model=str(own), store=True)
         return capsys.readouterr().out
 
     figures = json.loads(measure(2))
@@ -198,6 +199,22 @@ def test_accuracy_is_one_json_object_and_tells_by_look(model: Path, frames: Path
     assert 0 <= result["vessel_dice"] <= 1
     assert {look: row["frames"] for look, row in result["looks"].items()} == Counter(looks)
     assert result["mean_over_looks_left_out"]["frames"] == looks.count(looks[0])
+
+
+def test_sets_stand_side_by_side_each_also_with_its_bench(model: Path, frames: Path, tmp_path: Path) -> None:
+    with_bench = Path(shutil.copytree(frames, tmp_path / "set"))
+    sample = find_samples([frames])[0]
+    image, vessel, _ = sample.load(640)
+    write_bench(bench_from_pictures([image], vessel, "set", 640), with_bench / "bench")
+    done = run("benchmark", "--accuracy", frames, "--accuracy", with_bench, "--model", model, "--json")
+    assert done.returncode == 0, done.stderr
+    sets = json.loads(done.stdout)["sets"]
+    assert list(sets) == [str(frames), str(with_bench), f"{with_bench} with its bench"]
+    assert sets[str(frames)] == sets[str(with_bench)]
+    assert sets[f"{with_bench} with its bench"]["vessel_dice"] != sets[str(frames)]["vessel_dice"]
+    done = run("benchmark", "--accuracy", frames, "--accuracy", with_bench, "--model", model, "--store")
+    assert done.returncode == 2
+    assert "--store keeps the figures of one set" in done.stderr
 
 
 def test_a_folders_name_is_shown_as_it_is(tmp_path: Path) -> None:

@@ -53,6 +53,15 @@ def test_the_error_of_theta_is_signed_and_goes_the_short_way_round(found: float,
     assert score_frame("a", scene(found), VESSEL, ROBOT, truth).theta_error_deg == pytest.approx(error)
 
 
+def test_beside_a_branch_the_nearest_of_the_accepted_lines_counts() -> None:
+    branch = {"theta_deg": 40.0, "theta_signed_deg": -40.0, "state": "D"}
+    truth = TRUTH | {"alternatives": [branch]}
+    near = score_frame("a", scene(14.0), VESSEL, ROBOT, truth)
+    assert (near.theta_error_deg, near.true_state, near.true_theta_deg) == (pytest.approx(2.0), "C", 12.0)
+    far = score_frame("a", scene(-37.0), VESSEL, ROBOT, truth)
+    assert (far.theta_error_deg, far.true_state, far.true_theta_deg) == (pytest.approx(3.0), "D", 40.0)
+
+
 def test_a_frame_without_robot_or_masks() -> None:
     nothing = Scene(0, 0.0, (1280, 960), 0.5, refusal=Refusal(Reason.BLACK))
     score = score_frame("a", nothing, VESSEL, NOTHING, {"state": None, "theta_deg": None, "head_xy": None})
