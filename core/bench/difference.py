@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -28,7 +29,7 @@ _LEAST_HIGH, _LEAST_LOW = 14.0, 6.0
 """Least difference (grey levels of Lab, 0 to 255) of a robot's clearest parts, and of its faintest."""
 _HIGH_SIGMAS, _LOW_SIGMAS = 9.0, 4.0
 """The same in deviations of what the rest of the vessel differs by."""
-_EDGE_SHARE = 0.42
+_EDGE_SHARE = 0.4
 """The robot's edge lies at this share of its contrast there."""
 _CONTRAST_PX = 13
 """Diameter of the surroundings whose clearest place is the contrast."""
@@ -57,17 +58,34 @@ class Difference:
     glare: Mask
 
 
-def distance_to_empty(image: Image, view: BenchView) -> NDArray[np.float32]:
-    """How much each pixel differs from the empty bench, float32 (h, w), in grey levels of Lab."""
+def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False) -> NDArray[np.float32]:
+    """How much each pixel differs from the empty bench, float32 (h, w), in grey levels of Lab.
+
+    `with_gone`: also where something lay on the empty bench that is gone.
+    """
     seen, empty = (cv2.cvtColor(cv2.GaussianBlur(one, (0, 0), _SMOOTH_PX), cv2.COLOR_RGB2LAB) for one in (image, view.empty))
     apart = seen.astype(np.float32) - empty
     apart -= _light(apart)
-    # what an edge that is a part of a pixel off explains does not count
-    brightness = empty[..., 0]
-    slack = np.hypot(cv2.Sobel(brightness, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(brightness, cv2.CV_32F, 0, 1, scale=1 / 8))
+    slack, drawn = _gradient(empty[..., 0]), _gradient(seen[..., 0])
     apart[..., 1:] *= _COLOR
-    distance = np.sqrt((apart**2).sum(axis=2))
-    return np.asarray(np.maximum(distance - _SLACK_PX * slack, 0.0), np.float32)
+    # what an edge that is a part of a pixel off explains does not count
+    distance = np.maximum(np.sqrt((apart**2).sum(axis=2)) - _SLACK_PX * slack, 0.0)
+    if with_gone:
+        return np.asarray(distance, np.float32)
+    # nor the outline of what lay on the empty bench and is gone: a robot has edges of its own
+    before, now = cv2.blur(slack, (_GONE_PX, _GONE_PX)), cv2.blur(drawn, (_GONE_PX, _GONE_PX))
+    distance[(before > _GONE_TIMES * now) & (before > _GONE_LEVELS)] = 0.0
+    return np.asarray(distance, np.float32)
+
+
+def _gradient(brightness: NDArray[Any]) -> NDArray[np.float32]:
+    """Grey levels per px, float32 (h, w)."""
+    across, down = (cv2.Sobel(brightness, cv2.CV_32F, dx, 1 - dx, scale=1 / 8) for dx in (1, 0))
+    return np.asarray(cv2.magnitude(across, down), np.float32)
+
+
+_GONE_PX, _GONE_TIMES, _GONE_LEVELS = 7, 2.0, 2.0
+"""Side of the square in which edges are compared, how much stronger the empty picture's must be, and their least mean in it."""
 
 
 def _light(apart: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -167,7 +185,7 @@ def _continue_to_border(probability: NDArray[np.float32], reachable: Mask) -> No
             strip[goes_on] = np.where(area[goes_on, :_BORDER_PX], np.maximum(strip[goes_on], inner[goes_on, None]), strip[goes_on])
 
 
-_GLARE_LEVEL, _HALO_PX = 240, 41
+_GLARE_LEVEL, _HALO_PX = 240, 61
 """Grey level of all channels in a lamp's reflection, and the diameter of the disc by which its halo is wider."""
 _THIN_SHARE = 0.4
 """Of the robot's width: thinner parts are no robot."""
@@ -189,8 +207,7 @@ def check_without_robot(bench: Bench, robot: Probability, frames: Sequence[Image
     moved = []
     for frame in frames:
         if isinstance(view := register(frame, bench), BenchView):
-            differs = robot_by_difference(frame, view).probability >= np.float32(0.5)
-            moved.append(float(np.mean(differs[seen])))
+            moved.append(float(np.mean(distance_to_empty(frame, view, with_gone=True)[seen] > _LEAST_HIGH)))
     if moved and float(np.median(moved)) > _MOVED_SHARE:
         raise BenchError("the robot lies in the empty picture: take another without it")
 

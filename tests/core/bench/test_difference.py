@@ -68,6 +68,14 @@ def test_a_bubble_is_no_robot(bench: Bench) -> None:
     assert not (found(noisy(np.asarray(image, np.uint8), 2.0, 3), bench).probability[118:138, 255:285] >= 0.5).any()
 
 
+def test_what_lay_on_the_empty_bench_and_is_gone_is_no_robot() -> None:
+    with_fitting = cv2.rectangle(board(), (240, 100), (246, 150), (90, 90, 80), 2)
+    bench = bench_from_pictures([noisy(np.asarray(with_fitting, np.uint8), 2.0, 1)], tube(), "b", 320)
+    robot = found(noisy(with_line(board(), (0, 122), (243, 130)), 2.0, 3), bench).probability >= 0.5
+    assert dice(robot, line((0, 122), (243, 130))) > 0.9
+    assert not robot[100:116, 235:252].any()
+
+
 def test_the_way_from_the_vessels_end_to_the_border_may_hold_the_robot() -> None:
     vessel = tube() & (np.arange(SIZE[0]) > 60)[None]
     bench = bench_from_pictures([noisy(board(), 2.0, 1)], vessel, "b", 320)
