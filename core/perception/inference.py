@@ -140,6 +140,10 @@ class OpenVinoSegmenter(Segmenter):
     def engine(self) -> str:
         return f"OpenVINO CPU {'int8' if self.is_eight_bit else 'fp32'}"
 
+    @property
+    def takes_empty(self) -> bool:
+        return self.info.planes == 6
+
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         return self.segment_batch([image])[0]
 
@@ -243,6 +247,10 @@ class TorchSegmenter(Segmenter):
     @property
     def engine(self) -> str:
         return f"torch {self._device.type.upper()}"
+
+    @property
+    def takes_empty(self) -> bool:
+        return self.info.planes == 6
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         return _segmentation(image, self._run(image, self._network)[0], None)[:2]

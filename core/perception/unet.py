@@ -183,13 +183,14 @@ def with_prior_planes(network: DualUNet) -> DualUNet:
     ValueError
         The network takes them already.
     """
-    if network.shape.inputs != 3:
+    if network.shape.inputs == 5:
         raise ValueError("the network takes probabilities already")
     wider = DualUNet(replace(network.shape, inputs=5)).eval()
     state, name = network.state_dict(), "encoder.0.0.weight"
     kernel = wider.state_dict()[name].zero_()
-    # Folding keeps the pixels of a plane together: the planes of the picture come first as before.
-    kernel[:, : state[name].shape[1]] = state[name]
+    # Folding keeps the pixels of a plane together: the planes of the picture come first as before. Those of an empty bench go.
+    picture = 3 * network.shape.fold**2
+    kernel[:, :picture] = state[name][:, :picture]
     wider.load_state_dict(state | {name: kernel})
     return wider
 
