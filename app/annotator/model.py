@@ -12,6 +12,7 @@ from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, QTimer, Signal
 
 from app.ui.workers import Worker
 from app.widgets.image_canvas import halvings
+from core.annotation.carry import carried_masks
 from core.annotation.exchange import Proposal, proposal_of
 from core.annotation.model import (
     Annotation,
@@ -19,6 +20,7 @@ from core.annotation.model import (
     History,
     ImageView,
     JournalEntry,
+    MaskTarget,
     Readout,
     Status,
     measure_lines,
@@ -60,7 +62,8 @@ class AnnotationModel(QObject):
 
     ``opened`` comes when the chosen item is loaded; ``changed`` after every edit, undo and redo of it; ``status_changed`` with the
     place of an item; ``saved`` when everything is on the disk; ``failed`` with one line and whether edits wait to be written;
-    ``proposed`` when there is a proposal for the open item.
+    ``proposed`` when there is a proposal for the open item; ``carried`` with masks that another image's lead to, as an
+    annotation of the open item, and that image's name.
 
     Parameters
     ----------
@@ -74,6 +77,7 @@ class AnnotationModel(QObject):
     saved = Signal()
     failed = Signal(str, bool)
     proposed = Signal()
+    carried = Signal(object, str)
 
     def __init__(
         self,
@@ -111,6 +115,9 @@ class AnnotationModel(QObject):
         self._saving.failed.connect(self._on_save_failed)
         self._perceiving.done.connect(self._on_perceived)
         self._perceiving.failed.connect(lambda _sha256, line: self.failed.emit(line, False))
+        self._carrying = Worker("carrying", self, latest_only=True)
+        self._carrying.done.connect(self._on_carried)
+        self._carrying.failed.connect(lambda _place, line: self.failed.emit(line, False))
         if self.items:
             key = self.items[0].key
             for one in store.annotations(key.study, key.rater):
@@ -330,6 +337,44 @@ class AnnotationModel(QObject):
         if self.item is not None and self.item.image.sha256 == sha256:
             self.proposed.emit()
 
+    # ---- masks of another image
+
+    def carry(self) -> str:
+        """Find the masks of the open item by those of the nearest image with a robot's mask, the ones before it first.
+
+        ``carried`` comes when they are found. Returns that image's name; "" where there is none, or in a blind study.
+        """
+        item = self.item
+        source = self._mask_source()
+        if item is None or source is None or not self.is_open:
+            return ""
+        of, masks = self.items[source], self._contents[self.items[source].key].masks
+        paths = of.image.path, item.image.path
+
+        def find() -> tuple[Annotation, str]:
+            before, image = (read_image(path) for path in paths)
+            return Annotation(masks=carried_masks(before, masks, image)), paths[0].name
+
+        self._carrying.submit(item.key, find)
+        return paths[0].name
+
+    def _mask_source(self) -> int | None:
+        item = self.item
+        if item is None or self.blind:
+            return None
+
+        def fits(place: int) -> bool:
+            image, content = self.items[place].image, self._contents.get(self.items[place].key)
+            is_near = image.path.parent == item.image.path.parent and image.record.size == item.image.record.size
+            return is_near and place != self.index and content is not None and MaskTarget.ROBOT in content.drawn
+
+        places = (*range(self.index - 1, -1, -1), *range(self.index + 1, len(self.items)))
+        return next((place for place in places if fits(place)), None)
+
+    def _on_carried(self, key: object, found: tuple[Annotation, str]) -> None:
+        if self.item is not None and self.item.key == key and self.is_open:
+            self.carried.emit(self._in_view(found[0]), found[1])
+
     # ---- the end
 
     def settle(self) -> None:
@@ -351,9 +396,10 @@ class AnnotationModel(QObject):
         if self._to_write:
             self._saving.submit("edit", self._write_all)
         self._saving.stop(finish=True)
-        for thread in (self._loading, self._perceiving):
+        others = (self._loading, self._perceiving, self._carrying)
+        for thread in others:
             thread.stop(finish=False)
-        running = [thread for thread in (self._saving, self._loading, self._perceiving) if not thread.wait(_SAVE_WITHIN_MS)]
+        running = [thread for thread in (self._saving, *others) if not thread.wait(_SAVE_WITHIN_MS)]
         if not running:
             self.store.close()
         if self._to_write:

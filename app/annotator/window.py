@@ -74,6 +74,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("&Note"), window.edit_note, ("F2",)),
             None,
             MenuEntry(tr("Take the &algorithm's"), window.apply_proposal, ("G",)),
+            MenuEntry(tr("&Masks as in another image"), window.carry_masks, ("M",)),
             MenuEntry(tr("&Simplify outlines"), window.simplify, ("S",)),
         ],
     )
@@ -181,6 +182,8 @@ class AnnotatorWindow(WindowFrame):
         self.model = model
         model.setParent(self)
         self._training: TrainingDialog | None = None
+        self._carried: Annotation | None = None
+        """Masks that another image's lead to: a proposal, until it is taken or hidden."""
         # In a blind study no name tells that an image was there before.
         names = [item.image.path.name for item in model.items]
         if model.blind:
@@ -199,6 +202,7 @@ class AnnotatorWindow(WindowFrame):
         model.saved.connect(lambda: panels.header.show_saved(True))
         model.failed.connect(self._on_failed)
         model.proposed.connect(self._show_proposal)
+        model.carried.connect(self._show_carried)
         canvas.edited.connect(self._on_edited)
         canvas.previewed.connect(self._on_previewed)
         canvas.line_ended.connect(self._on_line_ended)
@@ -456,10 +460,46 @@ class AnnotatorWindow(WindowFrame):
 
     def _hide_proposal(self) -> None:
         self.panels.bar.set_switch("H", False)
+        self._carried = None
         self.panels.canvas.show_proposal(None)
+
+    def carry_masks(self) -> None:
+        """Propose the masks that follow from another image of the same bench; once more hides them."""
+        if self._carried is not None:
+            self._hide_proposal()
+            return
+        source = self.model.carry()
+        if source:
+            self.show_message(tr("Finding the masks by those of {name}", name=source))
+        elif self.model.blind:
+            self.show_message(tr("A blind study: masks are drawn outside it"))
+        else:
+            self.show_message(tr("No other image of this folder and size has a robot mask"))
+
+    def _show_carried(self, proposal: Annotation, name: str) -> None:
+        self._hide_proposal()
+        self._carried = proposal
+        self.panels.canvas.show_proposal(proposal)
+        self.show_message(tr("Proposed from {name}, dotted: G takes the masks over, M hides them", name=name))
+
+    def _apply_carried(self, proposal: Annotation) -> None:
+        """The masks of the mask tool, or with a line tool both."""
+        target = self.panels.canvas.tool.value.target
+        taken = tuple(mask for mask in proposal.masks if target is None or mask.target is target)
+        targets = {mask.target for mask in taken}
+        if taken:
+            kept = tuple(mask for mask in self.model.annotation.masks if mask.target not in targets)
+            self.model.edit("take the proposed masks", replace(self.model.annotation, masks=(*kept, *taken)))
+        else:
+            self.show_message(tr("Nothing of it was found in this image"))
+        self._hide_proposal()
 
     def apply_proposal(self) -> None:
         """Take over the lines with a line tool, the tool's masks with a mask tool; undo brings the rater's own back."""
+        self.panels.canvas.complete()
+        if self._carried is not None:
+            self._apply_carried(self._carried)
+            return
         if self.model.proposal is None:
             if self.model.blind or not self.panels.bar.is_on("H"):  # else the answer is waited for
                 self.toggle_proposal()

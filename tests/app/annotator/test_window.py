@@ -418,7 +418,7 @@ def test_an_answer_that_comes_after_it_was_switched_off_is_not_shown(rater: Rate
     assert bar.is_on("H"), "what is waited for cannot be taken over yet, and is waited for"
     rater.press(Key.Key_H)
     may_answer.set()
-    rater.qtbot.waitUntil(lambda: rater.model.proposal is not None)
+    rater.qtbot.waitUntil(lambda: rater.model.proposal is not None, timeout=60_000)
     assert not bar.is_on("H")
     assert rater.canvas.editor.drawing.proposal is None
     assert "Algorithm:" not in rater.message
@@ -523,6 +523,54 @@ def test_a_mode_with_a_line_tool_means_the_vessels_mask(rater: Rater) -> None:
     rater.press(Key.Key_Escape)
     assert rater.window.panels.bar.mode_shown is MaskMode.POINTS
     assert "click the outline" in rater.window.panels.bar.hint
+
+
+@pytest.fixture
+def moving_rater(make: MakeRater, tmp_path: Path) -> Rater:
+    """Over three pictures of a bench in which a dark robot goes on; it is drawn in the first."""
+    for k in range(3):
+        picture = np.full((SIZE[1], SIZE[0], 3), 180, np.uint8)
+        picture[230:251, : 200 + 100 * k] = 40
+        write_png(tmp_path / f"{k}.png", picture)
+    rater = make()
+    rater.model.edit("masks", Annotation(masks=(MaskPolygon(MaskTarget.ROBOT, ((0, 230), (199, 230), (199, 250), (0, 250))),)))
+    return rater
+
+
+def test_masks_of_the_image_before_are_proposed_and_taken(moving_rater: Rater) -> None:
+    moving_rater.press(Key.Key_N, Key.Key_M)
+    moving_rater.qtbot.waitUntil(lambda: moving_rater.canvas.editor.drawing.proposal is not None, timeout=60_000)
+    assert not moving_rater.drawn.masks, "a proposal is no answer"
+    assert moving_rater.message == "Proposed from 0.png, dotted: G takes the masks over, M hides them"
+    moving_rater.press(Key.Key_G)
+    assert moving_rater.canvas.editor.drawing.proposal is None
+    robot = fill(moving_rater.drawn.masks, MaskTarget.ROBOT, SIZE)
+    assert robot[240, 290] and not robot[240, 310] and not robot[200].any()
+    moving_rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
+    assert not moving_rater.drawn.masks
+
+
+def test_a_carried_proposal_is_hidden_by_its_key_and_by_another_image(moving_rater: Rater) -> None:
+    moving_rater.press(Key.Key_N, Key.Key_M)
+    moving_rater.qtbot.waitUntil(lambda: moving_rater.canvas.editor.drawing.proposal is not None, timeout=60_000)
+    moving_rater.press(Key.Key_M)
+    assert moving_rater.canvas.editor.drawing.proposal is None
+    moving_rater.press(Key.Key_M)
+    moving_rater.qtbot.waitUntil(lambda: moving_rater.canvas.editor.drawing.proposal is not None, timeout=60_000)
+    moving_rater.press(Key.Key_N)
+    assert moving_rater.canvas.editor.drawing.proposal is None
+
+
+def test_without_another_mask_there_is_nothing_to_carry(make: MakeRater) -> None:
+    rater = make()
+    rater.press(Key.Key_M)
+    assert rater.message == "No other image of this folder and size has a robot mask"
+
+
+def test_in_a_blind_study_nothing_is_carried(make: MakeRater) -> None:
+    rater = make(blind=True)
+    rater.press(Key.Key_M)
+    assert rater.message == "A blind study: masks are drawn outside it"
 
 
 def test_a_hole_in_a_mask_stays_open_on_the_screen(rater: Rater) -> None:
