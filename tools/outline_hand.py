@@ -1,6 +1,6 @@
 """A scripted hand outlines vessels: events and Dice of the annotator's tube and region tools.
 
-``python -m tools.outline_hand --benches ../shared/independent --out DIR`` outlines the empty picture of each bench, and phantoms of
+``python -m tools.outline_hand --benches FOLDER --out DIR`` outlines the empty picture of each bench in a folder, and phantoms of
 the twin with four branches, from an empty start and from the network's proposal, and writes pictures of the result. The hand knows
 the true mask's centerlines and widths; its places and widths are off by 1.5 px (standard deviation). An event is a drag, a click, a
 notch of the wheel, or a key.
@@ -121,13 +121,13 @@ class ScriptedHand:
     def correct(self) -> None:
         """Mend the worst fault again and again, until the outline is good or there were too many events.
 
-        A vessel that lacks more than any one place is dragged along, once. An outline that has far too much is begun again. What
+        A vessel that lacks more than any one place is dragged along, once. A proposal that has far too much is begun again. What
         makes it worse is undone; such a click ends the corrections.
         """
         lines = true_lines(self._truth)
         mask = self.outline.mask
         too_much, too_little = int((mask & ~self._truth).sum()), int((self._truth & ~mask).sum())
-        if dice(mask, self._truth) < _GOOD_DICE and too_much > too_little:
+        if not self.events and dice(mask, self._truth) < _GOOD_DICE and too_much > too_little:
             self.events += 1
             self.outline.edit("clear", Annotation())
             self.draw_all()
