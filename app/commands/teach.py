@@ -376,12 +376,13 @@ def _print_result(made: TeachingSet, out: Path, result: TeachingResult, steps: i
         return
     table = Table(title=f"{out}: what to expect on this bench", show_header=False)
     share = result.answered / result.frames if result.frames else 0.0
+    auroc = "-" if result.confidence_auroc is None else f"{result.confidence_auroc:.2f}"
     lines = (
         ("frames", f"{len(made.train)} learnt from, {len(made.held_out)} held out, {len(made.rejected)} rejected of {made.seen}"),
         ("answered", f"{share:.0%} of {result.frames} held-out frames, {result.right} of {result.answered} right"),
         ("agreement with the difference", f"Dice robot {result.robot_dice:.3f}, vessel {result.vessel_dice:.3f}"),
         ("head, theta (medians)", f"{_number(result.head_px, 'px')}, {_number(result.theta_deg, 'deg')}"),
-        ("confidence", f"{_share(result.confidence)}; calibration error {_share(result.calibration_error)}"),
+        ("confidence", f"{_share(result.confidence)}; calibration error {_share(result.calibration_error)}, AUROC {auroc}"),
         ("other benches refused", _share(result.refused)),
         ("doubtful places", f"{result.doubtful_share:.1%} of the robot"),
         ("time", f"{elapsed_s / 60:.1f} min, {steps} steps"),
