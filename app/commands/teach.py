@@ -58,9 +58,9 @@ _LEAST_S = 45.0
 """A shorter training does not learn a bench."""
 _FEW_STEPS = 80
 """Fewer steps than this are reported: the machine is too slow for the time given."""
-_EXAMPLES = 12
+_EXAMPLES = 6
 """Frames from which eight-bit copies learn: those of one bench are alike."""
-_EXPORT_PICTURES = 30.0
+_EXPORT_PICTURES = 80.0
 """Writing both networks with these copies takes as long as perceiving so many pictures in all orientations."""
 _PLAN = TrainingPlan(batch=8, learning_rate=2e-3, look_share=0.7, warmup_steps=20, keeps_statistics=True)
 """For a trained network and few frames, as the window "Train on my annotations" has it."""

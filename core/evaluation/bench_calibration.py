@@ -40,7 +40,7 @@ from core.perception.segmentation import Segmenter, to_working
 from core.perception.tip_refinement import TipRefinement
 from core.types import Frame, Image, Mask
 
-PRIOR_WEIGHT, PRIOR_OFFSET = 6.0, 0.3
+PRIOR_WEIGHT, PRIOR_OFFSET = 20.0, 0.3
 """Precision of the prior of each weight, and of the offset: as many clear answers it takes to move them half-way."""
 _EDGES = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)
 """Bins of the calibration error."""
