@@ -48,7 +48,7 @@ _STILL_SHARE = 0.15
 _SHADE = 8.0
 """Added to grey levels before their logarithm: noise in dark places counts less."""
 
-MOST_COMPONENTS, LARGEST_SHARE = 4, 0.6
+MOST_COMPONENTS, LARGEST_SHARE = 4, 0.45
 """A robot's mask has no more components, and the largest one has this share of its area."""
 LEAST_INSIDE, INSIDE_MARGIN_PX = 0.6, 4
 """Share of a robot's mask that lies in the vessel, widened by the margin."""
