@@ -149,6 +149,8 @@ def fit_to_prior(
     right : whether each was right (N,).
     weight : how much each counts (N,).
     """
+    if not len(right):
+        return prior
     mean, scale = np.array(prior.mean), np.array(prior.scale)
     x = np.column_stack([np.clip((evidence - mean) / scale, -4.0, 4.0), np.ones(len(evidence))])
     begin = np.array([*prior.weights, prior.offset])

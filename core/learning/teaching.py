@@ -82,8 +82,8 @@ _MOST_DOUBT = 0.35
 _GHOST_SHARE, _GHOST_PX = 0.9, 60
 """Share of the frames in which an area of the vessel, of this size at least, differs from the empty picture: all or none of them
 has the robot there."""
-_UNKNOWN_SHARE = 0.06
-"""Share of the vessel that differs between the empty pictures, above which one of them shows the robot."""
+_GONE_LEVELS = 14.0
+"""Grey levels of Lab by which a place differs where something lay on the empty bench."""
 _STATE = "teaching.json"
 _REJECTED = "rejected"
 
@@ -113,6 +113,7 @@ class TeachingFrame:
     focus, hidden_share : how much structure of the bench is seen, and the share of it that is hidden (``structure_of``).
     reason : why the frame is rejected; empty: it is not.
     is_held_out : it is not trained on.
+    differs : where the frame shows something else than the empty picture; None: not compared.
     """
 
     picture: TeachingPicture
@@ -123,6 +124,7 @@ class TeachingFrame:
     hidden_share: float = 0.0
     reason: str = ""
     is_held_out: bool = False
+    differs: Mask | None = None
 
     @property
     def doubtful_share(self) -> float:
@@ -255,7 +257,8 @@ def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = 
     specks = _specks(robot)
     robot, doubtful = robot & ~specks, doubtful | _widened(specks, 2)
     focus, hidden = structure_of(picture.image, view.placed, view.known)
-    frame = TeachingFrame(picture, vessel, robot, doubtful, focus, hidden)
+    gone = distance_to_empty(picture.image, view, with_gone=True) > np.float32(_GONE_LEVELS)
+    frame = TeachingFrame(picture, vessel, robot, doubtful, focus, hidden, differs=robot | (gone & view.known))
     if focus < _LEAST_FOCUS:
         return replace(frame, reason=message("blurred: {a:.0f} % of the empty picture's fine structure", a=100 * focus))
     if hidden > _MOST_HIDDEN:
@@ -392,17 +395,14 @@ def _width_px(mask: Mask) -> float:
 
 
 def _check_empty(frames: Sequence[TeachingFrame], bench: Bench) -> None:
-    """Raise TeachingError where an empty picture shows the robot.
+    """Raise TeachingError where the empty picture shows the robot.
 
-    Two empty pictures differ in the vessel then, or nearly all frames differ from the only one in a place where it stands out from
-    the vessel around it more than the frames do.
+    Nearly all frames differ from it in a place then, where it stands out from the vessel around more than the frames do.
     """
     vessel = bench.vessel
     if vessel is None:
         return
-    if float((vessel & ~bench.known).sum()) > _UNKNOWN_SHARE * float(vessel.sum()):
-        raise TeachingError("the empty pictures differ in the vessel: one of them shows the robot; take it again without")
-    common = np.mean([frame.robot for frame in frames], axis=0) >= _GHOST_SHARE
+    common = np.mean([frame.robot if frame.differs is None else frame.differs for frame in frames], axis=0) >= _GHOST_SHARE
     count, labels, statistics, _ = cv2.connectedComponentsWithStats((common & vessel).view(np.uint8), connectivity=8)
     usual: Image | None = None
     for index in range(1, count):

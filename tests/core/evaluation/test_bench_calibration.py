@@ -26,7 +26,7 @@ def _features(first: np.ndarray) -> np.ndarray:
 
 
 def test_without_answers_the_fit_is_the_prior() -> None:
-    fitted = fit_to_prior(np.zeros((0, COUNT)), np.zeros(0, bool), np.zeros(0), PRIOR)
+    fitted = fit_to_prior(np.zeros(0), np.zeros(0, bool), np.zeros(0), PRIOR)
     assert fitted.weights == pytest.approx(PRIOR.weights)
     assert fitted.offset == pytest.approx(PRIOR.offset)
 
