@@ -254,6 +254,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
     import torch
 
     from app.commands.trainer import FrameTraining, HeldOutMonitor, Trainer
+    from core.bench.bench import read_bench
     from core.config.models import PerceptionConfig
     from core.evaluation.bench_calibration import BenchCalibration
     from core.learning.dataset import find_samples
@@ -278,7 +279,11 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
     samples = _shown_as_often(made.train, remembered)
     has_tip = second_look_of(model_folder(begin)) is not None
     plan = replace(_PLAN, steps=_MOST_STEPS, seconds=left_s * (1 - _TIP_SHARE if has_tip else 1.0))
-    notes: dict[str, Any] = {"init": init, "frames": len(samples), "taught": {"bench": made.bench.name, "frames": len(made.train)}}
+    notes: dict[str, Any] = {
+        "init": init,
+        "frames": len(samples),
+        "taught": {"bench": read_bench(made.bench).name, "frames": len(made.train)},
+    }
     torch.manual_seed(plan.seed)
     task = FrameTraining(samples, begin, examples=_EXAMPLES)
     plan = replace(plan, crop=task.crop_size(plan.crop))
@@ -290,7 +295,8 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
         trainer = Trainer(network, notes, log.write, writer, bar, interrupt, off, steps_total=plan.steps)
         done = trainer.run(task, plan)
         if has_tip and not interrupt.asked:
-            tip_s = max(_LEAST_S / 3, clock.left_s - reserved_s)
+            # Where other programs have made all slower than was measured, it still gets most of its share.
+            tip_s = max(0.7 * _TIP_SHARE * left_s, clock.left_s - reserved_s)
             tip = replace(plan, steps=_MOST_STEPS // 3, batch=16, seconds=tip_s)
             trainer.run_tip(_shown_as_often(made.train, remembered[:_OTHERS]), tip, _EXAMPLES)
         result = None
