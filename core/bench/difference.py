@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from core.bench.bench import Bench, BenchError
-from core.bench.registration import BenchView, register
+from core.bench.registration import BenchView, gradient_of, lab_of, register
 from core.perception.segmentation import Probability
 from core.types import Image, Mask
 
-_SMOOTH_PX = 0.8
-"""Deviation of the Gaussian that takes noise out of both pictures."""
 _SLACK_PX = 0.4
 """An edge of the bench that lies this far off is no difference."""
 _COLOR = 1.5
@@ -63,10 +60,10 @@ def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False)
 
     `with_gone`: also where something lay on the empty bench that is gone.
     """
-    seen, empty = (cv2.cvtColor(cv2.GaussianBlur(one, (0, 0), _SMOOTH_PX), cv2.COLOR_RGB2LAB) for one in (image, view.empty))
-    apart = seen.astype(np.float32) - empty
+    seen = lab_of(image)
+    apart = np.asarray(cv2.subtract(seen, view.lab, dtype=cv2.CV_32F), np.float32)
     apart -= _light(apart)
-    slack, drawn = _gradient(empty[..., 0]), _gradient(seen[..., 0])
+    slack, drawn = view.gradient, gradient_of(seen[..., 0])
     brightness, red, yellow = cv2.split(apart)  # sums along an axis of three take ten times as long
     colored = cv2.magnitude(brightness, _COLOR * cv2.magnitude(red, yellow))
     # what an edge that is a part of a pixel off explains does not count
@@ -77,12 +74,6 @@ def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False)
     before, now = cv2.blur(slack, (_GONE_PX, _GONE_PX)), cv2.blur(drawn, (_GONE_PX, _GONE_PX))
     distance[(before > _GONE_TIMES * now) & (before > _GONE_LEVELS)] = 0.0
     return np.asarray(distance, np.float32)
-
-
-def _gradient(brightness: NDArray[Any]) -> NDArray[np.float32]:
-    """Grey levels per px, float32 (h, w)."""
-    across, down = (cv2.Sobel(brightness, cv2.CV_32F, dx, 1 - dx, scale=1 / 8) for dx in (1, 0))
-    return np.asarray(cv2.magnitude(across, down), np.float32)
 
 
 _GONE_PX, _GONE_TIMES, _GONE_LEVELS = 7, 2.0, 2.0

@@ -85,6 +85,10 @@ class BenchView:
     likeness: float
     placed: Image
     """The bench's empty picture at this place, in the bench's own light."""
+    lab: Image
+    """``empty`` without its noise, in Lab (``lab_of``); made once for all windows of this view."""
+    gradient: NDArray[np.float32]
+    """Of the brightness of ``lab`` (``gradient_of``)."""
     window: Window | None = None
     """The part of the picture that is meant; None: all of it."""
 
@@ -173,7 +177,9 @@ def register(image: Image, bench: Bench, previous: BenchView | None = None) -> B
     empty, gain, power = relit(placed, image, known)
     if slope / power < _SOFT_SLOPE:
         empty = blurred_alike(empty, image, known)
-    return BenchView(empty, known, vessel, area, noise, shift, rotation, gain, found, likeness, placed)
+    lab = lab_of(empty)
+    gradient = gradient_of(lab[..., 0])
+    return BenchView(empty, known, vessel, area, noise, shift, rotation, gain, found, likeness, placed, lab, gradient)
 
 
 def window_of(view: BenchView, window: Window) -> BenchView:
@@ -188,8 +194,25 @@ def window_of(view: BenchView, window: Window) -> BenchView:
         reachable=view.reachable[part],
         noise=view.noise[part],
         placed=view.placed[part],
+        lab=view.lab[part],
+        gradient=view.gradient[part],
         window=window,
     )
+
+
+def lab_of(image: Image) -> Image:
+    """Lab of a picture (h, w, 3), as bytes, without its finest noise."""
+    return np.asarray(cv2.cvtColor(cv2.GaussianBlur(image, (0, 0), _FINEST_PX), cv2.COLOR_RGB2LAB), np.uint8)
+
+
+_FINEST_PX = 0.8
+"""Deviation of the Gaussian that takes noise out of both pictures."""
+
+
+def gradient_of(brightness: NDArray[Any]) -> NDArray[np.float32]:
+    """Grey levels per px, float32 (h, w)."""
+    across, down = (cv2.Sobel(brightness, cv2.CV_32F, dx, 1 - dx, scale=1 / 8) for dx in (1, 0))
+    return np.asarray(cv2.magnitude(across, down), np.float32)
 
 
 def _moved(values: NDArray[Any], matrix: NDArray[np.float64], how: int, outside: int | None = None) -> NDArray[Any]:
