@@ -24,8 +24,8 @@ MINUTES = 5
 BURST = 8
 """Pictures that "Take picture" takes."""
 _POLL_MS = 40
-_BURST_WITHIN_MS = 4000
-"""So many pictures come in this time, or the camera gives none."""
+_SILENT_MS = 3000
+"""Without a new picture for so long the camera gives none."""
 _LOOK_EVERY_MS = 250
 """A look takes a fifth of a second of a processor core, and perception goes on beside it."""
 _END_WITHIN_MS = 5000
@@ -118,7 +118,8 @@ class TeachingModel(QObject):
         self.is_loaded = False
         self.training = TrainingState()
         self.result: TaughtResult | None = None
-        self._then: Callable[[object], None] | None = None
+        self._count = self._busy_job = 0
+        self._then: dict[object, Callable[[object], None] | None] = {}
         self._burst: list[Image] = []
         self._wanted = 0
         self._waited_ms = 0
@@ -140,6 +141,11 @@ class TeachingModel(QObject):
     @property
     def is_busy(self) -> bool:
         return bool(self.busy)
+
+    @property
+    def has_jobs(self) -> bool:
+        """Whether a job runs or waits, for which the window need not wait."""
+        return bool(self._then)
 
     @property
     def is_training(self) -> bool:
@@ -171,22 +177,27 @@ class TeachingModel(QObject):
         self._run(tr("keeping the vessel"), job)
 
     def leave_out(self, stem: str, on: bool) -> None:
-        self._run(tr("one moment"), partial(self._folder.leave_out, stem, on))
+        self._run("", partial(self._folder.leave_out, stem, on), quiet=True)
 
     def correct(self, stem: str, robot: Mask) -> None:
         """Another mask for the robot in a frame."""
-        self._run(tr("keeping the mask"), partial(self._folder.correct, stem, robot))
+        self._run("", partial(self._folder.correct, stem, robot), quiet=True)
 
     def keep_used(self) -> None:
-        self._run(tr("one moment"), self._folder.keep_used)
+        self._run("", self._folder.keep_used, quiet=True)
 
-    def _run(self, what: str, job: Callable[[], object], then: Callable[[object], None] | None = None) -> None:
-        """Do a job in the thread, then show what there is. Ignored while another one runs."""
-        if self.is_busy or self._is_closed:
+    def _run(
+        self, what: str, job: Callable[[], object], then: Callable[[object], None] | None = None, *, quiet: bool = False
+    ) -> None:
+        """Do a job in the thread, then show what there is. While another one runs it is ignored, but a `quiet` one waits."""
+        if self._is_closed or (self.is_busy and not quiet):
             return
-        self.busy, self._then = what, then
-        self.changed.emit()
-        self._work.submit("job", lambda: (job(), self._folder.view()))
+        self._count += 1
+        self._then[self._count] = then
+        if not quiet:
+            self.busy, self._busy_job = what, self._count
+            self.changed.emit()
+        self._work.submit(self._count, lambda: (job(), self._folder.view()))
 
     def _on_done(self, key: object, result: object) -> None:
         assert isinstance(result, tuple)
@@ -196,18 +207,25 @@ class TeachingModel(QObject):
             self.looked.emit(outcome)
             self.changed.emit()
             return
-        then, self._then, self.busy = self._then, None, ""
-        self.is_loaded = True
+        then = self._ended_job(key)
         if then is not None:
             then(outcome)
         self.changed.emit()
+
+    def _ended_job(self, key: object) -> Callable[[object], None] | None:
+        """What was to be done after the job that has ended."""
+        then = self._then.pop(key, None)
+        self.is_loaded = True
+        if key == self._busy_job:
+            self.busy = ""
+        return then
 
     def _on_failed(self, key: object, line: str) -> None:
         if key == "look":
             self._is_looking = False
             self._watch.stop()  # a full disk is not reported eight times a second
         else:
-            self._then, self.busy, self.is_loaded = None, "", True
+            self._ended_job(key)
             if self.training.phase is TrainingPhase.PREPARING:
                 self.training = TrainingState(TrainingPhase.FAILED, tr("Not started: {why}", why=tr_text(line)), self._name)
         self.said.emit(tr_text(line), True)
@@ -236,7 +254,7 @@ class TeachingModel(QObject):
         frame = self._newest()
         self._waited_ms += _POLL_MS
         if frame is not None and frame.index != self._last_index:
-            self._last_index = frame.index
+            self._last_index, self._waited_ms = frame.index, 0
             self._burst.append(frame.image)
         if len(self._burst) >= self._wanted:
             self._poll.stop()
@@ -246,7 +264,7 @@ class TeachingModel(QObject):
                 self._run(tr("comparing the pictures"), partial(self._folder.add_place, images[0]))
             else:
                 self._run(tr("looking at the pictures"), partial(self._folder.add_empty, images))
-        elif self._waited_ms >= _BURST_WITHIN_MS:
+        elif self._waited_ms >= _SILENT_MS:
             self._poll.stop()
             self.busy = ""
             self.said.emit(tr("The picture is not live: check the camera, or start the rig again (F5)"), True)
@@ -317,7 +335,7 @@ class TeachingModel(QObject):
         self._child = None
         if code == 0:
             self._show(replace(self.training, phase=TrainingPhase.DONE, line="", left_s=None))
-            self._run(tr("one moment"), partial(self._folder.keep_model, self._name))
+            self._run("", partial(self._folder.keep_model, self._name), quiet=True)
             self.trained.emit(self._name)
         elif code == _INTERRUPTED or self._is_stopping:
             why = tr("Stopped. Frames and what was learnt are kept: Train goes on from there")

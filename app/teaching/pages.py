@@ -241,7 +241,7 @@ class EmptyPage(TeachingPage):
         self.found.setMinimumHeight(84)
         self.found.setAlignment(Qt.AlignmentFlag.AlignTop)
         if is_twin:
-            self.column.addWidget(note(tr("Bench twin: hold the key arrow down until the robot is back at the port.")))
+            self.column.addWidget(note(tr("Bench twin: hold the key \N{DOWNWARDS ARROW} until the robot is back at the port.")))
         self.column.addWidget(self.take)
         self.column.addWidget(self.thumb, 0, Qt.AlignmentFlag.AlignLeft)
         self.column.addWidget(self.found)
@@ -562,7 +562,7 @@ class FramesPage(TeachingPage):
                 item.setText(words)
                 item.setToolTip(tr_text(taken.frame.reason) or words)
         taken_now = self._current
-        enable(taken_now is not None and not self.model.is_busy, self.out)
+        enable(taken_now is not None, self.out)
         self.undo.setEnabled(self._history.undo_action not in ("", "begin"))
         if taken_now is not None:
             self.out.setText(tr("&Take in again") if taken_now.is_left_out else tr("&Leave out"))
@@ -612,7 +612,7 @@ class FramesPage(TeachingPage):
         if not self._has_edits or self._open is None:
             return
         taken = next((one for one in self.view.frames if one.stem == self._open), None)
-        if taken is not None and not self.model.is_busy:
+        if taken is not None:
             self._has_edits = False
             height, width = taken.frame.robot.shape
             self.model.correct(taken.stem, fill(self._history.current.masks, MaskTarget.ROBOT, (width, height)))

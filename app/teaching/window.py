@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt, QTimer, Slot
 from PySide6.QtGui import QCloseEvent, QKeyEvent
@@ -40,18 +41,13 @@ _STEP_LINE_PX = 30
 _PICTURE_EVERY_MS = 50
 
 
+@dataclass(frozen=True, slots=True)
 class TeachingDriver:
-    """How the window moves the robot: what held keys do, and STOP.
+    """How the window moves the robot: ``drive`` does what held keys say, ``stop`` is STOP, ``can_move``: whether anything can."""
 
-    Parameters
-    ----------
-    drive : moves the robot as held keys do.
-    stop : STOP.
-    can_move : whether anything can move now.
-    """
-
-    def __init__(self, drive: Callable[[Jog], object], stop: Callable[[], object], can_move: Callable[[], bool]) -> None:
-        self.drive, self.stop, self.can_move = drive, stop, can_move
+    drive: Callable[[Jog], object]
+    stop: Callable[[], object]
+    can_move: Callable[[], bool]
 
 
 class TeachingWindow(QDialog):
