@@ -20,9 +20,13 @@ from app.teaching.folder import TeachingStep
 from app.teaching.model import TeachingModel, free_name, teaching_folder
 from app.training.model import TrainingPhase
 from core import geometry
+from core.bench.bench import read_bench
 from core.config.models import PerceptionConfig
+from core.learning.model_writer import save_model
 from core.perception.inference import open_segmenter
+from core.perception.model_file import own_models
 from core.perception.segmentation import OrientationAverage, Probability
+from core.perception.unet import DualUNet, UNetShape
 from core.types import Image
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.rendering.appearance import named_appearance
@@ -399,3 +403,35 @@ def test_a_tree_with_five_ends_takes_few_input_events(
     assert hand.used
     assert hand.events == 7  # of 40
     hand.end()
+
+
+TEACHES_LITTLE = """
+import sys
+import app.commands.teach as teach
+from app.cli import main
+teach._EXAMPLES, teach._REMEMBER, teach._MOST_STEPS = 2, 4, 6
+sys.argv = ["main.py", "teach", *sys.argv[1:], "--init", {model!r}]
+sys.exit(main())
+"""
+"""The real command with few steps of a small network."""
+
+
+@pytest.mark.slow
+def test_a_real_training_shows_how_it_goes_and_makes_a_model(
+    open_hand: OpenHand, driven: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    save_model(DualUNet(UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)), tmp_path / "small", training={}, figures={})
+    stands_for_teach(monkeypatch, TEACHES_LITTLE.format(model=str(tmp_path / "small")))
+    hand = open_hand(driven, TeachingStep.TRAIN)
+    page, name = hand.window.train_page, hand.window.train_page.model_name.text()
+    hand.click(page.start)
+    qtbot.waitUntil(lambda: not hand.model.is_training, timeout=5 * LONG_MS)
+    hand.wait()
+    state = hand.model.training
+    assert state.phase is TrainingPhase.DONE, state.line
+    assert state.step == state.steps == 6
+    assert [Path(path).is_file() for path in (*state.held_out[0].pictures, *state.held_out[-1].pictures)].count(False) == 0
+    assert hand.model.view.model == name
+    assert hand.model.result is not None
+    assert read_bench(own_models() / name / "bench").vessel is not None
+    shutil.rmtree(own_models() / name)
