@@ -38,14 +38,16 @@ WANTED = 24
 """Frames that the model learns from, with those that are held out."""
 ENOUGH_FRAMES, ENOUGH_BENDS = 16, 4
 """With so many frames, and so many of them that show a bend at a place where the robot had been, nothing more is asked for."""
-MOST_FRAMES = 60
-"""More are not taken; the most diverse of them are learnt from."""
+MOST_FRAMES, _MOST_LIKE = 120, 40
+"""More frames are not taken; from the second number on only those that show a new place. The most diverse are learnt from."""
 PLACES = 3
 """Places of the robot from which an empty picture is computed."""
 _NEW_CELLS = 2
 """A frame in which the robot covers so many new cells of the vessel is taken."""
 _OTHER_SHARE = 0.15
 """A frame whose robot differs this much (0..1) from that of each frame taken is taken, too."""
+_BENT_PX = 12
+"""Area, beyond unsure edges, that only one of two robots covers that are as far inserted, when one is bent otherwise."""
 _SAME_CELLS, _SAME_AREA = 1, 0.06
 """Robots are as far inserted when so many cells, at most, are covered by one alone, and their areas differ by this share."""
 _STILL_LEVELS, _STILL_SHARE = 10, 4e-4
@@ -416,10 +418,9 @@ class TeachingFolder:
         if frame.reason:
             is_moved = frame.reason.startswith((Reason.BENCH_MOVED.value, Reason.OTHER_BENCH.value))
             return TakenLook(LookKind.REJECTED, frame.reason, needs_empty=is_moved)
-        blurred = _blurred(frame.robot)
-        is_new = coverage.new_cells(frame.robot) >= _NEW_CELLS or not self._frames
-        if not is_new and any(_apart(blurred, other) < _OTHER_SHARE for other in self._blurred):
-            return TakenLook(LookKind.SEEN)
+        kind = self._kind_of(frame.robot)
+        if kind is LookKind.SEEN:
+            return TakenLook(kind)
         usable = [taken.frame for taken in self._frames if taken.is_used][-_CHECK_WITH:]
         if len(usable) >= _CHECK_FROM:
             try:
@@ -428,24 +429,32 @@ class TeachingFolder:
                 return TakenLook(LookKind.REJECTED, str(error), needs_empty=True)
             if reason:
                 return TakenLook(LookKind.REJECTED, reason)
-        kind = LookKind.BEND if not is_new and self._lay_there(frame.robot) else LookKind.PLACE
         self._write("frames", stem, png(image))
         self._frames.append(TakenFrame(frame, kind, thumb_of(frame)))
-        self._blurred.append(blurred)
+        self._blurred.append(_blurred(frame.robot))
         coverage.add(frame.robot)
         self._keep(frames=True, next_stem=self._record.next_stem + 1, model="", used=False)
         return TakenLook(kind)
 
-    def _lay_there(self, robot: Mask) -> bool:
-        """Whether the robot lay in the same part of the vessel before, as far inserted: then its head is bent otherwise."""
+    def _kind_of(self, robot: Mask) -> LookKind:
+        """Whether a robot lies at a new place, or as deep as in other frames but bent otherwise; SEEN: neither."""
         coverage = self._coverage
         assert coverage is not None
+        if not self._frames or coverage.new_cells(robot) >= _NEW_CELLS:
+            return LookKind.PLACE
+        if len(self._frames) >= _MOST_LIKE:
+            return LookKind.SEEN
         cells, area = coverage.cells_under(robot), int(robot.sum())
-        for taken in self._frames:
-            other = taken.frame.robot
-            if abs(int(other.sum()) - area) <= _SAME_AREA * area and (cells ^ coverage.cells_under(other)).sum() <= _SAME_CELLS:
-                return True
-        return False
+        others = [taken.frame.robot for taken in self._frames]
+        as_deep = [
+            other
+            for other in others
+            if abs(int(other.sum()) - area) <= _SAME_AREA * area and (cells ^ coverage.cells_under(other)).sum() <= _SAME_CELLS
+        ]
+        if as_deep:
+            return LookKind.BEND if all(_beside_px(robot, other) >= _BENT_PX for other in as_deep) else LookKind.SEEN
+        blurred = _blurred(robot)
+        return LookKind.PLACE if all(_apart(blurred, other) >= _OTHER_SHARE for other in self._blurred) else LookKind.SEEN
 
     def leave_out(self, stem: str, on: bool) -> None:
         """Leave a frame out, or take it in again."""
@@ -569,6 +578,11 @@ def _changed_share(one: Image, other: Image) -> float:
 def _blurred(robot: Mask) -> NDArray[np.float32]:
     """The robot's mask as it is compared between frames."""
     return np.asarray(cv2.GaussianBlur(robot.astype(np.float32), (0, 0), 5.0)[::4, ::4], np.float32)
+
+
+def _beside_px(one: Mask, other: Mask) -> int:
+    """Area of two masks (h, w) that only one of them covers, where it is wider than edges are unsure."""
+    return int(cv2.erode((one ^ other).view(np.uint8), np.ones((3, 3), np.uint8)).sum())
 
 
 def _apart(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:

@@ -19,8 +19,8 @@ CELL_PX = 20.0
 """Length of a cell along the centerline, working pixels."""
 _LEAST_PX = 12
 """Pixels of the robot in a cell from which on it has been there: a robot 3 px wide over a fifth of the cell."""
-_DONE_SHARE = 0.7
-"""A branch is done when so many of its cells are covered: the last of a narrow end cannot be reached."""
+_DONE_SHARE = 0.5
+"""A branch is done when so many of its cells are covered: the end of a narrow one cannot be reached."""
 _SIDE_SHARE = 0.33
 """An end this far from the middle of the tree, as a share of half its extent, is at the left, right, upper or lower side."""
 OUTSIDE, OPEN, COVERED, ASKED = range(4)

@@ -145,13 +145,14 @@ def fit_to_prior(
 
     Parameters
     ----------
-    evidence : features of N answers (N, F), of the prior's.
+    evidence : features of N answers (N, F), of the prior's; without any answer it stays the prior.
     right : whether each was right (N,).
     weight : how much each counts (N,).
     """
     if not len(right):
         return prior
     mean, scale = np.array(prior.mean), np.array(prior.scale)
+    evidence = evidence.reshape(-1, len(mean))
     x = np.column_stack([np.clip((evidence - mean) / scale, -4.0, 4.0), np.ones(len(evidence))])
     begin = np.array([*prior.weights, prior.offset])
     precision = np.array([PRIOR_WEIGHT] * len(prior.weights) + [PRIOR_OFFSET])

@@ -369,11 +369,11 @@ def twin_frames(look: str) -> tuple[list[Image], list[Image]]:
         route = way_from_port(phantom, target)
         route = np.vstack([geometry.extrapolate(route[::-1], 40.0, 3.0)[:0:-1], route])  # it comes from outside
         length = float(geometry.arc_length(route)[-1])
-        for depth in np.arange(0.2, 0.97, 6.0 / length):
+        for depth in np.arange(0.2, 0.98, 8.0 / length):
             line = geometry.cut(route, 0.0, depth * length)
-            bends = (-1.5, 0.0, 1.5) if 0.5 < depth < 0.6 else (0.0,)
+            bends = (-3.0, 0.0, 3.0) if 0.5 < depth < 0.6 else (0.0,)
             for bend in bends:
-                left = np.clip(1.0 - (geometry.arc_length(line)[-1] - geometry.arc_length(line)) / 10.0, 0.0, 1.0)[:, None]
+                left = np.clip(1.0 - (geometry.arc_length(line)[-1] - geometry.arc_length(line)) / 15.0, 0.0, 1.0)[:, None]
                 frames.append(renderer.render(line + bend * left**2 * geometry.normals(line), noise_seed=len(frames)).image)
     return [renderer.render(None, noise_seed=1000 + number).image for number in range(9)], frames
 
