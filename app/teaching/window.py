@@ -81,7 +81,7 @@ class TeachingWindow(QDialog):
         self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.picture = BenchPicture()
         self.picture.show_text(tr("No live picture"))
-        vessel_editor, robot_canvas, self.before_after = VesselOutlineEditor(), AnnotationCanvas(), BeforeAfter()
+        vessel_editor, robot_canvas, self.before_after = VesselOutlineEditor(), AnnotationCanvas(), BeforeAfter(is_drawn=False)
         vessel_editor.said.connect(self.say)
         self.empty_page = EmptyPage(model, self.picture, is_twin)
         self.vessel_page = VesselPage(model, vessel_editor)

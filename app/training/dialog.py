@@ -121,10 +121,11 @@ class _Picture(QLabel):
 
 
 class BeforeAfter(QWidget):
-    """Two pictures side by side, of one frame at a time."""
+    """Two pictures side by side, of one frame at a time. ``is_drawn``: the lines are masks drawn by hand, not the difference."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, is_drawn: bool = True) -> None:
         super().__init__()
+        self._is_drawn = is_drawn
         self._before: tuple[str, ...] = ()
         self._after: tuple[str, ...] = ()
         self._place = 0
@@ -170,7 +171,10 @@ class BeforeAfter(QWidget):
         square = '<span style="color:{}">\N{BLACK SQUARE}</span>&nbsp;{}'.format
         vessel, robot = square(colours.VESSEL, tr("vessel")), square(colours.ROBOT, tr("robot"))
         found, place = tr("colour: found ({vessel}, {robot})", vessel=vessel, robot=robot), self._place + 1
-        which = tr("Held-out picture {place} of {count}; {found}, line: drawn by hand", place=place, count=count, found=found)
+        if self._is_drawn:
+            which = tr("Held-out picture {place} of {count}; {found}, line: drawn by hand", place=place, count=count, found=found)
+        else:
+            which = tr("Held-out picture {place} of {count}; {found}, line: the difference", place=place, count=count, found=found)
         self._title.setText(which if count else tr("Held-out pictures"))
 
 
