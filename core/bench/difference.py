@@ -47,12 +47,13 @@ class Difference:
     """What differs from the empty bench.
 
     ``probability``: of the robot, float32 (h, w). ``doubtful``: bool (h, w), places that count neither as robot nor as background
-    when a network is trained. ``glare``: bool (h, w), around a lamp's reflection, where a difference says nothing.
+    when a network is trained. ``unusable``: bool (h, w), where a difference says nothing: around a lamp's reflection, and
+    over what goes on outside the drawn vessel, such as a cable or a hand.
     """
 
     probability: NDArray[np.float32]
     doubtful: Mask
-    glare: Mask
+    unusable: Mask
 
 
 def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False) -> NDArray[np.float32]:
@@ -99,15 +100,20 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     if not width:
         return Difference(probability, doubtful, np.zeros_like(doubtful))
     distance = distance_to_empty(image, view)
-    glare = _glare(image)
+    unusable = _glare(image)
     box = np.s_[y : y + height, x : x + width]
-    allowed = view.reachable[box] & view.known[box] & ~glare[box]
+    allowed = view.reachable[box] & view.known[box] & ~unusable[box]
     inside = distance[box][::2, ::2][allowed[::2, ::2]]
     noise = 1.4826 * float(np.median(inside)) if inside.size else 0.0
     high, low = max(_LEAST_HIGH, _HIGH_SIGMAS * noise), max(_LEAST_LOW, _LOW_SIGMAS * noise)
     strong = np.where(allowed, distance[box], np.float32(0.0))
     contrast = cv2.blur(cv2.dilate(strong, _square(_CONTRAST_PX)), (5, 5))
     cut = np.maximum(_EDGE_SHARE * contrast, np.float32(low))
+    if view.vessel is not None:
+        differs = ~view.reachable & view.known & (distance > high)
+        differs[box] |= strong > cut
+        unusable |= (foreign := _foreign(differs, view.reachable))
+        strong[foreign[box]] = 0.0
     mask = _robot_parts(strong, strong > cut, high)
     mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0
     values = np.clip(0.5 + (strong - cut) / (2.0 * cut), 0.0, 1.0)
@@ -116,8 +122,23 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     if view.window is None:
         _continue_to_border(probability, view.reachable)
     rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
-    doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | glare
-    return Difference(probability, doubtful, glare)
+    doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | unusable
+    return Difference(probability, doubtful, unusable)
+
+
+def _foreign(differs: Mask, reachable: Mask) -> Mask:
+    """Where what `differs` (h, w) is no robot, since much of it lies outside the vessel: a cable, a hand; widened by its rim."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(differs.view(np.uint8), connectivity=8)
+    outside = np.bincount(labels[~reachable & differs], minlength=count)
+    foreign = (outside >= _LEAST_AREA_PX) & (outside > _OUTSIDE_SHARE * stats[:, cv2.CC_STAT_AREA])
+    foreign[0] = False
+    if not foreign.any():
+        return np.zeros(differs.shape, np.bool_)
+    return np.asarray(cv2.dilate(foreign[labels].view(np.uint8), _square(_RIM_PX)) > 0)
+
+
+_OUTSIDE_SHARE = 0.3
+"""Of what differs: a robot's shadow, or a reflection of it, lies outside the drawn vessel to a lesser share."""
 
 
 def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> Mask:
@@ -217,12 +238,12 @@ _LEAST_ROBOT_PX, _MOVED_SHARE = 400, 0.5
 def combined(network: Probability, difference: Difference, view: BenchView) -> Probability:
     """The robot's probability (h, w): what differs from the empty bench, and what the `network` (h, w) sees beside that.
 
-    Where the empty bench is not known, and in glare, the network alone counts.
+    Where the empty bench is not known, and where the difference is unusable, the network alone counts.
     """
     differs = difference.probability >= np.float32(0.5)
     beside = cv2.dilate(differs.view(np.uint8), _square(_BESIDE_PX)) > 0
     robot = np.where(differs, np.maximum(network, difference.probability), np.where(beside, network, np.float32(0.0)))
-    return np.asarray(np.where(view.known & ~difference.glare, robot, network), np.float32)
+    return np.asarray(np.where(view.known & ~difference.unusable, robot, network), np.float32)
 
 
 _BESIDE_PX = 9

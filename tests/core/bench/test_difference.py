@@ -56,6 +56,22 @@ def test_a_shadow_across_the_vessel_is_no_robot(bench: Bench) -> None:
     assert dice(found(image, bench).probability >= 0.5, line(*ROBOT)) > 0.85
 
 
+@pytest.mark.parametrize("width", [5, 9])
+def test_a_cable_across_the_vessel_is_left_to_the_network(bench: Bench, width: int) -> None:
+    crossing = ((60, 0), (140, 239))
+    image = noisy(with_line(board(), *crossing, width=width), 2.0, 3)
+    difference = found(image, bench)
+    assert not (difference.probability >= 0.5).any()
+    within = tube() & line(*crossing, width=width)
+    assert difference.unusable[within].all()
+    assert difference.doubtful[within].all()
+    view = register(image, bench)
+    assert isinstance(view, BenchView)
+    nothing = np.zeros(tube().shape, np.float32)
+    assert not combined(nothing, difference, view).any()
+    assert (combined(nothing + np.float32(0.9), difference, view)[within] == np.float32(0.9)).all()
+
+
 def test_a_cable_beside_the_vessel_is_no_robot_and_no_background(bench: Bench) -> None:
     image = noisy(with_line(with_line(board(), *ROBOT), (20, 220), (300, 200)), 2.0, 3)
     difference = found(image, bench)
