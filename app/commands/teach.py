@@ -168,7 +168,7 @@ def _bench_of(empty: Sequence[Path], vessel: Path | None, name: str, init: str) 
     from core.learning.dataset import WORKING_SIZE_PX, read_mask
 
     images = [read_image(path) for path in empty]
-    mask = read_mask(vessel) if vessel is not None else _proposed_vessel(images, init)
+    mask = read_mask(vessel) if vessel is not None else _proposed_vessel(images[:1], init)
     return bench_from_pictures(images, mask, name, WORKING_SIZE_PX)
 
 
@@ -186,6 +186,9 @@ def _bench_without_picture(source: Path, vessel: Path | None, name: str, init: s
             images.append(picture.image)
         if len(images) == 2 * _SPREAD:
             images, step = images[::2], 2 * step
+    if not images:
+        raise UserError(f"{source}: no picture in it can be read; give a session, a video or a folder of pictures of one bench")
+    images = [image for image in images if image.shape == images[0].shape]  # others are reported where frames are picked
     segment = open_segmenter(PerceptionConfig().segmentation.model_copy(update={"model": init}))
     robots = [segment(image)[1] for image in images]
     mask = read_mask(vessel) if vessel is not None else _proposed_vessel(images, init)
@@ -264,7 +267,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
     twin = _twin_frames(made.folder)
     remembered = find_samples([twin])
     begin = _resumed(made, init)
-    network = made.folder / "network"
+    network = made.network
     prior = read_model_info(model_folder(init))
     if prior.calibration is None:
         prior = read_model_info(model_folder("default"))
@@ -338,7 +341,7 @@ def _resumed(made: TeachingSet, init: str) -> str:
     """The network of an interrupted call on the same frames, or else the model to begin with."""
     from core.perception.model_file import ModelError, check_model
 
-    network = made.folder / "network"
+    network = made.network
     try:
         check_model(str(network))
     except ModelError:

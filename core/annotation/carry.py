@@ -47,6 +47,8 @@ def carried_masks(before: Image, masks: Polygons, image: Image) -> Polygons:
     size = round(width * scale), round(height * scale)
     pictures = [_shrunk(one, size) for one in (before, image)]
     small = [cv2.resize(mask.view(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0 for mask in (robot, lumen)]
+    if not small[0].any():  # too thin for the smaller picture
+        return vessel
     found = _moved_robot(pictures[0], pictures[1], small[0], small[1]).astype(np.float32)
     whole = cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR) > 0.5
     return vessel + polygons_of(np.asarray(whole, np.bool_), MaskTarget.ROBOT, TOLERANCE_PX)

@@ -8,7 +8,7 @@ of the fit. The kind of pictures is that of the bench alone: another bench's are
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -361,7 +361,8 @@ def _examples(answers: _Answers) -> tuple[NDArray[np.float64], NDArray[np.bool_]
         if score.answered and score.expected and score.evidence is not None
     ]
     evidence, right, weight = zip(*rows, strict=True) if rows else ((), (), ())
-    return np.array(evidence, np.float64), np.array(right, np.bool_), np.array(weight, np.float64)
+    features = len(fields(ConfidenceFeatures))
+    return np.array(evidence, np.float64).reshape(-1, features), np.array(right, np.bool_), np.array(weight, np.float64)
 
 
 def _kind_of(

@@ -24,7 +24,7 @@ from core.bench.registration import BenchView, register
 from core.config.section import first_problem
 from core.devices import UserError
 from core.files import write_atomic
-from core.learning.dataset import IMAGE_ENDINGS, DatasetError, Sample, sample_at, write_mask, write_png
+from core.learning.dataset import IMAGE_ENDINGS, DatasetError, Sample, png, sample_at, write_mask, write_png
 from core.messages import message
 from core.perception.segmentation import Segmenter
 from core.types import Image, Mask, Refusal
@@ -86,6 +86,7 @@ _GONE_LEVELS = 14.0
 """Grey levels of Lab by which a place differs where something lay on the empty bench."""
 _STATE = "teaching.json"
 _REJECTED = "rejected"
+_NETWORK = "network"
 
 
 class TeachingError(UserError):
@@ -473,6 +474,11 @@ class TeachingSet:
         """The folder of the bench."""
         return self.folder / "bench"
 
+    @property
+    def network(self) -> Path:
+        """The folder in which a model is trained on these frames."""
+        return self.folder / _NETWORK
+
 
 def is_teaching_set(folder: Path) -> bool:
     """Whether ``write_teaching_set`` wrote this folder."""
@@ -484,6 +490,8 @@ def write_teaching_set(
 ) -> TeachingSet:
     """Write frames and bench as ``train --data`` reads them, rejected frames in a folder of their own; an older set is replaced.
 
+    A network that was trained on other frames is removed: it may have learnt from those that are held out now.
+
     Raises
     ------
     TeachingError
@@ -492,6 +500,8 @@ def write_teaching_set(
     if folder.exists() and not is_teaching_set(folder) and (not folder.is_dir() or any(folder.iterdir())):
         raise TeachingError(f"{folder}: exists and holds no frames of a bench; choose another --out")
     try:
+        if (folder / _NETWORK).exists() and not _is_split_as(folder, chosen):
+            shutil.rmtree(folder / _NETWORK)
         for name in ("images", "masks", _REJECTED):
             shutil.rmtree(folder / name, ignore_errors=True)
         for place, frames in ((folder, chosen), (folder / _REJECTED, rejected)):
@@ -514,6 +524,19 @@ def write_teaching_set(
             f"{error.filename or folder}: cannot be written ({error.strerror}); make room, or choose another --out"
         ) from None
     return read_teaching_set(folder)
+
+
+def _is_split_as(folder: Path, chosen: Sequence[TeachingFrame]) -> bool:
+    """Whether a set has the same pictures, and holds the same ones out."""
+    try:
+        state = _TeachingState.model_validate_json((folder / _STATE).read_bytes())
+        was_held_out = {row.stem: row.held_out for row in state.frames}
+        images = {path.name: path.read_bytes() for path in (folder / "images").iterdir()}
+    except (OSError, ValidationError):
+        return False
+    return images == {f"{frame.picture.stem}.png": png(frame.picture.image) for frame in chosen} and all(
+        was_held_out.get(frame.picture.stem) is frame.is_held_out for frame in chosen
+    )
 
 
 def read_teaching_set(folder: Path) -> TeachingSet:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from core.evaluation import bench_calibration as calibrating
 from core.evaluation.bench_calibration import bad_look, fit_to_prior, poses_of_masks, usual_look
 from core.evaluation.confidence import KnownPicture
 from core.learning.dataset import Sample, write_mask, write_png
-from core.perception.quality import BASIC_FEATURES, ConfidenceCalibration
+from core.perception.quality import BASIC_FEATURES, ConfidenceCalibration, ConfidenceFeatures
 from tests.core.learning.toy_bench import SIZE, toy_picture, toy_robot, toy_vessel
 
 COUNT = len(BASIC_FEATURES)
@@ -29,6 +30,13 @@ def test_without_answers_the_fit_is_the_prior() -> None:
     fitted = fit_to_prior(np.zeros(0), np.zeros(0, bool), np.zeros(0), PRIOR)
     assert fitted.weights == pytest.approx(PRIOR.weights)
     assert fitted.offset == pytest.approx(PRIOR.offset)
+
+
+def test_a_model_that_answers_no_held_out_frame_keeps_the_prior() -> None:
+    count = len(fields(ConfidenceFeatures))
+    prior = PRIOR.model_copy(update={"mean": (0.0,) * count, "scale": (1.0,) * count, "weights": (1.0,) * count})
+    fitted = fit_to_prior(*calibrating._examples(calibrating._Answers((), (), ())), prior)
+    assert fitted.weights == pytest.approx(prior.weights)
 
 
 def test_answers_move_the_offset_first_and_the_weights_when_there_are_many() -> None:

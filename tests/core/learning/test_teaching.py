@@ -230,6 +230,18 @@ def test_a_set_replaces_an_older_one_and_nothing_else(bench: Bench, frames: list
         read_teaching_set(folder)
 
 
+def test_a_network_of_an_interrupted_training_stays_only_while_the_same_frames_are_held_out(
+    bench: Bench, frames: list[TeachingFrame], tmp_path: Path
+) -> None:
+    chosen = choose(frames, 8)
+    network = write_teaching_set(tmp_path / "set", bench, chosen, [], 16).network
+    network.mkdir()
+    write_teaching_set(tmp_path / "set", bench, chosen, [], 16)
+    assert network.is_dir()
+    write_teaching_set(tmp_path / "set", bench, [replace(one, is_held_out=not one.is_held_out) for one in chosen], [], 16)
+    assert not network.exists(), "it has learnt from frames that are held out now"
+
+
 def test_a_full_disk_is_one_line(
     bench: Bench, frames: list[TeachingFrame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
