@@ -33,7 +33,7 @@ from core.control.modes import ARMED_MODES, Mode
 from core.perception.model_file import BENCH, own_models
 from core.perception.quality import UNKNOWN_KIND
 from core.session.writer import RecordStatus
-from core.types import Reason, Refusal
+from core.types import Frame, Reason, Refusal
 from hardware.rig import RigKind, kind_of
 from hardware.twin.catalog import look_of
 
@@ -237,20 +237,30 @@ class WindowServices(QObject):
             return
         bench = self._bench_name(window.rig.config)
         if self.teaching is not None and self.teaching.model.rig != bench:
+            if self.teaching.model.is_training:
+                self.teaching.open()
+                self.teaching.say(tr("Another bench is in use; this one is being trained: wait for it, or stop it"), is_fault=True)
+                return
             self.teaching.end()
             self.teaching.deleteLater()
             self.teaching = None
         if self.teaching is None:
             controls = window.controls
-            model = TeachingModel(
-                teaching_folder(bench), bench, lambda: window.live_frame, partial(_open_proposals, window.rig.config.perception)
-            )
+            newest = partial(self._frame_of, bench)
+            model = TeachingModel(teaching_folder(bench), bench, newest, partial(_open_proposals, window.rig.config.perception))
             model.trained.connect(self._on_taught)
             driver = TeachingDriver(controls.drive, controls.stop, lambda: controls.can_move)
             is_twin = window.rig.kind is RigKind.SIM
-            self.teaching = TeachingWindow(model, lambda: window.live_frame, driver, self._use_taught, is_twin, window)
+            self.teaching = TeachingWindow(model, newest, driver, self._use_taught, is_twin, window)
             model.setParent(self.teaching)
         self.teaching.open()
+
+    def _frame_of(self, bench: str) -> Frame | None:
+        """What the camera shows now; None where it is not live, or shows another bench than that."""
+        rig = self._window.rig
+        if rig.kind is RigKind.PLAYBACK or self._bench_name(rig.config) != bench:
+            return None
+        return self._window.live_frame
 
     def _bench_name(self, config: Config) -> str:
         """What the camera sees: a rig, and of the twin a phantom in a look."""
@@ -263,6 +273,8 @@ class WindowServices(QObject):
         rig = self._window.rig
         if why := self._against_another_model() or rig.work_in_progress():
             return why
+        if self.teaching is not None and self.teaching.model.rig != self._bench_name(rig.config):
+            return tr("another bench is in use: choose the one that was taught in the menu Rig or Twin first")
         bench, config = own_models() / name / BENCH, rig.config
         if config.rig.file is not None:
             try:
@@ -288,7 +300,7 @@ class WindowServices(QObject):
         teaching = self.teaching
         if teaching is None or teaching.isVisible():
             return
-        use = OfferButton(tr("Look at it"), self.teach)
+        use = OfferButton(tr("Look at it"), teaching.open)
         self._offers.offer(Offer(_TAUGHT, tr("This bench is taught: model {name}", name=name), "", (use,)))
 
     def _look_for_unfamiliar(self) -> None:

@@ -5,6 +5,7 @@ Without Qt. Everything is on disk as soon as it is taken, so that the window can
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -127,6 +128,7 @@ class TeachingView:
     Attributes
     ----------
     empty, known, vessel : of the bench, None before they are known.
+    drawn : the vessel as it is drawn so far, where it is not the bench's yet.
     places : pictures with the robot in other places, from which the empty one is computed.
     robot_like : outlines (N, 2) of what the model takes for a robot in the empty picture.
     frames : those taken, in their order.
@@ -140,6 +142,7 @@ class TeachingView:
     empty: Image | None = None
     known: Mask | None = None
     vessel: Mask | None = None
+    drawn: Mask | None = None
     places: tuple[Image, ...] = ()
     is_computed: bool = False
     robot_like: tuple[NDArray[np.int32], ...] = ()
@@ -221,6 +224,7 @@ class TeachingFolder:
     def _clear(self) -> None:
         self._record = _Record()
         self._bench: Bench | None = None
+        self._drawn: Mask | None = None
         self._places: list[Image] = []
         self._robot_like: tuple[NDArray[np.int32], ...] = ()
         self._frames: list[TakenFrame] = []
@@ -245,9 +249,17 @@ class TeachingFolder:
         if (self.folder / _BENCH).is_dir():
             self._bench = read_bench(self.folder / _BENCH)
         self._places = [read_image(place) for place in sorted((self.folder / "places").glob("*.png"))]
-        self._record = record
-        if self._bench is not None and self._bench.vessel is not None:
-            self._frames = [self._taken(row.stem, row.kind, row.left_out) for row in record.frames]
+        bench, has_vessel = self._bench, self._bench is not None and self._bench.vessel is not None
+        furthest = TeachingStep.TRAIN if has_vessel else TeachingStep.VESSEL if bench is not None else TeachingStep.EMPTY
+        self._record = record.model_copy(update={"step": min(record.step, furthest)})
+        if bench is not None and (self.folder / _VESSEL).is_file():
+            with contextlib.suppress(UserError):  # damaged: it is drawn again
+                drawn = read_mask(self.folder / _VESSEL)
+                self._drawn = drawn if drawn.shape == bench.known.shape else None
+        if has_vessel:
+            for row in record.frames:
+                with contextlib.suppress(UserError):  # a picture that was removed or is damaged: the others are kept
+                    self._frames.append(self._taken(row.stem, row.kind, row.left_out))
             self._recount()
             self._check()
 
@@ -281,6 +293,7 @@ class TeachingFolder:
             bench.empty if bench is not None else None,
             bench.known if bench is not None else None,
             bench.vessel if bench is not None else None,
+            self._drawn,
             tuple(self._places),
             record.computed,
             self._robot_like,
@@ -356,6 +369,8 @@ class TeachingFolder:
         self._make_folder()
         write_bench(bench, self.folder / _BENCH)
         self._bench = bench
+        if self._drawn is not None and self._drawn.shape != bench.known.shape:
+            self._drawn = None
         self._keep(computed=is_computed, model="", used=False)
         self._propose_again()
 
@@ -379,12 +394,26 @@ class TeachingFolder:
     def set_vessel(self, vessel: Mask) -> None:
         """The vessel as it was drawn, (h, w). Raises BenchError where it cannot be one."""
         assert self._bench is not None
-        if self._bench.vessel is not None and np.array_equal(self._bench.vessel, vessel):
-            return
-        bench = with_vessel(self._bench, vessel)
-        write_bench(bench, self.folder / _BENCH)
-        self._bench = bench
-        self._propose_again()
+        if self._bench.vessel is None or not np.array_equal(self._bench.vessel, vessel):
+            bench = with_vessel(self._bench, vessel)
+            write_bench(bench, self.folder / _BENCH)
+            self._bench = bench
+            self._keep(model="", used=False)
+            self._propose_again()
+        self._drawn = None
+        try:
+            (self.folder / _VESSEL).unlink(missing_ok=True)
+        except OSError as error:
+            raise _not_written(self.folder / _VESSEL, error) from None
+
+    def keep_drawn(self, vessel: Mask) -> None:
+        """The vessel (h, w) as it is drawn so far, to go on with; nothing else is changed."""
+        self._make_folder()
+        try:
+            write_atomic(self.folder / _VESSEL, mask_png(vessel))
+        except OSError as error:
+            raise _not_written(self.folder / _VESSEL, error) from None
+        self._drawn = vessel
 
     def _propose_again(self) -> None:
         """Masks of all frames against another bench; corrected ones stay."""
@@ -407,7 +436,7 @@ class TeachingFolder:
         bench, coverage = self._bench, self._coverage
         if bench is None or bench.vessel is None or coverage is None:
             return TakenLook(LookKind.STILL)
-        if len(self._frames) >= MOST_FRAMES:
+        if sum(taken.is_used for taken in self._frames) >= MOST_FRAMES:
             return TakenLook(LookKind.FULL)
         image = to_working(picture, WORKING_SIZE_PX)[0]
         if self._last is not None and self._last.shape == image.shape and _changed_share(image, self._last) < _STILL_SHARE:
@@ -424,7 +453,7 @@ class TeachingFolder:
         usable = [taken.frame for taken in self._frames if taken.is_used][-_CHECK_WITH:]
         if len(usable) >= _CHECK_FROM:
             try:
-                reason = teaching.check([*usable, frame], bench)[-1].reason
+                reason = self._checked([*usable, frame])[-1].reason
             except teaching.TeachingError as error:
                 return TakenLook(LookKind.REJECTED, str(error), needs_empty=True)
             if reason:
@@ -461,13 +490,22 @@ class TeachingFolder:
         self._replace(stem, is_left_out=on)
         self._keep(frames=True, model="", used=False)
 
-    def correct(self, stem: str, robot: Mask) -> None:
-        """Another mask (h, w) for the robot in a frame: it is certain there, and no check rejects it."""
+    def correct(self, stem: str, robot: Mask | None) -> None:
+        """Another mask (h, w) for the robot in a frame: it is certain there, and no check rejects it; None: that by difference."""
         place, taken = self._find(stem)
-        self._write("corrected", stem, mask_png(robot))
-        frame = _with_robot(taken.frame, robot)
-        self._frames[place] = replace(taken, frame=frame, thumb=thumb_of(frame), is_corrected=True, is_left_out=False)
-        self._recount()
+        if robot is not None:
+            self._write("corrected", stem, mask_png(robot))
+            frame = _with_robot(taken.frame, robot)
+            self._frames[place] = replace(taken, frame=frame, thumb=thumb_of(frame), is_corrected=True, is_left_out=False)
+            self._recount()
+        else:
+            path = self.folder / "corrected" / f"{stem}.png"
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                raise _not_written(path, error) from None
+            self._frames[place] = self._taken(stem, taken.kind, taken.is_left_out)
+            self._check()
         self._keep(frames=True, model="", used=False)
 
     def teaching_set(self) -> Path:
@@ -485,11 +523,15 @@ class TeachingFolder:
         teaching.write_teaching_set(self.folder / _SET, self._bench, chosen, [one for one in frames if one.reason], len(frames))
         return self.folder / _SET
 
+    def _checked(self, frames: Sequence[TeachingFrame]) -> list[TeachingFrame]:
+        """A computed bench is not known where the robot always lay: no empty picture shows it there."""
+        assert self._bench is not None
+        return teaching.check(frames, self._bench, has_pictures=not self._record.computed)
+
     def _check(self, *, raises: bool = False) -> None:
         """Reasons against frames beside the others; corrected ones keep none."""
-        assert self._bench is not None
         try:
-            checked = teaching.check([taken.frame for taken in self._frames if not taken.is_left_out], self._bench)
+            checked = self._checked([taken.frame for taken in self._frames if not taken.is_left_out])
         except UserError:
             if raises:
                 raise
@@ -562,7 +604,9 @@ def _left_out(taken: TakenFrame) -> str:
 
 
 def _with_robot(frame: TeachingFrame, robot: Mask) -> TeachingFrame:
-    """A frame with a mask that was drawn: nothing of it is doubtful."""
+    """A frame with a mask that was drawn: nothing of it is doubtful. One without a vessel stays rejected."""
+    if not frame.vessel.any():
+        return frame
     return replace(frame, robot=robot, doubtful=np.zeros(robot.shape, np.bool_), reason="")
 
 

@@ -176,11 +176,15 @@ class TeachingModel(QObject):
 
         self._run(tr("keeping the vessel"), job)
 
+    def keep_drawn(self, vessel: Mask) -> None:
+        """The vessel as it is drawn so far."""
+        self._run("", partial(self._folder.keep_drawn, vessel), quiet=True)
+
     def leave_out(self, stem: str, on: bool) -> None:
         self._run("", partial(self._folder.leave_out, stem, on), quiet=True)
 
-    def correct(self, stem: str, robot: Mask) -> None:
-        """Another mask for the robot in a frame."""
+    def correct(self, stem: str, robot: Mask | None) -> None:
+        """Another mask for the robot in a frame; None: that by difference again."""
         self._run("", partial(self._folder.correct, stem, robot), quiet=True)
 
     def keep_used(self) -> None:
@@ -226,7 +230,7 @@ class TeachingModel(QObject):
             self._watch.stop()  # a full disk is not reported eight times a second
         else:
             self._ended_job(key)
-            if self.training.phase is TrainingPhase.PREPARING:
+            if self.training.phase is TrainingPhase.PREPARING and key == self._busy_job:
                 self.training = TrainingState(TrainingPhase.FAILED, tr("Not started: {why}", why=tr_text(line)), self._name)
         self.said.emit(tr_text(line), True)
         self.changed.emit()

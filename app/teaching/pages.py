@@ -312,7 +312,8 @@ class VesselPage(TeachingPage):
     def __init__(self, model: TeachingModel, editor: VesselOutlineEditor) -> None:
         super().__init__(model, editor)
         self.editor = editor
-        self._is_asked = False
+        self._begun = Annotation()
+        """The drawing with which the page was opened."""
         self.undo = button(tr("&Undo"), editor.undo)
         tip = tr("The model's proposal instead of what was drawn; Undo brings that back")
         self.again = button(tr("Propose &again"), self._ask_proposal, tip)
@@ -336,17 +337,34 @@ class VesselPage(TeachingPage):
         return self.view.vessel is not None
 
     def enter(self) -> None:
-        view = self.view
+        view, outline = self.view, self.editor.outline
         assert view.empty is not None
-        self.editor.show_image(view.empty, view.vessel)
+        if outline is not None and outline.image is view.empty and outline.undo_action:
+            return  # what was drawn is there, with its undo
+        self.editor.show_image(view.empty, view.drawn if view.drawn is not None else view.vessel)
         self.editor.set_mode(MaskMode.REGION)
-        if view.vessel is None and not self._is_asked:
+        self._begun = self._annotation
+        if view.vessel is None and view.drawn is None:
             self._ask_proposal()
+
+    @property
+    def _annotation(self) -> Annotation:
+        return self.editor.outline.annotation if self.editor.outline is not None else Annotation()
+
+    def leave(self) -> None:
+        vessel, view = self.editor.vessel_mask, self.view
+        if vessel is None or not vessel.any() or self._annotation == self._begun:
+            return
+        if not any(np.array_equal(known, vessel) for known in (view.drawn, view.vessel) if known is not None):
+            self.model.keep_drawn(vessel)
 
     def next(self, step: TeachingStep) -> None:
         vessel = self.editor.vessel_mask
         assert vessel is not None
-        self.model.set_vessel(vessel, step)
+        if self.view.vessel is not None and self.view.drawn is None and self._annotation == self._begun:
+            self.model.go(step)  # the same vessel: its outline as points may differ by pixels
+        else:
+            self.model.set_vessel(vessel, step)
 
     def refresh(self) -> None:
         outline, busy = self.editor.outline, self.model.is_busy
@@ -356,7 +374,6 @@ class VesselPage(TeachingPage):
         self.words.setText(tr("The model sees no vessel here: drag a tube along the middle of each branch.") if is_empty else "")
 
     def _ask_proposal(self) -> None:
-        self._is_asked = True
         self.model.propose_vessel()
 
     def _on_proposed(self, vessel: Mask) -> None:
@@ -452,6 +469,7 @@ class MovePage(TeachingPage):
 
     def refresh(self) -> None:
         view = self.view
+        self.pause.setChecked(not self.model.is_watching)  # a full disk ends it, too
         if view.empty is None:
             return
         size = view.empty.shape[1], view.empty.shape[0]
@@ -511,7 +529,7 @@ class FramesPage(TeachingPage):
         self.canvas = canvas
         self._history = History()
         self._open: str | None = None
-        self._has_edits = False
+        self._was_corrected = False
         self.list = QListWidget()
         self.list.setViewMode(QListWidget.ViewMode.IconMode)
         self.list.setIconSize(QSize(152, 114))
@@ -545,12 +563,6 @@ class FramesPage(TeachingPage):
         doubtful = next((row for row, taken in enumerate(self.view.frames) if not taken.is_used), 0)
         self.list.setCurrentRow(doubtful if self.view.frames else -1)
 
-    def leave(self) -> None:
-        self._keep()
-
-    def next(self, step: TeachingStep) -> None:
-        self.model.go(step)
-
     def refresh(self) -> None:
         frames = self.view.frames
         for row, taken in enumerate(frames[: self.list.count()]):
@@ -577,8 +589,8 @@ class FramesPage(TeachingPage):
         taken = self._current
         if taken is None or not self.isVisible():
             return
-        self._keep()
         self._open, self._history = taken.stem, History()
+        self._was_corrected = taken.is_corrected
         self._history.edit("begin", Annotation(masks=polygons_of(taken.frame.robot, MaskTarget.ROBOT)))
         self.canvas.show_image(halvings(taken.frame.picture.image), self._history.current, lambda _annotation: Readout())
         self.canvas.set_tool(Tool.ROBOT_MASK)
@@ -595,25 +607,24 @@ class FramesPage(TeachingPage):
             return
         if annotation is not None:
             self._history.edit(action, annotation)
-            self._has_edits = True
+            self._keep()
         self.canvas.show_annotation(self._history.current)
-        self._keep()
         self.refresh()
 
     def _on_undo(self) -> None:
         self._history.undo()
-        self._has_edits = True
-        self.canvas.show_annotation(self._history.current)
         self._keep()
+        self.canvas.show_annotation(self._history.current)
         self.refresh()
 
     def _keep(self) -> None:
-        """Keep the mask that was drawn."""
-        if not self._has_edits or self._open is None:
-            return
+        """Keep the mask as it is drawn now; where all was undone, a frame that was not corrected before is not corrected."""
         taken = next((one for one in self.view.frames if one.stem == self._open), None)
-        if taken is not None:
-            self._has_edits = False
+        if taken is None:
+            return
+        if self._history.undo_action in ("", "begin") and not self._was_corrected:
+            self.model.correct(taken.stem, None)
+        else:
             height, width = taken.frame.robot.shape
             self.model.correct(taken.stem, fill(self._history.current.masks, MaskTarget.ROBOT, (width, height)))
 

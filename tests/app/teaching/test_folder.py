@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -286,3 +288,58 @@ def test_too_few_frames_are_said(work: TeachingFolder) -> None:
     work.look(robot_picture(0, 0.6))
     with pytest.raises(TeachingError, match="usable"):
         work.teaching_set()
+
+
+# ---- what a person draws
+
+
+def test_a_vessel_that_is_half_drawn_is_there_in_the_next_run(tmp_path: Path) -> None:
+    work = opened(tmp_path)
+    work.add_empty(empties())
+    work.go(TeachingStep.VESSEL)
+    drawn = large(toy_vessel())
+    work.keep_drawn(drawn)
+    again = opened(tmp_path)
+    assert again.view().vessel is None
+    assert (again.view().drawn == drawn).all()
+    again.set_vessel(drawn)
+    assert opened(tmp_path).view().drawn is None
+
+
+def test_a_correction_that_is_undone_is_no_correction(work: TeachingFolder) -> None:
+    drive(work, 3)
+    before = work.view().frames[0].frame.robot
+    work.correct("0000", large(toy_robot(1, 0.9)))
+    assert work.view().frames[0].is_corrected
+    work.correct("0000", None)
+    after = work.view().frames[0]
+    assert not after.is_corrected
+    assert (after.frame.robot == before).all()
+
+
+def test_a_corrected_frame_of_a_bench_that_is_no_longer_there_is_not_learnt_from(work: TeachingFolder) -> None:
+    drive(work, 3)
+    work.correct("0000", large(toy_robot(0, 0.4)))
+    work.add_empty([np.roll(one, 60, axis=1) for one in empties()])
+    assert not work.view().frames[0].is_used
+
+
+def test_a_computed_bench_need_not_be_known_where_the_robot_always_lies(work: TeachingFolder) -> None:
+    drive(work)
+    bench = work._bench
+    assert bench is not None and bench.vessel is not None
+    always = large(toy_robot(0, 0.45))
+    work._use_bench(replace(bench, known=bench.known & ~always), is_computed=True)
+    assert work.teaching_set().is_dir()
+
+
+def test_a_frame_whose_picture_is_damaged_does_not_hide_the_others(work: TeachingFolder, tmp_path: Path) -> None:
+    drive(work, 3)
+    count = len(work.view().frames)
+    (tmp_path / "teaching" / "frames" / "0001.png").write_bytes(b"no picture")
+    assert len(opened(tmp_path).view().frames) == count - 1
+
+
+def test_a_step_that_lacks_its_bench_is_not_opened(work: TeachingFolder, tmp_path: Path) -> None:
+    shutil.rmtree(tmp_path / "teaching" / "bench")
+    assert opened(tmp_path).view().step is TeachingStep.EMPTY
