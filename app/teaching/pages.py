@@ -262,7 +262,7 @@ class EmptyPage(TeachingPage):
 
     @property
     def is_done(self) -> bool:
-        return self.view.empty is not None
+        return self.view.empty is not None and not self.view.robot_like
 
     def refresh(self) -> None:
         view, busy = self.view, self.model.is_busy

@@ -101,6 +101,20 @@ def test_another_phantom_is_opened_without_the_bench(side: WindowServices, runni
     until(qtbot, lambda: running.shown_tick is not None)
 
 
+def test_while_another_phantom_is_shown_nothing_is_taken_of_it_and_the_bench_is_not_used(
+    side: WindowServices, running: OperatorWindow, qtbot: QtBot
+) -> None:
+    side.teach()
+    assert side.teaching is not None
+    assert side.teaching._newest() is not None
+    config = running.rig.config
+    running.rig.use_config(config.model_copy(update={"twin": config.twin.model_copy(update={"phantom": "y_branch"})}))
+    until(qtbot, lambda: running.shown_tick is not None)
+    assert side.teaching._newest() is None
+    assert "another bench is in use" in side._use_taught("mine_1")
+    assert running.rig.config.perception.bench is None
+
+
 def test_with_a_rig_file_model_and_bench_are_kept_in_it(
     make_window: MakeWindow, engine: FakeEngine, tmp_path: Path, qtbot: QtBot
 ) -> None:

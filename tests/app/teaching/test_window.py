@@ -246,24 +246,57 @@ def test_what_is_missing_and_what_was_rejected_is_said(open_hand: OpenHand) -> N
     assert not hand.model.is_watching
 
 
-def test_a_frame_is_left_out_and_its_mask_corrected(open_hand: OpenHand, driven: Path) -> None:
+def test_a_frame_is_left_out_and_its_mask_corrected(open_hand: OpenHand, driven: Path, qtbot: QtBot) -> None:
     hand = open_hand(driven, TeachingStep.FRAMES)
     page, view = hand.window.frames_page, hand.model.view
     page.list.setCurrentRow(1)
     hand.click(page.out)
-    assert hand.model.view.frames[1].is_left_out
+    qtbot.waitUntil(lambda: hand.model.view.frames[1].is_left_out, timeout=LONG_MS)
     assert page.list.item(1).text() == "left out"
     assert page.out.text() == "&Take in again"
     page.list.setCurrentRow(2)
     before = view.frames[2].frame.robot
     canvas = page.canvas
     hand.drag(canvas, [canvas.view.to_screen(point) for point in ((300, 60), (340, 60))])
+    qtbot.waitUntil(lambda: hand.model.view.frames[2].is_corrected, timeout=LONG_MS)
     after = hand.model.view.frames[2]
-    assert after.is_corrected
     assert after.frame.robot[60, 320]
     assert not before[60, 320]
     hand.click(page.undo)
-    assert not hand.model.view.frames[2].frame.robot[60, 320]
+    qtbot.waitUntil(lambda: not hand.model.view.frames[2].is_corrected, timeout=LONG_MS)
+    assert (hand.model.view.frames[2].frame.robot == before).all()
+
+
+def test_a_stroke_is_kept_when_another_frame_is_chosen_or_the_window_closed_at_once(
+    open_hand: OpenHand, driven: Path, qtbot: QtBot
+) -> None:
+    hand = open_hand(driven, TeachingStep.FRAMES)
+    page, canvas = hand.window.frames_page, hand.window.frames_page.canvas
+    page.list.setCurrentRow(1)
+    hand.drag(canvas, [canvas.view.to_screen(point) for point in ((300, 60), (340, 60))])
+    page.list.setCurrentRow(2)
+    hand.window.close()
+    hand.end()
+    again = open_hand()
+    assert [taken.is_corrected for taken in again.model.view.frames[:4]] == [False, True, False, False]
+
+
+def test_a_vessel_that_is_drawn_is_there_after_back_and_after_closing(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    window, page = hand.window, hand.window.vessel_page
+    hand.click(window.empty_page.take)
+    hand.click(window.next_button)
+    page.editor.set_mode(MaskMode.BRUSH)
+    canvas = page.editor.canvas
+    hand.drag(canvas, [canvas.view.to_screen(point) for point in ((300, 40), (340, 40))])
+    hand.click(window.back_button)
+    hand.click(window.next_button)
+    assert page.editor.vessel_mask[40, 320]
+    window.close()
+    hand.end()
+    again = open_hand()
+    assert again.window.page is again.window.vessel_page
+    assert again.window.vessel_page.editor.vessel_mask[40, 320]
 
 
 # ---- faults: one line, nothing lost
