@@ -209,6 +209,10 @@ class TeachingPage(QWidget):
     def leave(self) -> None:
         """Another page comes to the front, or the window is closed."""
 
+    def cancel(self) -> bool:
+        """Drop what is being drawn; False when there is nothing."""
+        return False
+
     def next(self, step: TeachingStep) -> None:
         """Keep what was done here, and go on."""
         self.model.go(step)
@@ -357,6 +361,13 @@ class VesselPage(TeachingPage):
             return
         if not any(np.array_equal(known, vessel) for known in (view.drawn, view.vessel) if known is not None):
             self.model.keep_drawn(vessel)
+
+    def cancel(self) -> bool:
+        canvas = self.editor.canvas
+        if not canvas.cancel():
+            return False
+        self.editor.set_mode(canvas.mask_mode)
+        return True
 
     def next(self, step: TeachingStep) -> None:
         vessel = self.editor.vessel_mask
@@ -562,6 +573,13 @@ class FramesPage(TeachingPage):
         self.refresh()
         doubtful = next((row for row, taken in enumerate(self.view.frames) if not taken.is_used), 0)
         self.list.setCurrentRow(doubtful if self.view.frames else -1)
+
+    def cancel(self) -> bool:
+        is_drawing = bool(self.canvas.editor.stroke)
+        if is_drawing:
+            self.canvas.cancel()
+            self.canvas.set_mask_mode(MaskMode.BRUSH)
+        return is_drawing
 
     def refresh(self) -> None:
         frames = self.view.frames

@@ -168,7 +168,9 @@ class TeachingWindow(QDialog):
         super().closeEvent(event)
 
     def reject(self) -> None:
-        self.close()
+        """Escape drops what is being drawn, and else closes the window."""
+        if not self._page.cancel():
+            self.close()
 
     def _leave(self) -> None:
         self._timer.stop()

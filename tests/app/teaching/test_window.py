@@ -281,6 +281,19 @@ def test_a_stroke_is_kept_when_another_frame_is_chosen_or_the_window_closed_at_o
     assert [taken.is_corrected for taken in again.model.view.frames[:4]] == [False, True, False, False]
 
 
+def test_escape_leaves_the_tool_before_it_closes_the_window(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    window, page = hand.window, hand.window.vessel_page
+    hand.click(window.empty_page.take)
+    hand.click(window.next_button)
+    assert page.editor.canvas.mask_mode is MaskMode.REGION
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert page.editor.bar.mode_shown is MaskMode.POINTS
+    assert window.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert not window.isVisible()
+
+
 def test_a_vessel_that_is_drawn_is_there_after_back_and_after_closing(open_hand: OpenHand) -> None:
     hand = open_hand()
     window, page = hand.window, hand.window.vessel_page
