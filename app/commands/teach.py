@@ -174,7 +174,7 @@ def _bench_of(empty: Sequence[Path], vessel: Path | None, name: str, init: str) 
 
 def _bench_without_picture(source: Path, vessel: Path | None, name: str, init: str) -> Bench:
     """The bench as most of some pictures show it, evenly over all of them, with the robot in another place in each."""
-    from core.bench.bench import bench_from_frames
+    from core.bench.bench import bench_from_frames, with_vessel
     from core.config.models import PerceptionConfig
     from core.learning.dataset import WORKING_SIZE_PX, read_mask
     from core.perception.inference import open_segmenter
@@ -192,8 +192,13 @@ def _bench_without_picture(source: Path, vessel: Path | None, name: str, init: s
     segment = open_segmenter(PerceptionConfig().segmentation.model_copy(update={"model": init}))
     robots = [segment(image)[1] for image in images]
     mask = read_mask(vessel) if vessel is not None else _proposed_vessel(images, init)
+    height, width = mask.shape  # of the camera's pictures, which are smaller here
+    scale = WORKING_SIZE_PX / max(height, width)
+    if (round(height * scale), round(width * scale)) != images[0].shape[:2]:
+        sizes = [f"{one.shape[1]}x{one.shape[0]}" for one in (mask, images[0])]
+        raise UserError(f"the vessel mask has {sizes[0]} px, the pictures {sizes[1]} at working size: draw it on one of them")
     sys.stderr.write("note: without --empty the empty bench is what most pictures show\n")
-    return bench_from_frames(images, name, WORKING_SIZE_PX, mask, robots)
+    return with_vessel(bench_from_frames(images, name, WORKING_SIZE_PX, None, robots), mask)
 
 
 def _proposed_vessel(images: Sequence[Image], init: str) -> Mask:

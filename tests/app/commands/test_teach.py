@@ -176,11 +176,22 @@ def test_an_interrupted_training_keeps_frames_and_network_and_goes_on(
 def test_without_an_empty_picture_the_bench_is_what_most_pictures_show(place: Path, tmp_path: Path) -> None:
     (tmp_path / "stream").mkdir()
     for picture in toy_stream(30):
-        write_png(tmp_path / "stream" / f"{picture.stem}.png", _large(picture.image))
+        write_png(tmp_path / "stream" / f"{picture.stem}.png", _large(_large(picture.image)))  # larger than working size
+    write_mask(tmp_path / "vessel.png", cv2.resize(toy_vessel().astype(np.uint8), (1280, 960)) > 0)
     done = run(
         "teach",
         tmp_path / "stream",
-        *("--vessel", place / "vessel.png", "--out", tmp_path / "own", "--init", place / "model", "--frames", 8, "--frames-only"),
+        *(
+            "--vessel",
+            tmp_path / "vessel.png",
+            "--out",
+            tmp_path / "own",
+            "--init",
+            place / "model",
+            "--frames",
+            8,
+            "--frames-only",
+        ),
     )
     assert "note: without --empty the empty bench is what most pictures show" in done.stderr
     assert done.returncode == 0, done.stderr
