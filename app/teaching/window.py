@@ -165,7 +165,7 @@ class TeachingWindow(QDialog):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self._leave()
-        super().closeEvent(event)
+        event.accept()  # QDialog's own asks reject() first, and stays open
 
     def reject(self) -> None:
         """Escape drops what is being drawn, and else closes the window."""

@@ -145,7 +145,8 @@ def test_each_step_says_what_it_is_for(open_hand: OpenHand) -> None:
 def test_closed_at_any_step_it_opens_there_again(open_hand: OpenHand, driven: Path) -> None:
     hand = open_hand(driven)
     taken = [frame.stem for frame in hand.model.view.frames]
-    hand.window.close()
+    hand.click(hand.window.close_button)
+    assert not hand.window.isVisible()
     assert not hand.model.is_watching
     hand.window.open()
     assert hand.window.page is hand.window.move_page
