@@ -64,7 +64,8 @@ def perceive(
         check_qt("leave --overlay out")
     lines_to = None if jsonl == "-" else Path(jsonl)  # ./- is a file
     if lines_to is not None:
-        read = (path for path in (*files, *(empty or ()), targets, config, vessel) if path is not None)
+        of_bench = bench.glob("*") if bench is not None else ()
+        read = (path for path in (*files, *(empty or ()), *of_bench, targets, config, vessel) if path is not None)
         check_no_input(lines_to, read, "--jsonl")
     for folder, option, endings in ((masks, "--masks", _MASK_ENDINGS), (overlay, "--overlay", _OVERLAY_ENDINGS)):
         if folder is not None:

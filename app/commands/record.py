@@ -18,6 +18,7 @@ from core.config.models import Config, sessions_folder
 from core.config.rig_file import as_calibrated
 from core.devices import DeviceError, EndOfStream
 from core.perception.model_file import check_model
+from core.perception.pipeline import configured_bench
 from core.session.files import check_parent
 from core.session.manifest import SessionError, about_rig, event_of_alert
 from core.session.writer import SessionWriter
@@ -49,7 +50,9 @@ def record(
     config = config.model_copy(update={"record": settings})
     folder = out if out is not None else sessions_folder(settings.folder)
     check_parent(folder)
-    check_model(config.perception.segmentation.model)  # a window opens without a model and shows it; here it is refused
+    # A window opens without a model or a bench and shows it; here it is refused.
+    check_model(config.perception.segmentation.model)
+    configured_bench(as_calibrated(config).perception)
     engine = EngineMaker()(config)
     writer: SessionWriter | None = None
     try:

@@ -177,9 +177,11 @@ class Pipeline:
     def with_config(self, config: PerceptionConfig) -> Pipeline:
         """The same networks under other thresholds, at the start of a stream; ``config.segmentation`` is not read.
 
-        Raises BenchError for another bench that cannot be read.
+        Raises BenchError for another bench that cannot be read, and for another working size than the bench has.
         """
-        bench = self._bench if config.bench == self._config.bench else _bench_of(config)
+        before = self._config
+        is_same = config.bench == before.bench and config.working_size_px == before.working_size_px
+        bench = self._bench if is_same else configured_bench(config)
         return Pipeline(self._stream, config, single=self._single, roi=self._offered_roi, bench=bench)
 
     def with_bench(self, bench: Bench | None) -> Pipeline:
@@ -558,14 +560,14 @@ def open_pipeline(config: PerceptionConfig, *, recalibrating: bool = False, benc
     Raises ModelError and BenchError. `recalibrating`: see ``open_calibrated``.
     """
     if bench is None:
-        bench = _bench_of(config)
+        bench = configured_bench(config)
     plain, averaged = open_calibrated(config, recalibrating=recalibrating)
     stream = averaged if config.segmentation.mirrored == "always" else plain
     single = plain if config.segmentation.mirrored == "never" else averaged
     return Pipeline(stream, config, single=single, roi=stream, bench=bench)
 
 
-def _bench_of(config: PerceptionConfig) -> Bench | None:
+def configured_bench(config: PerceptionConfig) -> Bench | None:
     """The configured bench; raises BenchError."""
     if config.bench is None:
         return None

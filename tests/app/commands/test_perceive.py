@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
+from core.bench.bench import bench_from_pictures, read_bench, write_bench
 from core.config.models import TwinConfig
 from core.files import read_image
 from hardware.twin.world import TwinWorld
@@ -260,6 +261,12 @@ def test_with_an_empty_picture_and_the_vessel_the_bench_is_known(picture: Path, 
     assert done.returncode == 0, done.stderr
     assert rows(out)[0]["state"] is not None
     assert np.array_equal(read_image(masks / "photo_vessel.png")[:, :, 0] > 127, mask)
+    known = bench_from_pictures([read_image(empty)], mask, "b", 640)
+    write_bench(known, tmp_path / "bench")
+    done = run("perceive", picture, "--bench", tmp_path / "bench", "--jsonl", tmp_path / "bench" / "bench.json")
+    assert done.returncode == 2
+    assert "is an input" in done.stderr
+    read_bench(tmp_path / "bench")
     other = tmp_path / "other.png"
     cv2.imwrite(str(other), np.roll(cv2.imread(str(picture)), 40, axis=1))
     done = run("perceive", other, "--empty", empty, "--jsonl", out)

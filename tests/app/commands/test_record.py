@@ -154,6 +154,7 @@ def test_a_killed_recording_is_recovered_by_the_command(config: Path, tmp_path: 
         (("record", "--seconds", 1, "--out", "{folder}", "--config", "{file}"), "not valid TOML"),
         (("record", "--seconds", 0, "--out", "{folder}"), "seconds"),
         (("record", "--seconds", 1, "--out", "{folder}", "--config", "{no_model}"), "no model 'nope'"),
+        (("record", "--seconds", 1, "--out", "{folder}", "--config", "{no_bench}"), "bench.json: cannot be read"),
         (("session", "info", "{folder}"), "not a session"),
         (("session", "info", "{file}"), "not a file"),
         (("session", "recover", "{folder}/nothing"), "no such session"),
@@ -162,10 +163,12 @@ def test_a_killed_recording_is_recovered_by_the_command(config: Path, tmp_path: 
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path, arguments: tuple[object, ...], why: str) -> None:
     folder, file, no_model = tmp_path / "folder", tmp_path / "file", tmp_path / "no_model.toml"
+    no_bench = tmp_path / "no_bench.toml"
+    no_bench.write_text('[perception]\nbench = "gone"\n')
     folder.mkdir()
     file.write_text("= not toml")
     no_model.write_text('[perception.segmentation]\nmodel = "nope"\n')
-    done = run(*(str(word).format(folder=folder, file=file, no_model=no_model) for word in arguments))
+    done = run(*(str(word).format(folder=folder, file=file, no_model=no_model, no_bench=no_bench) for word in arguments))
     assert done.returncode == 2
     assert why in done.stderr
     assert "Traceback" not in done.stderr

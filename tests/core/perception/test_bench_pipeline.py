@@ -215,5 +215,7 @@ def test_the_configured_bench_is_read(bench: Bench, tmp_path: Path) -> None:
     other = config.model_copy(update={"working_size_px": 320})
     with pytest.raises(BenchError, match="working size of 640 px"):
         Pipeline(Blind(), CONFIG).with_config(other)
+    with pytest.raises(BenchError, match="working size of 640 px"):
+        Pipeline(Blind(), config, bench=opened).with_config(other)
     with pytest.raises(BenchError, match="cannot be read"):
         open_pipeline(config.model_copy(update={"bench": str(tmp_path / "none")}))
