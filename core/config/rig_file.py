@@ -205,11 +205,16 @@ def check_can_save(name: str) -> None:
 
 
 def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -> RigFile:
-    """The bench of a configuration as a rig file. Raises RigFileError for a recording, and for a bad name."""
+    """The bench of a configuration as a rig file, with what its present file was taught; raises RigFileError.
+
+    A recording, and a bad name, are refused.
+    """
     kind = config.rig.camera
     if kind not in RESERVED or config.rig.source is not None:
         raise RigFileError(f"rig {config.rig.name} plays a recording: it cannot be saved as a rig")
     port = None if kind == "twin" or config.rig.robot == "none" else config.servos.port
+    before = _rig_in_use(config)
+    bench = str((before[0].parent / before[1].bench).absolute()) if before is not None and before[1].bench is not None else None
     try:
         return RigFile.model_validate(
             {
@@ -221,6 +226,8 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
                 "twin": config.twin if kind == "twin" else None,
                 "servos": config.servos.model_copy(update={"port": port}),
                 "calibration": calibration,
+                "bench": bench,
+                "model": before[1].model if before is not None else None,
             }
         )
     except ValidationError as error:

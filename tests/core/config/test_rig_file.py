@@ -200,6 +200,14 @@ def test_a_bench_beside_its_rig_file_is_found_from_there() -> None:
     assert as_calibrated(with_rig(load_config(), read_rig(path), path)).perception.bench == str(path.parent / "lab")
 
 
+def test_a_rig_that_is_calibrated_again_keeps_what_it_was_taught(tmp_path: Path) -> None:
+    path = write_rig(make_rig(REAL, "bench 1", None))
+    set_bench(path, tmp_path / "lab", "mine")
+    again = make_rig(with_rig(REAL, read_rig(path), path), "bench 1", KNOWN)
+    assert (again.bench, again.model) == (str(tmp_path / "lab"), "mine")
+    assert make_rig(REAL, "bench 2", KNOWN).bench is None
+
+
 def test_a_session_tells_its_calibration_again() -> None:
     manifest = Manifest(id="x", kind="LIVE", started_utc=MADE, started_monotonic_s=0.0)
     assert manifest.known is None
