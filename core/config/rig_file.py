@@ -9,6 +9,7 @@ import errno
 import os
 import re
 import tomllib
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -213,7 +214,9 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
     if kind not in RESERVED or config.rig.source is not None:
         raise RigFileError(f"rig {config.rig.name} plays a recording: it cannot be saved as a rig")
     port = None if kind == "twin" or config.rig.robot == "none" else config.servos.port
-    before = _rig_in_use(config)
+    before = None
+    with suppress(RigFileError):  # a file that has gone since must not cost the calibration
+        before = _rig_in_use(config)
     bench = str((before[0].parent / before[1].bench).absolute()) if before is not None and before[1].bench is not None else None
     try:
         return RigFile.model_validate(

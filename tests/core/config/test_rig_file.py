@@ -206,6 +206,9 @@ def test_a_rig_that_is_calibrated_again_keeps_what_it_was_taught(tmp_path: Path)
     again = make_rig(with_rig(REAL, read_rig(path), path), "bench 1", KNOWN)
     assert (again.bench, again.model) == (str(tmp_path / "lab"), "mine")
     assert make_rig(REAL, "bench 2", KNOWN).bench is None
+    running = with_rig(REAL, read_rig(path), path)
+    path.unlink()
+    assert make_rig(running, "bench 1", KNOWN).bench is None
 
 
 def test_a_session_tells_its_calibration_again() -> None:
