@@ -207,7 +207,7 @@ def test_an_empty_picture_with_the_robot_in_it_is_said_while_frames_are_taken_an
     drive(work, 3)
     taken = len(work.view().frames)
 
-    def finds_it(_frames: object, _bench: object) -> None:
+    def finds_it(*_: object, **_options: object) -> None:
         raise TeachingError("the empty picture shows the robot near (3, 4): take it again without the robot")
 
     with monkeypatch.context() as patch:
