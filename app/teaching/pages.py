@@ -426,8 +426,8 @@ class MovePage(TeachingPage):
 
     name = mark("Move the robot")
     hint = mark(
-        "Move the robot slowly through all branches, and bend its head both ways at some places; with the keys here, or by hand. "
-        "Frames are taken by themselves, and the map fills where it has been."
+        "Move the robot slowly through all branches, and bend its head both ways at some places; by hand, or with the keys here "
+        "once the servos are on (F3 in the operator window). Frames are taken by themselves, and the map fills where it has been."
     )
     step = TeachingStep.MOVE
 
