@@ -124,7 +124,7 @@ def register(image: Image, bench: Bench, previous: BenchView | None = None) -> B
     Returns
     -------
     A refusal (BENCH_MOVED, OTHER_BENCH) where the camera was moved by more than ``MAX_SHIFT_PX``, ``MAX_ROTATION_DEG`` or
-    ``MAX_SCALING``, or the picture is not of this bench.
+    ``MAX_SCALING``, the drawn vessel was moved on its board, or the picture is not of this bench.
     """
     height, width = bench.empty.shape[:2]
     if image.shape != bench.empty.shape:
@@ -155,6 +155,12 @@ def register(image: Image, bench: Bench, previous: BenchView | None = None) -> B
             rotation=abs(rotation),
             a=MAX_SHIFT_PX,
             b=MAX_ROTATION_DEG,
+        )
+        return Refusal(Reason.BENCH_MOVED, detail)
+    if (vessel_px := _vessel_shift_px(image, bench, found)) > 0.0:
+        detail = message(
+            "the vessel alone, by about {shift:.0f} px against what lies around it: put it back, or make the bench again",
+            shift=vessel_px,
         )
         return Refusal(Reason.BENCH_MOVED, detail)
     if previous is not None and _apart(found, previous.matrix, (width, height)) < SAME_PLACE_PX:
@@ -322,6 +328,61 @@ def _searched(image: Image, level: _Level) -> NDArray[np.float64]:
     start = np.eye(3)
     start[:2, 2] = level.scale * across[best], level.scale * down[best]
     return start
+
+
+def _vessel_shift_px(image: Image, bench: Bench, matrix: NDArray[np.float64]) -> float:
+    """By how much the drawn vessel was moved on its board, which is at `matrix` (2, 3); 0 where it lies where it was."""
+    found = _vessel_level(bench)
+    if found is None:
+        return 0.0
+    level, is_same = found
+    transform = _from_middle(matrix, bench.size)
+    places = level.places @ transform[:2, :2].T + transform[:2, 2] / level.scale
+    shifted = (places + _VESSEL_SHIFTS_PX[:, None] / level.scale).reshape(-1, 2)
+    seen = _sample(_structure(image, level.scale, level.limit), shifted, np.eye(3)).reshape(len(_VESSEL_SHIFTS_PX), -1)
+    apart = (seen - level.structure) / (2.0 * (_EDGE_PX * level.gradient + 0.01))
+    scores = (1.0 / (1.0 + apart**2)).mean(axis=1)
+    best = int(np.argmax(scores))
+    was_moved = scores[best] > _LEAST_VESSEL_SCORE and scores[is_same].max() < _VESSEL_SCORE_SHARE * scores[best]
+    return math.hypot(*_VESSEL_SHIFTS_PX[best]) if was_moved else 0.0
+
+
+@functools.lru_cache(maxsize=4)
+def _vessel_level(bench: Bench) -> tuple[_Level, NDArray[np.bool_]] | None:
+    """The points beside the drawn vessel's walls, at 1/4, and the shifts (K,) under which it stays as it is, as along a
+    straight tube. None where there are too few points to tell.
+    """
+    if bench.vessel is None:
+        return None
+    level = _levels(bench)[1]
+    solid = bench.vessel.view(np.uint8)
+    depth = cv2.distanceTransform(solid, cv2.DIST_L2, 5) + cv2.distanceTransform(1 - solid, cv2.DIST_L2, 5)
+    height, width = depth.shape
+    x, y = np.rint(level.places * level.scale + np.array([(width - 1) / 2, (height - 1) / 2])).astype(np.intp).T
+    beside = depth[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)] < _WALL_PX
+    if np.count_nonzero(beside) < _LEAST_WALL_POINTS:
+        return None
+    some = np.flatnonzero(beside)[:: max(1, np.count_nonzero(beside) // _WALL_POINTS)]
+    parts = {name: getattr(level, name)[some] for name in ("places", "structure", "derivatives", "gradient", "weight")}
+    small = cv2.resize(solid * 255, (width // level.scale, height // level.scale), interpolation=cv2.INTER_AREA)
+    is_same = []
+    for x_px, y_px in _VESSEL_SHIFTS_PX / level.scale:
+        moved = _moved(small, np.array([[1, 0, x_px], [0, 1, y_px]]), cv2.INTER_LINEAR)
+        is_same.append(float(cv2.min(small, moved).sum(dtype=np.float64)) >= _SAME_SHARE * float(small.sum(dtype=np.float64)))
+    return replace(level, **parts), np.array(is_same)
+
+
+_VESSEL_SHIFTS_PX = np.stack(np.meshgrid(np.arange(-16, 17, 4), np.arange(-16, 17, 4)), axis=-1).reshape(-1, 2)
+"""Shifts (K, 2) of a vessel on its board that are tried."""
+_WALL_PX = 12.0
+"""How near the walls structure belongs to the vessel."""
+_SAME_SHARE = 0.95
+"""A vessel that overlaps so much of itself was not moved."""
+_LEAST_WALL_POINTS, _WALL_POINTS = 40, 200
+"""Points with which it is searched: at least, and about at most."""
+_VESSEL_SCORE_SHARE, _LEAST_VESSEL_SCORE = 0.95, 0.7
+"""A vessel was moved where its score, 0..1, at its place is below this share of the highest, and that is above the second value: of
+152 frames of four benches none is; moved by 12 px on a textured board it is 0.7 of 0.97."""
 
 
 def _refined(image: Image, levels: tuple[_Level, ...], start: NDArray[np.float64]) -> tuple[NDArray[np.float64], float, float]:

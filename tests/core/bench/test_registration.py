@@ -50,6 +50,29 @@ def test_a_camera_that_was_moved_too_far_is_named(bench: Bench, shift: tuple[flo
     assert "at most 10 px" in found.detail
 
 
+@pytest.mark.parametrize("by", [8, -10, 12])
+def test_a_vessel_that_was_moved_on_its_board_is_named(by: int) -> None:
+    rng = np.random.default_rng(3)
+    ground = cv2.GaussianBlur(rng.normal(0.0, 60.0, (SIZE[1], SIZE[0], 3)), (0, 0), 4.0) * 16.0 + 120.0
+    ground = np.clip(ground, 40, 200).astype(np.uint8)
+
+    def tube_at(x: int) -> Image:  # down the picture, of glass: its walls alone
+        picture = ground
+        for side in (-15, 15):
+            picture = with_line(picture, (x + side, 0), (x + side, SIZE[1]), (230, 230, 230), 3)
+        return picture
+
+    lumen = cv2.line(np.zeros((SIZE[1], SIZE[0]), np.uint8), (150, 0), (150, SIZE[1]), 1, 30) > 0
+    bench = bench_from_pictures([noisy(tube_at(150), 2.0, 1)], lumen, "glass", 320)
+    with_robot = with_line(tube_at(150), (150, 0), (154, 150))
+    seen(noisy(with_robot, 2.0, 2), bench)
+    seen(noisy(moved(with_robot, (6.0, -7.5))[0], 2.0, 2), bench)
+    found = register(noisy(with_line(tube_at(150 + by), (150 + by, 0), (154 + by, 150)), 2.0, 2), bench)
+    assert isinstance(found, Refusal)
+    assert found.reason is Reason.BENCH_MOVED
+    assert "the vessel alone" in found.detail
+
+
 def test_another_bench_is_named(bench: Bench) -> None:
     for picture in (noisy(board(8, 40), 2.0, 2), np.full((SIZE[1], SIZE[0], 3), 128, np.uint8), board()[:200]):
         found = register(picture, bench)
