@@ -89,13 +89,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
-        <source>click the outline to put one in · T brush · S simplify · G take the model's masks</source>
-        <translation>单击轮廓插入点 · T 画笔 · S 简化 · G 采用模型的掩膜</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/editing.py"/>
-        <source>Drag paints, Shift + drag or right drag takes away · [ ] size · Insert and Delete paint at the cross · T back to points</source>
-        <translation>拖动涂抹，Shift + 拖动或右键拖动擦除 · [ ] 粗细 · Insert 和 Delete 在十字处涂抹 · T 回到点</translation>
+        <source>click the outline to put one in · R region, T brush, Y tube · S simplify · G take the model's masks</source>
+        <translation>单击轮廓可插入一点 · R 区域，T 画笔，Y 管 · S 简化 · G 采用模型的掩膜</translation>
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
@@ -138,6 +133,71 @@ destination, target: 目标点, 目标            route: 路线                 
         <translation>血管掩膜：拖动点</translation>
     </message>
     <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Region</source>
+        <translation>区域</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Add or take away what lies around a click, up to its edges</source>
+        <translation>添加或去除单击处周围直到边缘的部分</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Click adds the region around it, Shift + click or right click takes it away · wheel or [ ] size, Ctrl + wheel zoom · R back to points</source>
+        <translation>单击添加周围区域，Shift + 单击或右键单击去除 · 滚轮或 [ ] 调大小，Ctrl + 滚轮缩放 · R 返回点编辑</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Brush</source>
+        <translation>画笔</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Paint the mask instead of moving its points</source>
+        <translation>涂抹掩膜，而不是移动其点</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Drag paints, Shift + drag or right drag takes away · wheel or [ ] size, Ctrl + wheel zoom · Insert and Delete paint at the cross · T back to points</source>
+        <translation>拖动绘制，Shift + 拖动或右键拖动擦除 · 滚轮或 [ ] 调大小，Ctrl + 滚轮缩放 · Insert 和 Delete 在十字处绘制 · T 返回点编辑</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Tube</source>
+        <translation>管</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Drag along the middle of a vessel: both walls are found</source>
+        <translation>沿血管中线拖动：自动找到两侧管壁</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>Drag along the middle, the circle as wide as the vessel: both walls are found · wheel or [ ] width, also in the drag, Ctrl + wheel zoom · right drag takes away · Y back to points</source>
+        <translation>沿中线拖动，圆与血管同宽：自动找到两侧管壁 · 滚轮或 [ ] 调宽度，拖动中也可，Ctrl + 滚轮缩放 · 右键拖动去除 · Y 返回点编辑</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/outline_editor.py"/>
+        <source>Undone: {action}</source>
+        <translation>已撤销：{action}</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/outline_editor.py"/>
+        <source>Nothing to undo</source>
+        <translation>没有可撤销的</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/outline_editor.py"/>
+        <source>Done again: {action}</source>
+        <translation>已重做：{action}</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/outline_editor.py"/>
+        <source>Nothing to redo</source>
+        <translation>没有可重做的</translation>
+    </message>
+    <message>
         <location filename="../../app/annotator/panels.py"/>
         <source>new</source>
         <translation>未开始</translation>
@@ -176,16 +236,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/panels.py"/>
         <source>Show the drawn masks</source>
         <translation>显示已画的掩膜</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/panels.py"/>
-        <source>Brush</source>
-        <translation>画笔</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/panels.py"/>
-        <source>Paint the mask instead of moving its points</source>
-        <translation>涂抹掩膜，而不是移动其点</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -374,8 +424,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>take a point out; the brush: take away</source>
-        <translation>删除点；画笔：擦除</translation>
+        <source>take a point out; brush, region, tube: take away</source>
+        <translation>删除一点；画笔、区域、管：去除</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -384,8 +434,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>zoom at the cursor</source>
-        <translation>在光标处缩放</translation>
+        <source>zoom at the cursor; brush, region, tube: size, with Ctrl zoom</source>
+        <translation>在光标处缩放；画笔、区域、管：调大小，按 Ctrl 缩放</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -416,6 +466,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>The algorithm gives no pose: {why}</source>
         <translation>算法没有给出位姿：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Proposed from {name}, dotted: G takes the masks over, M hides them</source>
+        <translation>由 {name} 提议，虚线：G 采用掩膜，M 隐藏</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -529,23 +584,23 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Masks as in another image</source>
+        <translation>与另一图像相同的掩膜(&amp;M)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
         <source>&amp;Simplify outlines</source>
         <translation>简化轮廓(&amp;S)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>&amp;Brush</source>
-        <translation>画笔(&amp;B)</translation>
+        <source>Circle smaller</source>
+        <translation>缩小圆</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Brush smaller</source>
-        <translation>画笔变细</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>Brush larger</source>
-        <translation>画笔变粗</translation>
+        <source>Circle larger</source>
+        <translation>放大圆</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -594,26 +649,6 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Undone: {action}</source>
-        <translation>已撤销：{action}</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>Nothing to undo</source>
-        <translation>没有可撤销的</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>Done again: {action}</source>
-        <translation>已重做：{action}</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>Nothing to redo</source>
-        <translation>没有可重做的</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
         <source>Simplify is for masks: 3 or 4 first</source>
         <translation>简化只用于掩膜：请先按 3 或 4</translation>
     </message>
@@ -621,6 +656,16 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>A blind study: what the algorithm says is hidden</source>
         <translation>盲法研究：算法的结果被隐藏</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Finding the masks by those of {name}</source>
+        <translation>正在根据 {name} 的掩膜寻找掩膜</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Nothing of it was found in this image</source>
+        <translation>此图像中没有找到</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -641,6 +686,16 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>Not complete: {missing}; or X, can't tell</source>
         <translation>未完成：{missing}；或按 X：无法判断</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>A blind study: masks are drawn outside it</source>
+        <translation>盲法研究：掩膜在研究之外绘制</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>No other image of this folder and size has a robot mask</source>
+        <translation>此文件夹中没有其他同尺寸且带机器人掩膜的图像</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -699,6 +754,16 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/operator/manual_drive.py"/>
+        <source>stop: the rig that is being opened starts stopped</source>
+        <translation>停止：正在打开的装置将以停止状态启动</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/manual_drive.py"/>
+        <source>stop: no rig is open, so nothing moves</source>
+        <translation>停止：没有打开装置，所以没有东西会动</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/manual_drive.py"/>
         <source>cleared</source>
         <translation>已清除</translation>
     </message>
@@ -736,16 +801,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/operator/manual_drive.py"/>
         <source>servos on</source>
         <translation>开启舵机</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/manual_drive.py"/>
-        <source>stop: the rig that is being opened starts stopped</source>
-        <translation>停止：正在打开的装置将以停止状态启动</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/manual_drive.py"/>
-        <source>stop: no rig is open, so nothing moves</source>
-        <translation>停止：没有打开装置，所以没有东西会动</translation>
     </message>
     <message>
         <location filename="../../app/operator/manual_drive.py"/>
@@ -799,11 +854,6 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/operator/models.py"/>
-        <source>&amp;Model</source>
-        <translation>模型(&amp;M)</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/models.py"/>
         <source>, own</source>
         <translation>，自有</translation>
     </message>
@@ -811,6 +861,16 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/operator/models.py"/>
         <source>Use {name}</source>
         <translation>使用 {name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/models.py"/>
+        <source>Teach this &amp;bench...</source>
+        <translation>学习此台架(&amp;B)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/models.py"/>
+        <source>&amp;Model</source>
+        <translation>模型(&amp;M)</translation>
     </message>
     <message>
         <location filename="../../app/operator/models.py"/>
@@ -1529,6 +1589,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
+        <source>An empty picture, the vessel's outline and a minute of moving the robot; then five minutes of waiting.</source>
+        <translation>一张空台架图像、血管轮廓和一分钟的机器人移动；然后等待五分钟。</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Session</source>
         <translation>会话(&amp;S)</translation>
     </message>
@@ -1566,6 +1631,21 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/operator/services.py"/>
         <source>Annotations (*.sqlite)</source>
         <translation>标注 (*.sqlite)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>another bench is in use: choose the one that was taught in the menu Rig or Twin first</source>
+        <translation>正在使用另一台架：请先在“装置”或“数字孪生”菜单中选择所学习的台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>Model {name} and its bench from now on; the menu Model has the one before</source>
+        <translation>从现在起使用模型 {name} 及其台架；“模型”菜单中可选回之前的模型</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>Look at it</source>
+        <translation>查看</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -1637,6 +1717,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
+        <source>Annotate its &amp;refused frames</source>
+        <translation>标注其被拒绝的帧(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
         <source>&amp;Play the newest session</source>
         <translation>回放最新会话(&amp;P)</translation>
     </message>
@@ -1662,6 +1747,26 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
+        <source>A recording is played: start with a camera or the twin, or use the command teach</source>
+        <translation>正在播放录制内容：请以相机或数字孪生启动，或使用命令 teach</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>This bench is taught: model {name}</source>
+        <translation>此台架已学习：模型 {name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>Teach this bench</source>
+        <translation>学习此台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>The model does not know such pictures</source>
+        <translation>模型不认识这类图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
         <source>{what}. The report: {report}</source>
         <translation>{what}。报告：{report}</translation>
     </message>
@@ -1674,6 +1779,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/operator/services.py"/>
         <source>Session</source>
         <translation>会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>Another bench is in use; this one is being trained: wait for it, or stop it</source>
+        <translation>正在使用另一台架；此台架正在训练：请等待，或将其停止</translation>
     </message>
     <message>
         <location filename="../../app/operator/tour.py"/>
@@ -2452,8 +2562,33 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
+        <source>No frame without a pose here</source>
+        <translation>此处没有无位姿的帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>No difference here</source>
+        <translation>此处没有差异</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Opening the annotation tool: {count} frames</source>
+        <translation>正在打开标注工具：{count} 帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
         <source>Selection as &amp;video</source>
         <translation>所选部分存为视频(&amp;V)</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>&amp;Annotate this frame</source>
+        <translation>标注此帧(&amp;A)</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Annotate &amp;refused frames</source>
+        <translation>标注被拒绝的帧(&amp;R)</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -2619,6 +2754,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/window.py"/>
         <source>Nothing to play</source>
         <translation>没有可播放的内容</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Annotate the &amp;differences</source>
+        <translation>标注差异(&amp;D)</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/camera_pages.py"/>
@@ -3656,14 +3796,614 @@ Best close the program and start it again. Space is still STOP.</source>
         <translation>允许 {range}</translation>
     </message>
     <message>
-        <location filename="../../app/training/dialog.py"/>
-        <source>Step {step} of {steps}{left}. Loss {loss:.3f}, Dice vessel {vessel:.2f}, robot {robot:.2f}. {line}</source>
-        <translation>第 {step} / {steps} 步{left}。损失 {loss:.3f}，Dice 血管 {vessel:.2f}，机器人 {robot:.2f}。{line}</translation>
+        <location filename="../../app/teaching/model.py"/>
+        <source>The robot does not move</source>
+        <translation>机器人没有移动</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Seen already: move on, or bend the head</source>
+        <translation>已见过：请继续移动，或弯曲头端</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Frame {count} taken: a new place</source>
+        <translation>已取第 {count} 帧：新位置</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Frame {count} taken: a new bend</source>
+        <translation>已取第 {count} 帧：新弯曲</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Enough frames</source>
+        <translation>帧已足够</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Not taken: {why}</source>
+        <translation>未取：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>reading what was taken before</source>
+        <translation>正在读取之前取得的内容</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>removing what was taken</source>
+        <translation>正在移除取得的内容</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>one moment</source>
+        <translation>请稍候</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>looking for the vessel</source>
+        <translation>正在寻找血管</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>keeping the vessel</source>
+        <translation>正在保存血管</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>taking pictures, keep still</source>
+        <translation>正在拍摄，请保持不动</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>taking a picture</source>
+        <translation>正在拍摄一张图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Writing the frames</source>
+        <translation>正在写入各帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>writing the frames</source>
+        <translation>正在写入各帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Not started: {why}</source>
+        <translation>未开始：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Loading the network and frames of the twin</source>
+        <translation>正在载入网络和数字孪生的帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Stopped. Frames and what was learnt are kept: Train goes on from there</source>
+        <translation>已停止。各帧和已学内容均保留：“训练”从此处继续</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>it was ended by signal {number}</source>
+        <translation>被信号 {number} 终止</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>comparing the pictures</source>
+        <translation>正在比较图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>looking at the pictures</source>
+        <translation>正在查看图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>The picture is not live: check the camera, or start the rig again (F5)</source>
+        <translation>图像不是实时的：请检查相机，或重新启动装置 (F5)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Stopping; what was learnt is kept</source>
+        <translation>正在停止；已学内容保留</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Training failed: {why}</source>
+        <translation>训练失败：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>a click adds what lies around it, a right click takes it away.</source>
+        <translation>单击添加周围部分，右键单击去除。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>drag along the middle of a branch, the circle as wide as it; the wheel sets the width.</source>
+        <translation>沿分支中线拖动，圆与其同宽；滚轮调宽度。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>drag paints, right drag takes away.</source>
+        <translation>拖动绘制，右键拖动去除。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the branch at the upper left</source>
+        <translation>左上方的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the branch at the top</source>
+        <translation>上方的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the branch at the upper right</source>
+        <translation>右上方的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the left branch</source>
+        <translation>左侧的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the branch in the middle</source>
+        <translation>中间的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the right branch</source>
+        <translation>右侧的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the branch at the lower left</source>
+        <translation>左下方的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the branch at the bottom</source>
+        <translation>下方的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>the branch at the lower right</source>
+        <translation>右下方的分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Empty bench</source>
+        <translation>空台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Draw the robot back until none of it is in the vessel, and take your hands out of the picture. From here on camera and phantom stay where they are.</source>
+        <translation>把机器人退回到血管内看不到它为止，并把手移出画面。从现在起相机和体模保持原位。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Vessel</source>
+        <translation>血管</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Blue is the vessel as the model sees it in the empty picture. Correct it once; errors of a pixel or two do no harm. The tube's wall does not belong to it.</source>
+        <translation>蓝色是模型在空台架图像中看到的血管。请修正一次；一两个像素的误差无妨。管壁不属于血管。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Move the robot slowly through all branches, and bend its head both ways at some places; by hand, or with the keys here once the servos are on (F3 in the operator window). Frames are taken by themselves, and the map fills where it has been.</source>
+        <translation>让机器人缓慢通过所有分支，并在若干位置向两侧弯曲头端；可用手，也可在舵机开启后（操作窗口中按 F3）用此处的按键。帧会自动取得，机器人到过之处在图上填充。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Missing: {what}</source>
+        <translation>缺少：{what}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Look through</source>
+        <translation>检查</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Orange must be the robot, all of it and nothing else. Leave out what is wrong, or correct it at the right.</source>
+        <translation>橙色必须是整个机器人，且只是机器人。排除错误的帧，或在右侧修正。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Train</source>
+        <translation>训练</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>It trains beside the window, which may be closed meanwhile. The present model stays, and can be chosen again.</source>
+        <translation>训练在窗口之外进行，窗口可以关闭。当前模型保留，可再次选择。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Take &amp;place {number} of {count}</source>
+        <translation>取位置 {number} / {count}(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Good: the empty bench is known.</source>
+        <translation>很好：空台架已知。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>The model's proposal instead of what was drawn; Undo brings that back</source>
+        <translation>用模型的提议代替所绘内容；“撤销”可恢复</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{done} of {count}</source>
+        <translation>{done} / {count}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Nothing is missing. Next shows the frames; more may be taken.</source>
+        <translation>没有缺少。“下一步”显示各帧；还可以继续取。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>left out</source>
+        <translation>已排除</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>rejected</source>
+        <translation>拒绝</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>corrected</source>
+        <translation>已修正</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>place</source>
+        <translation>位置</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>bend</source>
+        <translation>弯曲</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{count} frames to learn from; a quarter of them is held out, to judge by.</source>
+        <translation>{count} 帧用于学习；其中四分之一留出，用于评判。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>&amp;Take picture</source>
+        <translation>拍摄(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Takes eight pictures within a second</source>
+        <translation>一秒内拍摄八张图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Take &amp;place</source>
+        <translation>取位置(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>One picture with the robot in another place</source>
+        <translation>机器人在另一位置时的一张图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>not taken yet</source>
+        <translation>尚未拍摄</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>The empty picture that was taken</source>
+        <translation>已拍摄的空台架图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>The present model sees a robot near ({x:.0f}, {y:.0f}), outlined in the picture. If it is one, draw it back and take the picture again; if not, go on.</source>
+        <translation>当前模型在 ({x:.0f}, {y:.0f}) 附近看到机器人，已在图中勾出。如果确是机器人，请将其退回并重新拍摄；如果不是，请继续。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{share:.1f} % of the picture are not known (dark): there the robot lay in all pictures.</source>
+        <translation>图像的 {share:.1f} % 未知（深色）：所有图像中机器人都在那里。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Propose &amp;again</source>
+        <translation>重新提议(&amp;A)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>What became of the newest picture</source>
+        <translation>最新图像的处理结果</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>&amp;Pause</source>
+        <translation>暂停(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Take no frames for a while</source>
+        <translation>暂时不取帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Waiting for the robot to move</source>
+        <translation>正在等待机器人移动</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source> (Back leads to the empty picture; the frames stay)</source>
+        <translation>（“上一步”可回到空台架图像；各帧保留）</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>a bend of the head</source>
+        <translation>一次头端弯曲</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{count} more frames</source>
+        <translation>还需 {count} 帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Frames</source>
+        <translation>帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>&amp;Leave out</source>
+        <translation>排除(&amp;L)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>A double click does it, too</source>
+        <translation>双击也可以</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Name of the new model</source>
+        <translation>新模型的名称</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source> min</source>
+        <translation> 分钟</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Time for the training</source>
+        <translation>训练时间</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>&amp;Train</source>
+        <translation>训练(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>&amp;Stop</source>
+        <translation>停止(&amp;S)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Frames and what was learnt are kept</source>
+        <translation>各帧和已学内容均保留</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Training</source>
+        <translation>训练</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Step {step} of {steps}{left}</source>
+        <translation>第 {step} 步，共 {steps} 步{left}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Model {name} is there.{more}</source>
+        <translation>模型 {name} 已就绪。{more}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>The robot cannot be taken out? Lay it in {count} different places and take each: the empty bench is computed.</source>
+        <translation>机器人无法取出？请把它放在 {count} 个不同位置并逐一拍摄：空台架由此计算。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Take one more &amp;place</source>
+        <translation>再取一个位置(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>&amp;Take it again</source>
+        <translation>重新拍摄(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Live</source>
+        <translation>实时</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{count} places taken</source>
+        <translation>已取 {count} 个位置</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>The model sees no vessel here: drag a tube along the middle of each branch.</source>
+        <translation>模型在此没有看到血管：请沿每个分支的中线拖出一根管。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Bends</source>
+        <translation>弯曲</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Paused</source>
+        <translation>已暂停</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>New model</source>
+        <translation>新模型</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>for</source>
+        <translation>训练</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>, about {minutes:.0f} min left</source>
+        <translation>，约剩 {minutes:.0f} 分钟</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source> It is in use.</source>
+        <translation>正在使用。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source> Use it puts it into force, with this bench.</source>
+        <translation>“使用”使其与此台架一起生效。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>answered</source>
+        <translation>已回答</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{answered} of {count} held-out frames</source>
+        <translation>{count} 个留出帧中的 {answered} 个</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>right</source>
+        <translation>右</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{right} of these</source>
+        <translation>其中 {right} 个</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>time</source>
+        <translation>时间</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>{minutes:.1f} min</source>
+        <translation>{minutes:.1f} 分钟</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>What to expect on this bench</source>
+        <translation>此台架上的预期结果</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Bench twin: hold the key ↓ until the robot is back at the port.</source>
+        <translation>数字孪生台架：按住 ↓ 键，直到机器人退回入口。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>&amp;Take in again</source>
+        <translation>重新纳入(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>Rejected: {why}</source>
+        <translation>被拒绝：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>robot (Dice)</source>
+        <translation>机器人 (Dice)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>head</source>
+        <translation>头端</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>Teach this bench: {name}</source>
+        <translation>学习此台架：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>No live picture</source>
+        <translation>没有实时图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>Start &amp;over</source>
+        <translation>重新开始(&amp;O)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>Forget what was taken of this bench</source>
+        <translation>删除为此台架取得的内容</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>What was taken is kept; the menu Model opens it again</source>
+        <translation>取得的内容已保留；可从“模型”菜单再次打开</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>Forget pictures, vessel and frames of this bench?</source>
+        <translation>删除此台架的图像、血管和各帧？</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>Forget</source>
+        <translation>删除</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>Not used: {why}</source>
+        <translation>未使用：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>&amp;Use it</source>
+        <translation>使用(&amp;U)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>&amp;Close, go on training</source>
+        <translation>关闭并继续训练(&amp;C)</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>No live picture: start the rig (F5 in the operator window)</source>
+        <translation>没有实时图像：请启动装置（操作窗口中按 F5）</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
-        <source>Held-out picture {place} of {count}; {found}, line: drawn by hand</source>
-        <translation>留出图像 {place} / {count}；{found}，线：手绘</translation>
+        <source>Step {step} of {steps}{left}. Loss {loss:.3f}, Dice vessel {vessel:.2f}, robot {robot:.2f}. {line}</source>
+        <translation>第 {step} / {steps} 步{left}。损失 {loss:.3f}，Dice 血管 {vessel:.2f}，机器人 {robot:.2f}。{line}</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -3709,6 +4449,16 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training/dialog.py"/>
         <source>colour: found ({vessel}, {robot})</source>
         <translation>彩色：检出（{vessel}、{robot}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/dialog.py"/>
+        <source>Held-out picture {place} of {count}; {found}, line: drawn by hand</source>
+        <translation>留出图像 {place} / {count}；{found}，线：手绘</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/dialog.py"/>
+        <source>Held-out picture {place} of {count}; {found}, line: the difference</source>
+        <translation>留出图像 {place} / {count}；{found}，线：差异</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -3772,23 +4522,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
-        <source>&amp;Train</source>
-        <translation>训练(&amp;T)</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
         <source>&amp;Stop, keep what was learnt</source>
         <translation>停止并保留所学(&amp;S)</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
-        <source>New model</source>
-        <translation>新模型</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
-        <source>Name of the new model</source>
-        <translation>新模型的名称</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -3799,11 +4534,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training/dialog.py"/>
         <source>Model to start from</source>
         <translation>起始模型</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
-        <source>for</source>
-        <translation>训练</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -3877,11 +4607,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/training/model.py"/>
-        <source>it was ended by signal {number}</source>
-        <translation>被信号 {number} 终止</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/model.py"/>
         <source>vessel {before:.2f} → {after:.2f}</source>
         <translation>血管 {before:.2f} → {after:.2f}</translation>
     </message>
@@ -3892,18 +4617,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/training/model.py"/>
-        <source>Not started: {why}</source>
-        <translation>未开始：{why}</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/model.py"/>
         <source>Stopped before the first step; there is no new model</source>
         <translation>在第一步之前已停止；没有新模型</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/model.py"/>
-        <source>Training failed: {why}</source>
-        <translation>训练失败：{why}</translation>
     </message>
     <message>
         <location filename="../../app/training/model.py"/>
@@ -4395,8 +5110,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>teach the model with labelled pictures of this rig</source>
-        <translation>用本装置的已标注图像训练模型</translation>
+        <source>teach this bench (menu Model)</source>
+        <translation>学习此台架（“模型”菜单）</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -4410,8 +5125,23 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>right</source>
-        <translation>右</translation>
+        <source>The camera or the phantom was moved</source>
+        <translation>相机或体模被移动</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>put it back, or make the bench again</source>
+        <translation>放回原位，或重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>Not the bench that was set up</source>
+        <translation>不是所设置的台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>point the camera at the phantom, or make the bench again</source>
+        <translation>把相机对准体模，或重新建立台架</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -4597,11 +5327,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>How far your motions of the last ten seconds agreed with the advice.</source>
         <translation>最近十秒内您的动作与建议的一致程度。</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>bend</source>
-        <translation>弯曲</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -5047,11 +5772,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/widgets/command_panel.py"/>
         <source>What the gate limited and rejected</source>
         <translation>安全闸的限幅与拒绝</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/command_panel.py"/>
-        <source>rejected</source>
-        <translation>拒绝</translation>
     </message>
     <message>
         <location filename="../../app/widgets/command_panel.py"/>
@@ -6313,6 +7033,116 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>机器人线 &lt; {a} px</translation>
     </message>
     <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>the empty picture is blurred (sharpness {found}): focus the camera and take another</source>
+        <translation>空台架图像模糊（清晰度 {found}）：请对焦后重新拍摄</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{count} frames are too few: move the robot to three places</source>
+        <translation>{count} 帧太少：请把机器人移到三个位置</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>the vessel mask has {a}x{b} px, the pictures {width}x{height}: draw it on one of them</source>
+        <translation>血管掩膜为 {a}x{b} px，图像为 {width}x{height}：请在其中一张图像上绘制</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>the vessel mask covers {share} of the picture: white must be the vessel</source>
+        <translation>血管掩膜覆盖图像的 {share}：白色必须是血管</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: format {found} is of a newer version; update the program</source>
+        <translation>{path}：格式 {found} 来自更新的版本；请更新程序</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: its pictures are damaged; make the bench again</source>
+        <translation>{path}：其图像已损坏；请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: its pictures differ in size; make the bench again</source>
+        <translation>{path}：其图像尺寸不一；请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>empty picture {number} shows another bench, or the camera was moved (likeness {found})</source>
+        <translation>空台架图像 {number} 显示另一台架，或相机被移动（相似度 {found}）</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>frame {number} shows another bench, or the camera was moved</source>
+        <translation>第 {number} 帧显示另一台架，或相机被移动</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>picture {number} has {a}x{b} px, the first {width}x{height}: take all with the same camera</source>
+        <translation>图像 {number} 为 {a}x{b} px，第一张为 {width}x{height}：请用同一相机拍摄全部图像</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: cannot be read ({why}); make the bench again</source>
+        <translation>{path}：无法读取（{why}）；请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: damaged ({why}); make the bench again</source>
+        <translation>{path}：已损坏（{why}）；请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: names {name}, which no bench has; make the bench again</source>
+        <translation>{path}：指定了 {name}，台架中没有此项；请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: cut or damaged (SHA-256); make the bench again</source>
+        <translation>{path}：被截断或已损坏 (SHA-256)；请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: lacks a picture ({why}); make the bench again</source>
+        <translation>{path}：缺少图像（{why}）；请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: cannot be read ({why})</source>
+        <translation>{path}：无法读取（{why}）</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: exists and is no bench; choose another folder</source>
+        <translation>{path}：已存在且不是台架；请选择另一文件夹</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: cannot be written ({why}); make room, or choose another folder</source>
+        <translation>{path}：无法写入（{why}）；请腾出空间，或选择另一文件夹</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/registration.py"/>
+        <source>the picture has {a}x{b} px at working size, the bench {width}x{height}</source>
+        <translation>图像在工作尺寸下为 {a}x{b} px，台架为 {width}x{height}</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/registration.py"/>
+        <source>likeness {found} (at least {least}): make the bench again, or put the camera back</source>
+        <translation>相似度 {found}（至少 {least}）：请重新建立台架，或把相机放回原位</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/registration.py"/>
+        <source>by {shift} px and {rotation} degrees (at most {a} px, {b} degrees): make the bench again</source>
+        <translation>移动了 {shift} px 和 {rotation} 度（最多 {a} px，{b} 度）：请重新建立台架</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/registration.py"/>
+        <source>the vessel alone, by about {shift} px against what lies around it: put it back, or make the bench again</source>
+        <translation>仅血管移动，相对周围约 {shift} px：请放回原位，或重新建立台架</translation>
+    </message>
+    <message>
         <location filename="../../core/calibration/camera.py"/>
         <source>{a} of its markers and {b} of its {c} corners are seen</source>
         <translation>看到 {a} 个标记和 {c} 个角点中的 {b} 个</translation>
@@ -6438,6 +7268,31 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>已 {a} ms</translation>
     </message>
     <message>
+        <location filename="../../core/control/camera_monitor.py"/>
+        <source>by {a} px (at most {b} px)</source>
+        <translation>{a} px（最多 {b} px）</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/camera_monitor.py"/>
+        <source>{a} identical pictures</source>
+        <translation>{a} 张相同图像</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/camera_monitor.py"/>
+        <source>{a} until now</source>
+        <translation>至今 {a} 个</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/camera_monitor.py"/>
+        <source>{a} in a row</source>
+        <translation>连续 {a} 次</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/camera_monitor.py"/>
+        <source>{a} frames</source>
+        <translation>{a} 帧</translation>
+    </message>
+    <message>
         <location filename="../../core/control/engine.py"/>
         <source>the camera's picture is {kind} {shape}, not 8-bit RGB: set its colour format</source>
         <translation>相机图像为 {kind} {shape}，不是 8 位 RGB：请设置其颜色格式</translation>
@@ -6466,31 +7321,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../core/control/gate.py"/>
         <source>{joint} by {a} mm (at most {b} mm)</source>
         <translation>{joint}相差 {a} mm（最多 {b} mm）</translation>
-    </message>
-    <message>
-        <location filename="../../core/control/health.py"/>
-        <source>by {a} px (at most {b} px)</source>
-        <translation>{a} px（最多 {b} px）</translation>
-    </message>
-    <message>
-        <location filename="../../core/control/health.py"/>
-        <source>{a} identical pictures</source>
-        <translation>{a} 张相同图像</translation>
-    </message>
-    <message>
-        <location filename="../../core/control/health.py"/>
-        <source>{a} until now</source>
-        <translation>至今 {a} 个</translation>
-    </message>
-    <message>
-        <location filename="../../core/control/health.py"/>
-        <source>{a} in a row</source>
-        <translation>连续 {a} 次</translation>
-    </message>
-    <message>
-        <location filename="../../core/control/health.py"/>
-        <source>{a} frames</source>
-        <translation>{a} 帧</translation>
     </message>
     <message>
         <location filename="../../core/control/pilot.py"/>
@@ -6548,9 +7378,49 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>{what}失败（{kind}：{why}）：请重新启动装置</translation>
     </message>
     <message>
+        <location filename="../../core/learning/teaching.py"/>
+        <source>in pieces: the robot's mask has {a}, the largest {b} % of it</source>
+        <translation>断成数段：机器人掩膜有 {a} 段，最大一段占 {b} %</translation>
+    </message>
+    <message>
+        <location filename="../../core/learning/teaching.py"/>
+        <source>a hand or a shadow: the mask has {a} times the usual area</source>
+        <translation>手或阴影：掩膜面积是通常的 {a} 倍</translation>
+    </message>
+    <message>
+        <location filename="../../core/learning/teaching.py"/>
+        <source>of another width: the mask has {a} px, the others {b} px</source>
+        <translation>宽度不同：掩膜宽 {a} px，其他为 {b} px</translation>
+    </message>
+    <message>
+        <location filename="../../core/learning/teaching.py"/>
+        <source>doubtful: {a} % of the robot's mask (at most {b} %)</source>
+        <translation>可疑：机器人掩膜的 {a} %（最多 {b} %）</translation>
+    </message>
+    <message>
+        <location filename="../../core/learning/teaching.py"/>
+        <source>beside the vessel: {a} % of the robot's mask lie in it (at least {b} %)</source>
+        <translation>在血管之外：机器人掩膜有 {a} % 在血管内（至少 {b} %）</translation>
+    </message>
+    <message>
+        <location filename="../../core/learning/teaching.py"/>
+        <source>blurred: {a} % of the empty picture's fine structure</source>
+        <translation>模糊：只有空台架图像精细结构的 {a} %</translation>
+    </message>
+    <message>
+        <location filename="../../core/learning/teaching.py"/>
+        <source>a hand or a shadow: {a} % of the bench are hidden</source>
+        <translation>手或阴影：台架有 {a} % 被遮挡</translation>
+    </message>
+    <message>
         <location filename="../../core/perception/centerline.py"/>
         <source>the target is {a} px beside the vessel</source>
         <translation>目标偏离血管 {a} px</translation>
+    </message>
+    <message>
+        <location filename="../../core/perception/pipeline.py"/>
+        <source>{path}: was made for a working size of {a} px, and {b} px are set; make the bench again</source>
+        <translation>{path}：按工作尺寸 {a} px 建立，而设置为 {b} px；请重新建立台架</translation>
     </message>
     <message>
         <location filename="../../core/perception/quality.py"/>
@@ -6718,16 +7588,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>{path}：视频结束</translation>
     </message>
     <message>
-        <location filename="../../hardware/cameras/kinds.py"/>
-        <source>the library of RealSense cameras cannot be used: {problem}</source>
-        <translation>无法使用 RealSense 相机的库：{problem}</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/cameras/kinds.py"/>
-        <source>no permission for {node}</source>
-        <translation>没有 {node} 的权限</translation>
-    </message>
-    <message>
         <location filename="../../hardware/cameras/live.py"/>
         <source>the driver of {camera} does not return: plug the camera out and in again</source>
         <translation>{camera}的驱动程序没有返回：拔下相机再重新插入</translation>
@@ -6751,6 +7611,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/cameras/realsense.py"/>
         <source>{camera} is lost ({why}): check its cable</source>
         <translation>{camera}断开（{why}）：检查其线缆</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>the library of RealSense cameras cannot be used: {problem}</source>
+        <translation>无法使用 RealSense 相机的库：{problem}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>no permission for {node}</source>
+        <translation>没有 {node} 的权限</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/webcam.py"/>
@@ -7174,8 +8044,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>steadiness</source>
-        <translation>稳定性</translation>
+        <source>sensitivity</source>
+        <translation>灵敏度</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -8276,6 +9146,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>head jumped</source>
         <translation>头端跳变</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>camera or phantom moved</source>
+        <translation>相机或体模被移动</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>not this bench</source>
+        <translation>不是此台架</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9779,16 +10659,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Own process</source>
-        <translation>独立进程</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>with servos: the simulation takes no time from the program</source>
-        <translation>带舵机时：仿真不占用程序的时间</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
         <source>Wiring</source>
         <translation>接线</translation>
     </message>
@@ -9836,6 +10706,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>longer side that all _px settings refer to</source>
         <translation>所有 _px 设置所依据的长边</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Bench</source>
+        <translation>台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>folder of the bench that the camera sees; empty: not known</source>
+        <translation>相机所见台架的文件夹；空：未知</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
