@@ -245,7 +245,9 @@ class EmptyPage(TeachingPage):
         self.found.setMinimumHeight(84)
         self.found.setAlignment(Qt.AlignmentFlag.AlignTop)
         if is_twin:
-            self.column.addWidget(note(tr("Bench twin: hold the key \N{DOWNWARDS ARROW} until the robot is back at the port.")))
+            self.column.addWidget(
+                note(tr("Bench twin: its robot begins inside and cannot be drawn out. Lay it in three places, as below."))
+            )
         self.column.addWidget(self.take)
         self.column.addWidget(self.thumb, 0, Qt.AlignmentFlag.AlignLeft)
         self.column.addWidget(self.found)

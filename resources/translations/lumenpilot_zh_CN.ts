@@ -4322,8 +4322,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
-        <source>Bench twin: hold the key ↓ until the robot is back at the port.</source>
-        <translation>数字孪生台架：按住 ↓ 键，直到机器人退回入口。</translation>
+        <source>Bench twin: its robot begins inside and cannot be drawn out. Lay it in three places, as below.</source>
+        <translation>数字孪生台架：机器人起始时已在内部，无法取出。请按下方所示将其放在三个位置。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
