@@ -8,7 +8,7 @@ of the fit. The kind of pictures is that of the bench alone: another bench's are
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -242,7 +242,7 @@ class BenchCalibration:
             answers[mirrored] = found
         fitted = {}
         for mirrored, prior in (("never", self._prior.calibration), ("always", self._prior.calibration_mirrored)):
-            fitted[mirrored] = fit_to_prior(*_examples(answers[mirrored]), prior) if prior is not None else None
+            fitted[mirrored] = fit_to_prior(*_examples(answers[mirrored], len(prior.mean)), prior) if prior is not None else None
         config = self._tolerant("always")
         segment = open_segmenter(config.segmentation)
         known, others = self._signatures(segment, should_stop)
@@ -352,8 +352,8 @@ def _confidence(score: FrameScore, calibration: ConfidenceCalibration | None) ->
     return calibration.confidence(ConfidenceFeatures(*score.evidence))
 
 
-def _examples(answers: _Answers) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
-    """Evidence, whether right, and weight of all answers: a bad look counts less, it is rare at a bench."""
+def _examples(answers: _Answers, features: int) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
+    """Evidence (N, features), whether right, and weight of all answers: a bad look counts less, it is rare at a bench."""
     rows = [
         (score.evidence, is_right(score), weight)
         for scores, weight in ((answers.plain, 1.0), (answers.usual, 1.0), (answers.bad, 0.5))
@@ -361,7 +361,6 @@ def _examples(answers: _Answers) -> tuple[NDArray[np.float64], NDArray[np.bool_]
         if score.answered and score.expected and score.evidence is not None
     ]
     evidence, right, weight = zip(*rows, strict=True) if rows else ((), (), ())
-    features = len(fields(ConfidenceFeatures))
     return np.array(evidence, np.float64).reshape(-1, features), np.array(right, np.bool_), np.array(weight, np.float64)
 
 

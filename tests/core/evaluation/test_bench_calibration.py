@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +9,11 @@ import pytest
 
 from core.config.models import PerceptionConfig
 from core.evaluation import bench_calibration as calibrating
+from core.evaluation.accuracy import FrameScore
 from core.evaluation.bench_calibration import bad_look, fit_to_prior, poses_of_masks, usual_look
 from core.evaluation.confidence import KnownPicture
 from core.learning.dataset import Sample, write_mask, write_png
-from core.perception.quality import BASIC_FEATURES, ConfidenceCalibration, ConfidenceFeatures
+from core.perception.quality import BASIC_FEATURES, ConfidenceCalibration
 from tests.core.learning.toy_bench import SIZE, toy_picture, toy_robot, toy_vessel
 
 COUNT = len(BASIC_FEATURES)
@@ -33,10 +33,19 @@ def test_without_answers_the_fit_is_the_prior() -> None:
 
 
 def test_a_model_that_answers_no_held_out_frame_keeps_the_prior() -> None:
-    count = len(fields(ConfidenceFeatures))
-    prior = PRIOR.model_copy(update={"mean": (0.0,) * count, "scale": (1.0,) * count, "weights": (1.0,) * count})
-    fitted = fit_to_prior(*calibrating._examples(calibrating._Answers((), (), ())), prior)
-    assert fitted.weights == pytest.approx(prior.weights)
+    fitted = fit_to_prior(*calibrating._examples(calibrating._Answers((), (), ()), COUNT), PRIOR)
+    assert fitted.weights == pytest.approx(PRIOR.weights)
+
+
+def test_the_evidence_of_answers_is_what_the_prior_is_computed_from() -> None:
+    pose = {"expected": True, "answered": True, "reason": None, "head_error_px": 1.0, "theta_error_deg": 1.0}
+    angle = {"theta_deg": 5.0, "true_theta_deg": 4.0, "state": "A", "true_state": "A", "confidence": 0.8}
+    score = FrameScore("a", 1.0, 1.0, **pose, **angle, evidence=(0.5,) * COUNT)  # type: ignore[arg-type]
+    evidence, right, weight = calibrating._examples(calibrating._Answers((score,), (score,), (score,)), COUNT)
+    assert evidence.shape == (3, COUNT)
+    assert right.all()
+    assert weight.tolist() == [1.0, 1.0, 0.5]
+    assert fit_to_prior(evidence, right, weight, PRIOR).offset > PRIOR.offset
 
 
 def test_answers_move_the_offset_first_and_the_weights_when_there_are_many() -> None:
