@@ -231,3 +231,23 @@ def _from_16_bit(array: NDArray[np.uint16]) -> NDArray[np.uint8]:
     top = next(full for full in _FULL_SCALES if brightest <= full)
     greys = np.rint(np.minimum(np.arange(65536) * (255.0 / top), 255.0)).astype(np.uint8)
     return np.asarray(greys[array])
+
+
+def replace_folder(scratch: Path, folder: Path) -> Path | None:
+    """Move a finished folder to its place, and return where the one that was there before lies now.
+
+    Raises OSError, with the older folder in its place again. If it is interrupted, one of both folders is whole.
+    """
+    aside = scratch.with_name(scratch.name + ".old")
+    was_there = folder.exists()
+    if was_there:
+        os.replace(folder, aside)
+    try:
+        os.replace(scratch, folder)
+    except BaseException:
+        if was_there:
+            os.replace(aside, folder)
+        raise
+    with contextlib.suppress(OSError):  # some file systems cannot
+        sync_folder(folder.parent)
+    return aside if was_there else None

@@ -342,7 +342,7 @@ class AnnotationModel(QObject):
     def carry(self) -> str:
         """Find the masks of the open item by those of the nearest image with a robot's mask, the ones before it first.
 
-        ``carried`` comes when they are found. Returns that image's name; "" where there is none, or in a blind study.
+        ``carried`` comes when they are found. Returns that image's name; "" where there is no such image, or in a blind study.
         """
         item = self.item
         source = self._mask_source()

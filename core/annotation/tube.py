@@ -28,7 +28,7 @@ _RADIUS_PX = 20.0
 _SLACK_PX = 6.5
 """A wall this far from where it was drawn, on a picture 640 px long, costs as much as an edge of full strength saves."""
 _UNCLEAR, _CLEAR, _CLEAR_GAIN = 0.92, 0.99, 1.0
-"""Where walls are the only edges, they may lie farther from where they were drawn: the gain grows between these shares of the
+"""Where walls are the only edges, they may lie more to the side: the gain grows between these shares of the
 strongest edge among all. A tube with an inner and an outer wall, and reflections, has less."""
 _TURN_COST, _GROWTH_COST = 40.0, 80.0
 """Cost of the change of the middle, or of the half width, from place to place, per squared radius."""

@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core.config.section import first_problem
 from core.devices import UserError
-from core.files import ImageError, read_image
+from core.files import ImageError, read_image, replace_folder
 from core.learning.dataset import mask_png, png
 from core.messages import message
 from core.perception import quality
@@ -492,7 +492,8 @@ def write_bench(bench: Bench, folder: Path) -> None:
                 file.flush()
                 os.fsync(file.fileno())
         scratch.chmod(0o755)
-        _replace(folder, scratch)
+        if (aside := replace_folder(scratch, folder)) is not None:
+            shutil.rmtree(aside, ignore_errors=True)
     except OSError as error:
         raise BenchError(
             message("{path}: cannot be written ({why}); make room, or choose another folder", path=folder, why=error.strerror)
@@ -500,17 +501,3 @@ def write_bench(bench: Bench, folder: Path) -> None:
     finally:
         if scratch is not None:
             shutil.rmtree(scratch, ignore_errors=True)
-
-
-def _replace(folder: Path, scratch: Path) -> None:
-    """Aside first, deleted last: whenever this is interrupted, one of the two folders is whole."""
-    aside = scratch.with_name(scratch.name + ".old")
-    if folder.exists():
-        os.replace(folder, aside)
-    try:
-        os.replace(scratch, folder)
-    except BaseException:
-        if aside.exists():
-            os.replace(aside, folder)
-        raise
-    shutil.rmtree(aside, ignore_errors=True)

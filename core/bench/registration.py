@@ -243,7 +243,7 @@ _LOGARITHMS = np.log(np.arange(256, dtype=np.float32) + 8.0)
 _SLOW = 5
 """Half the side of the square, in pixels of each scale, whose mean is the slow part."""
 _SMOOTH = 0.8
-"""Deviation of the Gaussian, in pixels of each scale: less noise, and steps from farther away."""
+"""Deviation of the Gaussian, in pixels of each scale: less noise, and longer steps."""
 _MOST_STRUCTURE = 2.0
 """Times the 90th percentile of the bench's structure: what is stronger, a robot or glare, counts as this."""
 

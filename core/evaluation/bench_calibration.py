@@ -118,7 +118,7 @@ def bad_look(image: Image, vessel: Mask, robot: Mask, rng: Generator) -> Image:
 
 
 def poses_of_masks(samples: Sequence[Sample], config: PerceptionConfig) -> dict[str, dict[str, Any]]:
-    """The pose that geometry gives for the masks of each frame, as a row of truth by its stem; state None: there is none."""
+    """The pose that geometry gives for the masks of each frame, as a row of truth by its stem; state None: no pose."""
     masks = TrueMasks()
     pipeline = Pipeline(masks, config)
     rows: dict[str, dict[str, Any]] = {}

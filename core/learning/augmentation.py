@@ -425,7 +425,7 @@ def nearness_to(ends: Sequence[Point], shape: tuple[int, ...]) -> NDArray[np.uin
 
 
 def _distances(ends: Sequence[Point], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Distance of each pixel from the nearest of the `ends`; infinite where there is none."""
+    """Distance of each pixel from the nearest of the `ends`; infinite without any."""
     rows, columns = (axis.astype(np.float32) for axis in np.ogrid[: shape[0], : shape[1]])
     nearest = np.full(shape[:2], np.inf, np.float32)
     for x, y in ends:

@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 
 from core.config.models import SegmentationConfig
-from core.files import sync_folder
+from core.files import replace_folder, sync_folder
 from core.learning.dataset import with_empty
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import (
@@ -311,19 +311,7 @@ def _replace(folder: Path, scratch: Path) -> None:
 
     Other files in the old one's folder, notes or frames, are moved into the new one's.
     """
-    aside = scratch.with_name(scratch.name + ".old")
-    # Aside first, deleted last: whenever this is interrupted, one of the two is whole.
-    if folder.exists():
-        os.replace(folder, aside)
-    try:
-        os.replace(scratch, folder)
-    except BaseException:
-        if aside.exists():
-            os.replace(aside, folder)
-        raise
-    with suppress(OSError):
-        sync_folder(folder.parent)
-    if aside.exists():
+    if (aside := replace_folder(scratch, folder)) is not None:
         _carry_over(aside, folder)
         shutil.rmtree(aside, ignore_errors=True)
 

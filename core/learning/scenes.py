@@ -34,8 +34,7 @@ class BenchScene:
     distance_px : signed distance to the wall, negative inside; kept to 1/8 px up to ``REACH_PX``, with its exact sign.
     ratio : distance to the centerline over the radius, kept to 1/200 up to ``MOST_RATIO``.
     lines : robots, (N, 2) each, tail -> head.
-    radius_px, wall_px : the robot's radius and the tube's wall in the twin's look.
-    pixels_per_mm : scale of the view.
+    radius_px : the robot's radius in the twin's look.
     pictures : the twin's pictures of the first robots, each with the robot's mask.
     empty : its picture without robot; None where there are no pictures.
     """
@@ -44,8 +43,6 @@ class BenchScene:
     ratio: NDArray[np.float32]
     lines: tuple[Points, ...]
     radius_px: float
-    wall_px: float
-    pixels_per_mm: float
     pictures: tuple[tuple[Image, Mask], ...] = ()
     empty: Image | None = None
 
@@ -57,7 +54,7 @@ class BenchScene:
     def to_bytes(self) -> bytes:
         """The contents of its file."""
         arrays: dict[str, NDArray[Any]] = {
-            "numbers": np.array([self.radius_px, self.wall_px, self.pixels_per_mm]),
+            "radius_px": np.array(self.radius_px),
             "distance": _packed(png(np.clip(np.floor(self.distance_px * 4) + 128, 0, 255).astype(np.uint8))),
             "ratio": _packed(png(np.rint(np.clip(self.ratio, 0, MOST_RATIO) * 100).astype(np.uint8))),
             "lengths": np.array([len(line) for line in self.lines], np.int64),
@@ -88,12 +85,12 @@ def read_scene(path: Path, *, pictures: bool = True) -> BenchScene:
 def _unpacked(file: Any, *, pictures: bool) -> BenchScene:
     distance = (_grey(file["distance"]).astype(np.float32) - np.float32(127.5)) * np.float32(0.25)
     ratio = _grey(file["ratio"]).astype(np.float32) * np.float32(0.01)
-    radius_px, wall_px, pixels_per_mm = (float(number) for number in file["numbers"])
+    radius_px = float(file["radius_px"])
     points, lengths = file["points"].astype(np.float64), file["lengths"]
     if ratio.shape != distance.shape or lengths.min() < 2 or points.shape != (lengths.sum(), 2) or not np.isfinite(points).all():
         raise ValueError("the parts do not fit together")
     lines = tuple(np.split(points, np.cumsum(lengths)[:-1]))
-    scene = BenchScene(distance, ratio, lines, radius_px, wall_px, pixels_per_mm)
+    scene = BenchScene(distance, ratio, lines, radius_px)
     if not pictures or "empty" not in file:
         return scene
     shown = range(sum(name.startswith("image") for name in file.files))
@@ -101,7 +98,7 @@ def _unpacked(file: Any, *, pictures: bool) -> BenchScene:
     empty = _color(file["empty"])
     if any(part.shape[:2] != distance.shape for part in (empty, *(part for pair in pairs for part in pair))):
         raise ValueError("the parts do not fit together")
-    return BenchScene(distance, ratio, lines, radius_px, wall_px, pixels_per_mm, pairs, empty)
+    return BenchScene(distance, ratio, lines, radius_px, pairs, empty)
 
 
 def _grey(data: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -175,7 +175,7 @@ class FrameSelection:
         Raises
         ------
         TeachingError
-            There is none, they are of another bench, or the robot lies still in all of them.
+            There are no pictures, they are of another bench, or the robot lies still in all of them.
         """
         if not self._kept:
             if self.refused:

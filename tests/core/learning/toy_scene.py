@@ -26,4 +26,4 @@ def toy_scene(*, pictures: bool = False, size: tuple[int, int] = (96, 128)) -> B
         image[robot] = 20
         shown.append((image, robot))
     empty = np.full((height, width, 3), 120, np.uint8) if pictures else None
-    return BenchScene(away - np.float32(RADIUS_PX), away / np.float32(RADIUS_PX), lines, 3.0, 2.0, 2.0, tuple(shown), empty)
+    return BenchScene(away - np.float32(RADIUS_PX), away / np.float32(RADIUS_PX), lines, 3.0, tuple(shown), empty)
