@@ -31,7 +31,9 @@ _QUEUE_FRAMES = 2
 """The library drops the oldest of more. Its pool starves when some 15 frames are kept, so every frame is copied and let go."""
 _RESET_S = 3.0
 """A camera that was reset is still listed for a moment, and then gone for about two seconds."""
-_EXPOSURE_STEPS_PER_MS = 10.0
+_RGB_STEPS_PER_MS, _STEREO_STEPS_PER_MS = 10.0, 1000.0
+"""Steps of the exposure: 100 us of an RGB camera, 1 us of a stereo module (librealsense issues 8243, 12006). The D405 has no RGB
+camera: its colour comes from the stereo module."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +214,8 @@ class RealSenseSensor:
         self._set(sensor, rs.option.auto_exposure_priority, 0.0)
         self._set(sensor, rs.option.enable_auto_exposure, float(config.exposure_ms is None))
         if config.exposure_ms is not None:
-            self._set(sensor, rs.option.exposure, config.exposure_ms * _EXPOSURE_STEPS_PER_MS)
+            steps_per_ms = _STEREO_STEPS_PER_MS if _is_stereo_module(sensor) else _RGB_STEPS_PER_MS
+            self._set(sensor, rs.option.exposure, config.exposure_ms * steps_per_ms)
         if config.gain is not None:
             self._set(sensor, rs.option.gain, config.gain)
         self._set(sensor, rs.option.enable_auto_white_balance, float(config.white_balance_k is None))
@@ -227,6 +230,11 @@ class RealSenseSensor:
         limits = sensor.get_option_range(option)
         steps = round((min(max(value, limits.min), limits.max) - limits.min) / limits.step) if limits.step else 0
         sensor.set_option(option, limits.min + steps * limits.step if limits.step else min(max(value, limits.min), limits.max))
+
+
+def _is_stereo_module(sensor: Any) -> bool:
+    """Whether the sensor has depth pictures as well."""
+    return any(profile.stream_type() == rs.stream.depth for profile in sensor.get_stream_profiles())
 
 
 def colour_image(frame: Any) -> Image:

@@ -35,15 +35,20 @@ OPTIONS = {
     rs.option.gain: (0, 4096, 1, 64),
     rs.option.white_balance: (2400, 6500, 10, 4600),
 }
+STEREO_OPTIONS = {rs.option.exposure: (1, 165_000, 1, 33_000), rs.option.gain: (16, 248, 1, 16)}
+"""As the library lists them for the stereo module of a D405: exposure in microseconds."""
 
 
 class SoftRealSense:
-    """A software device of the RealSense library, and a thread that injects frames. ``context`` lists it while it is plugged in."""
+    """A software device of the RealSense library, and a thread that injects frames. ``context`` lists it while it is plugged in.
 
-    def __init__(self, serial: str = "f1", *, usb: str = "3.2", form: Any = rs.format.rgb8) -> None:
+    `stereo`: a D405, whose colour comes from its stereo module.
+    """
+
+    def __init__(self, serial: str = "f1", *, usb: str = "3.2", form: Any = rs.format.rgb8, stereo: bool = False) -> None:
         self.device = rs.software_device()
         about = {
-            rs.camera_info.name: "Intel RealSense L515",
+            rs.camera_info.name: f"Intel RealSense {'D405' if stereo else 'L515'}",
             rs.camera_info.serial_number: serial,
             rs.camera_info.firmware_version: "1.5.8.1",
             rs.camera_info.recommended_firmware_version: "1.5.8.1",
@@ -51,11 +56,13 @@ class SoftRealSense:
         }
         for what, text in about.items():
             self.device.register_info(what, text)
-        self.sensor = self.device.add_sensor("RGB Camera")
-        for option, (low, high, step, default) in OPTIONS.items():
+        self.sensor = self.device.add_sensor("Stereo Module" if stereo else "RGB Camera")
+        for option, (low, high, step, default) in (OPTIONS | (STEREO_OPTIONS if stereo else {})).items():
             limits = rs.option_range()
             limits.min, limits.max, limits.step, limits.default = low, high, step, default
             self.sensor.add_option(option, limits, True)
+        if stereo:
+            self.sensor.add_video_stream(_stream(rs.format.z16, rs.stream.depth, uid=2))
         self._profile = self.sensor.add_video_stream(_stream(form)).as_video_stream_profile()
         self.plugged = True
         self.silent = False
@@ -95,9 +102,9 @@ class SoftRealSense:
                 self.number += 1
 
 
-def _stream(form: Any) -> Any:
+def _stream(form: Any, kind: Any = rs.stream.color, uid: int = 1) -> Any:
     stream = rs.video_stream()
-    stream.type, stream.index, stream.uid, stream.fmt = rs.stream.color, 0, 1, form
+    stream.type, stream.index, stream.uid, stream.fmt = kind, 0, uid, form
     stream.width, stream.height, stream.fps, stream.bpp = WIDTH, HEIGHT, 30, 3
     lens = rs.intrinsics()
     lens.width, lens.height, lens.ppx, lens.ppy, lens.fx, lens.fy = WIDTH, HEIGHT, WIDTH / 2, HEIGHT / 2, 150.0, 150.0

@@ -78,6 +78,14 @@ def test_the_sensor_is_set_up_as_configured() -> None:
     automatic.stop()
 
 
+def test_a_stereo_module_takes_its_exposure_in_microseconds() -> None:
+    soft = SoftRealSense(stereo=True)
+    sensor = RealSenseSensor(CONFIG.model_copy(update={"exposure_ms": 8.0}), soft.context)
+    sensor.start()
+    assert soft.sensor.get_option(rs.option.exposure) == 8000.0
+    sensor.stop()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
