@@ -143,8 +143,11 @@ def other_values(setting: Any, default: Any) -> list[Any]:
     if setting.choices:
         return [choice for choice in setting.choices if choice != default]
     if low is not None and high is not None:
-        middle = low + (high - low) * 0.37
-        return [round(middle) if setting.kind.value == "whole number" else middle]
+        tried = [low + (high - low) * 0.37]
+        if isinstance(default, int | float):
+            tried.append(default + (low - default) * 0.1)  # a ceiling with real servos is lower than what a twin may have
+        found = [round(value) if setting.kind.value == "whole number" else value for value in tried]
+        return [value for value in found if value != default]
     return ["ABCD", "other"]
 
 
@@ -238,6 +241,14 @@ def test_a_broken_file_that_may_not_be_moved_stays(tmp_path: Path) -> None:
     path.write_text("[perception\n", encoding="utf-8")
     assert "is no TOML" in read_settings(path, may_move=False).problems[0]
     assert [file.name for file in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_a_limit_of_an_older_file_that_is_too_loose_now_is_not_used_and_told(tmp_path: Path) -> None:
+    path = tmp_path / "settings.toml"
+    path.write_text("[safety]\nmin_confidence = 0.2\nhealthy_s = 2.0\n", encoding="utf-8")
+    file = read_settings(path)
+    assert (file.config.safety.min_confidence, file.config.safety.healthy_s) == (0.5, 2.0)
+    assert file.problems == (f"{path}: safety.min_confidence: Input should be greater than or equal to 0.5; the default is used",)
 
 
 def test_what_can_be_used_is_used_and_the_rest_is_told(tmp_path: Path) -> None:

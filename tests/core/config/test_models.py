@@ -1,6 +1,7 @@
 """The layers of the configuration, and how wrong files are reported."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import BaseModel, ValidationError
@@ -70,6 +71,22 @@ def test_a_bad_file_is_one_line_with_file_key_and_range(tmp_path: Path, text: st
 
 def test_the_twins_servos_may_be_more_patient(tmp_path: Path) -> None:
     assert load_config(_write(tmp_path, "[servos]\nheartbeat_timeout_s = 3.0\n")).servos.heartbeat_timeout_s == 3.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"max_current_ma": 5000.0}, "max_current_ma must be 1500 at most with real servos"),
+        ({"tracking_error_mm": 50.0}, "tracking_error_mm must be 3 at most with real servos"),
+        ({"joints": {"right": 50.0}}, "joint right: max_step_mm must be 1 at most with real servos"),
+        ({"joints": {"advance": 2.1}}, "joint advance: max_step_mm must be 2 at most with real servos"),
+        ({"joints": {"right": 1.0, "advance": 2.0}, "tracking_error_mm": 3.0}, ""),
+    ],
+)
+def test_what_a_joint_may_do_has_a_ceiling_with_real_servos(changes: dict[str, Any], words: str) -> None:
+    steps = changes.get("joints", {})
+    joints = [joint.model_copy(update={"max_step_mm": steps.get(joint.name, joint.max_step_mm)}) for joint in ServosConfig().joints]
+    assert ServosConfig.model_validate({**changes, "joints": joints}).too_loose == words
 
 
 def test_missing_file_and_unknown_preset_are_named(tmp_path: Path) -> None:
@@ -156,6 +173,8 @@ def test_the_thresholds_are_those_of_the_rules() -> None:
         {"tracking_time_s": 0.3},
         {"bus_errors": 6},
         {"missed_answers": 4},
+        {"min_confidence": 0.49},
+        {"max_drift_px": 11.0},
     ],
 )
 def test_the_rules_numbers_may_be_tightened_never_loosened(changes: dict[str, float]) -> None:

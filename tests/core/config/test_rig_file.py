@@ -68,6 +68,17 @@ def test_a_rig_with_real_servos_keeps_to_the_safety_rules() -> None:
         read_rig(path)
 
 
+def test_a_real_rigs_steps_have_a_ceiling_that_a_twins_have_not() -> None:
+    path = write_rig(make_rig(REAL, "bench 1", KNOWN))
+    path.write_text(path.read_text().replace("max_step_mm = 0.6", "max_step_mm = 50.0", 1))
+    with pytest.raises(RigFileError, match=r"servos: joint right: max_step_mm must be 1 at most with real servos") as told:
+        read_rig(path)
+    assert "\n" not in str(told.value)
+    twin = write_rig(make_rig(Config(), "soft", KNOWN))
+    twin.write_text(twin.read_text().replace("max_step_mm = 0.6", "max_step_mm = 50.0", 1))
+    assert read_rig(twin).servos.joints[0].max_step_mm == 50.0
+
+
 def test_a_copy_of_a_rig_file_does_not_take_its_place() -> None:
     path = write_rig(make_rig(REAL, "bench", KNOWN))
     (path.parent / "a backup of bench.toml").write_text(path.read_text())
