@@ -6,7 +6,6 @@ stand. So its bounds are enforced where all bounds are, in a process of its own 
 
 from __future__ import annotations
 
-import logging
 import re
 import threading
 import time
@@ -16,9 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
-from core.control.faults import Cause
 from core.messages import message
-from core.system import SLEPT_S, slept_s
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
 from hardware.servos.dynamixel_port import NoAnswer, ServoError
@@ -27,8 +24,6 @@ from hardware.servos.servo_robot import ServoRobot
 
 MAX_CURRENT_MA = 300.0
 """Of an XM430 about 80 N at a drum of 40 mm a turn: less than a jam, more than friction."""
-_log = logging.getLogger(__name__)
-
 _UNDER_TEST: JointName = "advance"
 _PLACE = JOINT_NAMES.index(_UNDER_TEST)
 _PERIOD_S = 0.02
@@ -37,8 +32,8 @@ _EXTRA_S = 3.0
 _SILENCE_S = 1.0
 _GAIN_PER_S = 10.0
 _MARGIN_MM = 0.3
-_LINE_FAULTS = frozenset({Cause.SERVO_SILENT, Cause.BUS_NOISE, Cause.WATCHDOG, Cause.HEARTBEAT_LOST})
 _TRIES, _RETRY_PAUSE_S = 3, 0.5
+"""How often a line without an answer is opened before anything is armed, and the pause between."""
 _CALM_HZ, _CALM_WATCHDOG_S, _CALM_HEARTBEAT_S = 20.0, 0.4, 1.5
 _STRAINED_CYCLES = 4
 """Starting a motor takes more current than moving it: strain lasts."""
@@ -173,7 +168,9 @@ def patient(servos: ServosConfig) -> ServosConfig:
 
 @contextmanager
 def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
-    """Connect, zero where the servos stand, arm; in the end hold and close. A servo without an answer is tried again.
+    """Connect, zero where the servos stand, arm; in the end hold and close.
+
+    A line without an answer is opened again; once it was armed, nothing is.
 
     Raises ServoError when port or servos are not in order, or STOP came.
     """
@@ -182,8 +179,6 @@ def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
             try:
                 robot.connect()
                 robot.zero()
-                stop.check()
-                robot.arm()
                 break
             except NoAnswer:
                 robot.close()
@@ -194,6 +189,8 @@ def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
                 robot.close()
                 raise
         try:
+            stop.check()
+            robot.arm()
             yield
         finally:
             robot.close()
@@ -207,40 +204,13 @@ def _by_id(text: str, config: ServosConfig) -> str:
     return text
 
 
-class LineFaultRetry:
-    """Arms again when the bus process has ended a motion for a fault of the line.
-
-    The operator who started the procedure has asked for all its motions, one after the other. A line that was silent or a machine
-    that was busy for a moment is tried again, three times at most, after a full check; STOP, a jam, a strain or a hardware error
-    never is, and nothing after the computer has slept, which is a moment to all clocks but one.
-    """
-
-    def __init__(self, robot: ServoRobot, stop: StopSwitch, title: str) -> None:
-        self._robot, self._stop, self._title = robot, stop, title
-        self._count = 0
-        self._slept_s = slept_s()
-
-    def ensure_armed(self, status: BusStatus) -> None:
-        """Return when the servos are armed, again or still; raise ServoError when they must not be."""
-        fault = status.latched
-        if fault is None and not status.armed:
-            raise ProbeFailed(f"{self._title}: the servos are no longer armed, try again")
-        if fault is None:
-            return
-        self._count += 1
-        if slept_s() - self._slept_s > SLEPT_S:
-            raise ProbeFailed(f"{self._title} was stopped, as the computer slept: look at the robot, then try again")
-        if fault.cause not in _LINE_FAULTS or self._count > _TRIES:
-            why = f"{fault.cause}: {fault.detail}".rstrip(": ")
-            raise ProbeFailed(f"{self._title} was stopped ({why}): find the cause, then try again")
-        _log.warning("%s: %s, trying again", self._title, fault.cause)
-        self._stop.sleep(_RETRY_PAUSE_S)
-        self._robot.status()  # a sign of life: only then is the line looked at
-        self._stop.sleep(_RETRY_PAUSE_S)
-        self._robot.acknowledge()
-        self._stop.check()
-        self._robot.arm()
-        self._stop.sleep(_PERIOD_S)
+def check_armed(status: BusStatus, title: str) -> None:
+    """Raise ProbeFailed when the bus process has ended the motion of `title`: only the operator begins another one."""
+    if (fault := status.latched) is not None:
+        why = f"{fault.cause}: {fault.detail}".rstrip(": ")
+        raise ProbeFailed(f"{title} was stopped ({why}): find the cause, then try again")
+    if not status.armed:
+        raise ProbeFailed(f"{title}: the servos are no longer armed, try again")
 
 
 class ServoProbe:
@@ -250,7 +220,6 @@ class ServoProbe:
         self._robot, self.servo_id, self._limits, self._stop = robot, servo_id, limits, stop
         self._strained = 0
         self._strain_seen_s = 0.0
-        self._retry = LineFaultRetry(robot, stop, f"servo {servo_id}")
         self._last: ServoState | None = None
 
     @classmethod
@@ -312,7 +281,7 @@ class ServoProbe:
             raise ProbeFailed(failure)
         if status is None or time.monotonic() - status.time_s > _SILENCE_S:
             raise ProbeFailed("the servo bus is silent: check port and supply")
-        self._retry.ensure_armed(status)
+        check_armed(status, f"servo {self.servo_id}")
         state = self._newest(status)
         self._watch_current(state)
         return state
@@ -359,7 +328,6 @@ class SteeredRobot:
         self._robot, self._joints, self._stop, self._max_current_ma = robot, joints, stop, max_current_ma
         self._strained = 0
         self._cycle = -1
-        self._retry = LineFaultRetry(robot, stop, "the robot")
         self._command = Command()
 
     @classmethod
@@ -390,7 +358,7 @@ class SteeredRobot:
         if (failure := self._robot.failure) is not None:
             raise ProbeFailed(failure)
         if status is not None:
-            self._retry.ensure_armed(status)
+            check_armed(status, "the robot")
         if status is not None and status.cycle != self._cycle:
             self._cycle = status.cycle
             self._watch_current([reading for reading in status.servos if isinstance(reading, ServoState)])

@@ -22,6 +22,7 @@ from hardware.calibration.servo_probe import (
 from hardware.servos.discovery import find_ports, find_servos
 from hardware.servos.dynamixel_port import NoAnswer, NotReady, PortError, ServoError
 from hardware.twin.servos.bus import SoftServoBus
+from hardware.twin.servos.protocol import Instruction, InstructionPacket
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_behind")]
 
@@ -115,28 +116,27 @@ def test_a_missing_servo_is_named(servos: SoftServoBus) -> None:
         raise AssertionError("not armed")
 
 
-def test_a_line_that_hiccups_is_tried_again(servos: SoftServoBus) -> None:
-    with ServoProbe.opened(_config(servos), SAFETY, LIMITS, StopSwitch()) as probe:
-        probe.move_to(1.0)
-        servos.faults.mute(4)
-        threading.Timer(0.4, lambda: servos.faults.mute(4, False)).start()
-        probe.move_to(-1.0)
-        assert probe.position_mm == pytest.approx(-1.0, abs=0.05)
-
-
-def test_nothing_moves_again_by_itself_after_the_computer_has_slept(servos: SoftServoBus, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All that is seen of a sleep is a watchdog that tripped, and that passed for a busy moment."""
-    slept = [0.0]
-    monkeypatch.setattr("hardware.calibration.servo_probe.slept_s", lambda: slept[0])
+@pytest.mark.parametrize("seconds", [0.4, 30.0])
+def test_a_line_that_is_silent_for_a_moment_ends_the_motion_and_nothing_is_armed_again(
+    servos: SoftServoBus, seconds: float
+) -> None:
     with (
-        pytest.raises(ProbeFailed, match="as the computer slept: look at the robot, then try again"),
+        pytest.raises(ProbeFailed, match=r"servo 3 was stopped .*: find the cause, then try again"),
         ServoProbe.opened(_config(servos), SAFETY, LIMITS, StopSwitch()) as probe,
     ):
-        slept[0] = 60.0
+        probe.move_to(1.0)
+        armed = len(_torque_writes(servos))
+        assert armed == 7
         servos.faults.mute(4)
         threading.Timer(0.4, lambda: servos.faults.mute(4, False)).start()
         probe.move_to(-1.0)
     assert servos.positions_mm()[2] > -0.9
+    assert len(_torque_writes(servos)) == armed
+
+
+def _torque_writes(servos: SoftServoBus) -> list[InstructionPacket]:
+    """The packets that switch a servo's torque (register 64) on."""
+    return [p for p in servos.log if p.instruction == Instruction.WRITE and p.parameters[:3] == b"\x40\x00\x01"]
 
 
 # ---- who is there
