@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import heapq
 import logging
+import math
 import os
 import random
 import select
@@ -18,9 +19,17 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from core.config.safety import ServosConfig
-from hardware.twin.servos.device import SoftServo, StatusReply
-from hardware.twin.servos.protocol import BROADCAST, Instruction, InstructionPacket, PacketParser, group_items, status_packet
+from core.config.safety import JointConfig, ServosConfig
+from hardware.twin.servos.device import REBOOT_S, ElasticWire, SoftServo, StatusReply
+from hardware.twin.servos.protocol import (
+    BROADCAST,
+    MAX_ID,
+    Instruction,
+    InstructionPacket,
+    PacketParser,
+    group_items,
+    status_packet,
+)
 
 
 class LineFaults:
@@ -100,10 +109,16 @@ class SoftServoBus:
     ----------
     clock : seconds for motion, heat and the servos' watchdogs; the line itself runs in real time.
     wire_time : delay answers by their duration at the speed of the port.
+    latency_s : the first answer to every packet comes so much later: the USB adapter, 1 to 4 ms with a latency timer of 1 ms, up to
+        16 ms as it comes. The attribute of this name may be set at any time.
     positions : ticks of each horn at the start; None draws them within one turn, from `seed`.
 
     Notes
     -----
+    To a test: ``modify_servo`` reaches one servo (see ``SoftServo``), ``faults`` spoils answers, ``brown_out`` dips the supply of
+    all, ``write_by_other`` writes as another program on the same line would, ``attach_wire`` loads a joint with an elastic wire,
+    and ``wire_n`` and ``motor_n`` tell the forces.
+
     Packets without stuffing, or with a wrong CRC, speed or length are ignored. As in the vendor's protocol the answers to a group
     read follow one another, so a silent servo also silences those behind it.
     """
@@ -114,12 +129,15 @@ class SoftServoBus:
         *,
         clock: Callable[[], float] = time.monotonic,
         wire_time: bool = False,
+        latency_s: float = 0.0,
         positions: Sequence[int] | None = None,
         seed: int = 0,
     ) -> None:
         self._joints = config.joints
         self._clock = clock
         self._wire_time = wire_time
+        self.latency_s = latency_s
+        self._baud = config.baud
         draw = random.Random(seed)
         start = positions if positions is not None else [draw.randrange(4096) for _ in self._joints]
         code = next((code for code, baud in BAUD_OF_CODE.items() if baud == config.baud), 3)
@@ -181,8 +199,44 @@ class SoftServoBus:
         """Set the force at each joint against its positive direction, in mN, which the servos' currents show."""
         with self._lock:
             for joint, force_mn in zip(self._joints, forces_mn, strict=True):
-                radius_m = joint.mm_per_turn / 6.283185307179586 / 1000.0
-                self._servos[joint.id].motor.load_mnm = joint.sign * force_mn * radius_m
+                self._servos[joint.id].motor.load_mnm = joint.sign * force_mn * _radius_mm(joint) / 1000.0
+
+    def attach_wire(self, servo_id: int, n_per_mm: float, slack_mm: float = 0.0) -> None:
+        """Load a joint with an elastic wire of `n_per_mm`, taut from `slack_mm` on (mm as of ``positions_mm``)."""
+        joint = self._joint(servo_id)
+        slack = self._mounted[servo_id] + slack_mm * joint.ticks_per_mm
+        wire = ElasticWire(n_per_mm * _radius_mm(joint) / abs(joint.ticks_per_mm), slack, joint.sign)
+        self.modify_servo(servo_id, lambda servo: setattr(servo.motor, "wire", wire))
+
+    def wire_n(self, servo_id: int) -> float:
+        """Tension (N) of a joint's elastic wire; 0 without one."""
+        with self._lock:
+            self._advance()
+            motor = self._servos[servo_id].motor
+            return abs(motor.wire.torque_mnm(motor.position)) / _radius_mm(self._joint(servo_id)) if motor.wire is not None else 0.0
+
+    def motor_n(self, servo_id: int) -> float:
+        """Force (N) of a joint's motor at its drum, in the joint's positive direction, friction of the gear included."""
+        with self._lock:
+            self._advance()
+            joint = self._joint(servo_id)
+            return joint.sign * self._servos[servo_id].torque_mnm / _radius_mm(joint)
+
+    def _joint(self, servo_id: int) -> JointConfig:
+        return next(joint for joint in self._joints if joint.id == servo_id)
+
+    def brown_out(self, for_s: float = REBOOT_S) -> None:
+        """The supply dips: all servos restart, and are silent for `for_s`."""
+        with self._lock:
+            self._advance()
+            for servo in self._servos.values():
+                servo.brown_out(for_s)
+
+    def write_by_other(self, address: int, data: bytes, servo_id: int = BROADCAST) -> None:
+        """Another program on the same line writes registers: ``write_by_other(64, bytes(1))`` switches all torque off."""
+        with self._lock:
+            packet = InstructionPacket(servo_id, Instruction.WRITE, address.to_bytes(2, "little") + data)
+            self._execute(packet, self._baud, time.monotonic())
 
     def start(self) -> None:
         """Open the pseudo-terminal and answer on it."""
@@ -300,6 +354,7 @@ class SoftServoBus:
             self._parser.rejected += 1
             return
         self.log.append(packet)
+        now_s += self.latency_s
         for servo in awake.values():
             servo.feed_watchdog()
         if packet.instruction == Instruction.SYNC_WRITE:
@@ -307,6 +362,7 @@ class SoftServoBus:
             for servo_id, data in items:
                 if servo_id in awake:
                     awake[servo_id].answer(Instruction.WRITE, address, data=data)
+                _obey_second_ids(awake, servo_id, address, data)
         elif packet.instruction == Instruction.SYNC_READ:
             self._group_read(packet.parameters, awake, baud, now_s)
         else:
@@ -314,6 +370,9 @@ class SoftServoBus:
 
     def _single(self, packet: InstructionPacket, awake: dict[int, SoftServo], baud: int | None, now_s: float) -> None:
         to_all = packet.id == BROADCAST
+        if packet.instruction == Instruction.WRITE:
+            address = int.from_bytes(packet.parameters[:2], "little")
+            _obey_second_ids(awake, packet.id, address, packet.parameters[2:])
         for servo in sorted(awake.values(), key=lambda servo: servo.id):
             if to_all or servo.id == packet.id:
                 answer = _answer(servo, packet)
@@ -347,6 +406,18 @@ class SoftServoBus:
             data = heapq.heappop(self._due)[2]
             with contextlib.suppress(BlockingIOError):  # no reader: the buffer is full, and the bytes are lost
                 os.write(self._pty[0], data)
+
+
+def _radius_mm(joint: JointConfig) -> float:
+    """Of the joint's drum; a torque in mN m over it is a force in N."""
+    return joint.mm_per_turn / (2.0 * math.pi)
+
+
+def _obey_second_ids(awake: dict[int, SoftServo], servo_id: int, address: int, data: bytes) -> None:
+    """Servos with this Secondary ID(12) obey, too; one whose own id it is has obeyed already."""
+    for servo in awake.values():
+        if servo.table["secondary_id"] == servo_id and servo.id != servo_id and servo_id <= MAX_ID:
+            servo.obey(address, data)
 
 
 def _answer(servo: SoftServo, packet: InstructionPacket) -> StatusReply:

@@ -1,6 +1,7 @@
-"""A software servo: answers, motion by its registers, protection, and its motor with current and heat.
+"""A software servo: answers, motion and force by its registers, protection, and its motor with current and heat.
 
-Figures are those of an XM430-W350 at 12 V, from its data sheet where it has them (speed, stall current, torque).
+Figures are those of an XM430-W350 at 12 V, from its data sheet and performance graph where they have them (speed, stall current,
+torque, friction), and what a register does is that of the Robotis e-Manual.
 """
 
 from __future__ import annotations
@@ -8,45 +9,103 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from hardware.twin.servos.protocol import ALERT, EXTENDED_POSITION, WATCHDOG_TRIPPED, ControlTable, ErrorCode, Instruction
+from hardware.twin.servos.protocol import (
+    ALERT,
+    BACKED_UP,
+    CURRENT_POSITION,
+    EEPROM,
+    POSITION,
+    POSITION_MODES,
+    RAM_START,
+    STARTUP_SINCE,
+    WATCHDOG_TRIPPED,
+    ControlTable,
+    ErrorCode,
+    Instruction,
+)
 
 TICKS_PER_TURN = 4096
 MAX_TICKS_S = 46.0 / 60.0 * TICKS_PER_TURN
 """No-load speed."""
 STALL_MA = 2300.0
-_TORQUE_NM_PER_A = 1.78
+TORQUE_NM_PER_A = 1.78
+"""Stall torque over stall current; the slope of the performance graph is 1.79."""
+GEAR_FRICTION_MNM = 233.0
+"""Torque below which the gear holds without current: where the line of the performance graph (0.84 A at 0.60 N m, 2.45 A at 1.50)
+ends at no current. It is friction of motion, taken for that of standing still too."""
 _STAND_MA, _FRICTION_MA = 8.0, 40.0
-_STIFFNESS_MA_PER_TICK = 12.0
+_FULL_PWM = 885
+"""Goal PWM(100) at the whole supply voltage."""
+_NOMINAL_V = 12.0
+_P_GAIN_UNIT = 128.0
+"""Position P Gain(84) over this: units of PWM (modes 3 and 4) or of current (mode 5) per tick of position error."""
+_GAIN_MA = 800 / _P_GAIN_UNIT / _FULL_PWM * STALL_MA
+"""Current of a blocked horn per tick of position error, as the servo comes: 16.2 mA."""
 _OVERLOAD_SHARE, _OVERLOAD_S = 0.8, 1.0
 _HEAT_C, _HEAT_TIME_S = 400.0, 180.0
 """Final rise of temperature at stall, and the time constant."""
+_STANDS_TICKS = 1e-6
+"""A horn that could move by less than this stands."""
 _STEP_S = 0.002
 _MAX_STEPS = 5000
 
 
 @dataclass(slots=True)
 class MotorGoal:
-    """The motion that the registers ask for, in ticks, ticks/s, ticks/s^2; ``acceleration`` 0: unlimited."""
+    """The motion that the registers ask for, in ticks, ticks/s, ticks/s^2; ``acceleration`` 0: unlimited.
+
+    Attributes
+    ----------
+    limit_ma : the current never exceeds it, whatever blocks the horn.
+    duty : share of the nominal voltage that the motor may get; it limits the speed.
+    gain_ma : current per tick by which a horn that cannot follow is behind.
+    """
 
     torque: bool = False
     goal: int = 0
     speed: float = MAX_TICKS_S
     acceleration: float = 0.0
+    limit_ma: float = STALL_MA
+    duty: float = 1.0
+    gain_ma: float = _GAIN_MA
+
+
+@dataclass(frozen=True, slots=True)
+class ElasticWire:
+    """A wire on the horn's drum that is taut beyond ``slack_ticks`` in the direction of ``sign``; torque in mN m per tick."""
+
+    mnm_per_tick: float
+    slack_ticks: float
+    sign: int = 1
+
+    def torque_mnm(self, position: float) -> float:
+        """Torque against the positive direction."""
+        return self.sign * self.mnm_per_tick * max(0.0, self.sign * (position - self.slack_ticks))
 
 
 class ServoMotor:
     """The motor; its position in ticks is independent of what the servo counts.
 
-    ``trajectory`` is the position of the profile, ``position`` that of the horn, which differs only when the horn is frozen.
-    ``grinds_ma`` is additional current as of a damaged gear. ``carried_ticks_s`` is a speed forced from outside.
+    ``trajectory`` and ``velocity`` are those of the profile, ``position`` and ``horn_ticks_s`` those of the horn. A horn that can
+    follow does so exactly (the lag of some ticks that a P controller leaves is left out); one that is frozen, or whose load needs
+    more current than the limit, stays behind, and draws the current of its position error up to the limit.
+
+    Attributes
+    ----------
+    load_mnm, wire : torque against the positive direction: constant, and of an elastic wire.
+    gear_mnm : a load above this torque, beyond what the motor gives, turns the horn back.
+    grinds_ma : additional current as of a damaged gear.
+    carried_ticks_s : a speed forced from outside.
     """
 
     def __init__(self, position: float, ambient_c: float = 25.0) -> None:
         self.position = self.trajectory = position
-        self.velocity = 0.0
+        self.velocity = self.horn_ticks_s = 0.0
         self.ambient_c = ambient_c
         self.temperature_c = ambient_c
         self.load_mnm = 0.0
+        self.wire: ElasticWire | None = None
+        self.gear_mnm = GEAR_FRICTION_MNM
         self.grinds_ma = self.carried_ticks_s = 0.0
         self.frozen = False
         self._overloaded_s = 0.0
@@ -58,17 +117,68 @@ class ServoMotor:
         self._overloaded_s = self._overloaded_s + duration_s if strained else 0.0
         if self.carried_ticks_s:
             self.position += self.carried_ticks_s * duration_s
-        if not drive.torque or self.carried_ticks_s:
-            self.velocity, self.trajectory = 0.0, self.position
+            self.stop()
+            self.horn_ticks_s = self.carried_ticks_s
             return
+        if not drive.torque:
+            self.stop()
         steps = min(_MAX_STEPS, math.ceil(duration_s / _STEP_S - 1e-9))
         part_s = min(duration_s, _MAX_STEPS * _STEP_S) / max(1, steps)
+        free = drive.torque and self._is_free(drive)
         for _ in range(steps):
-            if self.trajectory == drive.goal and self.velocity == 0.0:
+            before = self.position
+            at_goal = not drive.torque or (self.trajectory == drive.goal and self.velocity == 0.0)
+            if not at_goal:
+                self._move(drive, part_s)
+            if not free:
+                self._follow(drive, part_s)
+            if at_goal and self.position == before:
                 break
-            self._move(drive, part_s)
-        if not self.frozen:
-            self.position = self.trajectory
+        if free:
+            self.position, self.horn_ticks_s = self.trajectory, self.velocity
+        if not drive.torque:
+            self.trajectory = self.position
+
+    def _is_free(self, drive: MotorGoal) -> bool:
+        """Whether nothing can keep the horn from its trajectory."""
+        load_ma = abs(self._load_ma())
+        return (
+            not self.frozen
+            and self.wire is None
+            and self.position == self.trajectory
+            and load_ma + _FRICTION_MA + abs(self.grinds_ma) <= drive.limit_ma
+            and min(drive.speed, MAX_TICKS_S) <= MAX_TICKS_S * (drive.duty - load_ma / STALL_MA)
+        )
+
+    def _load_ma(self) -> float:
+        """Current that the load takes, signed."""
+        wire_mnm = self.wire.torque_mnm(self.position) if self.wire is not None else 0.0
+        return (self.load_mnm + wire_mnm) / TORQUE_NM_PER_A
+
+    def _follow(self, drive: MotorGoal, part_s: float) -> None:
+        """One step of the horn towards the trajectory as far as the current allows it, or back as far as the load turns it."""
+        self.horn_ticks_s = 0.0
+        if self.frozen:
+            return
+        lag, load_ma = self.trajectory - self.position, self._load_ma()
+        way = math.copysign(1.0, lag)
+        limit_ma = drive.limit_ma if drive.torque else 0.0
+        spare_ma = limit_ma - _FRICTION_MA - abs(self.grinds_ma) - way * load_ma
+        if lag and spare_ma >= 0.0:
+            fastest = MAX_TICKS_S * max(0.0, drive.duty - max(0.0, way * load_ma) / STALL_MA)
+            move = min(abs(lag), fastest * part_s)
+            if self.wire is not None and self.wire.sign == way:
+                slack = max(0.0, way * (self.wire.slack_ticks - self.position))
+                move = min(move, slack + spare_ma * TORQUE_NM_PER_A / self.wire.mnm_per_tick)
+            if move > _STANDS_TICKS:
+                self.position += way * move
+                self.horn_ticks_s = way * move / part_s
+            return
+        excess_ma = load_ma - max(-limit_ma, min(limit_ma, drive.gain_ma * lag))
+        beyond_ma = abs(excess_ma) - self.gear_mnm / TORQUE_NM_PER_A
+        if beyond_ma > 0.0:
+            self.horn_ticks_s = -math.copysign(min(1.0, beyond_ma / STALL_MA) * MAX_TICKS_S, excess_ma)
+            self.position += self.horn_ticks_s * part_s
 
     def _move(self, drive: MotorGoal, part_s: float) -> None:
         """One step along the profile, at the highest speed from which it can still brake in time."""
@@ -90,17 +200,20 @@ class ServoMotor:
 
     def stop(self) -> None:
         """Stop where the horn is, as at a tripped watchdog."""
-        self.trajectory, self.velocity = self.position, 0.0
+        self.trajectory, self.velocity, self.horn_ticks_s = self.position, 0.0, 0.0
 
     def current_ma(self, drive: MotorGoal) -> float:
-        """Motor current by load, friction, and the lag behind the trajectory."""
+        """Motor current by load, friction, and the position error of a horn that does not come nearer; at most the limit."""
         if not drive.torque:
             return 0.0
         lag = self.trajectory - self.position
-        friction = math.copysign(_FRICTION_MA, self.velocity) if self.velocity else _STAND_MA
+        if lag * self.horn_ticks_s > 0.0:
+            lag = 0.0  # its speed, not its load, keeps it behind
+        moves = self.horn_ticks_s or self.velocity
+        friction = math.copysign(_FRICTION_MA, moves) if moves else _STAND_MA
         grinding = math.copysign(self.grinds_ma, friction)
-        current = self.load_mnm / _TORQUE_NM_PER_A + friction + grinding + _STIFFNESS_MA_PER_TICK * lag
-        return max(-STALL_MA, min(STALL_MA, current))
+        current = self._load_ma() + friction + grinding + drive.gain_ma * lag
+        return max(-drive.limit_ma, min(drive.limit_ma, current))
 
     @property
     def is_overloaded(self) -> bool:
@@ -118,6 +231,13 @@ _ACCELERATION_TICKS_S2 = 214.577 / 3600.0 * TICKS_PER_TURN
 _CURRENT_MA = 2.69
 _WATCHDOG_S = _RIPPLE_S = 0.02
 REBOOT_S = 0.3
+_TORQUE_AT_START, _RAM_RESTORE = 1, 2
+"""Bits of Startup Configuration(60)."""
+_STORE, _RESTORE = b"\x01CTRL", b"\x02CTRL"
+"""Parameters of the instruction Control Table Backup."""
+_OUTPUT_LIMITS = (("goal_pwm", "pwm_limit"), ("goal_current", "current_limit"))
+_GAINS = ("velocity_i_gain", "velocity_p_gain", "position_d_gain", "position_i_gain", "position_p_gain", "feedforward_2nd",
+          "feedforward_1st")  # fmt: skip
 VOLTAGE_BIT, HEAT_BIT, OVERLOAD_BIT = 1, 4, 32
 
 
@@ -132,7 +252,19 @@ class StatusReply:
 class SoftServo:
     """A servo of the X series with its horn at `position` ticks.
 
-    Time advances by ``advance``; the bus watchdog counts from the last ``feed_watchdog``.
+    Time advances by ``advance``; the bus watchdog counts from the last ``feed_watchdog``. What a test may do to it:
+
+    - ``table[name]`` sets any register, as its EEPROM may have come from another program (``"startup"``, ``"shutdown"``,
+      ``"secondary_id"``, ``"firmware"``, ``"temperature_limit"``, ``"current_limit"`` ...). ``backup`` stores the backup that bit 1
+      of ``startup`` restores.
+    - ``restart``, ``brown_out``: RAM and turns are lost. ``alert``, ``heat``, ``supply_v``.
+    - ``freeze`` blocks the horn; ``motor.load_mnm`` and ``motor.wire`` load it; ``motor.gear_mnm`` is what the gear holds without
+      current; ``grind``, ``carry``, ``turn``.
+    - ``current_ma`` and ``torque_mnm`` tell what the motor gives at the moment, ``mechanical_ticks`` where the horn really is.
+
+    Modes 3, 4 and 5 move; the others (0, 1, 16) hold still. Forces: in modes 3 and 4 Goal PWM(100) alone limits the current, in
+    mode 5 also Goal Current(102); Current Limit(38) and PWM Limit(36) limit what those registers take, and their values after a
+    restart or a change of the mode.
     """
 
     def __init__(self, servo_id: int, model: int, position: int, baud_code: int = 3) -> None:
@@ -142,18 +274,29 @@ class SoftServo:
         self.table["model_number"] = model
         self.table["baud_rate"] = baud_code
         self.motor = ServoMotor(float(position))
-        self.supply_v = 12.0
+        self.supply_v = _NOMINAL_V
         self._grinds_ma, self._ripples = 0.0, False
         self._lost_turns = 0
         self._heard_s = 0.0
-        self._now_s = 0.0
+        self._now_s = self._started_s = 0.0
         self._silent_until_s: float | None = None
+        self._backup: dict[str, int] | None = None
         self.restart(silent_s=0.0)
 
     @property
     def mechanical_ticks(self) -> float:
         """True position of the horn, independent of what the servo counts."""
         return self.motor.position
+
+    @property
+    def current_ma(self) -> float:
+        """Motor current, signed; what register 126 rounds."""
+        return self.motor.current_ma(self._drive())
+
+    @property
+    def torque_mnm(self) -> float:
+        """Torque of the motor at the horn, signed, its friction included; 0 without torque."""
+        return self.current_ma * TORQUE_NM_PER_A
 
     @property
     def is_booting(self) -> bool:
@@ -176,14 +319,41 @@ class SoftServo:
         self._heard_s = self._now_s
 
     def restart(self, silent_s: float = REBOOT_S) -> None:
-        """Power-up: reset RAM and turn count, and do not answer for a while."""
-        self.table.reset_ram()
+        """Power-up: reset RAM and turn count, and do not answer for a while.
+
+        Startup Configuration(60) may bring parts of the RAM back from the backup (the indirect addresses among them), and switch
+        the torque on.
+        """
+        table = self.table
+        table.reset_ram()
+        for goal, limit in _OUTPUT_LIMITS:
+            table[goal] = table[limit]
+        startup = table["startup"] if table["firmware"] >= STARTUP_SINCE else 0
+        table["backup_ready"] = int(self._backup is not None)
+        if startup & _RAM_RESTORE and self._backup is not None:
+            for name in BACKED_UP:
+                table[name] = self._backup[name]
         self.motor.stop()
         self.motor.step(MotorGoal(), 0.0)
-        self._lost_turns = int(self.motor.position // TICKS_PER_TURN)
-        self.table["goal_position"] = self._count(self.motor.position)
+        self._forget_turns()
+        table["goal_position"] = self._count(self.motor.position)
+        table["torque"] = startup & _TORQUE_AT_START
+        self._started_s = self._now_s
         self._silent_until_s = self._now_s + silent_s if silent_s > 0.0 else None
         self._refresh()
+
+    def brown_out(self, for_s: float = REBOOT_S) -> None:
+        """The supply dips so far that the servo restarts; it is silent for `for_s`, and answers at its old voltage."""
+        self.restart(for_s)
+
+    def backup(self) -> None:
+        """Store the backup: the EEPROM, gains, profile and indirect addresses (instruction Control Table Backup)."""
+        self._backup = {name: self.table[name] for name in (*EEPROM, *BACKED_UP)}
+        self.table["backup_ready"] = 1
+
+    def _forget_turns(self) -> None:
+        """Count from within one turn from now on."""
+        self._lost_turns = int(self.motor.position // TICKS_PER_TURN)
 
     def answer(self, instruction: int, address: int = 0, length: int = 0, data: bytes = b"") -> StatusReply:
         """Execute an instruction."""
@@ -198,7 +368,30 @@ class SoftServo:
             reply = self._reply(ErrorCode.NONE)
             self.restart()
             return reply
+        if instruction == Instruction.BACKUP:
+            return self._store(address.to_bytes(2, "little") + data)
         return self._reply(ErrorCode.INSTRUCTION)
+
+    def _store(self, parameters: bytes) -> StatusReply:
+        """Store or restore the backup, which needs the torque off; a restored EEPROM restarts the servo."""
+        if self.table["firmware"] < STARTUP_SINCE:
+            return self._reply(ErrorCode.INSTRUCTION)
+        restored = self._backup if parameters == _RESTORE else None
+        if self.table["torque"] or (parameters != _STORE and restored is None):
+            return self._reply(ErrorCode.RESULT_FAIL)
+        reply = self._reply(ErrorCode.NONE)
+        if restored is None:
+            self.backup()
+        else:
+            for name in EEPROM:
+                self.table[name] = restored[name]
+            self.restart()
+        return reply
+
+    def obey(self, address: int, data: bytes) -> None:
+        """A write to its Secondary ID(12): the RAM obeys, and there is no answer."""
+        if address >= RAM_START:
+            self._write(address, data)
 
     def answers_to(self, instruction: int) -> bool:
         """Whether its status return level lets it answer."""
@@ -209,33 +402,52 @@ class SoftServo:
         return StatusReply(error | (ALERT if self.table["hardware_error"] else 0), data)
 
     def _write(self, address: int, data: bytes) -> ErrorCode:
-        torque = self.table["torque"]
+        torque, mode = self.table["torque"], self.table["operating_mode"]
         if address == 64 and data == b"\1" and self._has_shut_down():
             return ErrorCode.RESULT_FAIL  # only a restart clears a hardware error
         error, written = self.table.write(address, data)
         if error:
             return error
         if "torque" in written and self.table["torque"] and not torque:
+            if mode == POSITION:
+                self._forget_turns()
             self.motor.stop()  # it then moves to whatever the goal register has
         if "watchdog" in written:
             self.feed_watchdog()
-        if "operating_mode" in written and self.table["operating_mode"] != EXTENDED_POSITION:
-            self._lost_turns = int(self.motor.position // TICKS_PER_TURN)  # that mode knows one turn only
+        if self.table["operating_mode"] != mode:
+            self._change_mode()
+        for goal, limit in _OUTPUT_LIMITS:
+            if limit in written:
+                self.table[goal] = max(-self.table[limit], min(self.table[limit], self.table[goal]))
         self._refresh()
         return ErrorCode.NONE
+
+    def _change_mode(self) -> None:
+        """What a new Operating Mode(11) resets: turns, profile, gains, and the limits of PWM and current."""
+        self._forget_turns()
+        for name in ("profile_velocity", "profile_acceleration", *_GAINS):
+            self.table.reset(name)
+        for goal, limit in _OUTPUT_LIMITS:
+            self.table[goal] = self.table[limit]
 
     def _count(self, mechanical: float) -> int:
         return round(mechanical) - self._lost_turns * TICKS_PER_TURN
 
     def _drive(self) -> MotorGoal:
-        table = self.table
-        speed = table["profile_velocity"] or table["velocity_limit"]
-        halted = table["watchdog"] == WATCHDOG_TRIPPED or table["operating_mode"] != EXTENDED_POSITION
+        table, mode = self.table, self.table["operating_mode"]
+        halted = table["watchdog"] == WATCHDOG_TRIPPED or mode not in POSITION_MODES
+        volts = self.supply_v / _NOMINAL_V
+        duty = abs(table["goal_pwm"]) / _FULL_PWM * volts
+        gain = table["position_p_gain"] / _P_GAIN_UNIT
+        by_current = mode == CURRENT_POSITION
         return MotorGoal(
             torque=table["torque"] == 1,
             goal=round(self.motor.trajectory) if halted else table["goal_position"] + self._lost_turns * TICKS_PER_TURN,
-            speed=speed * _VELOCITY_TICKS_S,
+            speed=(table["profile_velocity"] or table["velocity_limit"]) * _VELOCITY_TICKS_S,
             acceleration=table["profile_acceleration"] * _ACCELERATION_TICKS_S2,
+            limit_ma=min(duty * STALL_MA, abs(table["goal_current"]) * _CURRENT_MA if by_current else math.inf),
+            duty=duty,
+            gain_ma=gain * _CURRENT_MA if by_current else gain / _FULL_PWM * STALL_MA * volts,
         )
 
     def _check_watchdog(self) -> None:
@@ -292,13 +504,15 @@ class SoftServo:
     def _refresh(self) -> None:
         """Update the registers with the present values."""
         table, motor = self.table, self.motor
-        current_ma = motor.current_ma(self._drive())
+        current_ma, limit = self.current_ma, abs(table["goal_pwm"])
+        pwm = round(_FULL_PWM * (current_ma / STALL_MA + motor.velocity / MAX_TICKS_S) * _NOMINAL_V / max(self.supply_v, 1.0))
+        table["present_pwm"] = max(-limit, min(limit, pwm)) if table["torque"] else 0
         table["present_position"] = self._count(motor.position)
         table["position_trajectory"] = self._count(motor.trajectory)
-        table["present_velocity"] = 0 if motor.frozen else round(motor.velocity / _VELOCITY_TICKS_S)
+        table["present_velocity"] = round(motor.horn_ticks_s / _VELOCITY_TICKS_S)
         table["velocity_trajectory"] = round(motor.velocity / _VELOCITY_TICKS_S)
         table["present_current"] = round(current_ma / _CURRENT_MA)
-        table["moving"] = int(motor.velocity != 0.0)
+        table["moving"] = int(motor.horn_ticks_s != 0.0)
         table["temperature"] = round(motor.temperature_c)
         table["voltage"] = round(10.0 * self.supply_v)
-        table["tick_ms"] = int(self._now_s * 1000.0) % 32768
+        table["tick_ms"] = int((self._now_s - self._started_s) * 1000.0) % 32768

@@ -11,6 +11,7 @@ from enum import IntEnum
 
 HEADER = b"\xff\xff\xfd"
 BROADCAST = 0xFE
+MAX_ID = 252
 MAX_PACKET = 1024
 _BODY = 7
 _STATUS = 0x55
@@ -21,6 +22,7 @@ class Instruction(IntEnum):
     READ = 0x02
     WRITE = 0x03
     REBOOT = 0x08
+    BACKUP = 0x20
     SYNC_READ = 0x82
     SYNC_WRITE = 0x83
 
@@ -155,13 +157,21 @@ def group_items(parameters: bytes) -> tuple[int, list[tuple[int, bytes]]]:
 SIZE = 662
 INDIRECT_ADDRESS, INDIRECT_DATA, INDIRECT_COUNT = 168, 224, 28
 WATCHDOG_TRIPPED = -1
-EXTENDED_POSITION = 4
+POSITION, EXTENDED_POSITION, CURRENT_POSITION = 3, 4, 5
+POSITION_MODES = frozenset({POSITION, EXTENDED_POSITION, CURRENT_POSITION})
+"""Operating modes that follow Goal Position(116); the last two count 256 turns in both directions."""
+RAM_START = 64
+WATCHDOG_SINCE, STARTUP_SINCE = 38, 45
+"""Firmware of the X430 and X540 from which there are a bus watchdog, and a startup configuration with backup."""
 MAX_TICKS = 256 * 4096 - 1
 
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """``eeprom`` registers are locked while the torque is on. ``low`` and ``high`` limit written values; None: read-only."""
+    """``eeprom`` registers are locked while the torque is on. ``low`` and ``high`` limit written values; None: read-only.
+
+    ``limit`` names the register whose value the amount must not exceed; ``since`` is the firmware that has the register.
+    """
 
     name: str
     address: int
@@ -170,6 +180,8 @@ class Register:
     low: int | None = None
     high: int | None = None
     eeprom: bool = False
+    limit: str = ""
+    since: int = 0
 
 
 _REGISTERS = (
@@ -193,18 +205,26 @@ _REGISTERS = (
     Register("velocity_limit", 44, 4, 200, 0, 1023, eeprom=True),
     Register("max_position", 48, 4, 4095, 0, 4095, eeprom=True),
     Register("min_position", 52, 4, 0, 0, 4095, eeprom=True),
+    Register("startup", 60, 1, 0, 0, 3, eeprom=True, since=STARTUP_SINCE),
     Register("shutdown", 63, 1, 52, 0, 255, eeprom=True),
     Register("torque", 64, 1, 0, 0, 1),
     Register("led", 65, 1, 0, 0, 1),
     Register("status_return", 68, 1, 2, 0, 2),
     Register("registered", 69, 1, 0),
     Register("hardware_error", 70, 1, 0),
-    Register("watchdog", 98, 1, 0, 0, 127),
-    Register("goal_pwm", 100, 2, 885, -885, 885),
-    Register("goal_current", 102, 2, 1193, -1193, 1193),
-    Register("goal_velocity", 104, 4, 0, -1023, 1023),
+    Register("velocity_i_gain", 76, 2, 1920, 0, 16383),
+    Register("velocity_p_gain", 78, 2, 100, 0, 16383),
+    Register("position_d_gain", 80, 2, 0, 0, 16383),
+    Register("position_i_gain", 82, 2, 0, 0, 16383),
+    Register("position_p_gain", 84, 2, 800, 0, 16383),
+    Register("feedforward_2nd", 88, 2, 0, 0, 16383),
+    Register("feedforward_1st", 90, 2, 0, 0, 16383),
+    Register("watchdog", 98, 1, 0, 0, 127, since=WATCHDOG_SINCE),
+    Register("goal_pwm", 100, 2, 885, -885, 885, limit="pwm_limit"),
+    Register("goal_current", 102, 2, 1193, -1193, 1193, limit="current_limit"),
+    Register("goal_velocity", 104, 4, 0, -1023, 1023, limit="velocity_limit"),
     Register("profile_acceleration", 108, 4, 0, 0, 32767),
-    Register("profile_velocity", 112, 4, 0, 0, 32767),
+    Register("profile_velocity", 112, 4, 0, 0, 32767, limit="velocity_limit"),
     Register("goal_position", 116, 4, 0, -MAX_TICKS, MAX_TICKS),
     Register("tick_ms", 120, 2, 0),
     Register("moving", 122, 1, 0),
@@ -217,6 +237,7 @@ _REGISTERS = (
     Register("position_trajectory", 140, 4, 0),
     Register("voltage", 144, 2, 120),
     Register("temperature", 146, 1, 25),
+    Register("backup_ready", 147, 1, 0, since=STARTUP_SINCE),
     *(
         Register(f"indirect_address_{n + 1}", INDIRECT_ADDRESS + 2 * n, 2, INDIRECT_DATA + n, 64, SIZE - 1)
         for n in range(INDIRECT_COUNT)
@@ -224,6 +245,12 @@ _REGISTERS = (
 )
 BY_NAME = {register.name: register for register in _REGISTERS}
 _BY_ADDRESS = {register.address: register for register in _REGISTERS}
+EEPROM = tuple(register.name for register in _REGISTERS if register.eeprom)
+BACKED_UP = (
+    "velocity_i_gain", "velocity_p_gain", "position_d_gain", "position_i_gain", "position_p_gain", "feedforward_2nd",
+    "feedforward_1st", "profile_acceleration", "profile_velocity", *(f"indirect_address_{n + 1}" for n in range(INDIRECT_COUNT)),
+)  # fmt: skip
+"""What a backup holds of the RAM."""
 GOALS = frozenset({"goal_pwm", "goal_current", "goal_velocity", "goal_position"})
 _SIGNED = {register.name for register in _REGISTERS if register.low is not None and register.low < 0} | {
     "watchdog", "present_pwm", "present_current", "present_velocity", "present_position", "velocity_trajectory",
@@ -250,6 +277,10 @@ class ControlTable:
         bits = value & (1 << 8 * register.size) - 1
         self._bytes[register.address : register.address + register.size] = bits.to_bytes(register.size, "little")
 
+    def reset(self, name: str) -> None:
+        """Set a register to its initial value."""
+        self[name] = BY_NAME[name].initial
+
     def reset_ram(self) -> None:
         """Set the RAM as after power-up; the EEPROM stays."""
         for register in _REGISTERS:
@@ -272,7 +303,15 @@ class ControlTable:
         return min(SIZE - 1, int.from_bytes(self._bytes[pointer : pointer + 2], "little"))
 
     def write(self, address: int, data: bytes) -> tuple[ErrorCode, list[str]]:
-        """Check and write whole registers, all or none of them; returns their names. Writing to indirect data is refused."""
+        """Check and write whole registers, all or none of them; returns their names.
+
+        Indirect data take a byte as long as their indirect address is their own; what it would do elsewhere is refused.
+        """
+        if INDIRECT_DATA <= address and data and address + len(data) <= INDIRECT_DATA + INDIRECT_COUNT:
+            if any(self._resolved(at) != at for at in range(address, address + len(data))):
+                return ErrorCode.ACCESS, []
+            self._bytes[address : address + len(data)] = data
+            return ErrorCode.NONE, []
         values: list[tuple[Register, int]] = []
         at = 0
         while at < len(data):
@@ -294,13 +333,18 @@ class ControlTable:
         return ErrorCode.NONE, [register.name for register, _ in values]
 
     def _check(self, register: Register, part: bytes) -> tuple[ErrorCode, int]:
-        if register.low is None or register.high is None or (register.eeprom and self["torque"]):
+        if (
+            register.low is None
+            or register.high is None
+            or (register.eeprom and self["torque"])
+            or self["firmware"] < register.since
+        ):
             return ErrorCode.ACCESS, 0
         value = int.from_bytes(part, "little", signed=register.low < 0)
         if register.name in GOALS and self["watchdog"] == WATCHDOG_TRIPPED:
             return ErrorCode.DATA_RANGE, 0
         if not register.low <= value <= register.high:
             return ErrorCode.DATA_RANGE, 0
-        if register.name == "profile_velocity" and value > self["velocity_limit"]:
+        if register.limit and abs(value) > self[register.limit]:
             return ErrorCode.DATA_LIMIT, 0
         return ErrorCode.NONE, value
