@@ -14,6 +14,7 @@ from app.ui.i18n import mark, tr, tr_text
 from app.widgets.painting import NONE
 from core.calibration.servos import Assignment
 from core.config.safety import JOINT_NAMES, TENDONS, JointName
+from core.config.servo_models import model_name
 from core.devices import UserError
 from hardware.calibration.rig_draft import RigDraft
 from hardware.rig import with_port
@@ -32,11 +33,6 @@ _UP_OR_DOWN = mark(
     "One camera cannot tell up from down. Choose tendon up, wiggle it and look from the side: does the head rise when the wire is "
     "pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed."
 )
-_MODEL_NAMES = {
-    1000: "XH430-W350", 1010: "XH430-W210", 1020: "XM430-W350", 1030: "XM430-W210", 1040: "XH430-V350", 1050: "XH430-V210",
-    1060: "XL430-W250", 1070: "XC430-W150", 1080: "XC430-W240", 1120: "XM540-W270", 1130: "XM540-W150",
-}  # fmt: skip
-"""As printed on the servo (Robotis e-Manual), by the model number that it reports."""
 _ID_PX, _DIRECTION_PX = 66, 80
 _DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
 
@@ -94,9 +90,8 @@ class PortPage(WizardPage):
         servos = found.servos if found is not None else ()
         self.servos.setRowCount(len(servos))
         for row, servo in enumerate(servos):
-            name = _MODEL_NAMES.get(servo.model)
             set_cell(self.servos, row, 0, str(servo.id))
-            set_cell(self.servos, row, 1, f"{name}  ({servo.model})" if name is not None else str(servo.model))
+            set_cell(self.servos, row, 1, model_name(servo.model))
         set_note(self.result, "" if found is None else tr("{count} servos at {baud} baud.", count=len(servos), baud=found.baud))
 
     def _search(self) -> None:

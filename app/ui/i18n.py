@@ -70,7 +70,7 @@ FIXED = (
     "train it with the twin's frames too, or choose another model",
     "plug the USB adapter in, or set servos.port (ls /dev/serial/by-id)", "unplug the USB adapter and plug it in again",
     "see the servo port", "see the vendor libraries in main.py doctor",
-    "switch the servos' 12 V on, check the cables, servos.baud and the joints' ids",
+    "switch the servos' supply on, check cables, servos.baud and the joints' ids",
     "find the reason (jam, heat, supply), then restart that servo in the servo table", "Bench twin (no hardware)",
     "pulls the head to the right", "pulls the head to the left", "pulls the head out of the picture's plane", "feeds the robot",
     "feeds the catheter", "seen by eye",

@@ -173,8 +173,8 @@ def status_by_servos(status: BusStatus | None) -> RobotStatus | None:
 
 
 def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, servos: ServosConfig, safety: SafetyConfig) -> Row:
-    hot, warm = servos.max_temperature_c, servos.max_temperature_c - safety.temperature_warn_margin_c
-    low, sags = servos.min_voltage_v, servos.min_voltage_v + safety.voltage_warn_margin_v
+    hot, low = servos.hottest_c(joint), servos.lowest_v(joint)
+    warm, sags = hot - safety.temperature_warn_margin_c, low + safety.voltage_warn_margin_v
     heat = Tone.BAD if state.temperature_c >= hot else Tone.WARN if state.temperature_c >= warm else Tone.PLAIN
     volts = Tone.BAD if state.voltage_v <= low else Tone.WARN if state.voltage_v <= sags else Tone.PLAIN
     error, current = _error(state), Cell(NONE)
@@ -311,7 +311,8 @@ def _balance(status: BusStatus | None, servos: ServosConfig, place: int) -> Pair
     one, other = (state.current_ma for state in states)
     forces = None
     if one is not None and other is not None:
-        forces = wire_force_mn(joints[0], one) / 1000.0, wire_force_mn(joints[1], other) / 1000.0
+        first, second = (servos.model_of(joint) for joint in joints)
+        forces = wire_force_mn(joints[0], first, one) / 1000.0, wire_force_mn(joints[1], second, other) / 1000.0
     known = replace(balance, sum_mm=states[0].position_mm + states[1].position_mm, forces_n=forces)
     if not status.armed:
         return known

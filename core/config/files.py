@@ -298,13 +298,15 @@ def _put_joints(document: TOMLDocument, joints: list[dict[str, Any]]) -> None:
     if isinstance(old, AoT) and len(old) == len(joints):
         for table, joint in zip(old, joints, strict=True):
             for name, value in joint.items():
-                if table.get(name) != value:
+                if value is None:
+                    table.pop(name, None)
+                elif table.get(name) != value:
                     table[name] = value
         return
     tables = tomlkit.aot()
     for joint in joints:
         entry = tomlkit.table()
-        entry.update(joint)
+        entry.update({name: value for name, value in joint.items() if value is not None})
         tables.append(entry)
     servos["joints"] = tables
 

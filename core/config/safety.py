@@ -14,6 +14,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from core.config.section import ConfigSection
+from core.config.servo_models import SERVO_MODELS, ServoModel, unsupported
 
 _REPEATED_S = 0.05
 """1.5 times the repeat period of a held key (33 ms), twice that of a held deadman (25 ms)."""
@@ -89,6 +90,7 @@ class JointConfig(ConfigSection):
 
     name: JointName
     id: int = Field(ge=0, le=252, description="on the bus")
+    model: int | None = Field(None, ge=0, le=65535, description="model number of its servo; empty: servos.model")
     sign: Literal[-1, 1] = Field(1, description="direction of the servo that increases the joint's millimetres")
     mm_per_turn: float = Field(40.0, gt=0.0, le=500.0, description="way of the joint at one turn of the servo's horn")
     low_mm: float = Field(ge=-2000.0, le=2000.0, description="end of the envelope: nothing is sent beyond it")
@@ -135,14 +137,18 @@ class ServosConfig(ConfigSection):
     driver: Literal["dynamixel", "direct"] = Field("dynamixel", description="direct: the twin without servos, a lighter load")
     port: str | None = Field(None, min_length=1, description="serial device; empty: the twin's own pseudo-terminal")
     baud: int = Field(1_000_000, ge=9600, le=4_500_000, description="speed of the bus")
-    model: int = Field(1020, ge=0, le=65535, description="model number that every servo must report (1020: XM430-W350)")
+    model: int = Field(1020, ge=0, le=65535, description="model number of the servos (1020: XM430-W350); a joint may have another")
     pretension_mm: float = Field(0.3, ge=0.0, le=5.0, description="pull of every tendon at zero bend")
     max_pull_mm: float = Field(2.0, gt=0.0, le=20.0, description="pull at a bend or pitch of 1")
     bus_hz: float = Field(50.0, ge=5.0, le=200.0, description="how often the servos are asked and told")
     heartbeat_timeout_s: float = Field(0.5, ge=0.05, le=5.0, description="silence of the application after which the bus holds")
     watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="the servos' own bus watchdog")
-    max_temperature_c: float = Field(70.0, ge=30.0, le=80.0, description="a hotter servo ends the driving")
-    min_voltage_v: float = Field(10.5, ge=5.0, le=24.0, description="a lower supply ends the driving")
+    max_temperature_c: float = Field(
+        70.0, ge=30.0, le=80.0, description="a hotter servo ends the driving; 5 °C below its own limit at most"
+    )
+    min_voltage_v: float | None = Field(
+        None, ge=3.5, le=24.0, description="a lower supply ends the driving; empty: 7/8 of what each servo's model recommends"
+    )
     max_current_ma: float = Field(
         600.0,
         ge=50.0,
@@ -167,10 +173,24 @@ class ServosConfig(ConfigSection):
         if len({joint.id for joint in self.joints}) != len(self.joints):
             raise ValueError("joints: two servos have the same id")
         for joint in self.joints:
+            if problem := unsupported(self.model if joint.model is None else joint.model):
+                raise ValueError(f"joint {joint.name}: {problem}")
             rest_mm, what = (self.pretension_mm, "pretension_mm") if joint.name in TENDONS else (0.0, "zero")
             if not joint.low_mm <= rest_mm <= joint.high_mm:
                 raise ValueError(f"joint {joint.name}: {what} must lie between low_mm and high_mm, or it would be driven at rest")
         return self
+
+    def model_of(self, joint: JointConfig) -> ServoModel:
+        """The model of a joint's servo."""
+        return SERVO_MODELS[self.model if joint.model is None else joint.model]
+
+    def lowest_v(self, joint: JointConfig) -> float:
+        """A lower supply of the joint's servo ends the driving."""
+        return self.model_of(joint).lowest_v if self.min_voltage_v is None else self.min_voltage_v
+
+    def hottest_c(self, joint: JointConfig) -> float:
+        """At this temperature of the joint's servo the driving ends."""
+        return min(self.max_temperature_c, self.model_of(joint).hottest_c)
 
     @property
     def too_loose(self) -> str:

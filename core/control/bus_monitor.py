@@ -187,10 +187,12 @@ class BusMonitor:
             names = ", ".join(name for name in JOINT_NAMES if name in self.gaps)
             found.append((Cause.SERVO_SILENT, f"in turns, {names}: not all in one cycle for {safety.bus_disarm_s:g} s"))
         is_astray = self.astray_since_s is not None and now_s - self.astray_since_s >= safety.tracking_time_s
-        warm_c = servos.max_temperature_c - safety.temperature_warn_margin_c
-        low_v = servos.min_voltage_v + safety.voltage_warn_margin_v
-        hot = _listed(newest.temperatures_c, lambda c: not c < servos.max_temperature_c, " {:.0f} °C")
-        low = _listed(newest.voltages_v, lambda v: not v > servos.min_voltage_v, " {:.1f} V")
+        # room to each joint's own limit: its model's, or a tighter one of the configuration
+        cooler_c = [servos.hottest_c(joint) - c for joint, c in zip(servos.joints, newest.temperatures_c, strict=False)]
+        spare_v = [v - servos.lowest_v(joint) for joint, v in zip(servos.joints, newest.voltages_v, strict=False)]
+        hot, low = _short(newest.temperatures_c, cooler_c, 0.0, " {:.0f} °C"), _short(newest.voltages_v, spare_v, 0.0, " {:.1f} V")
+        warm = _short(newest.temperatures_c, cooler_c, safety.temperature_warn_margin_c, " {:.0f} °C")
+        sags = _short(newest.voltages_v, spare_v, safety.voltage_warn_margin_v, " {:.1f} V")
         found += [
             (Cause.SERVO_ALERT, _listed(newest.hardware_errors, lambda bits: bits != 0, " {:#04x}")),
             (Cause.TRACKING, is_astray and self.astray),
@@ -199,9 +201,9 @@ class BusMonitor:
             (Cause.REBOOTED, self.rebooted),
             (Cause.WATCHDOG, newest.watchdog_tripped),
             (Cause.HOT, hot),
-            (Cause.WARM, not hot and _listed(newest.temperatures_c, lambda c: not c < warm_c, " {:.0f} °C")),
+            (Cause.WARM, not hot and warm),
             (Cause.VOLTAGE_LOW, low),
-            (Cause.VOLTAGE_SAGS, not low and _listed(newest.voltages_v, lambda v: not v > low_v, " {:.1f} V")),
+            (Cause.VOLTAGE_SAGS, not low and sags),
         ]
         return [Fault(cause, "" if told is True else told) for cause, told in found if told]
 
@@ -209,6 +211,12 @@ class BusMonitor:
 def _listed(values: Sequence[Any], is_bad: Callable[[Any], bool], how: str) -> str:
     """The joints whose value is bad, with the value as text."""
     return ", ".join(f"{name}{how.format(value)}" for name, value in zip(JOINT_NAMES, values, strict=False) if is_bad(value))
+
+
+def _short(values: Sequence[float], rooms: Sequence[float], margin: float, how: str) -> str:
+    """The joints whose room to a limit is not above `margin`, with the value as text; NaN counts as no room."""
+    pairs = zip(JOINT_NAMES, values, rooms, strict=False)
+    return ", ".join(f"{name}{how.format(value)}" for name, value, room in pairs if not room > margin)
 
 
 def _first_astray(tracking_mm: Sequence[float], limit_mm: float) -> str:

@@ -5,7 +5,7 @@ Nothing of the operator window runs meanwhile: the bench owns camera and port, a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal
@@ -63,10 +63,10 @@ class CalibrationBench:
 
     @contextmanager
     def probe(
-        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], found: Mapping[int, int] | None = None
     ) -> Iterator[ServoProbe]:
         """One servo, zeroed where it stands, armed."""
-        config = probe_config(servos, servo_id, limits, sign, ids)
+        config = probe_config(servos, servo_id, limits, sign, found)
         with ServoProbe.opened(config, self.config.safety, limits, self.stop) as probe:
             yield probe
 

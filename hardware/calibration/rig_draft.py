@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,7 @@ from core.config.calibration import CalibrationConfig, LensConfig, ScaleConfig, 
 from core.config.models import Config
 from core.config.rig_file import RigFile, make_rig
 from core.config.safety import JOINT_NAMES, JointName, ServosConfig
+from core.config.servo_models import model_name, unsupported
 from core.devices import DeviceError
 from core.messages import message
 from core.types import Image, Point
@@ -177,13 +180,13 @@ class RigDraft:
     def search_servos(self, bauds: Sequence[int] | None = None) -> FoundServos:
         """Find the servos on the bench's port, and take over their speed and model.
 
-        Raises DeviceError: no port, no answer, or not seven of one model.
+        Raises DeviceError: no port, no answer, not seven, or a model that is not supported.
         """
         servos = self.servos
         assert servos.port is not None
         chosen = bauds if bauds is not None else (servos.baud, *(baud for baud in BAUDS if baud != servos.baud))
         found = find_servos(servos.port, chosen, self.say, self.bench.stop.check)
-        listed = ", ".join(f"{servo.id} (model {servo.model})" for servo in found.servos)
+        listed = ", ".join(f"{servo.id} {model_name(servo.model)}" for servo in found.servos)
         if found.elsewhere and len(found.servos) < len(JOINT_NAMES):
             others = "; ".join(f"{', '.join(map(str, ids))} at {baud} baud" for baud, ids in found.elsewhere)
             raise DeviceError(
@@ -198,26 +201,25 @@ class RigDraft:
             raise DeviceError(
                 f"{len(found.servos)} servos answer, seven are needed: {listed}; check cables, and that no id is used twice"
             )
-        models = {servo.model for servo in found.servos}
-        if len(models) != 1:
-            raise DeviceError(f"servos of several models: {listed}; all seven must be of one")
+        if refused := [f"id {servo.id}: {why}" for servo in found.servos if (why := unsupported(servo.model))]:
+            raise DeviceError(refused[0])
         self.say(message("seven servos at {a} baud: {ids}", a=found.baud, ids=", ".join(map(str, found.ids))))
         self.found = found
         self.findings = {servo_id: finding for servo_id, finding in self.findings.items() if servo_id in found.ids}
         if any(one.id not in found.ids for one in self.assignments):  # a servo was changed for another one
             self.assignments = ()
-        self._set_servos(servos.model_copy(update={"baud": found.baud, "model": models.pop()}))
+        self._set_servos(_with_found(servos, found))
         return found
 
     def wiggle(self, servo_id: int) -> None:
         """Turn one servo both ways, for the operator to watch."""
         with self._moving():
-            servo_identification.wiggle(self.bench, self.servos, self._ids(), servo_id)
+            servo_identification.wiggle(self.bench, self.servos, self._found().models, servo_id)
 
     def identify_one(self, servo_id: int) -> ServoFinding | None:
         """What one servo does, as the camera sees it; None when nothing is clear."""
         with self._moving():
-            finding = servo_identification.identify_servo(self.bench, self.servos, self._ids(), servo_id, self.say)
+            finding = servo_identification.identify_servo(self.bench, self.servos, self._found().models, servo_id, self.say)
         self.findings.pop(servo_id, None)
         if finding is not None:
             self.findings[servo_id] = finding
@@ -225,7 +227,7 @@ class RigDraft:
 
     def identify(self) -> tuple[Assignment, ...]:
         """Who is who; raises NotIdentified when not all are clear."""
-        for servo_id in self._ids():
+        for servo_id in self._found().ids:
             self.identify_one(servo_id)
         return self.take_findings()
 
@@ -266,7 +268,8 @@ class RigDraft:
             raise NotIdentified("every servo must have one name, and every name one servo")
         self.assignments = tuple(assignments)
         before = _wiring(self.config.servos)
-        self._set_servos(servo_identification.identified(self.servos, assignments))
+        servos = servo_identification.identified(self.servos, assignments)
+        self._set_servos(servos if self.found is None else _with_found(servos, self.found))
         if _wiring(self.config.servos) != before:  # what was found by moving the servos was found with others in their places
             had = (self.zero, self.zeros, self.steering)
             self.zero = self.zeros = self.steering = self.head_px = None
@@ -352,10 +355,10 @@ class RigDraft:
         if self.zero is not None:
             self.zero = self.zero.model_copy(update={"pretension_mm": pretension_mm})
 
-    def _ids(self) -> tuple[int, ...]:
+    def _found(self) -> FoundServos:
         if self.found is None:
             raise DeviceError("search the servos first")
-        return self.found.ids
+        return self.found
 
     def _set_servos(self, servos: ServosConfig) -> None:
         self.config = self.config.model_copy(update={"servos": servos})
@@ -377,6 +380,19 @@ class RigDraft:
     def rig_file(self, name: str) -> RigFile:
         """The rig under this name, not saved yet; raises RigFileError."""
         return make_rig(self.config, name, self.calibration())
+
+
+def _with_found(servos: ServosConfig, found: FoundServos) -> ServosConfig:
+    """The bus with speed and models as found; joints whose servo is of another model than most have their own."""
+    ((common, _), *_) = Counter(found.models.values()).most_common()
+    joints = tuple(
+        joint.model_copy(update={"model": None if (model := found.models.get(joint.id, common)) == common else model})
+        for joint in servos.joints
+    )
+    change: dict[str, Any] = {"baud": found.baud, "model": common, "joints": joints}
+    if {servos.model_of(joint).number for joint in servos.joints} != set(found.models.values()):
+        change["min_voltage_v"] = None  # it was that of other servos
+    return servos.model_copy(update=change)
 
 
 def _wiring(servos: ServosConfig) -> tuple[tuple[int, int], ...]:

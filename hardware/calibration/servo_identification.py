@@ -74,7 +74,7 @@ class ServoBench(Protocol):
 
     def observe(self, alive: Callable[[], None]) -> Look: ...
     def probe(
-        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], found: Mapping[int, int] | None = None
     ) -> AbstractContextManager[Probe]: ...
     def steer(self, servos: ServosConfig) -> AbstractContextManager[Steered]: ...
 
@@ -87,9 +87,9 @@ class Zeros:
     problems: tuple[str, ...] = ()
 
 
-def wiggle(bench: ServoBench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, amplitude_mm: float = 1.5) -> None:
+def wiggle(bench: ServoBench, servos: ServosConfig, found: Mapping[int, int], servo_id: int, amplitude_mm: float = 1.5) -> None:
     """Turn one servo a little both ways and back, for the operator to watch."""
-    with bench.probe(servos, servo_id, ProbeLimits(-amplitude_mm, amplitude_mm), 1, ids) as probe:
+    with bench.probe(servos, servo_id, ProbeLimits(-amplitude_mm, amplitude_mm), 1, found) as probe:
         for target_mm in (amplitude_mm, 0.0, -amplitude_mm, 0.0):
             probe.move_to(target_mm)
             probe.pause(_SETTLE_S / 2)
@@ -110,14 +110,16 @@ def _or_back(back: Callable[[], None]) -> Iterator[None]:
         raise
 
 
-def identify_servo(bench: ServoBench, servos: ServosConfig, ids: tuple[int, ...], servo_id: int, say: Say) -> ServoFinding | None:
+def identify_servo(
+    bench: ServoBench, servos: ServosConfig, found: Mapping[int, int], servo_id: int, say: Say
+) -> ServoFinding | None:
     """What one servo does; None when nothing clear was seen. It is turned no further than needed.
 
-    Raises ServoError, DeviceError, HeadNotSeen.
+    `found` has the models of all servos on the line, by id. Raises ServoError, DeviceError, HeadNotSeen.
     """
     most_mm = _AMPLITUDES_MM[-1]
     limits = ProbeLimits(-most_mm, most_mm)
-    with bench.probe(servos, servo_id, limits, 1, ids) as probe, _or_back(lambda: probe.move_to(0.0)):
+    with bench.probe(servos, servo_id, limits, 1, found) as probe, _or_back(lambda: probe.move_to(0.0)):
         for amplitude_mm in _AMPLITUDES_MM:
             say(message("servo {a}: {b:g} mm both ways", a=servo_id, b=amplitude_mm))
             finding = classify(_wiggled(bench, probe, amplitude_mm))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
@@ -112,7 +112,7 @@ class ProbeLimits:
 
 
 def probe_config(
-    servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1] = 1, ids: tuple[int, ...] | None = None
+    servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1] = 1, found: Mapping[int, int] | None = None
 ) -> ServosConfig:
     """The bus with `servo_id` in the place of the joint under test, of which it takes nothing but the place.
 
@@ -120,7 +120,7 @@ def probe_config(
     ----------
     servos : port, speed, model, millimetres per turn.
     sign : the servo's direction that counts as positive.
-    ids : all seven on the line while it is unknown which is which; default those of `servos`, which are known by their joints.
+    found : ids and models of all seven on the line while it is unknown which is which; default: `servos` says which is which.
 
     Notes
     -----
@@ -129,12 +129,13 @@ def probe_config(
 
     Raises ProbeFailed when there are not seven, or `servo_id` is not among them.
     """
-    every = list(ids if ids is not None else (joint.id for joint in servos.joints))
+    models = found if found is not None else {joint.id: servos.model_of(joint).number for joint in servos.joints}
+    every = list(models)
     if len(every) != len(JOINT_NAMES) or servo_id not in every:
         raise ProbeFailed(f"servo {servo_id} cannot be moved: seven servos are needed, there are {', '.join(map(str, every))}")
     every.remove(servo_id)
     every.insert(_PLACE, servo_id)
-    known = {} if ids is not None else {joint.id: joint.mm_per_turn for joint in servos.joints}
+    known = {} if found is not None else {joint.id: joint.mm_per_turn for joint in servos.joints}
     largest = max(joint.mm_per_turn for joint in servos.joints)
     bounds = {
         "low_mm": limits.low_mm - _MARGIN_MM,
@@ -146,7 +147,13 @@ def probe_config(
     }
     joints = tuple(
         joint.model_copy(
-            update={"id": one, "sign": sign if one == servo_id else 1, "mm_per_turn": known.get(one, largest), **bounds}
+            update={
+                "id": one,
+                "model": models[one],
+                "sign": sign if one == servo_id else 1,
+                "mm_per_turn": known.get(one, largest),
+                **bounds,
+            }
         )
         for joint, one in zip(servos.joints, every, strict=True)
     )

@@ -194,14 +194,15 @@ def check_servos(config: ServosConfig) -> Check:
     except PortError as error:
         return Check(name, False, f"not asked: {one_line(error)}", "see the servo port")
     except ServoError as error:
-        return Check(name, False, one_line(error), "switch the servos' 12 V on, check the cables, servos.baud and the joints' ids")
+        return Check(name, False, one_line(error), "switch the servos' supply on, check cables, servos.baud and the joints' ids")
     finally:
         line.close()
     firmware = ", ".join(map(str, sorted({identity.firmware for identity in found})))
     # registers 64 (torque) to 70 (hardware error), and 144 (voltage in 0.1 V) to 146 (temperature)
     volts = min(int.from_bytes(supply[:2], "little") / 10.0 for _, supply in tables.values())
     degrees = max(float(supply[2]) for _, supply in tables.values())
-    what = message("{a} answer, model {b}, firmware {rest}", a=len(found), b=config.model, rest=firmware)
+    models = ", ".join(dict.fromkeys(config.model_of(joint).name for joint in config.joints))
+    what = message("{a} answer, {models}, firmware {rest}", a=len(found), models=models, rest=firmware)
     on = ", ".join(joint for joint, (status, _) in tables.items() if status[0] == 1)
     torque = f"torque on: {on}" if on else "torque off"
     detail = f"{what}; {volts:.1f} V at least, {degrees:.0f} \N{DEGREE SIGN}C at most, {torque}"
@@ -209,10 +210,15 @@ def check_servos(config: ServosConfig) -> Check:
     if broken := [f"{joint}: {describe(error)}" for joint, error in errors.items() if error]:
         fix = "find the reason (jam, heat, supply), then restart that servo in the servo table"
         return Check(name, False, f"hardware error, {'; '.join(broken)}", fix)
-    if volts < config.min_voltage_v:
-        return Check(name, False, detail, message("the supply must give {a:g} V or more at every servo", a=config.min_voltage_v))
-    if degrees > config.max_temperature_c:
-        return Check(name, False, detail, message("let it cool below {a:g} °C", a=config.max_temperature_c))
+    for joint in config.joints:
+        supply = tables[joint.name][1]
+        if int.from_bytes(supply[:2], "little") / 10.0 < config.lowest_v(joint):
+            fix = message("the supply must give {a:g} V or more at servo {joint}", a=config.lowest_v(joint), joint=joint.name)
+            return Check(name, False, detail, fix)
+        if supply[2] > config.hottest_c(joint):
+            return Check(
+                name, False, detail, message("let {joint} cool below {a:g} °C", joint=joint.name, a=config.hottest_c(joint))
+            )
     return Check(name, True, detail)
 
 

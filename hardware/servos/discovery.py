@@ -47,6 +47,11 @@ class FoundServos:
     def ids(self) -> tuple[int, ...]:
         return tuple(servo.id for servo in self.servos)
 
+    @property
+    def models(self) -> dict[int, int]:
+        """Model numbers by id."""
+        return {servo.id: servo.model for servo in self.servos}
+
 
 def find_ports() -> tuple[FoundPort, ...]:
     """Serial ports of USB adapters, as the system lists them; none is opened."""
@@ -90,7 +95,7 @@ def find_servos(
         others = tuple((baud, tuple(one.id for one in found)) for baud, found in answered.items() if baud != fullest)
         return FoundServos(port, fullest, answered[fullest], others)
     speeds = ", ".join(map(str, bauds))
-    raise NoAnswer(f"no servo answers on {port} (asked at {speeds} baud): switch their 12 V on, check the cable to the adapter")
+    raise NoAnswer(f"no servo answers on {port} (asked at {speeds} baud): switch their supply on, check the cable to the adapter")
 
 
 def _ids(line: ServoLine) -> list[int]:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from core.config.safety import JointConfig, JointName, ServosConfig
+from core.config.servo_models import model_name
 from core.messages import message
 from hardware.servos import registers
 from hardware.servos.dynamixel_port import (
@@ -25,13 +26,13 @@ from hardware.servos.dynamixel_port import (
 )
 from hardware.servos.registers import (
     ANSWERS_ALL,
-    BLOCK_BYTES,
     INDIRECT_ADDRESS,
     TAG_BYTES,
     HardwareError,
     MissingServo,
     ServoReading,
     ServoState,
+    block_bytes,
     describe,
     indirect_addresses,
     indirect_data,
@@ -79,15 +80,19 @@ def _identity(line: ServoLine, joint: JointConfig, config: ServosConfig) -> Serv
     """What a joint's servo says of itself. Raises NoAnswer, WrongServo."""
     table = line.read(joint.id, 0, 8)
     model = int.from_bytes(table[:2], "little")
-    _check_model(joint, model, config.model)
+    _check_model(joint, model, config)
     if table[7] != joint.id:
         raise WrongServo(f"{_title(joint)} says that its id is {table[7]}: give every servo an id of its own")
     return ServoIdentity(joint.name, joint.id, model, table[6])
 
 
-def _check_model(joint: JointConfig, model: int | None, expected: int) -> None:
+def _check_model(joint: JointConfig, model: int, config: ServosConfig) -> None:
+    """Raise WrongServo when the servo is not of the joint's model."""
+    expected = config.model_of(joint).number
     if model != expected:
-        raise WrongServo(f"{_title(joint)} is model {model}, not {expected}: swap the servo, or set servos.model or the joint's id")
+        raise WrongServo(
+            f"{_title(joint)} is {model_name(model)}, not {model_name(expected)}: swap the servo, or set the joint's model or id"
+        )
 
 
 def _silence(line: ServoLine, config: ServosConfig, silent: list[JointConfig]) -> NoAnswer:
@@ -113,6 +118,16 @@ def _title(joint: JointConfig) -> str:
     return f"servo {joint.name} (id {joint.id})"
 
 
+def _blocks(config: ServosConfig) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
+    """The group reads of a cycle: address and length of the status block, and the ids of the servos that have it there."""
+    members: dict[tuple[int, int], tuple[int, ...]] = {}
+    for joint in config.joints:
+        model = config.model_of(joint)
+        key = indirect_data(model), block_bytes(model)
+        members[key] = (*members.get(key, ()), joint.id)
+    return tuple((address, length, ids) for (address, length), ids in members.items())
+
+
 class ServoBus:
     """Seven servos on one line, in the order of the configuration's joints. One thread opens, uses and closes it.
 
@@ -134,6 +149,7 @@ class ServoBus:
         self.config = config
         self._joints = config.joints
         self._line = ServoLine(chosen, config.baud)
+        self._blocks = _blocks(config)
         self._reset()
 
     def _reset(self) -> None:
@@ -143,7 +159,7 @@ class ServoBus:
         self._put_off: set[int] = set()
         self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
         self._silences = dict(self._misses)
-        self._turn = 0
+        self._turns = dict.fromkeys((address for address, _, _ in self._blocks), 0)
 
     @property
     def is_open(self) -> bool:
@@ -265,21 +281,25 @@ class ServoBus:
     def read(self) -> tuple[ServoReading, ...]:
         """State of all seven, in the order of the joints; a servo without a usable answer is a ``MissingServo``.
 
-        Takes 3 ms at 1 Mbps, and at most 80 ms when servos are silent.
+        Takes 3 ms at 1 Mbps, and at most 80 ms when servos are silent. Small servos (330 size) beside others take a second request.
         """
-        length = BLOCK_BYTES + self._turn % (TAG_BYTES + 1)
-        # Those that were silent come last, where they cannot silence others.
-        ids = sorted(self._misses, key=lambda servo_id: self._silences[servo_id])
-        answer = self._line.group_read(ids, indirect_data(self.config.model), length)
+        data: dict[int, bytes] = {}
+        missed: dict[int, Miss] = {}
+        for address, length, members in self._blocks:
+            # Those that were silent come last, where they cannot silence others.
+            ids = sorted(members, key=lambda servo_id: self._silences[servo_id])
+            answer = self._line.group_read(ids, address, length + self._turns[address] % (TAG_BYTES + 1))
+            if answer.data or any(miss is not Miss.WAITING for miss in answer.missed.values()):
+                self._turns[address] += 1  # of what was really asked: else the next request would look like the one before
+            data |= answer.data
+            missed |= answer.missed
         now = time.monotonic()
-        if answer.data or any(miss is not Miss.WAITING for miss in answer.missed.values()):
-            self._turn += 1  # of what was really asked: else the next request would look like the one before
         readings: list[ServoReading] = []
         for joint in self._joints:
-            if joint.id in answer.data:
-                readings.append(self._reading(joint, answer.data[joint.id], now))
+            if joint.id in data:
+                readings.append(self._reading(joint, data[joint.id], now))
             else:
-                miss = answer.missed[joint.id]
+                miss = missed[joint.id]
                 self._misses[joint.id] += miss is not Miss.WAITING
                 self._silences[joint.id] += miss is Miss.SILENT
                 readings.append(MissingServo(joint.name, joint.id, now, self._misses[joint.id], miss.value))
@@ -351,7 +371,7 @@ class ServoBus:
         while (model := self._line.ping(servo_id)) is None:
             if time.monotonic() > until:
                 raise NoAnswer(f"{_title(joint)} did not come back after its reboot: switch the servos' power off and on")
-        _check_model(joint, model, self.config.model)
+        _check_model(joint, model, self.config)
         self._configure(joint)
         self._map_block(joint)
 
@@ -405,7 +425,7 @@ class ServoBus:
 
     def _map_block(self, joint: JointConfig) -> bool:
         """Gather the status block; not written when it is in place already. True: it was not, so that the servo has restarted."""
-        wanted = indirect_addresses()
+        wanted = indirect_addresses(self.config.model_of(joint))
         if self._line.read(joint.id, INDIRECT_ADDRESS, len(wanted)) == wanted:
             return False
         self._line.write(joint.id, INDIRECT_ADDRESS, wanted)
@@ -436,7 +456,7 @@ class ServoBus:
 
     def _reading(self, joint: JointConfig, block: bytes, time_s: float) -> ServoReading:
         self._misses[joint.id] = self._silences[joint.id] = 0
-        state = state_of(joint, self.config.model, self._zeros.get(joint.id), block, time_s)
+        state = state_of(joint, self.config.model_of(joint), self._zeros.get(joint.id), block, time_s)
         if state is None:
             self._armed = False
             self._zeros.pop(joint.id, None)

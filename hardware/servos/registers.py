@@ -1,8 +1,8 @@
 """Registers of a DYNAMIXEL X servo in millimetres, degrees Celsius and seconds, and the status block that one read gives. Pure.
 
-The block is eighteen bytes or less, gathered through the servo's indirect addresses. Why indirect: the registers of interest lie
+The block is seventeen bytes, gathered through the servo's indirect addresses. Why indirect: the registers of interest lie
 between 64 and 146. Read as they lie, seven servos take 6.6 ms at 1 Mbps and 115 ms at the factory's 57600; gathered they take 2
-and 33 ms. Why not more: the smallest servos have 20 indirect addresses.
+and 33 ms. Why not more: the smallest servos (330 size) have 20 indirect addresses. Their block is one byte shorter.
 
 The addresses are forgotten in a reboot, and the block then reads as zeros. So the block begins with a register that the driver
 keeps at 2, and holds the supply voltage: zeros cannot pass for a servo at position 0.
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 from core.config.safety import TICKS_PER_TURN, JointConfig, JointName
+from core.config.servo_models import ServoModel, drum_radius_mm
 
 MAX_TICKS = 256 * TICKS_PER_TURN - 1
 """Extended position mode counts so far from zero in both directions."""
@@ -25,15 +26,6 @@ ACCELERATION_RPM2 = 214.577
 WATCHDOG_S = 0.02
 VOLTAGE_V = 0.1
 _MAX_VELOCITY, _MAX_ACCELERATION = 1023, 32767
-_DEFAULT_CURRENT_MA = 2.69
-# Robotis e-Manual, Present Current(126). XL430 servos report a load in 0.1 % there, and are not listed.
-_CURRENT_MA = {
-    **dict.fromkeys((1040, 1050), 1.34),  # XH430-V, of 24 V; the XH430-W, of 12 V, count like the others
-    **dict.fromkeys((1190, 1200, 1210, 1220, 1230, 1240), 1.0),  # XL330, XC330
-}
-_LOAD_MODELS = frozenset({1060, 1070, 1080, 1090})
-_TORQUE_NM_PER_A = 4.1 / 2.3
-"""Stall torque over stall current of an XM430-W350 at 12 V (Robotis e-Manual)."""
 
 
 def to_ticks(joint: JointConfig, position_mm: float, zero_ticks: int) -> int:
@@ -72,15 +64,9 @@ def watchdog_units(watchdog_s: float) -> int:
     return max(1, min(127, math.ceil(watchdog_s / WATCHDOG_S - 1e-9)))
 
 
-def current_ma(model: int, units: int) -> float | None:
-    """Motor current, or None for models that report a load instead."""
-    return None if model in _LOAD_MODELS else units * _CURRENT_MA.get(model, _DEFAULT_CURRENT_MA)
-
-
-def wire_force_mn(joint: JointConfig, current_ma: float) -> float:
+def wire_force_mn(joint: JointConfig, model: ServoModel, current_ma: float) -> float:
     """Pull of a wire as the motor's current tells it, friction included; positive tightens."""
-    radius_m = joint.mm_per_turn / (2.0 * math.pi) / 1000.0
-    return joint.sign * current_ma / 1000.0 * _TORQUE_NM_PER_A / radius_m * 1000.0
+    return joint.sign * model.torque_nm(current_ma) / drum_radius_mm(joint.mm_per_turn) * 1e6
 
 
 def signed(data: bytes) -> int:
@@ -88,7 +74,7 @@ def signed(data: bytes) -> int:
     return int.from_bytes(data, "little", signed=True)
 
 
-# (first register, bytes). Positions fit in three bytes (2048 turns), velocity in two, a supply of up to 25 V in one.
+# (first register, bytes). Positions fit in three bytes (2048 turns), velocity in two.
 _PARTS = {
     "status_return": (68, 1),
     "torque": (64, 1),
@@ -98,14 +84,16 @@ _PARTS = {
     "current": (126, 2),
     "velocity": (128, 2),
     "position": (132, 3),
-    "voltage": (144, 1),
     "temperature": (146, 1),
+    "voltage": (144, 2),
 }
-BLOCK_BYTES = sum(size for _, size in _PARTS.values())
+_SMALL_PARTS = _PARTS | {"voltage": (144, 1)}
+"""Of the 330 size: a supply of 14 V or less fits in one byte."""
 TAG_BYTES = 2
 """Padding: requests in turn ask for 0, 1 or 2 bytes more, so that a late answer to an earlier one is known by its length."""
+_PADDING = (120, 121)
+"""Registers behind the block, for the padding: the realtime tick."""
 INDIRECT_ADDRESS = 168
-_SMALL_MODELS = frozenset({1190, 1200, 1210, 1220, 1230, 1240})
 WATCHDOG_TRIPPED = 0xFF
 ANSWERS_ALL = 2
 """Status return level: reads and writes are answered."""
@@ -169,32 +157,42 @@ class MissingServo:
 ServoReading = ServoState | MissingServo
 
 
-def indirect_data(model: int) -> int:
+def _parts(model: ServoModel) -> dict[str, tuple[int, int]]:
+    return _SMALL_PARTS if model.is_small else _PARTS
+
+
+def block_bytes(model: ServoModel) -> int:
+    """Length of a model's status block, without padding."""
+    return sum(size for _, size in _parts(model).values())
+
+
+def indirect_data(model: ServoModel) -> int:
     """Where a model keeps its indirect data: behind 20 addresses in the 330 size, behind 28 else."""
-    return 208 if model in _SMALL_MODELS else 224
+    return 208 if model.is_small else 224
 
 
-def indirect_addresses() -> bytes:
-    """What to write at ``INDIRECT_ADDRESS``: the block's registers, then the padding (the realtime tick)."""
-    registers = [first + offset for first, size in _PARTS.values() for offset in range(size)] + [120, 121]
-    return b"".join(register.to_bytes(2, "little") for register in registers)
+def indirect_addresses(model: ServoModel) -> bytes:
+    """What to write at ``INDIRECT_ADDRESS``: the block's registers, then the padding."""
+    registers = [first + offset for first, size in _parts(model).values() for offset in range(size)]
+    return b"".join(register.to_bytes(2, "little") for register in (*registers, *_PADDING))
 
 
-def split_block(block: bytes) -> dict[str, bytes]:
+def split_block(model: ServoModel, block: bytes) -> dict[str, bytes]:
     """The block's parts by name; `block` may carry padding. Raises ValueError when it is too short."""
-    if len(block) < BLOCK_BYTES:
+    if len(block) < block_bytes(model):
         raise ValueError(f"status block of {len(block)} bytes")
     parts, at = {}, 0
-    for name, (_, size) in _PARTS.items():
+    for name, (_, size) in _parts(model).items():
         parts[name] = block[at : at + size]
         at += size
     return parts
 
 
-def state_of(joint: JointConfig, model: int, zero_ticks: int | None, block: bytes, time_s: float) -> ServoState | None:
+def state_of(joint: JointConfig, model: ServoModel, zero_ticks: int | None, block: bytes, time_s: float) -> ServoState | None:
     """A servo's state from its block; None when the servo has lost its indirect addresses. Raises ValueError for a short block."""
-    parts = split_block(block)
-    if parts["status_return"][0] != ANSWERS_ALL or parts["voltage"] == b"\0":
+    parts = split_block(model, block)
+    voltage = int.from_bytes(parts["voltage"], "little")
+    if parts["status_return"][0] != ANSWERS_ALL or voltage == 0:
         return None
     ticks, goal = signed(parts["position"]), signed(parts["goal"])
     return ServoState(
@@ -206,8 +204,8 @@ def state_of(joint: JointConfig, model: int, zero_ticks: int | None, block: byte
         position_mm=None if zero_ticks is None else to_mm(joint, ticks, zero_ticks),
         goal_mm=None if zero_ticks is None else to_mm(joint, goal, zero_ticks),
         velocity_mm_s=velocity_mm_s(joint, signed(parts["velocity"])),
-        current_ma=current_ma(model, signed(parts["current"])),
-        voltage_v=parts["voltage"][0] * VOLTAGE_V,
+        current_ma=model.current_ma(signed(parts["current"])),
+        voltage_v=voltage * VOLTAGE_V,
         temperature_c=float(parts["temperature"][0]),
         error=HardwareError(parts["hardware_error"][0]),
         torque=parts["torque"][0] == 1,

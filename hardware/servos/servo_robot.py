@@ -222,7 +222,8 @@ class ServoRobot:
             return RobotStatus(time.monotonic(), 0.0, 0.0, (0.0,) * 4, (0.0,) * 4)
         at_mm = [state.position_mm or 0.0 for state in states]
         right, left, up, down = (
-            wire_force_mn(joint, state.current_ma or 0.0) for joint, state in zip(self._servos.joints[:4], states[:4], strict=True)
+            wire_force_mn(joint, self._servos.model_of(joint), state.current_ma or 0.0)
+            for joint, state in zip(self._servos.joints[:4], states[:4], strict=True)
         )
         return RobotStatus(
             time_s=min(state.time_s for state in states),

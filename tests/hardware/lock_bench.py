@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Literal
 
@@ -133,9 +133,9 @@ class LockBench:
 
     @contextmanager
     def probe(
-        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], ids: tuple[int, ...] | None = None
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], found: Mapping[int, int] | None = None
     ) -> Iterator[LockProbe]:
-        yield LockProbe(self._twin, probe_config(servos, servo_id, limits, sign, ids), self.stop)
+        yield LockProbe(self._twin, probe_config(servos, servo_id, limits, sign, found), self.stop)
 
     @contextmanager
     def steer(self, servos: ServosConfig) -> Iterator[LockSteered]:

@@ -142,7 +142,8 @@ class SoftServoBus:
         start = positions if positions is not None else [draw.randrange(4096) for _ in self._joints]
         code = next((code for code, baud in BAUD_OF_CODE.items() if baud == config.baud), 3)
         self._servos = {
-            joint.id: SoftServo(joint.id, config.model, ticks, code) for joint, ticks in zip(self._joints, start, strict=True)
+            joint.id: SoftServo(joint.id, config.model_of(joint).number, ticks, code)
+            for joint, ticks in zip(self._joints, start, strict=True)
         }
         self._mounted = {servo.id: servo.mechanical_ticks for servo in self._servos.values()}
         self.faults = LineFaults(seed)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from core.config.servo_models import SERVO_MODELS
 from hardware.twin.servos.protocol import (
     ALERT,
     BACKED_UP,
@@ -36,7 +37,6 @@ ends at no current. It is friction of motion, taken for that of standing still t
 _STAND_MA, _FRICTION_MA = 8.0, 40.0
 _FULL_PWM = 885
 """Goal PWM(100) at the whole supply voltage."""
-_NOMINAL_V = 12.0
 _P_GAIN_UNIT = 128.0
 """Position P Gain(84) over this: units of PWM (modes 3 and 4) or of current (mode 5) per tick of position error."""
 _GAIN_MA = 800 / _P_GAIN_UNIT / _FULL_PWM * STALL_MA
@@ -228,7 +228,6 @@ class ServoMotor:
 # Units of the registers.
 _VELOCITY_TICKS_S = 0.229 / 60.0 * TICKS_PER_TURN
 _ACCELERATION_TICKS_S2 = 214.577 / 3600.0 * TICKS_PER_TURN
-_CURRENT_MA = 2.69
 _WATCHDOG_S = _RIPPLE_S = 0.02
 REBOOT_S = 0.3
 _TORQUE_AT_START, _RAM_RESTORE = 1, 2
@@ -269,12 +268,17 @@ class SoftServo:
 
     def __init__(self, servo_id: int, model: int, position: int, baud_code: int = 3) -> None:
         self.id = servo_id
-        self.table = ControlTable()
+        kind = SERVO_MODELS[model]
+        self.table = ControlTable(kind.is_small)
+        self.table["temperature_limit"] = round(kind.max_temperature_c)
+        self.table["min_voltage_limit"] = round(10.0 * min(kind.supply_v[0], 0.8 * kind.recommended_v))
+        self.table["max_voltage_limit"] = round(10.0 * max(kind.supply_v[1], 1.2 * kind.recommended_v))
         self.table["id"] = servo_id
         self.table["model_number"] = model
         self.table["baud_rate"] = baud_code
         self.motor = ServoMotor(float(position))
-        self.supply_v = _NOMINAL_V
+        self.supply_v = self._nominal_v = kind.recommended_v
+        self._current_unit_ma = kind.current_unit_ma or STALL_MA / 1000.0  # else a load in 0.1 %
         self._grinds_ma, self._ripples = 0.0, False
         self._lost_turns = 0
         self._heard_s = 0.0
@@ -436,7 +440,7 @@ class SoftServo:
     def _drive(self) -> MotorGoal:
         table, mode = self.table, self.table["operating_mode"]
         halted = table["watchdog"] == WATCHDOG_TRIPPED or mode not in POSITION_MODES
-        volts = self.supply_v / _NOMINAL_V
+        volts = self.supply_v / self._nominal_v
         duty = abs(table["goal_pwm"]) / _FULL_PWM * volts
         gain = table["position_p_gain"] / _P_GAIN_UNIT
         by_current = mode == CURRENT_POSITION
@@ -445,9 +449,9 @@ class SoftServo:
             goal=round(self.motor.trajectory) if halted else table["goal_position"] + self._lost_turns * TICKS_PER_TURN,
             speed=(table["profile_velocity"] or table["velocity_limit"]) * _VELOCITY_TICKS_S,
             acceleration=table["profile_acceleration"] * _ACCELERATION_TICKS_S2,
-            limit_ma=min(duty * STALL_MA, abs(table["goal_current"]) * _CURRENT_MA if by_current else math.inf),
+            limit_ma=min(duty * STALL_MA, abs(table["goal_current"]) * self._current_unit_ma if by_current else math.inf),
             duty=duty,
-            gain_ma=gain * _CURRENT_MA if by_current else gain / _FULL_PWM * STALL_MA * volts,
+            gain_ma=gain * self._current_unit_ma if by_current else gain / _FULL_PWM * STALL_MA * volts,
         )
 
     def _check_watchdog(self) -> None:
@@ -505,13 +509,13 @@ class SoftServo:
         """Update the registers with the present values."""
         table, motor = self.table, self.motor
         current_ma, limit = self.current_ma, abs(table["goal_pwm"])
-        pwm = round(_FULL_PWM * (current_ma / STALL_MA + motor.velocity / MAX_TICKS_S) * _NOMINAL_V / max(self.supply_v, 1.0))
+        pwm = round(_FULL_PWM * (current_ma / STALL_MA + motor.velocity / MAX_TICKS_S) * self._nominal_v / max(self.supply_v, 1.0))
         table["present_pwm"] = max(-limit, min(limit, pwm)) if table["torque"] else 0
         table["present_position"] = self._count(motor.position)
         table["position_trajectory"] = self._count(motor.trajectory)
         table["present_velocity"] = round(motor.horn_ticks_s / _VELOCITY_TICKS_S)
         table["velocity_trajectory"] = round(motor.velocity / _VELOCITY_TICKS_S)
-        table["present_current"] = round(current_ma / _CURRENT_MA)
+        table["present_current"] = round(current_ma / self._current_unit_ma)
         table["moving"] = int(motor.horn_ticks_s != 0.0)
         table["temperature"] = round(motor.temperature_c)
         table["voltage"] = round(10.0 * self.supply_v)

@@ -156,6 +156,7 @@ def group_items(parameters: bytes) -> tuple[int, list[tuple[int, bytes]]]:
 
 SIZE = 662
 INDIRECT_ADDRESS, INDIRECT_DATA, INDIRECT_COUNT = 168, 224, 28
+SMALL_INDIRECT_DATA, SMALL_INDIRECT_COUNT = 208, 20
 WATCHDOG_TRIPPED = -1
 POSITION, EXTENDED_POSITION, CURRENT_POSITION = 3, 4, 5
 POSITION_MODES = frozenset({POSITION, EXTENDED_POSITION, CURRENT_POSITION})
@@ -259,9 +260,13 @@ _SIGNED = {register.name for register in _REGISTERS if register.low is not None 
 
 
 class ControlTable:
-    """One servo's registers. Values go in and out as signed numbers by name, or as bytes over the line."""
+    """One servo's registers. Values go in and out as signed numbers by name, or as bytes over the line.
 
-    def __init__(self) -> None:
+    `is_small`: a servo of the 330 size, whose indirect data lie behind 20 addresses instead of 28.
+    """
+
+    def __init__(self, is_small: bool = False) -> None:
+        self._data, self._count = (SMALL_INDIRECT_DATA, SMALL_INDIRECT_COUNT) if is_small else (INDIRECT_DATA, INDIRECT_COUNT)
         self._bytes = bytearray(SIZE)
         for register in _REGISTERS:
             self[register.name] = register.initial
@@ -286,7 +291,7 @@ class ControlTable:
         for register in _REGISTERS:
             if not register.eeprom:
                 self[register.name] = register.initial
-        self._bytes[INDIRECT_DATA : INDIRECT_DATA + INDIRECT_COUNT] = bytes(INDIRECT_COUNT)
+        self._bytes[self._data : self._data + self._count] = bytes(self._count)
 
     def read(self, address: int, length: int) -> tuple[ErrorCode, bytes]:
         """Bytes of the table; indirect data come from their indirect addresses."""
@@ -297,9 +302,9 @@ class ControlTable:
         return ErrorCode.NONE, bytes(self._bytes[self._resolved(at)] for at in range(address, address + length))
 
     def _resolved(self, at: int) -> int:
-        if not INDIRECT_DATA <= at < INDIRECT_DATA + INDIRECT_COUNT:
+        if not self._data <= at < self._data + self._count:
             return at
-        pointer = INDIRECT_ADDRESS + 2 * (at - INDIRECT_DATA)
+        pointer = INDIRECT_ADDRESS + 2 * (at - self._data)
         return min(SIZE - 1, int.from_bytes(self._bytes[pointer : pointer + 2], "little"))
 
     def write(self, address: int, data: bytes) -> tuple[ErrorCode, list[str]]:

@@ -163,6 +163,41 @@ def test_what_was_seen_of_a_servo_that_is_gone_is_forgotten(draft: RigDraft, mon
     assert draft.assignments == ()
 
 
+def _search(draft: RigDraft, monkeypatch: pytest.MonkeyPatch, **models: int) -> None:
+    """Search servos 1 to 7 of XM430-W350, those named (s1 to s7) of another model."""
+    draft.config = draft.config.model_copy(update={"servos": draft.config.servos.model_copy(update={"port": "/dev/ttyUSB0"})})
+    found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, models.get(f"s{k}", 1020)) for k in range(1, 8)))
+    monkeypatch.setattr("hardware.calibration.rig_draft.find_servos", lambda *_: found)
+    draft.search_servos()
+
+
+def test_small_servos_for_the_wires_beside_strong_ones(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    _search(draft, monkeypatch, s1=1200, s2=1200, s3=1200, s4=1200)
+    servos = draft.config.servos
+    assert [servos.model_of(joint).number for joint in servos.joints] == [1200] * 4 + [1020] * 3
+    assert [servos.lowest_v(joint) for joint in servos.joints] == [4.4] * 4 + [10.5] * 3
+    # the servos are found to sit elsewhere: their models move with them
+    order = (5, 6, 7, 1, 2, 3, 4)
+    names = ("right", "left", "up", "down", "advance", "delivery_1", "delivery_2")
+    draft.set_assignments([Assignment(name, one, 1, "seen") for name, one in zip(names, order, strict=True)])  # type: ignore[arg-type]
+    servos = draft.config.servos
+    assert [servos.model_of(joint).number for joint in servos.joints] == [1020] * 3 + [1200] * 4
+
+
+def test_a_limit_of_the_supply_belongs_to_the_servos_that_were_there(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    servos = draft.config.servos.model_copy(update={"min_voltage_v": 10.5})
+    draft.config = draft.config.model_copy(update={"servos": servos})
+    _search(draft, monkeypatch)
+    assert draft.config.servos.min_voltage_v == 10.5
+    _search(draft, monkeypatch, **{f"s{k}": 1240 for k in range(1, 8)})
+    assert draft.config.servos.min_voltage_v is None
+
+
+def test_a_servo_of_another_series_is_named(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(DeviceError, match=r"^id 3: servo XL-320 \(350\) is not supported"):
+        _search(draft, monkeypatch, s3=350)
+
+
 def test_the_servos_wait_until_the_board_is_away(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
     board, empty, said = np.ones((2, 2), np.uint8), np.zeros((2, 2), np.uint8), []
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 
 import numpy as np
@@ -21,6 +21,7 @@ from tests.hardware.lock_bench import LockBench, LockTwin, lock_bench
 
 WIRING = "3,-7,1,-12,-5,2,-4"  # tendons right, left, up, down; advance; two of the catheter
 IDS = (1, 2, 3, 4, 5, 7, 12)
+FOUND = dict.fromkeys(IDS, 1020)
 
 
 def _config(**twin: object) -> Config:
@@ -28,7 +29,7 @@ def _config(**twin: object) -> Config:
 
 
 def _identify(bench: LockBench, say: Callable[[str], object] = lambda _: None) -> tuple[Assignment, ...]:
-    found = {servo_id: servo_identification.identify_servo(bench, ServosConfig(), IDS, servo_id, say) for servo_id in IDS}
+    found = {servo_id: servo_identification.identify_servo(bench, ServosConfig(), FOUND, servo_id, say) for servo_id in IDS}
     return assign({servo_id: finding for servo_id, finding in found.items() if finding is not None})
 
 
@@ -61,7 +62,7 @@ def test_how_far_the_feed_goes_is_measured_over_its_longest_way(straight: tuple[
     twin, bench = straight
     feed = twin.wiring.joints[JOINT_NAMES.index("advance")]
     start = dict(twin.turned_mm)
-    finding = servo_identification.identify_servo(bench, ServosConfig(), IDS, feed.id, lambda _: None)
+    finding = servo_identification.identify_servo(bench, ServosConfig(), FOUND, feed.id, lambda _: None)
     assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
     assert finding.way.amplitude_mm == 3.0
     assert finding.way.px_per_mm == pytest.approx(Appearance().pixels_per_mm, rel=0.1)
@@ -80,7 +81,7 @@ def test_a_feed_that_leaves_the_picture_on_its_longest_way_is_a_feed_all_the_sam
                 raise HeadNotSeen("the robot's head is not seen")
             return super().observe(alive)
 
-    finding = servo_identification.identify_servo(LosesIt(twin), ServosConfig(), IDS, feed.id, lambda _: None)
+    finding = servo_identification.identify_servo(LosesIt(twin), ServosConfig(), FOUND, feed.id, lambda _: None)
     assert (finding.function, finding.sign) == (Function.ADVANCE, feed.sign)
     assert twin.turned_mm == pytest.approx(start, abs=0.05)
 
@@ -202,7 +203,7 @@ def test_a_step_that_loses_sight_leaves_nothing_turned(looks: int, error: Except
     twin = LockTwin(_config())
     before = dict(twin.turned_mm)
     steps = (
-        lambda blind: servo_identification.identify_servo(blind, ServosConfig(), IDS, 3, lambda _: None),
+        lambda blind: servo_identification.identify_servo(blind, ServosConfig(), FOUND, 3, lambda _: None),
         lambda blind: servo_identification.find_zeros(blind, twin.wiring, lambda _: None),
         lambda blind: servo_identification.learn_steering(blind, twin.wiring, lambda _: None),
     )
@@ -214,7 +215,7 @@ def test_a_step_that_loses_sight_leaves_nothing_turned(looks: int, error: Except
 
 def test_a_wiggle_goes_both_ways_and_comes_back() -> None:
     twin, bench = lock_bench(_config())
-    servo_identification.wiggle(bench, ServosConfig(), IDS, 7)
+    servo_identification.wiggle(bench, ServosConfig(), FOUND, 7)
     ways = [at_mm for servo_id, at_mm in twin.moved if servo_id == 7]
     assert {servo_id for servo_id, _ in twin.moved} == {7}
     assert (min(ways), max(ways)) == pytest.approx((-1.5, 1.5), abs=0.02)
@@ -223,7 +224,7 @@ def test_a_wiggle_goes_both_ways_and_comes_back() -> None:
 
 def test_the_servo_under_test_has_bounds_and_the_others_stand() -> None:
     limits = ProbeLimits(-1.0, 2.0, speed_mm_s=4.0)
-    made = probe_config(ServosConfig(), 12, limits, -1, IDS)
+    made = probe_config(ServosConfig(), 12, limits, -1, FOUND)
     tested = made.joints[JOINT_NAMES.index("advance")]
     assert (tested.id, tested.sign) == (12, -1)
     assert (tested.low_mm, tested.high_mm) == pytest.approx((-1.3, 2.3))
@@ -231,9 +232,9 @@ def test_the_servo_under_test_has_bounds_and_the_others_stand() -> None:
     assert {joint.id for joint in made.joints} == set(IDS)
     assert made.pretension_mm == 0.0
     with pytest.raises(ProbeFailed, match="servo 9 cannot be moved"):
-        probe_config(ServosConfig(), 9, limits, 1, IDS)
+        probe_config(ServosConfig(), 9, limits, 1, FOUND)
     with pytest.raises(ProbeFailed, match="seven servos are needed"):
-        probe_config(ServosConfig(), 1, limits, 1, IDS[:6])
+        probe_config(ServosConfig(), 1, limits, 1, dict.fromkeys(IDS[:6], 1020))
 
 
 def _with_turns(*mm_per_turn: float) -> ServosConfig:
@@ -265,7 +266,7 @@ def test_a_small_step_of_a_servo_that_is_known_is_one_of_its_own_joint(servo_id:
 @pytest.mark.parametrize("servo_id", range(1, 8))
 def test_a_servo_that_nobody_knows_yet_moves_nothing_farther_or_faster_than_asked(servo_id: int) -> None:
     servos = _with_turns(40.0, 38.0, 25.0, 25.0, 5.0, 60.0, 62.0)
-    made = probe_config(servos, servo_id, ProbeLimits(), ids=(1, 2, 3, 4, 5, 6, 7))
+    made = probe_config(servos, servo_id, ProbeLimits(), found=dict.fromkeys(range(1, 8), 1020))
     for asked_mm in (0.75, 3.0):
         assert 0.0 < _way_mm(servos, made, servo_id, asked_mm) <= asked_mm + 0.01
     real = next(joint for joint in servos.joints if joint.id == servo_id)
@@ -292,7 +293,7 @@ class _Wires:
 
     @contextmanager
     def probe(
-        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: int, ids: tuple[int, ...] | None = None
+        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: int, found: Mapping[int, int] | None = None
     ) -> Iterator[_WireProbe]:
         self._pulled = servo_id
         yield _WireProbe(self.at_mm, servo_id, limits)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.config.safety import JOINT_NAMES, JointConfig, ServosConfig
+from core.config.servo_models import SERVO_MODELS, ServoModel
 from core.devices import DeviceError
 from hardware.servos import registers
 from hardware.servos.dynamixel_bus import ServoBus
@@ -29,7 +30,7 @@ from hardware.servos.dynamixel_port import (
     WriteRefused,
     WrongServo,
 )
-from hardware.servos.registers import HardwareError, MissingServo, ServoState
+from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.protocol import Instruction
 
@@ -110,6 +111,22 @@ def _until(bus: ServoBus, index: int, wanted: Callable[[object], bool]) -> objec
     raise AssertionError(f"not seen: {reading}")
 
 
+@pytest.fixture
+def mixed() -> Iterator[tuple[SoftServoBus, ServoBus]]:
+    """Four small servos of 5 V for the tendons, three strong ones of 12 V, armed."""
+    joints = tuple(j.model_copy(update={"model": 1200}) if j.id <= 4 else j for j in CONFIG.joints)
+    config = ServosConfig.model_validate({**CONFIG.model_dump(), "joints": joints})
+    twin = SoftServoBus(config, positions=[1000] * 7)
+    twin.start()
+    bus = ServoBus(config, twin.port)
+    bus.open()
+    bus.set_zero()
+    bus.arm()
+    yield twin, bus
+    bus.close()
+    twin.stop()
+
+
 # --- millimetres and registers ---------------------------------------------------------------------------------------------------
 
 
@@ -163,30 +180,41 @@ def test_watchdog_in_steps_of_20_ms(seconds: float, steps: int) -> None:
     assert registers.watchdog_units(seconds) == steps
 
 
-def test_currents_by_model() -> None:
-    assert registers.current_ma(1020, -100) == pytest.approx(-269.0)
-    assert registers.current_ma(1200, 100) == 100.0
-    assert registers.current_ma(1060, 100) is None
+XM430, XL330 = SERVO_MODELS[1020], SERVO_MODELS[1200]
 
 
 def test_a_status_block_by_hand() -> None:
-    block = bytes.fromhex("02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 78 2D")
-    state = registers.state_of(TENDON, 1020, -131_073, block, 5.0)
+    block = bytes.fromhex("02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 2D 7800")
+    state = registers.state_of(TENDON, XM430, -131_073, block, 5.0)
+    assert state is not None
     assert (state.torque, state.error, state.watchdog_tripped) == (True, HardwareError.OVERLOAD, True)
     assert (state.goal_ticks, state.ticks, state.position_mm) == (-1024, -131_073, 0.0)
     assert (state.current_ma, state.voltage_v, state.temperature_c) == (pytest.approx(-246 * 2.69), 12.0, 45.0)
     assert state.velocity_mm_s == pytest.approx(-65 * 0.229 / 60 * 40)
+    small = registers.state_of(TENDON, XL330, -131_073, block[:-2] + b"\x32", 5.0)
+    assert small is not None
+    assert (small.current_ma, small.voltage_v, small.temperature_c) == (-246.0, 5.0, 45.0)
 
 
-def test_zeros_are_no_servo_at_zero() -> None:
-    assert registers.state_of(TENDON, 1020, 0, bytes(16), 0.0) is None
-    with pytest.raises(ValueError, match="15 bytes"):
-        registers.state_of(TENDON, 1020, 0, bytes(15), 0.0)
+def test_a_supply_of_25_6_v_is_no_lost_block() -> None:
+    state = registers.state_of(TENDON, SERVO_MODELS[1040], 0, bytes.fromhex("02 01 00 00 000000 0000 0000 000000 2D 0001"), 0.0)
+    assert state is not None
+    assert state.voltage_v == pytest.approx(25.6)
 
 
-def test_the_block_fits_the_smallest_servos() -> None:
-    assert len(registers.indirect_addresses()) <= 2 * 20
-    assert (registers.indirect_data(1020), registers.indirect_data(1200)) == (224, 208)
+@pytest.mark.parametrize("model", SERVO_MODELS.values(), ids=lambda model: model.name)
+def test_zeros_are_no_servo_at_zero(model: ServoModel) -> None:
+    length = registers.block_bytes(model)
+    assert registers.state_of(TENDON, model, 0, bytes(length), 0.0) is None
+    with pytest.raises(ValueError, match=f"{length - 1} bytes"):
+        registers.state_of(TENDON, model, 0, bytes(length - 1), 0.0)
+
+
+@pytest.mark.parametrize("model", SERVO_MODELS.values(), ids=lambda model: model.name)
+def test_the_block_fits_the_servo(model: ServoModel) -> None:
+    room, data = (20, 208) if model.name[:5] in ("XL330", "XC330") else (28, 224)
+    assert len(registers.indirect_addresses(model)) // 2 == registers.block_bytes(model) + registers.TAG_BYTES <= room
+    assert registers.indirect_data(model) == data
 
 
 def test_hardware_errors_in_words() -> None:
@@ -350,7 +378,7 @@ def test_a_servo_with_another_id_is_named_and_so_are_those_found(twin: SoftServo
 
 @pytest.mark.parametrize(
     ("register", "value", "words"),
-    [("model_number", 1060, r"is model 1060, not 1020"), ("id", 5, "says that its id is 5")],
+    [("model_number", 1060, r"is XL430-W250 \(1060\), not XM430-W350 \(1020\)"), ("id", 5, "says that its id is 5")],
 )
 def test_a_wrong_model_and_a_wrong_id_are_refused(
     twin: SoftServoBus, closed: ServoBus, register: str, value: int, words: str
@@ -931,3 +959,45 @@ def test_without_power_for_a_moment_all_must_be_zeroed(twin: SoftServoBus, armed
     assert all(isinstance(reading, ServoState) for reading in readings)
     assert armed.zero_ticks == (None,) * 7
     assert not armed.is_armed
+
+
+# --- several models on one line --------------------------------------------------------------------------------------------------
+
+
+def test_small_and_strong_servos_work_together(mixed: tuple[SoftServoBus, ServoBus]) -> None:
+    _, bus = mixed
+    assert [identity.model for identity in bus.identities] == [1200] * 4 + [1020] * 3
+    states = _states(bus)
+    assert [state.voltage_v for state in states] == [5.0] * 4 + [12.0] * 3
+    assert all(not state.error for state in states)
+    bus.write((0.3, 0.2, 0.1, 0.0, 0.4, 0.5, 0.6))
+    for index, goal_mm in enumerate((0.3, 0.2, 0.1, 0.0, 0.4, 0.5, 0.6)):
+        _until(bus, index, lambda r, goal_mm=goal_mm: isinstance(r, ServoState) and abs((r.position_mm or 0.0) - goal_mm) < 0.01)  # type: ignore[misc]
+
+
+def test_currents_of_several_models_are_told_in_their_units(mixed: tuple[SoftServoBus, ServoBus]) -> None:
+    twin, bus = mixed
+    for servo_id in (1, 5):
+        twin.modify_servo(servo_id, lambda servo: servo.grind(100.0))
+    small, strong = (_until(bus, index, lambda r: isinstance(r, ServoState) and (r.current_ma or 0.0) > 90.0) for index in (0, 4))
+    assert isinstance(small, ServoState)
+    assert isinstance(strong, ServoState)
+    assert small.current_ma == pytest.approx(108.0, abs=1.0)
+    assert strong.current_ma == pytest.approx(108.0, abs=3.0)
+
+
+@pytest.mark.parametrize("servo_id", [2, 6])
+def test_a_silent_servo_of_one_model_hides_none_of_another(mixed: tuple[SoftServoBus, ServoBus], servo_id: int) -> None:
+    twin, bus = mixed
+    twin.faults.mute(servo_id)
+    readings = _until_all(bus, lambda readings: isinstance(readings[servo_id - 1], MissingServo))
+    assert [isinstance(reading, ServoState) for reading in readings] == [k != servo_id for k in range(1, 8)]
+
+
+def _until_all(bus: ServoBus, wanted: Callable[[Sequence[ServoReading]], bool]) -> Sequence[ServoReading]:
+    for _ in range(100):
+        readings = bus.read()
+        if wanted(readings):
+            return readings
+        time.sleep(0.01)
+    raise AssertionError(readings)
