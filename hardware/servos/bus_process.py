@@ -5,7 +5,8 @@ The application starts it (``bus_ipc.start_bus``) as ``python -m hardware.servos
 - 50 times a second it reads all servos, takes the newest order through the gate, and writes (``BusLoop``, ``bus_guard``).
 - An order is good for 100 ms and for one bounded step. Heartbeats that stop for ``heartbeat_timeout_s`` disarm; then the process
   falls silent, so that the servos' own watchdogs trip as a second layer. When the application wakes up, it finds the cause latched.
-- STOP has a pipe of its own. When the application is gone, that pipe ends: the servos hold, and the process ends.
+- STOP has a pipe of its own, which is also read between any two transactions of opening, zeroing, arming and restarting.
+  When the application is gone, that pipe ends: the servos hold, and the process ends.
 - The process itself stopped or killed: each servo ends at its last goal, within one step; then its watchdog trips.
 """
 
@@ -29,7 +30,7 @@ from core.messages import message
 from hardware.servos.bus_guard import BusGuard
 from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, Request
 from hardware.servos.dynamixel_bus import ServoBus
-from hardware.servos.dynamixel_port import LATE_S, NotReady, PortError, PortLost, ServoError, TorqueStillOn
+from hardware.servos.dynamixel_port import LATE_S, NotReady, PortError, PortLost, ServoError, StoppedMeanwhile, TorqueStillOn
 from hardware.servos.registers import MissingServo, ServoReading, ServoState
 
 _log = logging.getLogger(__name__)
@@ -133,6 +134,8 @@ _READS_BEFORE_ARMING = 3
 _SETTLE_CYCLES, _SETTLED_MM = 5, 0.2
 """After a hold it is checked, and repeated, for so many cycles; so far a goal may be from the position."""
 _WINDOW_S = 10.0
+_INTERRUPTED_BY_STOP = frozenset({"open", "zero", "arm", "reboot"})
+"""Requests that end at a STOP; the others hold the servos or release them, and are finished first."""
 _TRIES_ON_REQUEST, _TRIES_AT_END = 4, 15
 
 
@@ -153,6 +156,7 @@ class BusLoop:
         self._reopen_at_s = 0.0
         self._open_problem = ""
         self._stop_s = -math.inf
+        self._must_hold = False
         self._actions: dict[str, Callable[[Request], None]] = {
             "open": lambda _: self._open(),
             "zero": lambda request: bus.set_zero(request.details.get("names")),
@@ -211,12 +215,39 @@ class BusLoop:
                 return
 
     def _handle_stop(self) -> None:
-        """A key that stays down and a broken wire send it fifty times a second; held as often, a tendon under load would creep."""
+        if self._latch_stop():
+            self._finish_stop()
+
+    def _latch_stop(self) -> bool:
+        """No more goals, and the status says so at once; ``_finish_stop`` holds. False for a STOP that goes on.
+
+        A key that stays down and a broken wire send it fifty times a second; held as often, a tendon under load would creep.
+        """
         now_s = time.monotonic()
         is_same = self._guard.stopped and now_s - self._stop_s < _SAME_STOP_S
         self._stop_s = now_s
         if not is_same:
-            self._guard_port(lambda: self._end_motion(Fault(Cause.STOP_PRESSED)))
+            self._must_hold = True
+            self._guard.end_motion(Fault(Cause.STOP_PRESSED))
+            self._publish(now_s)
+        return not is_same
+
+    def _finish_stop(self) -> None:
+        """Hold after a STOP."""
+        if self._must_hold:
+            self._must_hold = False
+            self._guard_port(lambda: self._hold_after(Fault(Cause.STOP_PRESSED)))
+
+    def _check_stop(self) -> None:
+        """Between two transactions: raise StoppedMeanwhile when STOP has come."""
+        if self._server.read_stop() and self._latch_stop():
+            raise StoppedMeanwhile("stopped meanwhile: acknowledge, then switch the servos on again")
+
+    def _check_request(self) -> None:
+        """Between two transactions of a request: nothing is switched on for an application that has gone, either."""
+        self._check_stop()
+        if self._ended or self._server.is_alone:
+            raise StoppedMeanwhile("the application ended meanwhile: nothing was switched on")
 
     def _run_cycle(self) -> None:
         started_s = time.monotonic()
@@ -226,7 +257,9 @@ class BusLoop:
         self._quiet = is_settled and silence_s > self._servos.heartbeat_timeout_s + _LINGER_S
         self._readings = ()
         if self._bus.is_open and not self._quiet:
-            self._guard_port(self._read_decide_write)
+            with contextlib.suppress(StoppedMeanwhile), self._bus.interruptible(self._check_stop):
+                self._guard_port(self._read_decide_write)
+            self._finish_stop()
         elif self._lost and started_s >= self._reopen_at_s:
             self._reopen(started_s)
         self._publish(time.monotonic())
@@ -266,8 +299,12 @@ class BusLoop:
             self._end_motion(Fault(Cause.SERVOS_WRONG, str(error)))
 
     def _end_motion(self, fault: Fault) -> None:
-        """Goal = measured; no more goals. A fault that stops may switch the torque off, too."""
+        """No more goals; goal = measured. A fault that stops may switch the torque off, too."""
         self._guard.end_motion(fault)
+        self._hold_after(fault)
+
+    def _hold_after(self, fault: Fault) -> None:
+        """Goal = measured; the torque goes off, too, where that is requested."""
         if fault.cause.reaction is Reaction.STOP and self._servos.torque_off_on_stop:
             self._release.request()
         if not self._bus.is_open:
@@ -342,7 +379,7 @@ class BusLoop:
             if not missing:
                 return
             if left:
-                time.sleep(LATE_S)
+                self._bus.pause(LATE_S)
         silent = ", ".join(f"{one.name} (id {one.id}): {one.reason}" for one in missing)
         raise NotReady(message("not armed: {why}; check its supply and cable", why=silent))
 
@@ -377,12 +414,17 @@ class BusLoop:
                 raise NotReady(f"the servo bus process does not know how to {request.what}")
             if after_stop and request.what == "acknowledge":
                 raise NotReady("STOP was pressed meanwhile: acknowledge again")
-            action(request)
+            if request.what in _INTERRUPTED_BY_STOP:
+                with self._bus.interruptible(self._check_request):
+                    action(request)
+            else:
+                action(request)
         except PortLost as lost:
             error = lost
             self._lose_port()
         except ServoError as refused:
             error = refused
+        self._finish_stop()
         self._guard.note_request(time.monotonic())
         self._publish(time.monotonic())
         self._server.answer(request, error)

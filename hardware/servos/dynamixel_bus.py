@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from core.config.safety import JointConfig, JointName, ServosConfig
@@ -50,6 +50,8 @@ _COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
 """Registers that decide what a position means."""
 _SPEEDS = (57600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
 _REBOOT_S = 1.5
+_TORQUE_OFF_PACKETS = 3
+"""A packet to several servos has no answer, and may get lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,7 @@ def _silence(line: ServoLine, config: ServosConfig, silent: list[JointConfig]) -
     line.close()
     for baud in _SPEEDS:
         if baud != config.baud:
+            line.check()
             other = ServoLine(line.port, baud)
             other.open()
             try:
@@ -180,6 +183,19 @@ class ServoBus:
         """Silent, damaged, late answers and retries since ``open``."""
         return self._line.counts
 
+    @contextlib.contextmanager
+    def interruptible(self, check: Callable[[], None]) -> Iterator[None]:
+        """While inside, `check` is called between all transactions, and may raise.
+
+        ``arm`` then switches off what it had switched on; what held before holds.
+        """
+        with self._line.interruptible(check):
+            yield
+
+    def pause(self, seconds: float) -> None:
+        """Sleep; inside ``interruptible`` with checks."""
+        self._line.pause(seconds)
+
     def open(self) -> None:
         """Open and lock the port, and make sure that the seven servos are those of the configuration. Nothing moves, none lets go.
 
@@ -224,54 +240,73 @@ class ServoBus:
         for joint in chosen:
             if joint.id not in self._put_off:
                 continue
+            self._check_counting(joint)
             if not self._holds(joint):
                 self._configure(joint)
-            elif not _COUNTING.isdisjoint(self._differences(joint)):
-                raise NotReady(
-                    f"{_title(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
-                )
         self._zeros.update({joint.id: self._read_signed(joint, _POSITION) for joint in chosen})
 
     def arm(self) -> None:
-        """Torque on, each servo holding where it stands.
+        """Torque on, each servo holding where it stands. A servo that holds already goes on holding.
 
-        The order: watchdog off, torque off, mode and limits, profile, position read, goal = position, torque on, watchdog on.
+        The order: watchdog off; EEPROM where it differs, for which this one servo lets go and holds again; profile; position read,
+        goal = position; torque on where it is off; watchdog on.
 
         Raises
         ------
-        NotReady : a joint has no zero, has lost it by a restart, or a servo reports a hardware error.
-        WrongServo, NoAnswer, WriteRefused : before the torque is touched; later, the torque of all servos is off again.
-        TorqueStillOn : it could not be switched on everywhere, nor proven to be off again.
+        NotReady : a joint has no zero, has lost it by a restart, holds in another mode, or a servo reports a hardware error.
+        WrongServo, NoAnswer, WriteRefused, StoppedMeanwhile : the torque that was switched on is off again; the rest holds.
+        TorqueStillOn : that is not proven.
         """
         self._armed = False
         self._check_ready()
+        switched_on: list[int] = []
         try:
             for joint in self._joints:
                 self._line.write(joint.id, _WATCHDOG, b"\0")
             for joint in self._joints:
-                self._line.write(joint.id, TORQUE, b"\0")
-            for joint in self._joints:
-                self._configure(joint)
                 if self._map_block(joint):  # the only sign that it has restarted: it counts from another turn now
                     self._zeros.pop(joint.id, None)
+                self._set_up_held(joint)
                 self._set_profile(joint)
             self._check_zeroed()
-            self._send_position_as_goal()
+            self._send_position_as_goal(self._joints)
             for joint in self._joints:
-                self._line.write(joint.id, TORQUE, b"\1")
+                if not self._holds(joint):
+                    switched_on.append(joint.id)
+                    self._line.write(joint.id, TORQUE, b"\1")
             for joint in self._joints:  # from now on a servo that hears nothing for so long holds
                 self._line.write(joint.id, _WATCHDOG, bytes([registers.watchdog_units(self.config.watchdog_s)]))
         except PortLost:
             raise
         except ServoError as error:
             try:
-                self.torque_off()
+                self._undo_arming(switched_on)
             except PortLost:
                 raise
             except ServoError as still_on:
                 raise TorqueStillOn(f"{error}; {still_on}") from error
             raise
         self._armed = True
+
+    def _set_up_held(self, joint: JointConfig) -> None:
+        """``_configure``; a servo that holds lets go for that, where something differs, and holds again at once."""
+        if not self._differences(joint):
+            self._put_off.discard(joint.id)
+            return
+        held = self._holds(joint)
+        self._configure(joint)
+        if held:
+            self._send_position_as_goal([joint])
+            self._line.write(joint.id, TORQUE, b"\1")
+
+    def _undo_arming(self, switched_on: Sequence[int]) -> None:
+        """Torque off of the servos that this arming has switched on; the others hold, with their watchdogs on again."""
+        units = bytes([registers.watchdog_units(self.config.watchdog_s)])
+        self._line.group_write(_WATCHDOG, {joint.id: units for joint in self._joints})
+        if switched_on:
+            for _ in range(_TORQUE_OFF_PACKETS):
+                self._line.group_write(TORQUE, dict.fromkeys(switched_on, b"\0"))
+            self._prove_torque_off(switched_on)
 
     def disarm(self) -> None:
         """Hold, and take no more goals. The torque stays on; the servos' watchdogs trip when the line falls silent."""
@@ -335,10 +370,14 @@ class ServoBus:
         Raises TorqueStillOn when a servo still has torque, or does not tell.
         """
         self._armed = False
-        for _ in range(3):
+        for _ in range(_TORQUE_OFF_PACKETS):
             self._line.broadcast(TORQUE, b"\0")
-        answer = self._line.group_read([joint.id for joint in self._joints], TORQUE, 1)
-        doubtful = [joint.name for joint in self._joints if answer.data.get(joint.id) != b"\0"]
+        self._prove_torque_off([joint.id for joint in self._joints])
+
+    def _prove_torque_off(self, ids: Sequence[int]) -> None:
+        """Raises TorqueStillOn for those that still have torque, or do not tell."""
+        answer = self._line.group_read(list(ids), TORQUE, 1)
+        doubtful = [joint.name for joint in self._joints if joint.id in ids and answer.data.get(joint.id) != b"\0"]
         if doubtful:
             raise TorqueStillOn(
                 message("torque of {names} is not proven to be off: cut the servos' power", names=", ".join(doubtful))
@@ -367,7 +406,7 @@ class ServoBus:
         self._zeros.pop(servo_id, None)
         self._line.reboot(servo_id)
         until = time.monotonic() + _REBOOT_S
-        time.sleep(0.1)  # it answers for a moment before it goes down
+        self._line.pause(0.1)  # it answers for a moment before it goes down
         while (model := self._line.ping(servo_id)) is None:
             if time.monotonic() > until:
                 raise NoAnswer(f"{_title(joint)} did not come back after its reboot: switch the servos' power off and on")
@@ -385,6 +424,14 @@ class ServoBus:
             error = HardwareError(self._line.read(joint.id, _HARDWARE_ERROR, 1)[0])
             if error:
                 raise NotReady(f"{_title(joint)} reports {describe(error)}: find the cause, then reboot the servo")
+            self._check_counting(joint)
+
+    def _check_counting(self, joint: JointConfig) -> None:
+        """Raise NotReady for a servo that holds in a mode in which its positions mean something else."""
+        if not _COUNTING.isdisjoint(self._differences(joint)) and self._holds(joint):
+            raise NotReady(
+                f"{_title(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
+            )
 
     def _check_zeroed(self) -> None:
         names = ", ".join(joint.name for joint in self._joints if joint.id not in self._zeros)
@@ -446,11 +493,11 @@ class ServoBus:
         """Goal ticks by id, in one packet."""
         self._line.group_write(_GOAL, {servo_id: ticks.to_bytes(4, "little", signed=True) for servo_id, ticks in goals.items()})
 
-    def _send_position_as_goal(self) -> None:
-        """Goal = present position of all, proven by reading it back."""
-        goals = {joint.id: self._read_signed(joint, _POSITION) for joint in self._joints}
+    def _send_position_as_goal(self, joints: Sequence[JointConfig]) -> None:
+        """Goal = present position, proven by reading it back."""
+        goals = {joint.id: self._read_signed(joint, _POSITION) for joint in joints}
         self._send_goals(goals)
-        for joint in self._joints:
+        for joint in joints:
             if self._read_signed(joint, _GOAL) != goals[joint.id]:
                 raise WriteRefused(f"{_title(joint)} did not take its own position as goal: reboot it")
 

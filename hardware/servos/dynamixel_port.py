@@ -67,6 +67,10 @@ class TorqueStillOn(ServoError):
     """The torque could not be proven to be off."""
 
 
+class StoppedMeanwhile(ServoError):
+    """STOP came, or the application went, between two transactions of a request; what it had switched on is off again."""
+
+
 class BusProcessLost(ServoError):
     """The process that owns the servo bus cannot be started, is gone, or does not answer."""
 
@@ -202,6 +206,8 @@ _ERROR_TEXT = {
 _STATUS_BODY = 9
 """Where a status packet's data begin: header, id, length, instruction, error."""
 _ATTEMPTS = 3
+_PAUSE_SLICE_S = 0.01
+"""Longest sleep of the line between two looks for STOP."""
 
 
 class Miss(StrEnum):
@@ -242,7 +248,10 @@ class _Round:
 
 
 class ServoLine:
-    """The port with the packet handler. All methods but the constructor raise ``PortLost`` when the port vanishes."""
+    """The port with the packet handler. All methods but the constructor raise ``PortLost`` when the port vanishes.
+
+    ``interruptible`` lets a check raise between two transactions.
+    """
 
     def __init__(self, port: str, baud: int) -> None:
         self.port, self.baud = port, baud
@@ -251,6 +260,33 @@ class ServoLine:
         self._handler = StuffingHandler()
         self._quiet_until: dict[int, float] = {}
         self._owner: int | None = None
+        self._check: Callable[[], None] | None = None
+
+    @contextlib.contextmanager
+    def interruptible(self, check: Callable[[], None] | None) -> Iterator[None]:
+        """While inside, `check` is called before every transaction and in every pause, and may raise.
+
+        Once it has raised it is not called again: what was begun can be undone.
+        """
+        self._check = check
+        try:
+            yield
+        finally:
+            self._check = None
+
+    def check(self) -> None:
+        """Raises what the check of ``interruptible`` raises."""
+        check, self._check = self._check, None
+        if check is not None:
+            check()
+            self._check = check
+
+    def pause(self, seconds: float) -> None:
+        """Sleep, with checks meanwhile."""
+        until_s = time.monotonic() + seconds
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            self.check()
+            time.sleep(min(left_s, _PAUSE_SLICE_S))
 
     @property
     def is_open(self) -> bool:
@@ -292,6 +328,7 @@ class ServoLine:
             raise NotReady("the servo port is not open: open it first")
         if threading.get_ident() != self._owner:
             raise RuntimeError("the servo line belongs to the thread that opened it")
+        self.check()
         try:
             yield port
         except (OSError, termios.error) as error:  # SerialException is an OSError, termios.error is not
@@ -464,9 +501,7 @@ class ServoLine:
 
     def _let_late_answers_pass(self, servo_id: int) -> None:
         """Before a single request: the sender drops what has come until then."""
-        wait = self._quiet_until.get(servo_id, 0.0) - time.monotonic()
-        if wait > 0:
-            time.sleep(wait)
+        self.pause(self._quiet_until.get(servo_id, 0.0) - time.monotonic())
 
 
 def _error_text(error: int) -> str:

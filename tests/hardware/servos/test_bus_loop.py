@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -12,7 +13,7 @@ from core.control.faults import Cause, Fault
 from hardware.servos import bus_process, servo_robot
 from hardware.servos.bus_ipc import BusStatus, Request
 from hardware.servos.bus_process import BusLoop
-from hardware.servos.dynamixel_port import LineCounts, NoAnswer, NotReady, ServoError, TorqueStillOn
+from hardware.servos.dynamixel_port import LineCounts, NoAnswer, NotReady, ServoError, StoppedMeanwhile, TorqueStillOn
 from hardware.servos.registers import HardwareError, MissingServo, ServoState
 from hardware.servos.servo_robot import ServoRobot
 
@@ -27,6 +28,15 @@ class PaperBus:
         self.told: list[str] = []
         self.torque_stays = False
         self.missing = ""
+        self.check: Callable[[], None] = lambda: None
+
+    @contextlib.contextmanager
+    def interruptible(self, check: Callable[[], None]) -> Iterator[None]:
+        self.check = check
+        yield
+
+    def pause(self, seconds: float) -> None:
+        self.check()
 
     def open(self) -> None:
         if self.missing:
@@ -175,6 +185,55 @@ def test_an_acknowledgement_that_was_asked_for_before_stop_does_not_undo_it(pape
     paper.now_s += 0.02
     paper.hear(request="acknowledge")
     assert not paper.stopped
+
+
+def test_stop_between_two_transactions_of_arming_is_told_at_once_and_the_servos_are_held(paper: Paper) -> None:
+    """It was heard when all servos had been switched on."""
+
+    def arm() -> None:
+        paper.bus.check()
+        paper.end.stop = True
+        assert not paper.stopped
+        with pytest.raises(StoppedMeanwhile):
+            paper.bus.check()
+        assert paper.end.told.latched == Fault(Cause.STOP_PRESSED)
+        paper.bus.told.append("undone")
+        raise StoppedMeanwhile("stopped meanwhile: acknowledge, then switch the servos on again")
+
+    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.reads()
+    paper.hear(request="arm")
+    assert paper.bus.told == ["undone", "hold"]
+    assert paper.stopped
+    assert not paper.loop._guard.armed
+    assert "stopped meanwhile: acknowledge" in str(paper.end.answers[0][1])
+    paper.hear(request="arm")
+    assert "acknowledge first: stop pressed" in str(paper.end.answers[1][1])
+
+
+def test_stop_in_the_middle_of_arming_releases_the_wires_where_that_is_the_policy(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+
+    def arm() -> None:
+        paper.end.stop = True
+        paper.bus.check()
+
+    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.reads()
+    paper.hear(request="arm")
+    assert paper.bus.told == ["hold", "torque off"]
+
+
+def test_servos_are_not_switched_on_for_an_application_that_has_gone(paper: Paper) -> None:
+    def arm() -> None:
+        paper.end.is_alone = True
+        paper.bus.check()
+        raise AssertionError("it went on")
+
+    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.reads()
+    paper.hear(request="arm")
+    assert "the application ended meanwhile" in str(paper.end.answers[0][1])
 
 
 def test_the_first_cause_stays_when_the_torque_cannot_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:

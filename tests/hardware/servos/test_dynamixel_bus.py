@@ -25,6 +25,7 @@ from hardware.servos.dynamixel_port import (
     PortLost,
     PortTaken,
     ServoLine,
+    StoppedMeanwhile,
     StuffingHandler,
     TorqueStillOn,
     WriteRefused,
@@ -32,6 +33,7 @@ from hardware.servos.dynamixel_port import (
 )
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
 from hardware.twin.servos.bus import SoftServoBus
+from hardware.twin.servos.device import SoftServo
 from hardware.twin.servos.protocol import Instruction
 
 pytestmark = pytest.mark.real_time
@@ -457,7 +459,7 @@ def test_the_arming_order(twin: SoftServoBus, closed: ServoBus) -> None:
     closed.arm()
     goal = (1003).to_bytes(4, "little")
     profile = (83).to_bytes(4, "little") + (65).to_bytes(4, "little")
-    assert _writes(twin, 3) == [(98, b"\0"), (64, b"\0"), (108, profile), (132, b""), (116, goal), (64, b"\1"), (98, bytes([100]))]
+    assert _writes(twin, 3) == [(98, b"\0"), (108, profile), (132, b""), (116, goal), (64, b"\1"), (98, bytes([100]))]
     order = [(packet.id, packet.parameters[0]) for packet in twin.log if packet.instruction == Instruction.WRITE]
     assert order.index((1, 64)) > order.index((7, 98)), "all watchdogs off before the first torque is touched"
     assert closed.is_armed
@@ -578,6 +580,77 @@ def test_arming_that_fails_midway_leaves_no_torque_or_names_the_servos(
             bus.arm()
         assert _torques(twin) == [0] * 7
     assert not bus.is_armed
+
+
+class TorqueChanges:
+    """Every change of a servo's torque between two packets, as (id, value)."""
+
+    def __init__(self, twin: SoftServoBus, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.seen: list[tuple[int, int]] = []
+        answer = SoftServo.answer
+
+        def watched(servo: SoftServo, *args: object, **details: object) -> object:
+            before = servo.table["torque"]
+            reply = answer(servo, *args, **details)  # type: ignore[arg-type]
+            if servo.table["torque"] != before:
+                self.seen.append((servo.id, servo.table["torque"]))
+            return reply
+
+        monkeypatch.setattr(SoftServo, "answer", watched)
+
+
+def test_arming_again_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a STOP with the head bent all seven let go for 0.1 to 0.2 s."""
+    armed.disarm()
+    changes = TorqueChanges(twin, monkeypatch)
+    armed.arm()
+    assert changes.seen == []
+    assert armed.is_armed
+
+
+def test_arming_again_with_another_speed_lets_go_of_one_wire_at_a_time(
+    twin: SoftServoBus, armed: ServoBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    armed.disarm()
+    for servo_id in (2, 5):
+        twin.modify_servo(servo_id, lambda servo: servo.table.__setitem__("velocity_limit", 7))
+    changes = TorqueChanges(twin, monkeypatch)
+    before = twin.positions_mm()
+    armed.arm()
+    assert changes.seen == [(2, 0), (2, 1), (5, 0), (5, 1)]
+    assert twin.servo(2).table["velocity_limit"] == 65
+    assert twin.positions_mm() == before
+
+
+def test_a_servo_that_holds_in_another_mode_is_not_armed_and_does_not_let_go(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.disarm()
+    twin.modify_servo(3, lambda servo: servo.table.__setitem__("drive_mode", 1))
+    with pytest.raises(NotReady, match=r"servo up \(id 3\) holds in a mode of another program: switch the torque off"):
+        armed.arm()
+    assert _torques(twin) == [1] * 7
+
+
+@pytest.mark.parametrize("on_before", [(), (1, 2, 3, 4), (1, 2, 3, 4, 5, 6, 7)])
+def test_an_arming_that_is_broken_off_leaves_the_torque_as_it_was(
+    twin: SoftServoBus, armed: ServoBus, on_before: tuple[int, ...]
+) -> None:
+    armed.torque_off()
+    for servo_id in on_before:
+        twin.modify_servo(servo_id, lambda servo: servo.table.__setitem__("torque", 1))
+    expected = [int(joint.id in on_before) for joint in CONFIG.joints]
+    for calls in (0, 10, 40, 60, 75, 80, 84):
+        left = [calls]
+
+        def check(left: list[int] = left) -> None:
+            left[0] -= 1
+            if left[0] < 0:
+                raise StoppedMeanwhile("stopped meanwhile")
+
+        with armed.interruptible(check), pytest.raises(StoppedMeanwhile):
+            armed.arm()
+        assert _torques(twin) == expected, f"after {calls} transactions"
+        assert not armed.is_armed
+    armed.arm()
 
 
 def test_armed_it_cannot_be_zeroed(armed: ServoBus) -> None:
@@ -889,7 +962,7 @@ def test_27_a_servo_that_restarts_between_disarming_and_arming_is_not_armed(twin
     with pytest.raises(NotReady, match="not zeroed: advance "):
         armed.arm()
     assert not armed.is_armed
-    assert not any(state.torque for state in _states(armed))
+    assert [state.torque for state in _states(armed)] == [True] * 4 + [False] + [True] * 2, "what held goes on holding"
     assert [ticks is None for ticks in armed.zero_ticks] == [False] * 4 + [True] + [False] * 2
     armed.set_zero(["advance"])
     armed.arm()
