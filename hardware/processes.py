@@ -1,4 +1,7 @@
-"""Child processes (the servo bus and the twin), the shared memory between two processes, and threads that serve a device."""
+"""Child processes (the servo bus and the twin), the shared memory between two processes, and threads that serve a device.
+
+Also which programs have a device open (``holders``).
+"""
 
 from __future__ import annotations
 
@@ -27,6 +30,34 @@ MESSAGE_BYTES = 131_072
 """The largest message on a socket between two processes."""
 PARENT_CHECK_S = 1.0
 """How often a process that waits for its first message looks whether its parent still lives."""
+
+
+def holders(device: str) -> tuple[str, ...]:
+    """The other programs that have a device open, as "name (process 12)"; a pseudo-terminal's own far end is left out.
+
+    Only root sees what other users run.
+    """
+    target = os.path.realpath(device)
+    terminal = target.removeprefix("/dev/pts/")
+    found = []
+    for folder in Path("/proc").iterdir():
+        if not folder.name.isdecimal() or int(folder.name) == os.getpid():
+            continue
+        with contextlib.suppress(OSError):  # another user's, or gone meanwhile
+            links = {fd.name: os.readlink(fd) for fd in (folder / "fd").iterdir()}
+            ends = [fd for fd, link in links.items() if link.endswith("ptmx")]
+            infos = [(folder / "fdinfo" / fd).read_text(encoding="ascii") for fd in ends]
+            if target in links.values() and not any(f"tty-index:\t{terminal}" in info.splitlines() for info in infos):
+                found.append(f"{_program(folder)} (process {folder.name})")
+    return tuple(sorted(found))
+
+
+def _program(folder: Path) -> str:
+    """What a process in /proc runs; of Python the script or module."""
+    words = [word.decode("utf-8", "replace") for word in (folder / "cmdline").read_bytes().split(b"\0") if word]
+    name = Path(words[0]).name if words else (folder / "comm").read_text(encoding="utf-8", errors="replace").strip()
+    script = next((Path(word).name for word in words[1:] if not word.startswith("-")), "")
+    return f"{name} {script}" if name.startswith("python") and script else name
 
 
 class DeviceProcess:

@@ -27,6 +27,9 @@ class BusReport:
     hardware_errors : the servos' register 70.
     tracking_mm : goal minus measured position.
     currents_ma : None for a servo that reports none.
+    rebooted : a servo has restarted, so that its zero is lost.
+    torque_taken : the torque is off while the bus is armed, though the servo neither restarted nor reports an error: another master
+        on the line has switched it off. The zero is kept.
     armed, ended : whether the bus process follows commands, and why it does not any more.
     torque_off : all servos have said since the last report that their torque is off.
     torque_problem : why a torque-off that was requested is not proven yet.
@@ -41,6 +44,7 @@ class BusReport:
     tracking_mm: Sequence[float] = ()
     currents_ma: Sequence[float | None] = ()
     rebooted: bool = False
+    torque_taken: Sequence[bool] = ()
     watchdog_tripped: bool = False
     armed: bool = True
     ended: Fault | None = None
@@ -199,6 +203,7 @@ class BusMonitor:
             (Cause.STRAINED, self.strained),
             (Cause.TORQUE_ON, newest.torque_problem),
             (Cause.REBOOTED, self.rebooted),
+            (Cause.TORQUE_TAKEN, _listed(newest.torque_taken, bool, "")),
             (Cause.WATCHDOG, newest.watchdog_tripped),
             (Cause.HOT, hot),
             (Cause.WARM, not hot and warm),

@@ -91,6 +91,8 @@ class Cause(StrEnum):
         "Nothing heard from the servo bus", "acknowledge, then switch the servos on: that starts it again", True)
     REBOOTED = ("servo restarted", Area.SERVOS, Reaction.DISARM,
         "A servo restarted and lost its zero", "acknowledge, then zero the servos again", True)
+    TORQUE_TAKEN = ("torque switched off by another program", Area.SERVOS, Reaction.DISARM,
+        "Another program switched the torque off", "end that program (doctor names it), check the wires, then acknowledge", True)
     WATCHDOG = ("bus watchdog tripped", Area.SERVOS, Reaction.DISARM,
         "The servos' watchdog tripped", "check the servos, then acknowledge", True)
     HOT = ("servo too hot", Area.SERVOS, Reaction.DISARM,

@@ -23,6 +23,7 @@ from core.types import Frame
 from hardware.cameras import sysfs
 from hardware.cameras.registry import CAMERA_KINDS
 from hardware.preflight.checks import NOT_CONFIGURED, RENEW, Check, one_line
+from hardware.processes import holders
 from hardware.rig import RigKind, kind_of, real_camera
 
 _SEE_LIBRARIES = "see the vendor libraries in main.py doctor"
@@ -151,20 +152,28 @@ def check_servo_port(port: str | None, *, wanted: bool = False) -> Check:
     try:
         handle = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
-        busy = error.errno == errno.EBUSY
-        fix = f"close the program that has it (fuser -v {port})" if busy else "unplug the USB adapter and plug it in again"
-        return Check(name, False, f"{port} cannot be opened ({error.strerror})", fix)
+        if error.errno == errno.EBUSY:
+            return _taken(name, port)
+        return Check(name, False, f"{port} cannot be opened ({error.strerror})", "unplug the USB adapter and plug it in again")
     try:
         if not os.isatty(handle):
             return Check(name, False, message("{port} is no serial port", port=port), "set servos.port (ls /dev/serial/by-id)")
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        fix = f"close the program that has it (fuser -v {port}); it may be LumenPilot itself"
-        return Check(name, False, message("{port} is in use by another program", port=port), fix)
+        return _taken(name, port)
     finally:
         os.close(handle)
+    if holders(port):
+        return _taken(name, port)
     target = os.path.realpath(port)
     return Check(name, True, message("{port} is free", port=port) + (f" ({target})" if target != port else ""))
+
+
+def _taken(name: str, port: str) -> Check:
+    """The port is open in another program, which is named if this user may see it."""
+    who = ", ".join(holders(port))
+    what = message("{port} is in use by another program", port=port) + (f": {who}" if who else "")
+    return Check(name, False, what, f"close that program (sudo fuser -v {port}); it may be LumenPilot itself")
 
 
 def _group(path: Path) -> str:

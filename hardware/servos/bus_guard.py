@@ -80,7 +80,9 @@ def report_of(readings: Sequence[ServoReading], *, armed: bool, errors: int, reb
         # goals mean something only while they are followed
         tracking_mm=() if not whole else tuple(errors_mm) if armed and len(errors_mm) == len(readings) else (0.0,) * len(readings),
         currents_ma=tuple(reading.current_ma if isinstance(reading, ServoState) else None for reading in readings),
-        rebooted=rebooted or any(reading.restarted for reading in missing) or (armed and any(not s.torque for s in states)),
+        rebooted=rebooted or any(reading.restarted for reading in missing),
+        # a servo that has switched itself off has an error; one that has restarted has lost its status block
+        torque_taken=tuple(armed and isinstance(r, ServoState) and not r.torque and not r.error for r in readings),
         watchdog_tripped=any(state.watchdog_tripped for state in states),
     )
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
 import termios
 import threading
@@ -28,6 +29,7 @@ from dynamixel_sdk import (
 
 from core.devices import DeviceError
 from core.messages import message
+from hardware.processes import holders
 from hardware.servos.registers import TAG_BYTES
 
 
@@ -81,7 +83,11 @@ _READ_SLICE_S = 0.0005
 
 
 class LockedPort(PortHandler):  # type: ignore[misc]
-    """A serial port that only one program can hold, timed by the monotonic clock."""
+    """A serial port that only one program can hold, timed by the monotonic clock.
+
+    Programs that ask for the lock (flock) are refused by it, all others by the terminal's exclusive mode: while it is on, the
+    system refuses every further ``open``, but for those of root. One that had the port open before is looked for.
+    """
 
     is_open: bool
     _late_bytes: int | None = None
@@ -104,9 +110,13 @@ class LockedPort(PortHandler):  # type: ignore[misc]
                 timeout=_READ_SLICE_S,
                 exclusive=True,
             )
+            fcntl.ioctl(self.ser.fileno(), termios.TIOCEXCL)
         except (serial.SerialException, OSError, ValueError) as error:
             raise _port_error(self.port_name, error) from None
         self.is_open = True
+        if holders(self.port_name):
+            self.closePort()
+            raise _port_taken(self.port_name)
         self.is_using = False
         # Not every port is a USB adapter: a pseudo-terminal has no such mode.
         with contextlib.suppress(ValueError, NotImplementedError):
@@ -114,6 +124,14 @@ class LockedPort(PortHandler):  # type: ignore[misc]
         self.ser.reset_input_buffer()
         self.tx_time_per_byte = 10_000.0 / self.baudrate
         return True
+
+    def closePort(self) -> None:  # noqa: N802
+        """Give the port back. A terminal that another program keeps open would stay exclusive."""
+        try:
+            with contextlib.suppress(OSError, termios.error):
+                fcntl.ioctl(self.ser.fileno(), termios.TIOCNXCL)
+        finally:
+            super().closePort()
 
     def setPacketTimeout(self, packet_length: int) -> None:  # noqa: N802
         self._late_bytes = None
@@ -177,7 +195,7 @@ def _port_error(port: str, error: Exception) -> PortError:
             message("no permission for servo port {port}: add your user to the group dialout, then log in again", port=port)
         )
     if code in {errno.EAGAIN, errno.EBUSY}:
-        return PortTaken(message("servo port {port} is in use by another program: close that program first", port=port))
+        return _port_taken(port)
     if code in {errno.ENODEV, errno.ENXIO, errno.EIO}:
         return PortError(
             message("servo port {port} has no device behind it: unplug the USB adapter and plug it in again", port=port)
@@ -189,6 +207,15 @@ def _port_error(port: str, error: Exception) -> PortError:
             why=" ".join(str(error).split()),
         )
     )
+
+
+def _port_taken(port: str) -> PortTaken:
+    """Names the programs that hold the port, as far as the system shows them to this user."""
+    if who := ", ".join(holders(port)):
+        return PortTaken(
+            message("servo port {port} is in use by another program, {who}: close that program first", port=port, who=who)
+        )
+    return PortTaken(message("servo port {port} is in use by another program: close that program first", port=port))
 
 
 LATE_S = 0.04

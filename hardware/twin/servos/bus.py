@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import heapq
 import logging
 import math
@@ -99,6 +100,8 @@ _SPEEDS = {getattr(termios, f"B{baud}"): baud for baud in BAUD_OF_CODE.values()}
 _IDLE_S = 0.02
 _PACKET_PAUSE_S = 0.1
 _BITS_PER_BYTE = 10
+_TIOCGEXCL = 0x8004_5440
+"""Asks whether a terminal is in exclusive mode (asm-generic/ioctls.h); the module termios does not have it."""
 _PRIORITY = -10
 
 
@@ -323,6 +326,8 @@ class SoftServoBus:
                 self._settled.set()
             elif self._pty is not None and self._pty[0] in ready:
                 self._receive(self._pty[0])
+            elif self._pty is not None:
+                _end_exclusive_mode(self._pty[1])
             self._settled.set()
             self._advance()
             self._send()
@@ -407,6 +412,16 @@ class SoftServoBus:
             data = heapq.heappop(self._due)[2]
             with contextlib.suppress(BlockingIOError):  # no reader: the buffer is full, and the bytes are lost
                 os.write(self._pty[0], data)
+
+
+def _end_exclusive_mode(slave: int) -> None:
+    """Do what the last close of a real port does, when the program that held it was killed: a driver that lives has the lock."""
+    if fcntl.ioctl(slave, _TIOCGEXCL, bytes(4)) == bytes(4):
+        return
+    with contextlib.suppress(BlockingIOError):
+        fcntl.flock(slave, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.ioctl(slave, termios.TIOCNXCL)
+        fcntl.flock(slave, fcntl.LOCK_UN)
 
 
 def _radius_mm(joint: JointConfig) -> float:

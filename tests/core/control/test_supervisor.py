@@ -174,6 +174,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.BUS_NOISE: _bus(ticks=6, errors=1),
     Cause.BUS_DEAD: _mute(BusReport, 0.53125),
     Cause.REBOOTED: _bus(rebooted=True),
+    Cause.TORQUE_TAKEN: _bus(torque_taken=_joint(True, 3, False)),
     Cause.WATCHDOG: _bus(watchdog_tripped=True),
     Cause.HOT: _bus(temperatures_c=_joint(70.0, 6, 40.0)),
     Cause.VOLTAGE_LOW: _bus(voltages_v=_joint(10.5, 0, 12.0)),
@@ -861,7 +862,7 @@ def test_after_a_stop_the_servos_must_be_checked_before_anything_moves(benches: 
 
 
 @pytest.mark.parametrize(
-    "cause", [Cause.SERVO_SILENT, Cause.BUS_DEAD, Cause.REBOOTED, Cause.WATCHDOG, Cause.CLOCK, Cause.PORT_LOST]
+    "cause", [Cause.SERVO_SILENT, Cause.BUS_DEAD, Cause.REBOOTED, Cause.TORQUE_TAKEN, Cause.WATCHDOG, Cause.CLOCK, Cause.PORT_LOST]
 )
 def test_after_these_the_servos_must_be_checked_again(cause: Cause, benches: dict[Mode, Bench]) -> None:
     bench = benches[R].copy()

@@ -7,6 +7,8 @@ import os
 import pty
 import re
 import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -429,6 +431,18 @@ def test_the_servo_port(line: str, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     _bad(device_checks.check_servo_port(str(tmp_path / "file")), "no serial port", "servos.port")
     _bad(device_checks.check_servo_port("/dev/null"), "no serial port", "servos.port")
+
+
+def test_a_program_that_holds_the_port_without_a_lock_is_named(line: str, tmp_path: Path) -> None:
+    script = tmp_path / "wizard.py"
+    script.write_text(f"import os, sys\nos.open({line!r}, os.O_RDWR | os.O_NOCTTY)\nprint(flush=True)\nsys.stdin.read()\n")
+    with subprocess.Popen([sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        named = rf"in use by another program: python\S* wizard.py \(process {other.pid}\)"
+        _bad(device_checks.check_servo_port(line), named, f"fuser -v {line}")
+        other.communicate()
+    _good(device_checks.check_servo_port(line), "is free")
 
 
 def test_a_port_that_another_program_holds(line: str) -> None:

@@ -19,7 +19,7 @@ import psutil
 import pytest
 
 from core.config.calibration import ZeroConfig
-from core.config.safety import SafetyConfig, ServosConfig
+from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import RejectReason, Source
 from core.devices import DeviceError, Robot
@@ -489,6 +489,21 @@ def test_faults_end_the_motion(
     assert status.fault_counts[cause] == 1
     servos.faults.clear()
     _settle_mm(servos)
+
+
+def test_fault_29_another_master_switches_the_torque_off(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """No servo has restarted: the zeros hold, and the cause is named."""
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    servos.write_by_other(64, b"\0")
+    status = _drive(armed, until=lambda status: status.latched is not None)
+    assert not status.armed
+    assert status.latched.cause is Cause.TORQUE_TAKEN
+    assert status.latched.detail == ", ".join(JOINT_NAMES)
+    assert all(status.zeroed)
+    assert status.restarts == 0
+    assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
+    armed.acknowledge()
+    armed.arm()
 
 
 def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot) -> None:

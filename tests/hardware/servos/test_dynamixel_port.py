@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import random
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
-from dynamixel_sdk import COMM_SUCCESS
+import serial
+from dynamixel_sdk import COMM_SUCCESS, PortHandler
 
-from hardware.servos.dynamixel_port import LockedPort, StuffingHandler
+from core.config.safety import ServosConfig
+from hardware.servos.dynamixel_port import LockedPort, PortTaken, ServoLine, StuffingHandler
+from hardware.twin.servos.bus import SoftServoBus
 
 _SLICE_S = 0.0005
 _ANSWER = bytes.fromhex("fffffd00 01 0800 55 00 a6000000 8cc0".replace(" ", ""))
@@ -81,3 +90,72 @@ def test_an_answer_that_came_in_time_is_read_by_a_process_that_was_kept_waiting(
     packet, result = StuffingHandler().rxPacket(port, False)
     assert result == COMM_SUCCESS
     assert bytes(packet) == _ANSWER
+
+
+# --- one program only ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def terminal() -> Iterator[str]:
+    """The software servos' pseudo-terminal itself, which any user may open."""
+    servos = SoftServoBus(ServosConfig())
+    servos.start()
+    terminal = os.path.realpath(servos.port)
+    os.chmod(terminal, 0o666)
+    yield terminal
+    servos.stop()
+
+
+_OPENED, _BUSY, _OTHER = 0, 16, 99
+
+
+def _opened_by_another_user(terminal: str) -> int:
+    """What the vendor's own port handler gets in another process, without the rights of root."""
+    child = os.fork()
+    if child == 0:
+        code = _OTHER
+        try:
+            if os.geteuid() == 0:
+                os.setgid(65534)
+                os.setuid(65534)
+            code = _OPENED if PortHandler(terminal).openPort() else _OTHER
+        except serial.SerialException as error:
+            code = error.errno or _OTHER
+        finally:
+            os._exit(code)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def test_no_other_program_can_open_the_port_until_it_is_closed(terminal: str) -> None:
+    assert _opened_by_another_user(terminal) == _OPENED
+    line = ServoLine(terminal, 1_000_000)
+    line.open()
+    assert _opened_by_another_user(terminal) == _BUSY
+    line.close()
+    assert _opened_by_another_user(terminal) == _OPENED
+
+
+def test_after_a_driver_that_was_killed_the_twins_port_is_free_again(terminal: str) -> None:
+    if (driver := os.fork()) == 0:
+        ServoLine(terminal, 1_000_000).open()
+        os.kill(os.getpid(), 9)
+    os.waitpid(driver, 0)
+    until_s = time.monotonic() + 5.0
+    while (found := _opened_by_another_user(terminal)) == _BUSY and time.monotonic() < until_s:
+        time.sleep(0.02)
+    assert found == _OPENED
+
+
+def test_a_program_that_had_the_port_before_is_named(terminal: str, tmp_path: Path) -> None:
+    script = tmp_path / "wizard.py"
+    script.write_text(f"import os, sys\nos.open({terminal!r}, os.O_RDWR | os.O_NOCTTY)\nprint(flush=True)\nsys.stdin.read()\n")
+    with subprocess.Popen([sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        line = ServoLine(terminal, 1_000_000)
+        with pytest.raises(PortTaken, match=rf"in use by another program, python\S* wizard.py \(process {other.pid}\): close"):
+            line.open()
+        assert not line.is_open
+        other.communicate()
+    line.open()
+    line.close()
