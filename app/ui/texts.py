@@ -621,6 +621,8 @@ def calibration_lines(rig: RigFile) -> list[str]:
                 roll=known.steering.roll_deg,
             )
         )
+        if known.steering.turn_deg_per_mm is not None:
+            lines.append(tr("turn of the head: {turn:.0f}° per mm of pull", turn=known.steering.turn_deg_per_mm))
     if known.zero is not None:
         slack = ", ".join(f"{value:+.2f}" for value in known.zero.slack_mm)
         lines.append(

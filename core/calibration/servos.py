@@ -36,6 +36,8 @@ _LINE_PX = 40.0
 """Length of the robot's end that gives its heading."""
 _TANGENT_PX = 8.0
 """Length of the end that is extended straight on."""
+_TIP_PX = 16.0
+"""Length of the end whose direction is the head's when the robot is driven (``PursuitConfig.heading_px``)."""
 _LEAST_LOOKS = 3
 """Paths that must be found."""
 
@@ -86,7 +88,15 @@ class Look:
     @cached_property
     def heading(self) -> Points:
         """Unit vector in which the robot's end points."""
-        found = [vector.direction for path in self.working_paths if (vector := fit_robot_vector(path, _LINE_PX)) is not None]
+        return self._direction(_LINE_PX)
+
+    @cached_property
+    def tip_heading(self) -> Points:
+        """The same of the short end that turns when a tendon is pulled."""
+        return self._direction(_TIP_PX)
+
+    def _direction(self, length_px: float) -> Points:
+        found = [vector.direction for path in self.working_paths if (vector := fit_robot_vector(path, length_px)) is not None]
         if not found:
             raise HeadNotSeen("the robot's end has no direction: feed it farther into the vessel")
         mean = np.median(np.array(found), axis=0)
@@ -99,11 +109,13 @@ class HeadMove:
 
     ``vector`` (2,) is its displacement at the same length of robot; ``lateral_px`` the part to the right of the heading;
     ``longer_px`` how much more of the robot is visible (fed forward), or less (drawn back, or bent out of the image plane).
+    ``turned_deg`` is the turn of its tip, positive to the right.
     """
 
     vector: Points
     lateral_px: float
     longer_px: float
+    turned_deg: float = 0.0
 
     @property
     def size_px(self) -> float:
@@ -123,7 +135,8 @@ def head_move(rest: Look, moved: Look) -> HeadMove:
     found = np.array([_one_move(one, other, anchor_px) for one, other in pairs])
     x, y, longer = np.median(found, axis=0).tolist()
     along, vector = rest.heading, np.array([x, y])
-    return HeadMove(vector, float(along[0] * vector[1] - along[1] * vector[0]), longer)
+    turned_deg = turn_deg(angle_deg(rest.tip_heading), angle_deg(moved.tip_heading))
+    return HeadMove(vector, float(along[0] * vector[1] - along[1] * vector[0]), longer, turned_deg)
 
 
 def angle_deg(vector: Sequence[float] | Points) -> float:
@@ -406,8 +419,18 @@ def learn(pulls: Mapping[str, Pull], heading: Points) -> SteeringConfig:
         heading_deg=heading_deg,
         roll_deg=math.degrees(math.atan2(gains[1], gains[0])),
         disagreement_deg=max(pair.disagreement_deg for pair in seen),
+        turn_deg_per_mm=_turn_deg_per_mm(pulls["right"], pulls["left"]) if tendons[0].direction_deg is not None else None,
         tendons=tuple(tendons),
     )
+
+
+def _turn_deg_per_mm(right: Pull, left: Pull) -> float | None:
+    """Turn of the head per millimetre of pull; None when it did not turn with its motion.
+
+    The larger one: a wall on one side holds the head back, and a turn that is taken for too small makes the steering too strong.
+    """
+    turns = [math.copysign(1.0, pull.move.lateral_px) * pull.move.turned_deg / pull.pull_mm for pull in (right, left)]
+    return max(turns) if max(turns) > 0.0 else None
 
 
 def _pair(one: Pull, other: Pull, heading_deg: float) -> _Pair | None:

@@ -74,6 +74,9 @@ class SteeringConfig(ConfigSection):
         ge=-180.0, le=180.0, description="turn of the robot about its axis; 0: right and left act in the picture"
     )
     disagreement_deg: float = Field(ge=0.0, description="between the way of the head and the normal of its heading")
+    turn_deg_per_mm: float | None = Field(
+        None, gt=0.0, le=720.0, description="turn of the head per millimetre of pull to the right or left; empty: not measured"
+    )
     tendons: tuple[TendonConfig, ...] = Field(min_length=4, max_length=4)
 
     @model_validator(mode="after")
@@ -104,6 +107,12 @@ class CalibrationConfig(ConfigSection):
     made_utc: datetime
     assumed: tuple[JointName, ...] | None = Field(
         None, description="joints whose servos one camera cannot tell apart, and nobody has confirmed: their ids decided"
+    )
+    wiring: tuple[tuple[int, int], ...] | None = Field(
+        None,
+        min_length=len(JOINT_NAMES),
+        max_length=len(JOINT_NAMES),
+        description="id and sign of each joint, found or confirmed: others in servos.joints are not known to be right",
     )
     lens: LensConfig | None = None
     scale: ScaleConfig | None = None

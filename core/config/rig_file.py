@@ -305,11 +305,25 @@ def scaled(config: Config, known: CalibrationConfig | None) -> Config:
     return config.model_copy(update={"policy": config.policy.model_copy(update={"pursuit": pursuit})})
 
 
+def _steered(config: Config, known: CalibrationConfig | None) -> Config:
+    """The configuration with the learnt turn of the head at full bend as ``policy.drive.turn_deg``; unchanged without one."""
+    steering = known.steering if known is not None else None
+    if steering is None or steering.turn_deg_per_mm is None:
+        return config
+    full_deg = min(max(steering.turn_deg_per_mm * config.servos.max_pull_mm, _LEAST_TURN_DEG), _MOST_TURN_DEG)
+    drive = config.policy.drive.model_copy(update={"turn_deg": full_deg})
+    return config.model_copy(update={"policy": config.policy.model_copy(update={"drive": drive})})
+
+
+_LEAST_TURN_DEG, _MOST_TURN_DEG = 10.0, 720.0
+"""Ends of ``policy.drive.turn_deg`` from a rig file: less turn than that would make the steering too strong."""
+
+
 def as_calibrated(config: Config) -> Config:
-    """The configuration with scale, insertion port and bench of its rig file. Raises RigFileError."""
+    """The configuration with scale, steering, insertion port and bench of its rig file. Raises RigFileError."""
     found = _rig_in_use(config)
     known = found[1].calibration if found is not None else None
-    config = scaled(config, known)
+    config = _steered(scaled(config, known), known)
     if found is not None and found[1].bench is not None:
         bench = str(found[0].parent / found[1].bench)  # an absolute one stays
         config = config.model_copy(update={"perception": config.perception.model_copy(update={"bench": bench})})

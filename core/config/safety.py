@@ -209,3 +209,8 @@ class ServosConfig(ConfigSection):
         if self.watchdog_s < 2.0 / self.bus_hz:
             raise ValueError("watchdog_s must be two cycles of the bus (2 / bus_hz) at least, or it trips by itself")
         return self
+
+
+def wiring_of(servos: ServosConfig) -> tuple[tuple[int, int], ...]:
+    """Id and sign of each joint, in the order of the joints."""
+    return tuple((joint.id, joint.sign) for joint in servos.joints)

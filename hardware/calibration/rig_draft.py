@@ -28,7 +28,7 @@ from core.calibration.servos import Assignment, HeadNotSeen, NotIdentified, Serv
 from core.config.calibration import CalibrationConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
 from core.config.models import Config
 from core.config.rig_file import RigFile, make_rig
-from core.config.safety import JOINT_NAMES, JointName, ServosConfig
+from core.config.safety import JOINT_NAMES, JointName, ServosConfig, wiring_of
 from core.config.servo_models import model_name, unsupported
 from core.devices import DeviceError
 from core.messages import message
@@ -78,6 +78,7 @@ class RigDraft:
         self.assignments: tuple[Assignment, ...] = ()
         self.port = known.port if known is not None else None
         self._assumed_earlier = known.assumed if known is not None else None
+        self._wiring = known.wiring if known is not None else None
         self.zeros: servo_identification.Zeros | None = None
         self.notes: list[str] = []
         self._is_displaced = False
@@ -207,7 +208,7 @@ class RigDraft:
         self.found = found
         self.findings = {servo_id: finding for servo_id, finding in self.findings.items() if servo_id in found.ids}
         if any(one.id not in found.ids for one in self.assignments):  # a servo was changed for another one
-            self.assignments = ()
+            self.assignments, self._wiring = (), None
         self._set_servos(_with_found(servos, found))
         return found
 
@@ -267,10 +268,11 @@ class RigDraft:
         if sorted(names) != sorted(JOINT_NAMES) or len(ids) != len(JOINT_NAMES):
             raise NotIdentified("every servo must have one name, and every name one servo")
         self.assignments = tuple(assignments)
-        before = _wiring(self.config.servos)
+        before = wiring_of(self.config.servos)
         servos = servo_identification.identified(self.servos, assignments)
         self._set_servos(servos if self.found is None else _with_found(servos, self.found))
-        if _wiring(self.config.servos) != before:  # what was found by moving the servos was found with others in their places
+        self._wiring = wiring_of(self.config.servos)
+        if self._wiring != before:  # what was found by moving the servos was found with others in their places
             had = (self.zero, self.zeros, self.steering)
             self.zero = self.zeros = self.steering = self.head_px = None
             if any(one is not None for one in had):
@@ -334,9 +336,10 @@ class RigDraft:
         self._set_zero(learnt.zero_ticks)
         self.say(
             message(
-                "steering: roll {a:+.0f}°, way and heading {b:.1f}° from a right angle",
+                "steering: roll {a:+.0f}°, way and heading {b:.1f}° from a right angle, the head turns by {c:.0f}° per mm",
                 a=steering.roll_deg,
                 b=steering.disagreement_deg,
+                c=steering.turn_deg_per_mm or 0.0,
             )
         )
         return steering
@@ -370,6 +373,7 @@ class RigDraft:
         return CalibrationConfig(
             made_utc=datetime.now(UTC).replace(microsecond=0),
             assumed=self.assumed or None,
+            wiring=self._wiring,
             lens=self.lens,
             scale=self.scale,
             steering=self.steering,
@@ -393,8 +397,3 @@ def _with_found(servos: ServosConfig, found: FoundServos) -> ServosConfig:
     if {servos.model_of(joint).number for joint in servos.joints} != set(found.models.values()):
         change["min_voltage_v"] = None  # it was that of other servos
     return servos.model_copy(update=change)
-
-
-def _wiring(servos: ServosConfig) -> tuple[tuple[int, int], ...]:
-    """Which servo each joint has, and which way it turns."""
-    return tuple((joint.id, joint.sign) for joint in servos.joints)

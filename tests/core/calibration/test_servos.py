@@ -205,6 +205,24 @@ def test_tendons_that_act_in_the_picture() -> None:
     assert found.tendons[0].px_per_mm == pytest.approx(math.hypot(8.0, 1.0) / 0.4)
 
 
+def test_the_tips_turn_is_positive_to_the_right() -> None:
+    assert head_move(look(path()), look(path(20.0))).turned_deg == pytest.approx(16.5, abs=1.0)  # its last 16 of 46 px
+    assert head_move(look(path(10.0)), look(path(-10.0))).turned_deg == pytest.approx(-16.5, abs=1.0)
+
+
+def test_the_turn_per_millimetre_is_that_of_the_freer_side() -> None:
+    pulls = _pulls()
+    assert learn(pulls, np.array([1.0, 0.0])).turn_deg_per_mm is None, "the head did not turn"
+    for name, sign, turned_deg in (("right", 1.0, 12.0), ("left", -1.0, 18.0)):
+        move = pulls[name].move
+        pulls[name] = Pull(0.4, HeadMove(move.vector, move.lateral_px, move.longer_px, sign * turned_deg))
+    assert learn(pulls, np.array([1.0, 0.0])).turn_deg_per_mm == pytest.approx(45.0)
+    swapped = pulls | {"right": pulls["left"], "left": pulls["right"]}
+    found = learn(swapped, np.array([1.0, 0.0]))
+    assert (found.turn_deg_per_mm, abs(found.roll_deg)) == (pytest.approx(45.0), pytest.approx(180.0))
+    assert learn(_pulls(90.0, way_px=20.0), np.array([1.0, 0.0])).turn_deg_per_mm is None, "it acts out of the picture"
+
+
 @pytest.mark.parametrize("roll_deg", [-60.0, 30.0, 90.0, 180.0])
 def test_a_robot_that_is_rolled(roll_deg: float) -> None:
     found = learn(_pulls(roll_deg, way_px=20.0), np.array([1.0, 0.0]))

@@ -30,6 +30,7 @@ from core.config.rig_file import (
     with_rig,
     write_rig,
 )
+from core.config.safety import TENDONS
 from core.session.manifest import Manifest, about_rig
 from tests.core.bench.drawn_bench import board
 
@@ -167,6 +168,17 @@ def test_the_measured_scale_goes_before_the_configured_one(
     assert scaled(cropped, KNOWN.model_copy(update={"scale": scale})) == cropped, "another part of the bench"
     assert scaled(config, None) is config
     assert scaled(config, CalibrationConfig(made_utc=MADE, lens=LENS)).policy.pursuit.pixels_per_mm == 7.0
+
+
+@pytest.mark.parametrize(("turn_deg_per_mm", "turn_deg"), [(30.0, 60.0), (2.0, 10.0), (None, 94.0)])
+def test_the_learnt_turn_of_the_head_reaches_the_drive(turn_deg_per_mm: float | None, turn_deg: float) -> None:
+    tendons = [{"name": name, "moved_px": 8.0, "px_per_mm": 20.0} for name in TENDONS]
+    steering = {"heading_deg": 0.0, "roll_deg": 0.0, "disagreement_deg": 1.0, "tendons": tendons}
+    known = CalibrationConfig.model_validate({"made_utc": MADE, "steering": steering | {"turn_deg_per_mm": turn_deg_per_mm}})
+    path = write_rig(make_rig(REAL, "bench 1", known))
+    config = with_rig(load_config(), read_rig(path), path)
+    assert (config.policy.drive.turn_deg, as_calibrated(config).policy.drive.turn_deg) == (94.0, turn_deg)
+    assert as_calibrated(config).policy.pursuit == config.policy.pursuit
 
 
 def test_the_insertion_port_is_kept_in_the_rig_file_and_reaches_perception() -> None:

@@ -12,6 +12,7 @@ from core.calibration.camera import BoardError, BoardSpec
 from core.calibration.servos import Assignment, HeadNotSeen, ServoFinding, SteeringNotSeen
 from core.config.calibration import ZeroConfig
 from core.config.models import Config
+from core.config.safety import wiring_of
 from core.devices import DeviceError
 from core.types import Image
 from hardware.calibration import servo_identification
@@ -133,6 +134,17 @@ def test_a_head_without_room_costs_no_zero(draft: RigDraft, monkeypatch: pytest.
 def test_zeros_are_kept_without_the_steering(draft: RigDraft) -> None:
     draft.set_pretension(0.4)
     assert draft.calibration().zero == ZeroConfig(ticks=TICKS, slack_mm=(0.1,) * 4, pretension_mm=0.4)
+
+
+def test_the_wiring_that_was_found_is_kept(draft: RigDraft) -> None:
+    assert draft.calibration().wiring is None
+    found = [Assignment(joint.name, joint.id, joint.sign, "seen") for joint in draft.servos.joints]
+    found[0], found[1] = Assignment("right", 2, -1, "seen"), Assignment("left", 1, 1, "seen")
+    draft.set_assignments(found)
+    known = draft.calibration()
+    assert known.wiring == ((2, -1), (1, 1), (3, 1), (4, 1), (5, 1), (6, 1), (7, 1)) == wiring_of(draft.config.servos)
+    again = RigDraft(Bench(), draft.config, known)  # type: ignore[arg-type]
+    assert again.calibration().wiring == known.wiring
 
 
 @pytest.mark.parametrize(

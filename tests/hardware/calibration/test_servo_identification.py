@@ -119,6 +119,7 @@ def test_the_steering_is_learnt_to_three_degrees(roll_deg: float) -> None:
         elif name == "right":
             assert abs(turn_deg(_true_direction(twin, bench, axis), direction)) <= 3.0
     assert np.hypot(*(np.array(learnt.head_px) - twin.head_px())) < 15.0
+    assert steering.turn_deg_per_mm == pytest.approx(38.0, rel=0.2)  # of the tip, as the truth has it: 36 to 40
 
 
 def _true_direction(twin: LockTwin, bench: LockBench, axis: str) -> float:
