@@ -28,8 +28,10 @@ from app.commands.progress import (
     progress_writer,
     report_progress,
 )
+from core.config.rig_file import find_rig, set_bench
 from core.devices import UserError
 from core.learning.training_plan import TrainingPlan
+from core.perception.model_file import BENCH
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -76,6 +78,7 @@ def teach(
     frames: Annotated[int, typer.Option(min=8, max=200, help="diverse frames to learn from, a quarter of them held out")] = 24,
     minutes: Annotated[float, typer.Option(min=0.5, max=600, help="time that it takes in all")] = 5.0,
     init: Annotated[str, typer.Option(help="model to begin with")] = "default",
+    rig: Annotated[str | None, typer.Option(help="rig whose file takes the model and its bench")] = None,
     frames_only: Annotated[
         bool, typer.Option("--frames-only", help="stop before the training; look through OUT_teaching, and go on with it as SOURCE")
     ] = False,
@@ -91,6 +94,7 @@ def teach(
     end_like_an_interrupt()
     began_s = time.monotonic()
     clock = _Clock(began_s, began_s + 60 * minutes)
+    taker = find_rig(rig)[0] if rig is not None else None
     out = Path(os.path.realpath(out))
     folder = out.with_name(out.name + "_teaching")
     _check_places(source, out, folder, init)
@@ -101,6 +105,8 @@ def teach(
         _print_frames(made, as_json or progress_json)
         return
     result, steps = _train(made, out, init, clock)
+    if taker is not None:
+        set_bench(taker, out / BENCH, str(out))
     _print_result(made, out, result, steps, clock.elapsed_s, as_json or progress_json)
 
 

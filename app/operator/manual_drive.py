@@ -34,7 +34,7 @@ from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.modes import ARMED_MODES, Act
 from core.control.motion import AT_REST, Jog
-from core.control.pilot import Pilot
+from core.control.pilot import KEYBOARD, Pilot
 from core.types import Point
 from hardware.inputs.gamepad import Gamepad, GamepadError, GamepadState
 from hardware.inputs.pedal import Pedal, PedalError, PedalReport
@@ -429,7 +429,7 @@ class DriveController(QObject):
     @Slot(bool)
     def _on_deadman(self, held: bool) -> None:
         if (pilot := self._rig.pilot) is not None:
-            pilot.deadman("window", held)
+            pilot.deadman(KEYBOARD, held)
 
     def _log(self, text: str) -> None:
         self._panels.log(LogKind.OPERATOR, text)
@@ -449,7 +449,7 @@ class DriveController(QObject):
         pilot.window_alive()
         pilot.hand_speed(self._speed)
         if not self.deadman.is_held:
-            pilot.deadman("window", False)
+            pilot.deadman(KEYBOARD, False)
         news = pilot.news()
         # The recorder may know of the next rig already; what this one reported until then was recorded when it was left.
         is_kept = not self._rig.engine.is_ending

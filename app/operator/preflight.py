@@ -17,6 +17,7 @@ from core.config.models import Config
 from core.control.alerts import ALERTS
 from core.control.drive_view import DriveView
 from core.control.faults import Area
+from core.control.modes import OF_THE_RIG
 from hardware.preflight.checks import Check
 from hardware.preflight.preflight import Level, level_of
 
@@ -95,6 +96,8 @@ def live_findings(view: DriveView | None) -> tuple[PreflightFinding, ...]:
         spec = ALERTS[worst.cause]
         detail = f"{tr(spec.text)} ({tr_text(worst.detail)})" if worst.detail else tr(spec.text)
         found.append(PreflightFinding(name, Level.BAD if held else Level.WARNING, detail, tr(spec.what_to_do)))
+    specs = [ALERTS[reason] for reason in view.against_arming if reason in OF_THE_RIG]
+    found += [PreflightFinding(tr("rig"), Level.BAD, tr(spec.text), tr(spec.what_to_do)) for spec in specs]
     return tuple(found)
 
 

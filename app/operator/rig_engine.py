@@ -13,6 +13,7 @@ from core.control.engine import Engine, Perceive
 from core.control.health import ModelReport
 from core.control.pilot import LeftOver, Pilot
 from core.control.policies import make_policy
+from core.control.readiness import READY, read_readiness
 from core.perception.inference import cores
 from core.perception.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
@@ -31,7 +32,8 @@ class RigEngine(Engine):
 
     def __init__(self, rig: Rig, perceive: Perceive, config: Config, model: ModelReport, left_over: LeftOver | None = None) -> None:
         policy = make_policy(config.policy.name, config)
-        pilot = Pilot(rig.robot, policy, config, model, left_over=left_over) if rig.robot is not None else None
+        readiness = read_readiness(config) if rig.kind is RigKind.LIVE else READY
+        pilot = Pilot(rig.robot, policy, config, model, left_over=left_over, readiness=readiness) if rig.robot is not None else None
         super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
         self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None
         self._network: Pipeline | None = None

@@ -178,7 +178,7 @@ def _hand_over(view: DriveView) -> NextStep:
     key = OperatorStep.HAND_OVER.value.key
     held, loose = (
         tr("press {key}: the program drives while you hold", key=key),
-        tr("hold {deadman}, then press {key} to hand over", deadman=DEADMAN_KEY, key=key),
+        tr("hold {deadman}, then press {key} to hand over", deadman=_deadman_of(view), key=key),
     )
     return NextStep(OperatorStep.HAND_OVER, True, tr("Ready"), held if view.deadman else loose, other=OperatorStep.DISARM)
 
@@ -189,8 +189,14 @@ def _interrupted(view: DriveView) -> NextStep:
     if causes:
         first = ALERTS[causes[0]]
         return NextStep(OperatorStep.TAKE_BACK, True, first.text, first.what_to_do, causes, OperatorStep.DISARM)
-    rest = tr("hold {deadman} and press {again} to go on, or {back} to take back", deadman=DEADMAN_KEY, again=again, back=back)
+    deadman = _deadman_of(view)
+    rest = tr("hold {deadman} and press {again} to go on, or {back} to take back", deadman=deadman, again=again, back=back)
     return NextStep(OperatorStep.TAKE_BACK, True, tr("Interrupted"), rest, other=OperatorStep.DISARM)
+
+
+def _deadman_of(view: DriveView) -> str:
+    """What must be held on this rig."""
+    return DEADMAN_KEY if view.keyboard_deadman else tr("the pedal")
 
 
 STATE_TITLE = {

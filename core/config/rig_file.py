@@ -55,6 +55,7 @@ class RigFile(ConfigSection):
     calibration: CalibrationConfig | None = None
     bench: str | None = Field(None, min_length=1, description="folder of the bench, from the rig file's own folder")
     model: str | None = Field(None, min_length=1, description="model that was taught on this bench; empty: as in the settings")
+    keyboard_deadman: bool = Field(False, description="real servos: the program may drive with the deadman on the keyboard alone")
 
     @model_validator(mode="after")
     def _check_parts(self) -> Self:
@@ -216,7 +217,7 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
     port = None if kind == "twin" or config.rig.robot == "none" else config.servos.port
     before = None
     with suppress(RigFileError):  # a file that has gone since must not cost the calibration
-        before = _rig_in_use(config)
+        before = rig_in_use(config)
     bench = str((before[0].parent / before[1].bench).absolute()) if before is not None and before[1].bench is not None else None
     try:
         return RigFile.model_validate(
@@ -231,6 +232,7 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
                 "calibration": calibration,
                 "bench": bench,
                 "model": before[1].model if before is not None else None,
+                "keyboard_deadman": before is not None and before[1].keyboard_deadman,
             }
         )
     except ValidationError as error:
@@ -276,7 +278,7 @@ def read_again(running: Config, settings: Config) -> Config:
     return with_rig(running, rig, path).model_copy(update={"perception": running.perception})
 
 
-def _rig_in_use(config: Config) -> tuple[Path, RigFile] | None:
+def rig_in_use(config: Config) -> tuple[Path, RigFile] | None:
     """The rig file of the configured rig; None without one, and for recordings. Raises RigFileError."""
     if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
         return None
@@ -289,7 +291,7 @@ def calibration_of(config: Config) -> CalibrationConfig | None:
 
     Raises RigFileError.
     """
-    found = _rig_in_use(config)
+    found = rig_in_use(config)
     return found[1].calibration if found is not None else None
 
 
@@ -321,7 +323,7 @@ _LEAST_TURN_DEG, _MOST_TURN_DEG = 10.0, 720.0
 
 def as_calibrated(config: Config) -> Config:
     """The configuration with scale, steering, insertion port and bench of its rig file. Raises RigFileError."""
-    found = _rig_in_use(config)
+    found = rig_in_use(config)
     known = found[1].calibration if found is not None else None
     config = _steered(scaled(config, known), known)
     if found is not None and found[1].bench is not None:

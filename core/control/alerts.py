@@ -77,7 +77,34 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Hindrance.DESTINATION_BEHIND: ("The destination is behind the robot", "choose one ahead, or retract by hand first"),
     Hindrance.DEADMAN_NOT_HELD: ("The deadman is not held", "press and hold it (let it go first if it is down), then hand over"),
     Hindrance.DEADMAN_HELD_BEFORE: ("The deadman was down before arming", "let it go and press it again"),
+    Hindrance.DEADMAN_ON_KEYBOARD: (
+        "The keyboard alone is no deadman here",
+        "hold the pedal, or set keyboard_deadman = true in the rig's file, then F5",
+    ),
     Hindrance.OPERATOR_DRIVING: ("The controls are in use", "let go of the controls, then hand over"),
+    Hindrance.DIRECTIONS_UNKNOWN: (
+        "The servos' directions are not learned",
+        "menu Rig, Calibrate: page Wiggle and direction; by hand you can drive",
+    ),
+    Hindrance.DIRECTIONS_ASSUMED: (
+        "Up and down are assumed",
+        "menu Rig, Calibrate: look, and confirm or swap them on the page Wiggle and direction",
+    ),
+    Hindrance.STEERING_UNKNOWN: ("The steering is not learned", "menu Rig, Calibrate: page Steering; by hand you can drive"),
+    Hindrance.STEERING_WRONG: (
+        "Right and left act the wrong way",
+        "menu Rig, Calibrate: wiggle again, or turn the robot in its holder; then Steering",
+    ),
+    Hindrance.MODEL_UNCALIBRATED: (
+        "The model's confidence is not calibrated",
+        "menu Model, Teach this bench; or main.py teach, or calibrate",
+    ),
+    Hindrance.MODEL_UNTAUGHT: ("The model was not taught on this bench", "menu Model, Teach this bench; or main.py teach"),
+    Hindrance.CHECKS_OFF: (
+        "Checks of perception are switched off",
+        "set perception.quality.enabled, and max_novelty to 1.25 at most",
+    ),
+    Hindrance.POLICY_BLIND: ("The policy does not look at the picture", "set policy.name to pursuit or table"),
     RejectReason.NON_FINITE: ("Command is not a number", "nothing to do; report it if it comes again"),
     RejectReason.WRONG_COUNT: ("Command has the wrong number of joints", "report it with the log"),
     RejectReason.FROM_THE_FUTURE: ("Command is from the future", "start the program again"),

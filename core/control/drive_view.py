@@ -29,6 +29,7 @@ class DriveView:
     latched, active : first cause of the last disarming until it is acknowledged; all faults now.
     against_arming, against_hand_over : why either request would be refused now; empty: it would be granted. The reasons against a
         hand-over leave out the deadman, which the operator presses with it.
+    keyboard_deadman : the keyboard alone may be the deadman on this rig.
     deadman : held now, whether the press counts or not; None when no deadman has reported yet.
     servos_on : checked, torque on, following the permitted source.
     busy : what the servos are doing that takes time ("checking the servos"), else empty.
@@ -49,6 +50,7 @@ class DriveView:
     active: tuple[Fault, ...] = ()
     against_arming: tuple[Hindrance | Cause, ...] = ()
     against_hand_over: tuple[Hindrance | Cause, ...] = ()
+    keyboard_deadman: bool = True
     deadman: bool | None = None
     servos_on: bool = False
     busy: str = ""

@@ -26,11 +26,13 @@ class DeadmanReport:
     pressed : None when it cannot tell, as a pedal with a damaged report: then it does not count as held, nor as released.
     said_s : when it was said, which may be a turn of the pilot earlier; None: now.
     source : which deadman it is.
+    alone : whether it is enough by itself; the keyboard is not on a real rig, unless its file says so.
     """
 
     pressed: bool | None
     said_s: float | None = None
     source: Hashable = ""
+    alone: bool = True
 
     def at_s(self, now_s: float) -> float:
         """When it was said, if it is handled now."""
@@ -119,19 +121,21 @@ class Deadman:
     pressed : the last state that it reported, at ``reported_s``; None: nothing yet, or too long ago.
     counts : the press began while armed.
     interrupted : since then it could not tell.
+    alone : it is enough by itself.
     """
 
     pressed: bool | None = None
     reported_s: float = 0.0
     counts: bool = False
     interrupted: bool = False
+    alone: bool = True
 
-    def update(self, pressed: bool | None, said_s: float, *, armed: bool) -> Deadman:
+    def update(self, pressed: bool | None, said_s: float, *, armed: bool, alone: bool = True) -> Deadman:
         """The state after its report."""
         known = self if said_s - self.reported_s <= FORGOTTEN_S else Deadman()
         if pressed is None:
             return replace(known, interrupted=True)
-        return Deadman(pressed, said_s, pressed and (known.counts or (known.pressed is False and armed)))
+        return Deadman(pressed, said_s, pressed and (known.counts or (known.pressed is False and armed)), alone=alone)
 
     def is_down(self, now_s: float, timeout_s: float) -> bool:
         """Whether it reported pressed within `timeout_s`, counting or not."""
@@ -185,8 +189,8 @@ class Health:
                 return replace(self, window_s=now_s)
             case Beat():
                 return replace(self, perception_s=now_s)
-            case DeadmanReport(pressed, _, source):
-                deadman = self.deadmen.get(source, Deadman()).update(pressed, report.at_s(now_s), armed=armed)
+            case DeadmanReport(pressed, _, source, alone):
+                deadman = self.deadmen.get(source, Deadman()).update(pressed, report.at_s(now_s), armed=armed, alone=alone)
                 return replace(self, deadmen={**self.deadmen, source: deadman})
             case ModelReport():
                 return replace(self, model=report)
@@ -222,8 +226,16 @@ class Health:
         return replace(self, deadmen=deadmen, rejection=None, rejected_run=0)
 
     def deadman_held(self, now_s: float, safety: SafetyConfig) -> bool:
-        """Whether a deadman is held, by a press that began while armed."""
-        return any(deadman.counts and deadman.is_down(now_s, safety.deadman_timeout_s) for deadman in self.deadmen.values())
+        """Whether a deadman that is enough by itself is held, by a press that began while armed."""
+        return any(held.alone for held in self._held(now_s, safety))
+
+    def only_weak_held(self, now_s: float, safety: SafetyConfig) -> bool:
+        """Whether deadmen are held so, but none that is enough by itself."""
+        held = self._held(now_s, safety)
+        return bool(held) and not any(deadman.alone for deadman in held)
+
+    def _held(self, now_s: float, safety: SafetyConfig) -> list[Deadman]:
+        return [one for one in self.deadmen.values() if one.counts and one.is_down(now_s, safety.deadman_timeout_s)]
 
     def deadman_down(self, now_s: float, safety: SafetyConfig) -> bool | None:
         """Whether a deadman is down, whenever the press began; None: none has ever reported."""

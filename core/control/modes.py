@@ -48,8 +48,32 @@ class Hindrance(StrEnum):
     DESTINATION_BEHIND = "destination behind the robot"
     DEADMAN_NOT_HELD = "deadman not held"
     DEADMAN_HELD_BEFORE = "deadman was down before arming"
+    DEADMAN_ON_KEYBOARD = "deadman on the keyboard only"
     OPERATOR_DRIVING = "controls in use"
+    # of a LIVE rig (``readiness``)
+    DIRECTIONS_UNKNOWN = "directions of the servos not learned"
+    DIRECTIONS_ASSUMED = "up and down assumed"
+    STEERING_UNKNOWN = "steering not learned"
+    STEERING_WRONG = "right and left act the wrong way"
+    MODEL_UNCALIBRATED = "model not calibrated"
+    MODEL_UNTAUGHT = "model not taught on this bench"
+    CHECKS_OFF = "checks of perception switched off"
+    POLICY_BLIND = "policy does not look at the picture"
 
+
+OF_THE_RIG = frozenset(
+    {
+        Hindrance.DIRECTIONS_UNKNOWN,
+        Hindrance.DIRECTIONS_ASSUMED,
+        Hindrance.STEERING_UNKNOWN,
+        Hindrance.STEERING_WRONG,
+        Hindrance.MODEL_UNCALIBRATED,
+        Hindrance.MODEL_UNTAUGHT,
+        Hindrance.CHECKS_OFF,
+        Hindrance.POLICY_BLIND,
+    }
+)
+"""What a LIVE rig lacks (``readiness``): nothing that happens while it is open changes it."""
 
 Event = Act | Report
 
@@ -67,9 +91,16 @@ class RequestRefused:
 
 @dataclass(frozen=True, slots=True)
 class SupervisorState:
-    """State of the supervisor; a fresh one is disarmed, with nothing known. ``latched``: first cause, until it is acknowledged."""
+    """State of the supervisor; a fresh one is disarmed, with nothing known.
+
+    Attributes
+    ----------
+    against_program : why the program may not drive this rig, as long as it is open.
+    latched : first cause, until it is acknowledged.
+    """
 
     mode: Mode = Mode.ADVISORY
+    against_program: tuple[Hindrance, ...] = ()
     health: Health = field(default_factory=Health)
     time_s: float | None = None
     latched: Fault | None = None

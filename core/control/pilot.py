@@ -27,6 +27,7 @@ from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Pa
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, combined
 from core.control.policies import Policy
+from core.control.readiness import READY, Readiness
 from core.control.robot import GuardedRobot, SentMotion
 from core.control.servo_requests import ReleaseEvent, ServoRequests, TorqueRelease
 from core.control.supervisor import hindrances, supervise
@@ -99,6 +100,9 @@ class LeftOver:
     stopped: bool
 
 
+KEYBOARD = "window"
+"""Source of the deadman on the keyboard and the screen. A key whose release is lost (a keyboard out of radio, a remote desktop that
+was cut) seems to be held on."""
 PERIOD_S = 0.02
 """Of the turns."""
 _ARRIVED_S = 0.5
@@ -121,6 +125,7 @@ class Pilot:
     model : whether perception's model passed its check.
     clock : monotonic, the one of the frames.
     left_over : what is not acknowledged yet of the rig before this one: starting again acknowledges nothing.
+    readiness : what stands against the program's driving of this rig.
     """
 
     def __init__(
@@ -131,17 +136,19 @@ class Pilot:
         model: ModelReport,
         clock: Callable[[], float] = time.monotonic,
         left_over: LeftOver | None = None,
+        readiness: Readiness = READY,
     ) -> None:
+        self._readiness = readiness
         self._robot, self._policy, self._config, self._clock = robot, policy, config, clock
         self._inputs = InputQueue(config.safety, [model])
         self._requests = ServoRequests(robot, self._inputs.post)
         self._release = TorqueRelease(is_enabled=config.servos.torque_off_on_stop)
         self._alerts = AlertReporter()
         self._reports = FrameReports(config.policy.pursuit)
-        self._state = SupervisorState()
+        self._state = SupervisorState(against_program=readiness.hindrances)
         if left_over is not None:
             mode = Mode.STOPPED if left_over.stopped else Mode.ADVISORY
-            self._state = SupervisorState(mode=mode, latched=left_over.fault)
+            self._state = replace(self._state, mode=mode, latched=left_over.fault)
         self._permitted: Source | None = None
         self._busy_s = -math.inf
         self._jogging, self._following = JogIntegrator(config.hand), AdviceController(config.policy.drive)
@@ -240,7 +247,8 @@ class Pilot:
 
     def deadman(self, source: Hashable, pressed: bool | None) -> None:
         """A deadman as it is now (None: it cannot tell); to be repeated many times a second. One that is held is enough."""
-        self._inputs.post(DeadmanReport(pressed, self._clock(), source))
+        is_enough = source != KEYBOARD or self._readiness.keyboard_deadman
+        self._inputs.post(DeadmanReport(pressed, self._clock(), source, is_enough))
 
     def window_alive(self) -> None:
         """A sign of life of the window's thread."""
@@ -463,6 +471,7 @@ class Pilot:
             active=decision.active,
             against_arming=arming,
             against_hand_over=hand_over,
+            keyboard_deadman=self._readiness.keyboard_deadman,
             deadman=self._state.health.deadman_down(now_s, safety),
             servos_on=self._state.health.servos_ready,
             busy=self._requests.busy,

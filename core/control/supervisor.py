@@ -202,7 +202,7 @@ def _against_arming(state: SupervisorState, now_s: float, safety: SafetyConfig) 
         reasons.append(Hindrance.PERCEPTION_SETTLING)
     if state.health.servo_problems is None:
         reasons.append(Hindrance.SERVOS_UNCHECKED)
-    return tuple(reasons)
+    return (*reasons, *state.against_program)
 
 
 def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfig) -> tuple[Hindrance | Cause, ...]:
@@ -220,19 +220,21 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
         reasons.append(Hindrance.NO_DESTINATION)
     if state.health.frames.route is RouteState.BEHIND:
         reasons.append(Hindrance.DESTINATION_BEHIND)
-    if not state.health.deadman_held(now_s, safety):
+    if state.health.only_weak_held(now_s, safety):
+        reasons.append(Hindrance.DEADMAN_ON_KEYBOARD)
+    elif not state.health.deadman_held(now_s, safety):
         down = state.health.deadman_down(now_s, safety)
         reasons.append(Hindrance.DEADMAN_HELD_BEFORE if down else Hindrance.DEADMAN_NOT_HELD)
     if state.input_s is not None and now_s - state.input_s < safety.operator_quiet_s:
         reasons.append(Hindrance.OPERATOR_DRIVING)
-    return tuple(reasons)
+    return (*reasons, *state.against_program)
 
 
 def hindrances(
     state: SupervisorState, now_s: float, safety: SafetyConfig
 ) -> tuple[tuple[Hindrance | Cause, ...], tuple[Hindrance | Cause, ...]]:
     """Why arming, and why a hand-over, would be refused now; without the deadman, which is pressed with the hand-over."""
-    deadman = {Hindrance.DEADMAN_NOT_HELD, Hindrance.DEADMAN_HELD_BEFORE}
+    deadman = {Hindrance.DEADMAN_NOT_HELD, Hindrance.DEADMAN_HELD_BEFORE, Hindrance.DEADMAN_ON_KEYBOARD}
     over = _against_hand_over(state, now_s, safety)
     return _against_arming(state, now_s, safety), tuple(reason for reason in over if reason not in deadman)
 

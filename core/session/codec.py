@@ -307,6 +307,7 @@ class _DriveLayout(JsonLayout):
     active: tuple[_FaultField, ...]
     against_arming: _Reasons
     against_hand_over: _Reasons
+    keyboard_deadman: bool = True
     deadman: bool | None = None
     servos_on: bool
     busy: Text

@@ -16,7 +16,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from core.config.models import Config, GamepadConfig, PedalConfig
+from core.config.rig_file import RigFileError, as_calibrated
 from core.config.safety import ServosConfig
+from core.control.alerts import ALERTS
+from core.control.readiness import read_readiness
 from core.devices import Camera, DeviceError
 from core.messages import message
 from core.types import Frame
@@ -112,6 +115,22 @@ def _judge_frames(config: Config, frames: Sequence[Frame]) -> Check:
     if refusal is not None:
         return Check(name, False, f"{detail}; {refusal}", "lens cap, lamp, focus; or set camera.exposure_ms")
     return Check(name, True, detail)
+
+
+def check_readiness(config: Config) -> Check:
+    """Whether the program may drive this rig; without it a real one stays advisory."""
+    name = "driving by program"
+    if kind_of(config.rig) is not RigKind.LIVE or config.rig.robot == "none":
+        return Check(name, True, "only asked of a rig with a real robot")
+    try:
+        found = read_readiness(as_calibrated(config))
+    except RigFileError as error:
+        return Check(name, False, one_line(error), "mend the rig file, or calibrate the rig")
+    lacks = [ALERTS[hindrance] for hindrance in found.hindrances]
+    if not lacks:
+        deadman = "" if found.keyboard_deadman else "; with pedal or gamepad as deadman"
+        return Check(name, True, f"directions, steering, model and policy are as needed{deadman}")
+    return Check(name, False, "; ".join(lack.text for lack in lacks), "; ".join(lack.what_to_do for lack in lacks))
 
 
 def list_cameras() -> Check:

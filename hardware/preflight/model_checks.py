@@ -34,7 +34,7 @@ _RESTORE = "git checkout -- resources/models   (or unpack the program again)"
 
 
 def check_model(name: str) -> Check:
-    """The hashes of all files of a model."""
+    """The hashes of all files of a model, and whether its confidence is calibrated."""
     try:
         folder = model_folder(name)
         info, files = read_model_info(folder, verify=()), check_all_files(folder)
@@ -42,6 +42,9 @@ def check_model(name: str) -> Check:
             files += [f"{near.name}/{file}" for file in check_all_files(near)]
     except ModelError as error:
         return Check("model", False, one_line(error), _advice(name))
+    if info.calibration is None or info.familiarity is None:
+        text = "{name}: all {count} files are whole (SHA-256); its confidence is not calibrated: it drives no real rig"
+        return Check("model", True, message(text, name=info.name, count=len(files)))
     return Check("model", True, message("{name}: all {count} files are whole (SHA-256)", name=info.name, count=len(files)))
 
 

@@ -35,6 +35,7 @@ CHECKS: dict[str, tuple[Callable[[Config], Check], Level | None]] = {
     "display": (lambda config: checks.check_display(os.environ), None),
     "model": (lambda config: model_checks.check_model(config.perception.segmentation.model), Level.BAD),
     "self-test": (lambda config: model_checks.check_self_test(config.perception), Level.BAD),
+    "driving by program": (device_checks.check_readiness, None),
     "cameras found": (lambda config: device_checks.list_cameras(), None),
     "camera": (device_checks.check_camera, Level.BAD),
     "picture": (device_checks.check_picture, None),

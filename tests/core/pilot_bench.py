@@ -15,6 +15,7 @@ from core.control.health import ModelReport
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST
 from core.control.pilot import PERIOD_S, LeftOver, Pilot
+from core.control.readiness import READY, Readiness
 from core.control.robot import SentMotion
 from core.devices import DeviceError
 from core.types import Advice, Centerline, Command, Frame, Pose, PoseState, RobotPath, RobotStatus, Route, Scene, Speed
@@ -134,7 +135,7 @@ def scene_at(index: int, captured_s: float, *, left_px: float = 200.0, route: bo
 class Bench:
     """Turns the pilot with a frame every second turn; `scene` changes what is understood."""
 
-    def __init__(self, config: Config | None = None, left_over: LeftOver | None = None) -> None:
+    def __init__(self, config: Config | None = None, left_over: LeftOver | None = None, readiness: Readiness = READY) -> None:
         self.now_s, self.index = 100.0, 0
         self.robot, self.policy = Robot(), Policy()
         self.scene: Callable[[Scene], Scene] = lambda scene: scene
@@ -142,7 +143,7 @@ class Bench:
         self.jog = AT_REST
         self.seeing = True
         config = config or Config()
-        self.pilot = Pilot(self.robot, self.policy, config, ModelReport(True), clock=lambda: self.now_s, left_over=left_over)
+        self.pilot = Pilot(self.robot, self.policy, config, ModelReport(True), lambda: self.now_s, left_over, readiness)
         self.shown: Advice | None = None
 
     def turn(self, count: int = 1) -> Bench:

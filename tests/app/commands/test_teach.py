@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from core.bench.bench import read_bench
+from core.config.models import Config
+from core.config.rig_file import make_rig, read_rig, write_rig
 from core.learning.dataset import Sample, write_mask, write_png
 from core.learning.model_writer import save_model
 from core.learning.training_plan import TrainingPlan
@@ -200,13 +202,16 @@ def test_without_an_empty_picture_the_bench_is_what_most_pictures_show(place: Pa
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("own_folder")
 def test_a_bench_is_taught_from_end_to_end(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.commands.teach._EXAMPLES", 2)
     monkeypatch.setattr("app.commands.teach._REMEMBER", 4)
     monkeypatch.setattr("app.commands.teach._MOST_STEPS", 6)
     out = tmp_path / "own"
-    code, output, errors = _teach(place, out, "--frames", 10, "--minutes", 3, "--json")
+    rig = write_rig(make_rig(Config(), "lab", None))
+    code, output, errors = _teach(place, out, "--frames", 10, "--minutes", 3, "--json", "--rig", "lab")
     assert code == 0, errors
+    assert (read_rig(rig).model, read_rig(rig).bench) == (str(out), str(out / "bench"))
     told = json.loads(output)
     assert told["steps"] == 6
     assert told["frames"] == 8

@@ -20,7 +20,7 @@ from app.ui.workers import module_of
 from core.config.models import Config
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
-from core.control.modes import Act
+from core.control.modes import Act, Hindrance
 from hardware.preflight.preflight import Level
 from tests.app.fakes import FakeEngine, until
 
@@ -143,6 +143,14 @@ def test_what_the_open_rig_says_of_itself() -> None:
     assert (camera.level, servos.level) == (Level.BAD, Level.WARNING)
     assert camera.detail == "Camera lost (newest frame 900 ms old)"
     assert camera.fix
+
+
+def test_what_the_open_rig_lacks_stands_in_the_list() -> None:
+    view = DriveView(0.0, against_arming=(Hindrance.CAMERA_SETTLING, Hindrance.STEERING_UNKNOWN))
+    *_, lack = live_findings(view)
+    assert (lack.level, lack.detail) == (Level.BAD, "The steering is not learned")
+    assert "page Steering" in lack.fix
+    assert len(live_findings(view)) == 3, "what passes by itself is no finding"
 
 
 @pytest.fixture

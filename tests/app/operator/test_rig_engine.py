@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,7 +19,7 @@ from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.control.engine import Perceive
 from core.control.faults import Cause, Fault
 from core.control.health import ModelReport
-from core.control.modes import Act, Mode
+from core.control.modes import OF_THE_RIG, Act, Hindrance, Mode
 from core.control.policies import Policy, make_policy
 from core.devices import DeviceError
 from core.perception.pipeline import Pipeline
@@ -118,6 +119,29 @@ class _Grey(_Camera):
     def read(self, timeout_s: float) -> Frame | None:
         given = super().read(timeout_s)
         return frame(given.captured_s) if given is not None else None
+
+
+@pytest.mark.parametrize("kind", [RigKind.SIM, RigKind.LIVE])
+def test_a_live_rig_that_nothing_was_learnt_of_is_advisory_only_and_a_twin_is_not(kind: RigKind) -> None:
+    config = Config.model_validate({"policy": {"name": "random"}})
+    engine = RigEngine(
+        Rig("bench", kind, _Grey([0]), Robot()), Pipeline(DrawnNetwork(), PerceptionConfig()), config, ModelReport(True)
+    )
+    pilot = engine.pilot
+    assert pilot is not None
+    until_s = time.monotonic() + 10.0
+    while pilot.view.time_s == 0.0 or not pilot.view.against_arming:
+        assert time.monotonic() < until_s
+    view = pilot.view
+    engine.close()
+    lacks = {
+        Hindrance.DIRECTIONS_UNKNOWN,
+        Hindrance.STEERING_UNKNOWN,
+        Hindrance.MODEL_UNTAUGHT,
+        Hindrance.POLICY_BLIND,
+    }
+    assert set(view.against_arming) & OF_THE_RIG == (lacks if kind is RigKind.LIVE else set())
+    assert view.keyboard_deadman is (kind is RigKind.SIM)
 
 
 @pytest.mark.parametrize(("knows_past", "head_x"), [(True, 424.0), (False, 190.0)])

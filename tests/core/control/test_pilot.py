@@ -19,8 +19,9 @@ from core.control.gate import Rejection, RejectReason, Source
 from core.control.health import ModelReport
 from core.control.modes import Act, Hindrance, Mode
 from core.control.motion import AT_REST, Jog
-from core.control.pilot import PERIOD_S, LeftOver, Pilot, PilotLoop
+from core.control.pilot import KEYBOARD, PERIOD_S, LeftOver, Pilot, PilotLoop
 from core.control.policies import make_policy
+from core.control.readiness import Readiness
 from core.system import slept_s
 from core.types import Advice, Points, Reason, Refusal, Route, Scene, Speed
 from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
@@ -222,6 +223,30 @@ def test_a_policy_forgets_when_it_is_handed_over_to_out_of_a_hold_that_has_expir
     bench.pilot.ask(Act.HAND_OVER)  # refused: it drives already
     bench.turn(3)
     assert bench.policy.resets == 2
+
+
+def test_where_the_keyboard_is_no_deadman_it_hands_over_beside_a_pedal_only() -> None:
+    bench = Bench(readiness=Readiness(keyboard_deadman=False)).armed()
+
+    def turn(*, key: bool, pedal: bool) -> None:
+        bench.pilot.deadman(KEYBOARD, key)
+        bench.pilot.deadman("pedal", pedal)
+        bench.turn()
+
+    turn(key=False, pedal=False)
+    turn(key=True, pedal=False)
+    assert bench.pilot.view.deadman is True
+    assert not bench.pilot.view.keyboard_deadman
+    bench.pilot.ask(Act.HAND_OVER)
+    turn(key=True, pedal=False)
+    assert (bench.mode, bench.alerts()) == (Mode.ARMED, {Hindrance.DEADMAN_ON_KEYBOARD})
+    turn(key=True, pedal=True)
+    bench.pilot.ask(Act.HAND_OVER)
+    turn(key=True, pedal=True)
+    assert bench.mode is Mode.AUTONOMOUS
+    turn(key=True, pedal=False)
+    assert bench.mode is Mode.HOLD
+    bench.pilot.close()
 
 
 def test_a_deadman_that_falls_silent_is_let_go_within_a_tenth_of_a_second(bench: Bench) -> None:

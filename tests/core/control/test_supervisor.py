@@ -524,6 +524,49 @@ def test_a_silent_deadman_is_not_held(benches: dict[Mode, Bench]) -> None:
     assert _refused(decision, Act.HAND_OVER) == {Hindrance.DEADMAN_NOT_HELD}
 
 
+def test_a_deadman_that_is_not_enough_by_itself_neither_hands_over_nor_keeps_driving() -> None:
+    bench = _ready_to_hand_over()
+    bench.held = False
+    key = DeadmanReport(True, source="window", alone=False)
+    bench.tick(replace(key, pressed=False))
+    bench.tick(key)
+    assert _refused(bench.tick(key, Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.DEADMAN_ON_KEYBOARD}
+    bench.held = True
+    bench.tick(key)
+    assert bench.tick(key, Act.HAND_OVER).mode is U
+    bench.held = False
+    assert bench.tick(key).mode is H, "the pedal was released, the key is down"
+    bench.held = True
+    assert bench.run(0.25, key)[-1].mode is U
+    assert bench.tick(replace(key, pressed=False)).mode is U, "the pedal is enough"
+
+
+LACKS = (Hindrance.DIRECTIONS_UNKNOWN, Hindrance.POLICY_BLIND)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_what_a_rig_lacks_refuses_arming_and_hand_over_in_every_mode(benches: dict[Mode, Bench], mode: Mode) -> None:
+    for act in (Act.ARM, Act.HAND_OVER):
+        bench = benches[mode].copy()
+        bench.state = replace(bench.state, against_program=LACKS)
+        assert set(LACKS) <= _refused(bench.tick(act), act)
+        assert bench.state.mode is mode
+
+
+def test_what_a_rig_lacks_outlasts_all_events_and_leaves_the_operator_driving() -> None:
+    bench = Bench().in_mode(V)
+    bench.state = replace(bench.state, against_program=LACKS)
+    for event in SINGLE_EVENTS.values():
+        bench.tick(event)
+    bench.tick(after_s=5.0)  # the clock jumps
+    bench.tick(Act.ACKNOWLEDGE)
+    bench.tick(ModelReport(True), ServoCheckReport())
+    bench.run(1.0625)
+    decision = bench.tick(Act.ARM)
+    assert _refused(decision, Act.ARM) == set(LACKS)
+    assert (decision.mode, decision.permitted) == (V, Source.OPERATOR)
+
+
 def test_a_hand_over_while_the_controls_are_in_use_is_refused() -> None:
     bench = _ready_to_hand_over()
     assert _refused(bench.tick(Act.INPUT, Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.OPERATOR_DRIVING}

@@ -209,6 +209,16 @@ def test_a_whole_model_passes_and_a_flipped_bit_is_found(copied: Path) -> None:
     _bad(model.check_model(str(copied / "gone")), "no model", "restore|set perception")
 
 
+@pytest.mark.parametrize("part", ["calibration", "familiarity"])
+def test_a_model_that_is_not_calibrated_is_told(copied: Path, part: str) -> None:
+    assert "calibrated" not in model.check_model(str(copied)).detail
+    manifest = json.loads((copied / INFO).read_text())
+    (copied / INFO).write_text(json.dumps(manifest | {part: None}))
+    found = model.check_model(str(copied))
+    assert found.ok
+    assert found.detail.endswith("its confidence is not calibrated: it drives no real rig")
+
+
 def test_a_model_that_has_lost_its_second_look_does_not_pass(copied: Path) -> None:
     shutil.rmtree(copied / SECOND_LOOK)
     _bad(model.check_model(str(copied)), "second_look.*missing", "restore the model folder")
@@ -383,6 +393,28 @@ class _Camera:
 
 def _scene() -> Image:
     return np.random.default_rng(0).integers(40, 200, (120, 160, 3), np.uint8)
+
+
+def test_what_a_real_rig_lacks_for_driving_by_program_is_told_with_what_to_do(own_folder: None) -> None:
+    assert device_checks.check_readiness(Config()).ok
+    twin = Config.model_validate({"policy": {"name": "random"}})
+    assert device_checks.check_readiness(twin).ok
+    real = {"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": "/dev/ttyUSB0"}, "policy": {"name": "random"}}
+    found = device_checks.check_readiness(Config.model_validate(real))
+    assert not found.ok
+    for lack in (
+        "directions are not learned",
+        "steering is not learned",
+        "not taught on this bench",
+        "does not look at the picture",
+    ):
+        assert lack in found.detail
+    for remedy in ("menu Rig, Calibrate", "menu Model, Teach this bench", "policy.name"):
+        assert remedy in found.fix
+    looked_at = Config.model_validate(real | {"rig": {"camera": "webcam", "robot": "none"}})
+    assert device_checks.check_readiness(looked_at).ok
+    gone = Config.model_validate(real | {"rig": {"camera": "webcam", "robot": "servos", "file": "/nowhere/lab.toml"}})
+    assert "no such rig file" in device_checks.check_readiness(gone).detail
 
 
 def test_a_real_camera_is_tried() -> None:

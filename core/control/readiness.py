@@ -1,0 +1,82 @@
+"""What a LIVE rig needs before the program may drive it: learnt directions, a model of this bench, a policy that looks. Pure.
+
+A rig without it stays advisory: pictures, advice and driving by hand. On a simulated rig nothing hinders.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from core.config.models import Config, PolicyName, QualityConfig
+from core.config.rig_file import RigFile, rig_in_use
+from core.config.safety import wiring_of
+from core.control.modes import Hindrance
+from core.perception.model_file import ModelError, ModelInfo, model_folder, read_model_info
+
+BLIND_POLICIES: frozenset[PolicyName] = frozenset({"push", "random"})
+"""Policies that do not look at the picture: baselines of trials."""
+MOST_ROLL_DEG = 45.0
+"""Beyond this roll right and left act mostly out of the picture, or the wrong way."""
+_MOST_NOVELTY = float(QualityConfig().max_novelty)
+"""A larger ``max_novelty`` lets pictures pass of kinds that the model does not know."""
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """What stands against the program's driving of a rig; ``keyboard_deadman``: the keyboard alone may be the deadman."""
+
+    hindrances: tuple[Hindrance, ...] = ()
+    keyboard_deadman: bool = True
+
+
+READY = Readiness()
+"""Of a simulated rig."""
+
+
+def readiness_of(config: Config, rig: RigFile | None, model: ModelInfo | None) -> Readiness:
+    """Of a LIVE rig.
+
+    Parameters
+    ----------
+    config : as it drives.
+    rig : its rig file; None: it has none, so nothing of it was learnt.
+    model : the manifest of the model that perceives; None: it cannot be read, which another check reports.
+    """
+    found: list[Hindrance] = []
+    known = rig.calibration if rig is not None else None
+    if known is None or known.wiring is None or known.wiring != wiring_of(config.servos):
+        found.append(Hindrance.DIRECTIONS_UNKNOWN)
+    elif known.assumed:
+        found.append(Hindrance.DIRECTIONS_ASSUMED)
+    steering = known.steering if known is not None else None
+    if steering is None or steering.turn_deg_per_mm is None:
+        found.append(Hindrance.STEERING_UNKNOWN)
+    elif abs(steering.roll_deg) > MOST_ROLL_DEG:
+        found.append(Hindrance.STEERING_WRONG)
+    if model is not None:
+        reference = model.familiarity
+        if model.calibration is None or reference is None or reference.working_size_px != config.perception.working_size_px:
+            found.append(Hindrance.MODEL_UNCALIBRATED)
+        elif rig is None or not _is_taught(config, rig, model):
+            found.append(Hindrance.MODEL_UNTAUGHT)
+    quality = config.perception.quality
+    if not quality.enabled or quality.max_novelty > _MOST_NOVELTY:
+        found.append(Hindrance.CHECKS_OFF)
+    if config.policy.name in BLIND_POLICIES:
+        found.append(Hindrance.POLICY_BLIND)
+    return Readiness(tuple(found), keyboard_deadman=rig is not None and rig.keyboard_deadman)
+
+
+def _is_taught(config: Config, rig: RigFile, model: ModelInfo) -> bool:
+    """Whether the model was taught on the bench that the rig file names; pictures of another bench are refused then."""
+    return rig.bench is not None and rig.model == config.perception.segmentation.model and "taught" in model.training
+
+
+def read_readiness(config: Config) -> Readiness:
+    """The same with rig file and manifest read from disk. Raises RigFileError."""
+    found = rig_in_use(config)
+    try:
+        model = read_model_info(model_folder(config.perception.segmentation.model), verify=())
+    except ModelError:
+        model = None
+    return readiness_of(config, found[1] if found is not None else None, model)
