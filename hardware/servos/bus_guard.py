@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
-from core.config.safety import JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.safety import TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusMonitor, BusReport
 from core.control.faults import Cause, Fault, Reaction, worst
 from core.control.gate import (
@@ -59,6 +59,52 @@ class OneStep:
         return tuple(
             min(max(goal, start - joint.max_step_mm), start + joint.max_step_mm) if math.isfinite(goal) else goal
             for goal, start, joint in zip(goals_mm, self._from_mm, self._joints, strict=True)
+        )
+
+
+RELEASE_MM_S = 2.0
+"""Speed at which a tendon is let go: the whole pull of 2.8 mm in 1.4 s, so that neither wire nor head snaps back."""
+RELEASED = frozenset({Cause.STRAINED, Cause.TRACKING})
+"""Stops after which the tendons are let go instead of held: the tension that they hold is what went wrong."""
+_RELEASE_EXTRA_S = 0.5
+"""Beyond the time that the way takes; a drum that cannot turn ends it."""
+_SLACK_MM = 0.05
+"""A tendon with no more pull than this has no tension."""
+
+
+class ReleaseRamp:
+    """Lets the tendons go: their goals move slowly to zero pull, where a tendon has no tension. Pure.
+
+    For every case in which held tension is the danger: a strain, an overheating servo, a program that leaves. The goal moves, and
+    not the current: a gear of 350:1 holds a wire without any current, so a current that fades would leave the tension as it is.
+
+    A tendon is never tightened: one that stands at zero pull or below stays there, and goals are at most one step below the
+    measured position. Feed and delivery keep their goals: nothing is pulled out of a vessel without an order.
+
+    Parameters
+    ----------
+    from_mm : positions of the joints at the start, at `now_s` (monotonic).
+    """
+
+    def __init__(self, joints: Sequence[JointConfig], from_mm: Joints, now_s: float) -> None:
+        self._joints, self._from_mm, self._start_s = joints, from_mm, now_s
+        longest_mm = max(at for at, joint in zip(from_mm, joints, strict=True) if joint.name in TENDONS)
+        self._end_s = now_s + max(0.0, longest_mm) / RELEASE_MM_S + _RELEASE_EXTRA_S
+
+    def goals(self, at_mm: Sequence[float], now_s: float) -> tuple[float | None, ...] | None:
+        """The goals now, None for a joint that keeps its own; None altogether when it is over.
+
+        Parameters
+        ----------
+        at_mm : measured positions.
+        """
+        tight = [at > _SLACK_MM for at, joint in zip(at_mm, self._joints, strict=True) if joint.name in TENDONS]
+        if now_s > self._end_s or not any(tight):
+            return None
+        gone_mm = RELEASE_MM_S * max(0.0, now_s - self._start_s)
+        return tuple(
+            min(at, max(0.0, start - gone_mm, at - joint.max_step_mm)) if joint.name in TENDONS and at > 0.0 else None
+            for at, start, joint in zip(at_mm, self._from_mm, self._joints, strict=True)
         )
 
 
@@ -179,6 +225,13 @@ class BusGuard:
         self._orders.clear()
         self.followed = None
         self.rejection, self.clamps, self.at_end = None, (), ()
+
+    def release_ramp(self, now_s: float) -> ReleaseRamp | None:
+        """The ramp that lets the tendons go from where they are; None when that is not known."""
+        at = self._measurement
+        if at is None or now_s - at.measured_s > self._safety.measurement_max_age_s:
+            return None
+        return ReleaseRamp(self._servos.joints, tuple(at.positions_mm), now_s)
 
     def acknowledge(self) -> None:
         """The operator has seen the cause. Faults that are still there go on to hinder arming."""

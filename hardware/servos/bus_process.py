@@ -27,7 +27,7 @@ from dataclasses import replace
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
 from core.messages import message
-from hardware.servos.bus_guard import BusGuard
+from hardware.servos.bus_guard import RELEASED, BusGuard, ReleaseRamp
 from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, Request
 from hardware.servos.dynamixel_bus import ServoBus
 from hardware.servos.dynamixel_port import LATE_S, NotReady, PortError, PortLost, ServoError, StoppedMeanwhile, TorqueStillOn
@@ -134,6 +134,8 @@ _READS_BEFORE_ARMING = 3
 _SETTLE_CYCLES, _SETTLED_MM = 5, 0.2
 """After a hold it is checked, and repeated, for so many cycles; so far a goal may be from the position."""
 _WINDOW_S = 10.0
+_ENDS_RAMP = frozenset({"zero", "arm", "reboot", "torque off"})
+"""Requests after which tendons are no longer let go slowly."""
 _INTERRUPTED_BY_STOP = frozenset({"open", "zero", "arm", "reboot"})
 """Requests that end at a STOP; the others hold the servos or release them, and are finished first."""
 _TRIES_ON_REQUEST, _TRIES_AT_END = 4, 15
@@ -152,6 +154,7 @@ class BusLoop:
         self._readings: tuple[ServoReading, ...] = ()
         self._corrupt = self._bad_packets = 0
         self._settle = 0
+        self._ramp: ReleaseRamp | None = None
         self._ended = self._quiet = self._lost = False
         self._reopen_at_s = 0.0
         self._open_problem = ""
@@ -253,7 +256,7 @@ class BusLoop:
         started_s = time.monotonic()
         self._cycle += 1
         silence_s = self._guard.silence_s(self._server.heartbeat(), started_s)
-        is_settled = not self._guard.armed and not self._release.is_requested
+        is_settled = not self._guard.armed and not self._release.is_requested and self._ramp is None
         self._quiet = is_settled and silence_s > self._servos.heartbeat_timeout_s + _LINGER_S
         self._readings = ()
         if self._bus.is_open and not self._quiet:
@@ -282,10 +285,25 @@ class BusLoop:
             self._drive()
         elif self._release.is_requested:
             self._release.release()
+        elif self._ramp is not None:
+            self._follow_ramp(self._ramp)
         elif self._settle > 0:
             self._settle -= 1
             if not self._holds():
                 self._bus.hold()
+
+    def _follow_ramp(self, ramp: ReleaseRamp) -> None:
+        """Let the tendons go a little further; in the end all servos hold where they are."""
+        at_mm = [r.position_mm for r in self._readings if isinstance(r, ServoState) and r.position_mm is not None]
+        if len(at_mm) < len(self._servos.joints):
+            self._ramp = ramp if any(isinstance(r, MissingServo) and not r.restarted for r in self._readings) else None
+            return
+        goals_mm = ramp.goals(at_mm, time.monotonic())
+        if goals_mm is None:
+            self._ramp, self._settle = None, _SETTLE_CYCLES
+            self._bus.hold()
+        else:
+            self._bus.slacken(goals_mm, self._readings)
 
     def _drive(self) -> None:
         order, beat = self._server.order(), self._server.heartbeat()
@@ -304,7 +322,8 @@ class BusLoop:
         self._hold_after(fault)
 
     def _hold_after(self, fault: Fault) -> None:
-        """Goal = measured; the torque goes off, too, where that is requested."""
+        """Goal = measured. The torque goes off where that is requested; else a strain or a jam lets the tendons go slowly."""
+        self._ramp = None
         if fault.cause.reaction is Reaction.STOP and self._servos.torque_off_on_stop:
             self._release.request()
         if not self._bus.is_open:
@@ -313,6 +332,8 @@ class BusLoop:
         self._bus.disarm()
         if self._release.is_requested:
             self._release.release()
+        elif fault.cause in RELEASED:
+            self._ramp = self._guard.release_ramp(time.monotonic())
 
     def _holds(self) -> bool:
         """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
@@ -414,6 +435,8 @@ class BusLoop:
                 raise NotReady(f"the servo bus process does not know how to {request.what}")
             if after_stop and request.what == "acknowledge":
                 raise NotReady("STOP was pressed meanwhile: acknowledge again")
+            if request.what in _ENDS_RAMP:
+                self._ramp = None
             if request.what in _INTERRUPTED_BY_STOP:
                 with self._bus.interruptible(self._check_request):
                     action(request)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from core.config.safety import JointConfig, JointName, ServosConfig
+from core.config.safety import TENDONS, JointConfig, JointName, ServosConfig
 from core.config.servo_models import model_name
 from core.messages import message
 from hardware.servos import registers
@@ -50,6 +50,7 @@ _COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
 """Registers that decide what a position means."""
 _SPEEDS = (57600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
 _REBOOT_S = 1.5
+_ROUNDING_MM = 1e-9
 _TORQUE_OFF_PACKETS = 3
 """A packet to several servos has no answer, and may get lost."""
 
@@ -363,6 +364,22 @@ class ServoBus:
         if goals:
             self._send_goals(goals)
         return readings
+
+    def slacken(self, goals_mm: Sequence[float | None], readings: Sequence[ServoReading]) -> None:
+        """Let tendons go by a step, also while no goals are taken; None leaves a joint alone, and so does a servo that is missing.
+
+        Raises ValueError, and sends nothing: a goal that would tighten, is more than a step away, or is that of no tendon.
+        """
+        goals: dict[int, int] = {}
+        for joint, goal_mm, reading in zip(self._joints, goals_mm, readings, strict=True):
+            if goal_mm is None or not isinstance(reading, ServoState) or reading.position_mm is None or not reading.torque:
+                continue
+            lowest_mm = reading.position_mm - joint.max_step_mm - _ROUNDING_MM
+            if joint.name not in TENDONS or not lowest_mm <= goal_mm <= reading.position_mm:
+                raise ValueError(f"joint {joint.name}: from {reading.position_mm:g} mm it cannot be slackened to {goal_mm:g} mm")
+            goals[joint.id] = registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
+        if goals:
+            self._send_goals(goals)
 
     def torque_off(self) -> None:
         """Switch all torque off: one packet to all, three times, read back. It releases the tension of the wires.

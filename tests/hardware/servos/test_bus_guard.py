@@ -15,7 +15,7 @@ from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import Rejection, RejectReason, Source
 from core.types import Command
-from hardware.servos.bus_guard import BusGuard, OneStep
+from hardware.servos.bus_guard import RELEASE_MM_S, BusGuard, OneStep, ReleaseRamp
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
 from hardware.servos.dynamixel_port import NotReady
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
@@ -61,6 +61,45 @@ def test_one_order_moves_a_joint_by_one_step_at_most() -> None:
     further = (0.9, -0.9, 0.0, 0.0, 11.5, 1.5, 0.0)
     assert step.bounded(further, (1.0, "a"), moved) == (0.6, -0.6, 0.0, 0.0, 11.0, 1.0, 0.0)
     assert step.bounded(further, (1.02, "a"), moved) == further
+
+
+# --- tendons are let go ----------------------------------------------------------------------------------------------------------
+
+PULLED = (2.3, -1.7, 0.3, 0.3, 40.0, 3.0, 3.0)
+
+
+def test_tendons_are_let_go_slowly_to_no_pull_and_nothing_else_moves() -> None:
+    ramp, at_mm = ReleaseRamp(SERVOS.joints, PULLED, 10.0), list(PULLED)
+    for now_s, tendons in ((10.0, (2.3, -1.7, 0.3, 0.3)), (10.1, (2.1, -1.7, 0.1, 0.1)), (10.4, (1.5, -1.7, 0.0, 0.0))):
+        goals = ramp.goals(at_mm, now_s)
+        assert goals is not None
+        assert goals[1] is None, "it hangs slack already"
+        assert goals[4:] == (None, None, None), "nothing is pulled out of a vessel without an order"
+        at_mm = [at if goal is None else goal for goal, at in zip(goals, at_mm, strict=True)]
+        assert at_mm[:4] == pytest.approx(tendons)
+    assert ramp.goals((0.05, -1.7, 0.0, 0.0, 40.0, 3.0, 3.0), 11.0) is None
+
+
+def test_a_drum_that_does_not_turn_ends_it() -> None:
+    ramp = ReleaseRamp(SERVOS.joints, PULLED, 10.0)
+    assert ramp.goals(PULLED, 11.6) is not None
+    assert ramp.goals(PULLED, 10.0 + 2.3 / RELEASE_MM_S + 0.51) is None
+
+
+pulls = st.floats(-3.0, 6.0)
+
+
+@given(st.tuples(*[pulls] * 4), st.tuples(*[pulls] * 4), st.floats(0.0, 10.0))
+def test_letting_go_never_tightens_and_is_one_step_at_most(
+    begun: tuple[float, ...], at_mm: tuple[float, ...], after_s: float
+) -> None:
+    goals = ReleaseRamp(SERVOS.joints, (*begun, 1.0, 2.0, 2.0), 50.0).goals((*at_mm, 5.0, 6.0, 6.0), 50.0 + after_s)
+    if goals is None:
+        assert after_s > 0.5 or max(at_mm) <= 0.05
+        return
+    assert goals[4:] == (None, None, None)
+    for joint, goal, at in zip(SERVOS.joints, goals, at_mm, strict=False):
+        assert goal is None if at <= 0.0 else goal is not None and max(0.0, at - joint.max_step_mm) <= goal <= at
 
 
 # --- the guard -------------------------------------------------------------------------------------------------------------------

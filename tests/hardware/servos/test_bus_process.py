@@ -27,6 +27,7 @@ from core.types import Command
 from hardware.processes import PARENT_CHECK_S
 from hardware.servos.bus_ipc import BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, start_bus
 from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
+from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.bus import SoftServoBus
 from tools.kill_campaign import BOUND_S, BOUND_STEPS, KINDS, strike
@@ -38,6 +39,8 @@ ROOT = Path(__file__).resolve().parents[3]
 CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0), SafetyConfig()
 FORWARD = Command(advance_mm_s=5.0)
 PATIENCE_S = 10.0
+STRAIN_MA = 700.0
+"""Of a gear that grinds: more than a servo may draw."""
 NO_SLACK: dict[str, Any] = {"slack_mm": (0.0,) * 4, "pretension_mm": 0.3}
 
 
@@ -504,6 +507,54 @@ def test_fault_29_another_master_switches_the_torque_off(servos: SoftServoBus, a
     assert [servos.servo(joint.id).table["torque"] for joint in CONFIG.joints] == [0] * 7
     armed.acknowledge()
     armed.arm()
+
+
+def _bend(robot: ServoRobot, share: float = 1.0) -> BusStatus:
+    """Bend until the right tendon has its pull."""
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        robot.beat(Source.OPERATOR)
+        robot.send(Command(bend=share, advance_mm_s=2.0))
+        status = robot.bus_status()
+        at_mm = _positions(status)[0] if status is not None else None
+        if status is not None and at_mm is not None and at_mm > 2.0 * share + 0.2:
+            return status
+        time.sleep(0.02)
+    raise AssertionError("the robot does not bend")
+
+
+def _positions(status: BusStatus) -> tuple[float | None, ...]:
+    return tuple(reading.position_mm if isinstance(reading, ServoState) else None for reading in status.servos) or (None,) * 7
+
+
+def test_after_a_strain_the_tendons_are_let_go_slowly(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _bend(armed)
+    servos.modify_servo(1, lambda servo: servo.grind(STRAIN_MA))
+    _seen(armed, _latched(Cause.STRAINED))
+    servos.modify_servo(1, lambda servo: servo.grind(0.0))
+    begun_s, fed_mm = time.monotonic(), servos.positions_mm()[4]
+    while time.monotonic() - begun_s < 0.5:  # the sender of goals may be late, but never early
+        gone_mm = 2.3 - servos.positions_mm()[0]
+        assert gone_mm <= 2.0 * (time.monotonic() - begun_s + 0.3)
+        time.sleep(0.02)
+    status = _seen(armed, lambda status: all(at is not None and at <= 0.06 for at in _positions(status)[:4]))
+    assert status.latched is not None
+    assert status.latched.cause is Cause.STRAINED
+    assert not status.armed
+    assert _positions(status)[1] == pytest.approx(-1.7, abs=0.1), "a slack tendon is not tightened"
+    assert servos.positions_mm()[4] == pytest.approx(fed_mm, abs=0.1), "the robot is not pulled out"
+    assert _torques(servos) == [1] * 7
+
+
+def test_stop_holds_tendons_that_are_being_let_go(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _bend(armed)
+    servos.modify_servo(1, lambda servo: servo.grind(STRAIN_MA))
+    _seen(armed, _latched(Cause.STRAINED))
+    armed.stop()
+    time.sleep(0.3)
+    at_mm = servos.positions_mm()[0]
+    time.sleep(0.3)
+    assert servos.positions_mm()[0] == pytest.approx(at_mm, abs=0.02)
 
 
 def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot) -> None:

@@ -716,6 +716,30 @@ def test_hold_stops_where_it_is(twin: SoftServoBus, armed: ServoBus) -> None:
     assert state.position_mm < 40.0
 
 
+def test_tendons_are_slackened_without_being_armed(twin: SoftServoBus, armed: ServoBus) -> None:
+    armed.write((0.5, 0.5, 0.5, 0.5, 0.5, 0.0, 0.0))
+    _until(armed, 0, lambda r: isinstance(r, ServoState) and r.position_mm == r.goal_mm and (r.position_mm or 0.0) > 0.4)
+    armed.disarm()
+    armed.slacken((0.2, None, None, None, None, None, None), _states(armed))
+    _until(armed, 0, lambda r: isinstance(r, ServoState) and (r.position_mm or 1.0) == pytest.approx(0.2, abs=0.01))
+    assert twin.positions_mm()[1] > 0.4
+
+
+@pytest.mark.parametrize(
+    "goals_mm",
+    [(0.1, None, None, None, None, None, None), (-0.7, None, None, None, None, None, None), (None,) * 4 + (-0.1, None, None),
+     (math.nan, None, None, None, None, None, None)],
+    ids=["tighter", "more than a step", "the feed", "not a number"],
+)  # fmt: skip
+def test_what_is_not_slackening_is_not_sent(twin: SoftServoBus, armed: ServoBus, goals_mm: tuple[float | None, ...]) -> None:
+    armed.disarm()
+    states = _states(armed)
+    twin.log.clear()
+    with pytest.raises(ValueError, match="cannot be slackened"):
+        armed.slacken(goals_mm, states)
+    assert not any(packet.instruction == Instruction.SYNC_WRITE for packet in twin.log)
+
+
 def test_torque_off_is_one_packet_three_times_read_back(twin: SoftServoBus, armed: ServoBus) -> None:
     twin.log.clear()
     armed.torque_off()
