@@ -26,9 +26,9 @@ _LEAST_HIGH, _LEAST_LOW = 14.0, 6.0
 """Least difference (grey levels of Lab, 0 to 255) of a robot's clearest parts, and of its faintest."""
 _HIGH_SIGMAS, _LOW_SIGMAS = 9.0, 4.0
 """The same in deviations of what the rest of the vessel differs by."""
-_EDGE_SHARE = 0.4
+_EDGE_SHARE = 0.43
 """The robot's edge lies at this share of its contrast there."""
-_CONTRAST_PX = 11
+_CONTRAST_PX = 7
 """Side of the surroundings whose clearest place is the contrast."""
 _LEAST_AREA_PX = 40
 """A smaller part is noise or a bubble."""
@@ -46,12 +46,14 @@ _CLOSE_PX = 7
 class Difference:
     """What differs from the empty bench.
 
-    ``probability``: of the robot, float32 (h, w). ``doubtful``: bool (h, w), places that count neither as robot nor as background
+    ``probability``: of the robot, float32 (h, w). ``evidence``: how much a pixel differs, whatever is around it, float32 (h, w):
+    0.5 at an edge of the robot. ``doubtful``: bool (h, w), places that count neither as robot nor as background
     when a network is trained. ``unusable``: bool (h, w), where a difference says nothing: around a lamp's reflection, and
     over what goes on outside the drawn vessel, such as a cable or a hand.
     """
 
     probability: NDArray[np.float32]
+    evidence: NDArray[np.float32]
     doubtful: Mask
     unusable: Mask
 
@@ -95,10 +97,10 @@ def _light(apart: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def robot_by_difference(image: Image, view: BenchView) -> Difference:
     """The robot in `image` (h, w, 3), a picture at working size that was registered as `view`."""
-    probability, doubtful = np.zeros(image.shape[:2], np.float32), ~view.known
+    probability, evidence, doubtful = np.zeros(image.shape[:2], np.float32), np.zeros(image.shape[:2], np.float32), ~view.known
     x, y, width, height = cv2.boundingRect(view.reachable.view(np.uint8))
     if not width:
-        return Difference(probability, doubtful, np.zeros_like(doubtful))
+        return Difference(probability, evidence, doubtful, np.zeros_like(doubtful))
     distance = distance_to_empty(image, view)
     unusable = _glare(image)
     box = np.s_[y : y + height, x : x + width]
@@ -107,23 +109,24 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     noise = 1.4826 * float(np.median(inside)) if inside.size else 0.0
     high, low = max(_LEAST_HIGH, _HIGH_SIGMAS * noise), max(_LEAST_LOW, _LOW_SIGMAS * noise)
     strong = np.where(allowed, distance[box], np.float32(0.0))
-    contrast = cv2.blur(cv2.dilate(strong, _square(_CONTRAST_PX)), (5, 5))
-    cut = np.maximum(_EDGE_SHARE * contrast, np.float32(low))
+    cut = np.maximum(_EDGE_SHARE * _contrast(strong), np.float32(low))
     if view.vessel is not None:
         differs = ~view.reachable & view.known & (distance > high)
         differs[box] |= strong > cut
         unusable |= (foreign := _foreign(differs, view.reachable))
         strong[foreign[box]] = 0.0
     mask = _robot_parts(strong, strong > cut, high)
+    mask = _with_ends(mask, strong, cut, high)
     mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0
-    values = np.clip(0.5 + (strong - cut) / (2.0 * cut), 0.0, 1.0)
+    values = np.clip(strong / (2.0 * cut), 0.0, 1.0)
+    evidence[box] = values
     around = cv2.dilate(mask.view(np.uint8), _disc(5)) > 0
     probability[box] = np.where(mask, np.maximum(values, 0.6), np.where(around, np.minimum(values, 0.49), 0.0))
     if view.window is None:
         _continue_to_border(probability, view.reachable)
     rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
     doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | unusable
-    return Difference(probability, doubtful, unusable)
+    return Difference(probability, evidence, doubtful, unusable)
 
 
 def _foreign(differs: Mask, reachable: Mask) -> Mask:
@@ -169,6 +172,61 @@ def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> M
         for label in {label for label in np.unique(labels[near]).tolist() if peaks.get(label, 0.0) >= least}:
             result |= labels == label
     return result
+
+
+def _with_ends(mask: Mask, strong: NDArray[np.float32], cut: NDArray[np.float32], high: float) -> Mask:
+    """The robot's `mask` (h, w) with ends of another colour, which differ less than its body; `cut` is lowered there, in place."""
+    depth = cv2.distanceTransform(mask.view(np.uint8), cv2.DIST_L2, 3)
+    if not mask.any():
+        return mask
+    width = 4.0 * float(depth[mask].mean())  # a strip's mean depth is a quarter of its width
+    body = cv2.dilate(mask.view(np.uint8), _disc(2 * _END_RIM_PX + 1)) > 0
+    around = cv2.dilate(mask.view(np.uint8), _square(2 * round(_END_REACH * width) + 1)) > 0
+    rest = np.where(around & ~body, strong, np.float32(0.0))
+    differs = rest > _EDGE_SHARE * _contrast(rest)
+    clear = max(_END_CLEAR * high, _END_CONTRAST * float(np.median(strong[mask])))
+    found = cv2.morphologyEx((differs & (rest > np.float32(high / 2.0))).view(np.uint8), cv2.MORPH_OPEN, _disc(3))
+    count, labels, stats, centers = cv2.connectedComponentsWithStats(found, connectivity=8)
+    if count == 1:
+        return mask
+    side = 2 * round(_END_REACH * width) + 1
+    beside = cv2.blur(mask.view(np.uint8).astype(np.float32), (side, side))
+    mask = mask.copy()
+    for label in range(1, count):
+        x, y, box_width, box_height, area = stats[label].tolist()
+        column, row = (round(value) for value in centers[label].tolist())
+        is_small = area < _END_AREA * width**2
+        if is_small or max(box_width, box_height) > _END_LENGTH * width or beside[row, column] > _END_BESIDE:
+            continue
+        box = np.s_[max(0, y - 4) : y + box_height + 4, max(0, x - 4) : x + box_width + 4]
+        part = labels[box] == label
+        touches = (cv2.dilate(part.view(np.uint8), _square(3)) > 0) & body[box]
+        if float(rest[box][part].max()) < clear or not touches.any():
+            continue
+        near = cv2.dilate(part.view(np.uint8), _disc(2 * _END_RIM_PX + 3)) > 0
+        level = np.float32(_END_EDGE * float(np.quantile(strong[box][part], 0.9)))
+        cut[box] = np.where(near, np.minimum(cut[box], level), cut[box])
+        mask[box] |= near & (strong[box] > cut[box])
+    return mask
+
+
+_END_RIM_PX = 2
+"""Width of the rim of the robot's body, where its blurred edge is no end of another colour."""
+_END_REACH, _END_LENGTH = 1.5, 2.0
+"""How far beside the body ends are looked for, and their greatest length, in widths of the body."""
+_END_AREA = 0.12
+"""Least area of an end, in squares of the body's width."""
+_END_CLEAR, _END_CONTRAST = 1.5, 0.3
+"""Least difference of an end: of the robot's clearest parts' least, and of what the body differs by."""
+_END_EDGE = 0.5
+"""An end's edge lies at this share of its own contrast."""
+_END_BESIDE = 0.15
+"""Most of the surroundings of an end that is body: beside the body, where its shadow lies, it is more."""
+
+
+def _contrast(strong: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The clearest difference around each pixel (h, w)."""
+    return np.asarray(cv2.blur(cv2.dilate(strong, _square(_CONTRAST_PX)), (5, 5)), np.float32)
 
 
 def _darkest(image: Image) -> NDArray[np.uint8]:
@@ -242,12 +300,15 @@ def combined(network: Probability, difference: Difference, view: BenchView) -> P
     """
     differs = difference.probability >= np.float32(0.5)
     beside = cv2.dilate(differs.view(np.uint8), _square(_BESIDE_PX)) > 0
-    robot = np.where(differs, np.maximum(network, difference.probability), np.where(beside, network, np.float32(0.0)))
+    seen = np.where(network + difference.evidence >= np.float32(_BOTH), network, np.minimum(network, np.float32(0.49)))
+    robot = np.where(differs, np.maximum(network, difference.probability), np.where(beside, seen, np.float32(0.0)))
     return np.asarray(np.where(view.known & ~difference.unusable, robot, network), np.float32)
 
 
 _BESIDE_PX = 9
 """Side of the square around what differs within which the network adds to the robot: a part that looks like the bench."""
+_BOTH = 1.0
+"""There the network's probability and the difference's evidence add up to this at least; a blurred rim or a shadow is no robot."""
 
 
 def _square(side: int) -> NDArray[np.uint8]:

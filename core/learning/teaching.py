@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from core.bench.bench import Bench, read_bench, write_bench
-from core.bench.difference import distance_to_empty, robot_by_difference
-from core.bench.registration import BenchView, register
+from core.bench.difference import combined, distance_to_empty, robot_by_difference
+from core.bench.registration import register
 from core.config.section import first_problem
 from core.devices import UserError
 from core.files import write_atomic
@@ -54,10 +54,6 @@ LEAST_INSIDE, INSIDE_MARGIN_PX = 0.6, 4
 """Share of a robot's mask that lies in the vessel, widened by the margin."""
 _SPECK_SHARE = 0.05
 """A component of the robot's mask with a smaller share of its area is left out."""
-_COMPLETED_PX = 6
-"""So far beside the robot by difference a network completes it."""
-_LEAST_DIFFERENCE, _DIFFERENCE_SIGMAS = 4.0, 2.0
-"""There it must differ by so many grey levels of Lab, and deviations of the noise, at least."""
 _CELL_PX, _KNOWN_SHARE = 40, 0.5
 """Side of a cell in which structure is compared, and the share of it that must be known."""
 _STRONG_SHARE, _LEAST_STRUCTURE = 0.9, 0.009
@@ -254,7 +250,9 @@ def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = 
     vessel = view.vessel if view.vessel is not None else np.zeros(picture.image.shape[:2], bool)
     robot, doubtful = difference.probability >= np.float32(0.5), difference.doubtful
     if segment is not None:
-        robot = completed(robot, segment(picture.image)[1] >= np.float32(0.5), picture.image, view)
+        both = combined(segment(picture.image)[1], difference, view) >= np.float32(0.5)
+        core = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+        robot = cv2.morphologyEx((both & (view.known & ~difference.unusable)).view(np.uint8), cv2.MORPH_OPEN, core) > 0
     specks = _specks(robot)
     robot, doubtful = robot & ~specks, doubtful | _widened(specks, 2)
     focus, hidden = structure_of(picture.image, view.placed, view.known)
@@ -267,16 +265,6 @@ def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = 
     if robot.sum() < _LEAST_AREA_PX:
         return replace(frame, reason="no robot: nothing in the vessel differs from the empty bench")
     return frame
-
-
-def completed(robot: Mask, found: Mask, image: Image, view: BenchView) -> Mask:
-    """The `robot` by difference, with what a network `found` beside it and what differs a little, all (h, w)."""
-    distance = distance_to_empty(image, view)
-    usual = distance[view.reachable & view.known]
-    noise = 1.4826 * float(np.median(usual)) if usual.size else 0.0
-    beside = found & _widened(robot, _COMPLETED_PX) & (distance > max(_LEAST_DIFFERENCE, _DIFFERENCE_SIGMAS * noise))
-    core = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
-    return np.asarray(cv2.morphologyEx((robot | beside).view(np.uint8), cv2.MORPH_OPEN, core) > 0)
 
 
 def _specks(robot: Mask) -> Mask:
