@@ -200,7 +200,7 @@ def _with_ends(mask: Mask, strong: NDArray[np.float32], cut: NDArray[np.float32]
             continue
         box = np.s_[max(0, y - 4) : y + box_height + 4, max(0, x - 4) : x + box_width + 4]
         part = labels[box] == label
-        touches = (cv2.dilate(part.view(np.uint8), _square(3)) > 0) & body[box]
+        touches = (cv2.dilate(part.view(np.uint8), _square(5)) > 0) & body[box]
         if float(rest[box][part].max()) < clear or not touches.any():
             continue
         near = cv2.dilate(part.view(np.uint8), _disc(2 * _END_RIM_PX + 3)) > 0
@@ -216,7 +216,7 @@ _END_REACH, _END_LENGTH = 1.5, 2.0
 """How far beside the body ends are looked for, and their greatest length, in widths of the body."""
 _END_AREA = 0.12
 """Least area of an end, in squares of the body's width."""
-_END_CLEAR, _END_CONTRAST = 1.5, 0.3
+_END_CLEAR, _END_CONTRAST = 1.5, 0.22
 """Least difference of an end: of the robot's clearest parts' least, and of what the body differs by."""
 _END_EDGE = 0.5
 """An end's edge lies at this share of its own contrast."""
