@@ -154,6 +154,9 @@ class LockstepPort(LockedPort):
         self.tx_time_per_byte = 10_000.0 / self.baudrate
         return True
 
+    def closePort(self) -> None:
+        self.is_open = False
+
     def writePort(self, packet: list[int]) -> int:
         return self._lockstep.write(bytes(packet))
 

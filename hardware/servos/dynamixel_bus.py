@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import secrets
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -42,9 +43,9 @@ from hardware.servos.registers import (
 _log = logging.getLogger(__name__)
 
 # Registers (Robotis e-Manual, X series)
-_RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT = 9, 10, 11, 20, 44
+_RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT, _STARTUP = 9, 10, 11, 20, 44, 60
 TORQUE, _STATUS_RETURN, _HARDWARE_ERROR, _WATCHDOG, _PROFILE, _GOAL, _POSITION = 64, 68, 70, 98, 108, 116, 132
-_EEPROM_BYTES = 48
+_EEPROM_BYTES = 61
 _EXTENDED_POSITION = 4
 _COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
 """Registers that decide what a position means."""
@@ -161,6 +162,7 @@ class ServoBus:
         self.identities: tuple[ServoIdentity, ...] = ()
         self._zeros: dict[int, int] = {}
         self._put_off: set[int] = set()
+        self._marks: dict[int, int] = {}
         self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
         self._silences = dict(self._misses)
         self._turns = dict.fromkeys((address for address, _, _ in self._blocks), 0)
@@ -467,6 +469,7 @@ class ServoBus:
             _MODE: bytes([_EXTENDED_POSITION]),
             _HOMING_OFFSET: bytes(4),  # with one, a tripped watchdog can move the motor
             _VELOCITY_LIMIT: registers.profile_velocity(joint).to_bytes(4, "little"),
+            _STARTUP: b"\0",  # no torque at power-up, and no RAM brought back, which would hide a restart; firmware 44 has 0 there
         }
         table = self._line.read(joint.id, 0, _EEPROM_BYTES)
         return {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
@@ -480,6 +483,11 @@ class ServoBus:
         wrong = self._differences(joint)
         if wrong:
             self._line.write(joint.id, TORQUE, b"\0")
+        if _STARTUP in wrong:
+            was = self._line.read(joint.id, _STARTUP, 1)[0]
+            _log.warning(
+                "%s had Startup Configuration (register 60) %d: set to 0, else a restart may pass unseen", _title(joint), was
+            )
         for address, data in wrong.items():
             self._line.write(joint.id, address, data)
             if self._line.read(joint.id, address, len(data)) != data:
@@ -489,10 +497,18 @@ class ServoBus:
 
     def _map_block(self, joint: JointConfig) -> bool:
         """Gather the status block; not written when it is in place already. True: it was not, so that the servo has restarted."""
-        wanted = indirect_addresses(self.config.model_of(joint))
-        if self._line.read(joint.id, INDIRECT_ADDRESS, len(wanted)) == wanted:
+        model = self.config.model_of(joint)
+        wanted, data = indirect_addresses(model), indirect_data(model)
+        *found, mark = self._line.read(joint.id, INDIRECT_ADDRESS, data + 1 - INDIRECT_ADDRESS)
+        is_mapped, known = bytes(found[: len(wanted)]) == wanted, self._marks.get(joint.id)
+        if is_mapped and (mark == known or (known is None and mark)):
+            self._marks[joint.id] = mark
             return False
-        self._line.write(joint.id, INDIRECT_ADDRESS, wanted)
+        if not is_mapped:
+            self._line.write(joint.id, INDIRECT_ADDRESS, wanted)
+        with contextlib.suppress(WriteRefused):  # a servo that keeps no mark is told by its addresses alone
+            self._line.write(joint.id, data, bytes([1 + secrets.randbelow(255)]))
+        self._marks[joint.id] = self._line.read(joint.id, data, 1)[0]
         return True
 
     def _set_profile(self, joint: JointConfig) -> None:
@@ -520,7 +536,7 @@ class ServoBus:
 
     def _reading(self, joint: JointConfig, block: bytes, time_s: float) -> ServoReading:
         self._misses[joint.id] = self._silences[joint.id] = 0
-        state = state_of(joint, self.config.model_of(joint), self._zeros.get(joint.id), block, time_s)
+        state = state_of(joint, self.config.model_of(joint), self._zeros.get(joint.id), block, time_s, self._marks.get(joint.id, 0))
         if state is None:
             self._armed = False
             self._zeros.pop(joint.id, None)

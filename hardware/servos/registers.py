@@ -4,8 +4,8 @@ The block is seventeen bytes, gathered through the servo's indirect addresses. W
 between 64 and 146. Read as they lie, seven servos take 6.6 ms at 1 Mbps and 115 ms at the factory's 57600; gathered they take 2
 and 33 ms. Why not more: the smallest servos (330 size) have 20 indirect addresses. Their block is one byte shorter.
 
-The addresses are forgotten in a reboot, and the block then reads as zeros. So the block begins with a register that the driver
-keeps at 2, and holds the supply voltage: zeros cannot pass for a servo at position 0.
+The addresses are forgotten in a reboot, and the block then reads as zeros. So the block begins with a mark that the driver has
+written, goes on with a register that it keeps at 2, and holds the supply voltage: zeros cannot pass for a servo at position 0.
 """
 
 from __future__ import annotations
@@ -91,6 +91,9 @@ _SMALL_PARTS = _PARTS | {"voltage": (144, 1)}
 """Of the 330 size: a supply of 14 V or less fits in one byte."""
 TAG_BYTES = 2
 """Padding: requests in turn ask for 0, 1 or 2 bytes more, so that a late answer to an earlier one is known by its length."""
+_MARK_BYTES = 1
+"""The block's first byte: an indirect datum whose indirect address is its own, so that it keeps what the driver writes there. It is
+0 after a restart, also where Startup Configuration(60) restores the indirect addresses: no backup holds it."""
 _PADDING = (120, 121)
 """Registers behind the block, for the padding: the realtime tick."""
 INDIRECT_ADDRESS = 168
@@ -163,36 +166,41 @@ def _parts(model: ServoModel) -> dict[str, tuple[int, int]]:
 
 def block_bytes(model: ServoModel) -> int:
     """Length of a model's status block, without padding."""
-    return sum(size for _, size in _parts(model).values())
+    return _MARK_BYTES + sum(size for _, size in _parts(model).values())
 
 
 def indirect_data(model: ServoModel) -> int:
-    """Where a model keeps its indirect data: behind 20 addresses in the 330 size, behind 28 else."""
+    """Where a model keeps its indirect data: behind 20 addresses in the 330 size, behind 28 else. The mark is the first byte."""
     return 208 if model.is_small else 224
 
 
 def indirect_addresses(model: ServoModel) -> bytes:
-    """What to write at ``INDIRECT_ADDRESS``: the block's registers, then the padding."""
+    """What to write at ``INDIRECT_ADDRESS``: the mark, the block's registers, then the padding."""
     registers = [first + offset for first, size in _parts(model).values() for offset in range(size)]
-    return b"".join(register.to_bytes(2, "little") for register in (*registers, *_PADDING))
+    return b"".join(register.to_bytes(2, "little") for register in (indirect_data(model), *registers, *_PADDING))
 
 
 def split_block(model: ServoModel, block: bytes) -> dict[str, bytes]:
     """The block's parts by name; `block` may carry padding. Raises ValueError when it is too short."""
     if len(block) < block_bytes(model):
         raise ValueError(f"status block of {len(block)} bytes")
-    parts, at = {}, 0
+    parts, at = {"mark": block[:_MARK_BYTES]}, _MARK_BYTES
     for name, (_, size) in _parts(model).items():
         parts[name] = block[at : at + size]
         at += size
     return parts
 
 
-def state_of(joint: JointConfig, model: ServoModel, zero_ticks: int | None, block: bytes, time_s: float) -> ServoState | None:
-    """A servo's state from its block; None when the servo has lost its indirect addresses. Raises ValueError for a short block."""
+def state_of(
+    joint: JointConfig, model: ServoModel, zero_ticks: int | None, block: bytes, time_s: float, mark: int
+) -> ServoState | None:
+    """A servo's state from its block; None when it has lost its indirect addresses or its `mark`: it has restarted.
+
+    Raises ValueError for a short block.
+    """
     parts = split_block(model, block)
     voltage = int.from_bytes(parts["voltage"], "little")
-    if parts["status_return"][0] != ANSWERS_ALL or voltage == 0:
+    if parts["status_return"][0] != ANSWERS_ALL or voltage == 0 or parts["mark"][0] != mark:
         return None
     ticks, goal = signed(parts["position"]), signed(parts["goal"])
     return ServoState(

@@ -557,10 +557,11 @@ def test_stop_holds_tendons_that_are_being_let_go(servos: SoftServoBus, armed: S
     assert servos.positions_mm()[0] == pytest.approx(at_mm, abs=0.02)
 
 
-def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot) -> None:
-    """It is silent for 0.3 s, and then has lost its settings and its zero."""
+@pytest.mark.parametrize("startup", [0, 2, 3])
+def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot, startup: int) -> None:
+    """It is silent for 0.3 s, and then has lost its zero, whatever Startup Configuration(60) brings back of its settings."""
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
-    servos.modify_servo(6, lambda servo: servo.restart())
+    servos.modify_servo(6, lambda servo: (servo.backup(), servo.table.__setitem__("startup", startup), servo.brown_out()))
     status = _drive(armed, until=lambda status: status.latched is not None)
     assert not status.armed
     _seen(armed, lambda status: status.restarts > 0)

@@ -186,20 +186,22 @@ XM430, XL330 = SERVO_MODELS[1020], SERVO_MODELS[1200]
 
 
 def test_a_status_block_by_hand() -> None:
-    block = bytes.fromhex("02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 2D 7800")
-    state = registers.state_of(TENDON, XM430, -131_073, block, 5.0)
+    block = bytes.fromhex("A7 02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 2D 7800")
+    state = registers.state_of(TENDON, XM430, -131_073, block, 5.0, 0xA7)
     assert state is not None
     assert (state.torque, state.error, state.watchdog_tripped) == (True, HardwareError.OVERLOAD, True)
     assert (state.goal_ticks, state.ticks, state.position_mm) == (-1024, -131_073, 0.0)
     assert (state.current_ma, state.voltage_v, state.temperature_c) == (pytest.approx(-246 * 2.69), 12.0, 45.0)
     assert state.velocity_mm_s == pytest.approx(-65 * 0.229 / 60 * 40)
-    small = registers.state_of(TENDON, XL330, -131_073, block[:-2] + b"\x32", 5.0)
+    small = registers.state_of(TENDON, XL330, -131_073, block[:-2] + b"\x32", 5.0, 0xA7)
     assert small is not None
     assert (small.current_ma, small.voltage_v, small.temperature_c) == (-246.0, 5.0, 45.0)
 
 
 def test_a_supply_of_25_6_v_is_no_lost_block() -> None:
-    state = registers.state_of(TENDON, SERVO_MODELS[1040], 0, bytes.fromhex("02 01 00 00 000000 0000 0000 000000 2D 0001"), 0.0)
+    block = bytes.fromhex("A7 02 01 00 00 000000 0000 0000 000000 2D 0001")
+    assert registers.state_of(TENDON, SERVO_MODELS[1040], 0, block, 0.0, 0xA8) is None, "another mark: it has restarted"
+    state = registers.state_of(TENDON, SERVO_MODELS[1040], 0, block, 0.0, 0xA7)
     assert state is not None
     assert state.voltage_v == pytest.approx(25.6)
 
@@ -207,9 +209,9 @@ def test_a_supply_of_25_6_v_is_no_lost_block() -> None:
 @pytest.mark.parametrize("model", SERVO_MODELS.values(), ids=lambda model: model.name)
 def test_zeros_are_no_servo_at_zero(model: ServoModel) -> None:
     length = registers.block_bytes(model)
-    assert registers.state_of(TENDON, model, 0, bytes(length), 0.0) is None
+    assert registers.state_of(TENDON, model, 0, bytes(length), 0.0, 0) is None
     with pytest.raises(ValueError, match=f"{length - 1} bytes"):
-        registers.state_of(TENDON, model, 0, bytes(length - 1), 0.0)
+        registers.state_of(TENDON, model, 0, bytes(length - 1), 0.0, 0)
 
 
 @pytest.mark.parametrize("model", SERVO_MODELS.values(), ids=lambda model: model.name)
@@ -453,7 +455,7 @@ def _writes(twin: SoftServoBus, servo_id: int) -> list[tuple[int, bytes]]:
 def test_the_arming_order(twin: SoftServoBus, closed: ServoBus) -> None:
     closed.open()
     opened = [address for address, _ in _writes(twin, 3)]
-    assert opened == [64, 9, 11, 44, 168]  # torque off, then what differs from what we need, then the status block
+    assert opened == [64, 9, 11, 44, 168, 224]  # torque off, then what differs from what we need, then the status block, its mark
     closed.set_zero()
     twin.log.clear()
     closed.arm()
@@ -913,6 +915,69 @@ def test_25_a_jam_shows_as_distance_current_and_then_overload(twin: SoftServoBus
     state = _states(bus)[0]
     assert (state.error, state.torque) == (HardwareError.OVERLOAD, False)
     bus.close()
+
+
+def _has_backup(servo: SoftServo, startup: int) -> None:
+    """As another program may leave it: a backup that a restart brings back (indirect addresses among it)."""
+    servo.backup()
+    servo.table["startup"] = startup
+
+
+@pytest.mark.parametrize("startup", [1, 2, 3])
+def test_27_startup_configuration_is_set_to_0(
+    twin: SoftServoBus, closed: ServoBus, caplog: pytest.LogCaptureFixture, startup: int
+) -> None:
+    """While the torque is off; a servo that holds is left alone until it is switched on."""
+    for servo_id in (3, 5):
+        twin.modify_servo(servo_id, lambda servo: _has_backup(servo, startup))
+    twin.modify_servo(5, lambda servo: servo.table.__setitem__("operating_mode", 4))
+    twin.modify_servo(5, lambda servo: servo.table.__setitem__("torque", 1))
+    closed.open()
+    assert [twin.servo(servo_id).table["startup"] for servo_id in (3, 5)] == [0, startup]
+    assert f"servo up (id 3) had Startup Configuration (register 60) {startup}: set to 0" in caplog.text
+    closed.set_zero()
+    closed.arm()
+    assert twin.servo(5).table["startup"] == 0
+
+
+@pytest.mark.parametrize("startup", [0, 2, 3])
+def test_27_a_brown_out_is_seen_also_where_the_servo_restores_its_block(
+    twin: SoftServoBus, armed: ServoBus, clock: Clock, startup: int
+) -> None:
+    """The feed is at 75 mm, and would be taken for two turns (80 mm) less."""
+    twin.modify_servo(5, lambda servo: servo.carry(75 * 102.4 / 10.0))
+    clock.ahead_s += 10.0
+    twin.modify_servo(5, lambda servo: (servo.carry(0.0), _has_backup(servo, startup)))
+    assert _states(armed)[4].position_mm == pytest.approx(75.0, abs=1.0)
+    twin.brown_out()
+    clock.ahead_s += 0.5
+    for _ in range(20):
+        readings = armed.read()
+        if any(isinstance(reading, MissingServo) and reading.restarted for reading in readings):
+            break
+        time.sleep(0.05)
+    assert not armed.is_armed
+    assert armed.zero_ticks[4] is None
+    assert twin.positions_mm()[4] == pytest.approx(75.0, abs=1.0)
+    time.sleep(0.05)
+    with pytest.raises(NotReady, match=r"not zeroed: .*advance"):
+        armed.arm()
+
+
+@pytest.mark.parametrize("startup", [0, 2])
+def test_27_arming_sees_a_brown_out_that_no_read_has_seen(twin: SoftServoBus, bus: ServoBus, startup: int) -> None:
+    bus.set_zero()
+    twin.modify_servo(5, lambda servo: (_has_backup(servo, startup), servo.restart(silent_s=0.0)))
+    with pytest.raises(NotReady, match="not zeroed: advance"):
+        bus.arm()
+
+
+def test_27_the_mark_of_a_session_is_known_again_by_the_next_one(twin: SoftServoBus, armed: ServoBus) -> None:
+    """A servo that has not restarted keeps its mark; one that cannot keep any is still told by its block."""
+    before = twin.servo(2).table.read(224, 1)
+    armed.close()
+    armed.open()
+    assert twin.servo(2).table.read(224, 1) == before != (0, b"\0")
 
 
 def test_26_a_vanished_port_is_lost_and_opens_again_clean(twin: SoftServoBus, armed: ServoBus) -> None:
