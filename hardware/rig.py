@@ -127,9 +127,10 @@ def _open_live(config: Config, zero: ZeroConfig | None) -> Rig:
         undo.callback(camera.close)
         robot: ServoRobot | None = None
         if rig.robot == "servos":
+            from hardware.servos.eeprom import backups_folder
             from hardware.servos.servo_robot import ServoRobot
 
-            robot = ServoRobot(config.servos, config.safety, name=rig.name, kept_zero=zero)
+            robot = ServoRobot(config.servos, config.safety, name=rig.name, kept_zero=zero, backups=backups_folder())
             robot.connect()
         undo.pop_all()
     return Rig(rig.name, RigKind.LIVE, camera, robot)

@@ -170,6 +170,17 @@ def calibration_steps(draft: RigDraft, steps: tuple[str, ...], pictures: int) ->
         yield from ["steering"] if was_kept or "zero" not in steps else ["zero", "steering"]
 
 
+@rig.command("restore-servos")
+def restore_servos(name: RigName) -> None:
+    """Write the servos' EEPROM back as it was before this program changed it; nothing moves, and the torque must be off."""
+    from hardware.servos.eeprom import backups_folder, restore_eeprom
+
+    _, found = find_rig(name)
+    if found.robot != "servos":
+        raise UserError(f"rig {found.name} has no servos of its own")
+    restore_eeprom(found.servos, backups_folder(), lambda line: sys.stdout.write(f"{line}\n"))
+
+
 @rig.command("board")
 def print_board_file(
     out: Annotated[Path, typer.Option(help="board.pdf or board.png")],

@@ -22,6 +22,7 @@ from core.types import Frame, Image, Reason, Scene
 from hardware.calibration.servo_probe import ProbeLimits, ServoProbe, SteeredRobot, StopSwitch, probe_config
 from hardware.cameras.live import CameraFeed
 from hardware.rig import START_INSERTION_MM, RigKind, kind_of, real_camera
+from hardware.servos.eeprom import backups_folder
 
 if TYPE_CHECKING:
     from hardware.twin.rendering.calibration_board import BoardPictures
@@ -48,6 +49,7 @@ class CalibrationBench:
     def __init__(self, config: Config, camera: Camera, port: str | None, perceive: Perceive, on_close: Callable[[], None]) -> None:
         self.config, self.port, self._perceive, self._on_close = config, port, perceive, on_close
         self.kind = kind_of(config.rig)
+        self._backups = backups_folder() if self.kind is RigKind.LIVE else None
         self.stop = StopSwitch()
         self.feed = CameraFeed(camera)
         self._boards: dict[BoardSpec, BoardPictures] = {}
@@ -67,13 +69,13 @@ class CalibrationBench:
     ) -> Iterator[ServoProbe]:
         """One servo, zeroed where it stands, armed."""
         config = probe_config(servos, servo_id, limits, sign, found)
-        with ServoProbe.opened(config, self.config.safety, limits, self.stop) as probe:
+        with ServoProbe.opened(config, self.config.safety, limits, self.stop, self._backups) as probe:
             yield probe
 
     @contextmanager
     def steer(self, servos: ServosConfig) -> Iterator[SteeredRobot]:
         """All seven, zeroed where they stand, armed."""
-        with SteeredRobot.opened(servos, self.config.safety, self.stop) as robot:
+        with SteeredRobot.opened(servos, self.config.safety, self.stop, self._backups) as robot:
             yield robot
 
     def servos_config(self, servos: ServosConfig) -> ServosConfig:

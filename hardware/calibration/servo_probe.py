@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
@@ -231,10 +232,12 @@ class ServoProbe:
 
     @classmethod
     @contextmanager
-    def opened(cls, config: ServosConfig, safety: SafetyConfig, limits: ProbeLimits, stop: StopSwitch) -> Iterator[ServoProbe]:
+    def opened(
+        cls, config: ServosConfig, safety: SafetyConfig, limits: ProbeLimits, stop: StopSwitch, backups: Path | None = None
+    ) -> Iterator[ServoProbe]:
         """Connect and arm, with ``probe_config``'s bus; where the servo stands now is 0. At the end it holds, disarmed."""
         servo_id = config.joints[_PLACE].id
-        robot = ServoRobot(config, safety, name=f"servo {servo_id}")
+        robot = ServoRobot(config, safety, name=f"servo {servo_id}", backups=backups)
         try:
             with armed(robot, stop):
                 yield cls(robot, servo_id, limits, stop)
@@ -339,10 +342,12 @@ class SteeredRobot:
 
     @classmethod
     @contextmanager
-    def opened(cls, servos: ServosConfig, safety: SafetyConfig, stop: StopSwitch) -> Iterator[SteeredRobot]:
+    def opened(
+        cls, servos: ServosConfig, safety: SafetyConfig, stop: StopSwitch, backups: Path | None = None
+    ) -> Iterator[SteeredRobot]:
         """Connect, zero where the servos stand, and arm; at the end they hold, disarmed."""
         config = patient(servos)
-        robot = ServoRobot(config, safety, name="robot")
+        robot = ServoRobot(config, safety, name="robot", backups=backups)
         with armed(robot, stop):
             yield cls(robot, config.joints, stop)
 

@@ -20,6 +20,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 from core.config.safety import JointName, SafetyConfig, ServosConfig
@@ -210,11 +211,14 @@ class BusClient:
     Parameters
     ----------
     prestarted : a process from ``start_bus``; without one, or when it has died meanwhile, one is started.
+    backups : folder for the EEPROM of servos before it is changed; None: it is not kept.
 
     Raises BusProcessLost: when the process cannot be started.
     """
 
-    def __init__(self, servos: ServosConfig, safety: SafetyConfig, prestarted: DeviceProcess | None = None) -> None:
+    def __init__(
+        self, servos: ServosConfig, safety: SafetyConfig, prestarted: DeviceProcess | None = None, backups: Path | None = None
+    ) -> None:
         self._lock, self._requesting = threading.Lock(), threading.Lock()
         self._request_id = 0
         self._fatal = ""
@@ -223,7 +227,8 @@ class BusClient:
         self._process, memory = DeviceProcess.claim(prestarted, start_bus, _MEMORY_BYTES)
         self._order, self._heartbeat, self._status = SharedSlot.row(memory, _SLOTS)
         with contextlib.suppress(OSError):  # the first request finds out that a process is gone
-            self._process.send({"servos": servos.model_dump(), "safety": safety.model_dump()})
+            folder = None if backups is None else str(backups)
+            self._process.send({"servos": servos.model_dump(), "safety": safety.model_dump(), "backups": folder})
 
     @property
     def pid(self) -> int:

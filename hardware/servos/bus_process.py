@@ -23,6 +23,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
@@ -509,8 +510,9 @@ def _serve(server: BusServer) -> int:
     if message is None:
         return 0
     servos, safety = ServosConfig.model_validate(message["servos"]), SafetyConfig.model_validate(message["safety"])
+    backups = message.get("backups")
     try:
-        bus = ServoBus(servos)
+        bus = ServoBus(servos, backups=None if backups is None else Path(backups))
     except ServoError as error:
         server.send_fatal(str(error))
         return 1

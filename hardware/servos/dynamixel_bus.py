@@ -8,9 +8,10 @@ import secrets
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from core.config.safety import TENDONS, JointConfig, JointName, ServosConfig
-from core.config.servo_models import model_name
+from core.config.servo_models import ServoModel, model_name
 from core.messages import message
 from hardware.servos import registers
 from hardware.servos.dynamixel_port import (
@@ -25,6 +26,7 @@ from hardware.servos.dynamixel_port import (
     WriteRefused,
     WrongServo,
 )
+from hardware.servos.eeprom import EEPROM_BYTES, keep_eeprom
 from hardware.servos.registers import (
     ANSWERS_ALL,
     INDIRECT_ADDRESS,
@@ -45,7 +47,12 @@ _log = logging.getLogger(__name__)
 # Registers (Robotis e-Manual, X series)
 _RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT, _STARTUP = 9, 10, 11, 20, 44, 60
 TORQUE, _STATUS_RETURN, _HARDWARE_ERROR, _WATCHDOG, _PROFILE, _GOAL, _POSITION = 64, 68, 70, 98, 108, 116, 132
-_EEPROM_BYTES = 61
+_FIRMWARE, _SECONDARY_ID, _TEMPERATURE_LIMIT, _SHUTDOWN = 6, 12, 31, 63
+_NO_SECONDARY_ID = 253
+"""From this value on Secondary ID(12) is off."""
+_BY = "with DYNAMIXEL Wizard 2"
+_SHUTDOWN_NEEDED = HardwareError.OVERLOAD | HardwareError.OVERHEATING
+"""What a servo must switch itself off for; its Shutdown(63) comes as 52, which adds the electrical shock."""
 _EXTENDED_POSITION = 4
 _COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
 """Registers that decide what a position means."""
@@ -66,8 +73,10 @@ class ServoIdentity:
     firmware: int
 
 
-def identify(line: ServoLine, config: ServosConfig) -> tuple[ServoIdentity, ...]:
+def identify(line: ServoLine, config: ServosConfig, *, makes_answer: bool = False) -> tuple[ServoIdentity, ...]:
     """Ping all seven and compare them with the configuration.
+
+    With `makes_answer` servos that are set not to answer reads or writes are told to, once the models of all seven are known.
 
     Raises NoAnswer, WrongServo: naming the servo. After a silence of all seven the line may have been closed.
     """
@@ -77,17 +86,51 @@ def identify(line: ServoLine, config: ServosConfig) -> tuple[ServoIdentity, ...]
     silent = [joint for joint in config.joints if models[joint.id] is None]
     if silent:
         raise _silence(line, config, silent)
+    for joint in config.joints:
+        _check_model(joint, models[joint.id] or 0, config)
+    if makes_answer:
+        for joint in config.joints:
+            _make_answer(line, joint)
     return tuple(_identity(line, joint, config) for joint in config.joints)
 
 
 def _identity(line: ServoLine, joint: JointConfig, config: ServosConfig) -> ServoIdentity:
     """What a joint's servo says of itself. Raises NoAnswer, WrongServo."""
-    table = line.read(joint.id, 0, 8)
+    table = line.read(joint.id, 0, EEPROM_BYTES)
     model = int.from_bytes(table[:2], "little")
     _check_model(joint, model, config)
     if table[7] != joint.id:
         raise WrongServo(f"{_title(joint)} says that its id is {table[7]}: give every servo an id of its own")
-    return ServoIdentity(joint.name, joint.id, model, table[6])
+    if problem := _unprotected(table, config.model_of(joint)):
+        raise WrongServo(f"{_title(joint)} {problem}")
+    return ServoIdentity(joint.name, joint.id, model, table[_FIRMWARE])
+
+
+def _make_answer(line: ServoLine, joint: JointConfig) -> None:
+    """Let a servo answer reads and writes. Raises NoAnswer."""
+    with contextlib.suppress(NoAnswer):
+        if line.read(joint.id, _STATUS_RETURN, 1) == bytes([ANSWERS_ALL]):
+            return
+    line.write_unanswered(joint.id, _STATUS_RETURN, bytes([ANSWERS_ALL]))
+    line.read(joint.id, _STATUS_RETURN, 1)
+
+
+def _unprotected(table: bytes, model: ServoModel) -> str:
+    """What keeps a servo of this EEPROM from protecting itself, or from being stopped, and how to mend it; "" for nothing.
+
+    These registers are left to the operator: whoever changed them had a reason that may still hold.
+    """
+    firmware, second_id, limit_c = table[_FIRMWARE], table[_SECONDARY_ID], table[_TEMPERATURE_LIMIT]
+    if firmware < model.watchdog_firmware:
+        return f"has firmware {firmware}, which has no bus watchdog: update it with DYNAMIXEL Wizard 2"
+    if second_id < _NO_SECONDARY_ID:
+        return f"also obeys what is sent to id {second_id}: set its Secondary ID (register 12) to 255, {_BY}"
+    if limit_c > model.max_temperature_c:
+        most_c = f"{model.max_temperature_c:g}"
+        return f"gets {limit_c} °C hot before it switches itself off: set its Temperature Limit (register 31) to {most_c}, {_BY}"
+    if missing := _SHUTDOWN_NEEDED & ~HardwareError(table[_SHUTDOWN]):
+        return f"does not switch itself off at {describe(missing)}: set its Shutdown (register 63) to 52, {_BY}"
+    return ""
 
 
 def _check_model(joint: JointConfig, model: int, config: ServosConfig) -> None:
@@ -140,6 +183,7 @@ class ServoBus:
     ----------
     config : identities, conversion and speeds. Envelope and step limits are the gate's business, not the driver's.
     port : serial device; default is the configuration's.
+    backups : folder that keeps what the EEPROM of a servo was before it is changed; None: it is not kept.
 
     Notes
     -----
@@ -147,13 +191,14 @@ class ServoBus:
     bus is closed, and ``open`` starts again: disarmed, without zeros.
     """
 
-    def __init__(self, config: ServosConfig, port: str | None = None) -> None:
+    def __init__(self, config: ServosConfig, port: str | None = None, backups: Path | None = None) -> None:
         chosen = port or config.port
         if chosen is None:
             raise NotReady("no servo port is configured: set servos.port")
         self.config = config
         self._joints = config.joints
         self._line = ServoLine(chosen, config.baud)
+        self._backups = backups
         self._blocks = _blocks(config)
         self._reset()
 
@@ -210,8 +255,7 @@ class ServoBus:
         self._line.open()
         self._reset()
         try:
-            self._line.broadcast(_STATUS_RETURN, bytes([ANSWERS_ALL]))  # else a servo may be set not to answer writes
-            self.identities = identify(self._line, self.config)
+            self.identities = identify(self._line, self.config, makes_answer=True)
             for joint in self._joints:
                 if not self._holds(joint):
                     self._configure(joint)
@@ -471,7 +515,7 @@ class ServoBus:
             _VELOCITY_LIMIT: registers.profile_velocity(joint).to_bytes(4, "little"),
             _STARTUP: b"\0",  # no torque at power-up, and no RAM brought back, which would hide a restart; firmware 44 has 0 there
         }
-        table = self._line.read(joint.id, 0, _EEPROM_BYTES)
+        table = self._line.read(joint.id, 0, EEPROM_BYTES)
         return {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
 
     def _configure(self, joint: JointConfig) -> None:
@@ -482,6 +526,8 @@ class ServoBus:
         self._put_off.discard(joint.id)
         wrong = self._differences(joint)
         if wrong:
+            if self._backups is not None:
+                keep_eeprom(self._backups, self._line.port, self._line.read(joint.id, 0, EEPROM_BYTES))
             self._line.write(joint.id, TORQUE, b"\0")
         if _STARTUP in wrong:
             was = self._line.read(joint.id, _STARTUP, 1)[0]

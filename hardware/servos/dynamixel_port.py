@@ -412,6 +412,11 @@ class ServoLine:
         with self._exchange() as port, contextlib.suppress(IndexError):
             self._handler.reboot(port, servo_id)
 
+    def write_unanswered(self, servo_id: int, address: int, data: bytes) -> None:
+        """Write to a servo whose status return level lets it give no answer; read what was taken."""
+        with self._exchange() as port:
+            self._handler.writeTxOnly(port, servo_id, address, len(data), list(data))
+
     def broadcast(self, address: int, data: bytes) -> None:
         """Write to all servos in one packet, which has no answer."""
         with self._exchange() as port:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
 from core.calibration.servos import zero_advice
 from core.config.calibration import ZeroConfig
@@ -37,6 +38,7 @@ class ServoRobot:
     truth : tells the status instead of the servos, where the robot is simulated.
     kept_zero : of the rig file; arming without a zero then says whether the servos have lost their turns since.
     process : a bus process that was started ahead, for the first connection.
+    backups : folder that keeps the servos' EEPROM as it was before it is changed; None for software servos.
 
     Notes
     -----
@@ -55,12 +57,13 @@ class ServoRobot:
         truth: Callable[[], RobotStatus] | None = None,
         kept_zero: ZeroConfig | None = None,
         process: DeviceProcess | None = None,
+        backups: Path | None = None,
     ) -> None:
         self._servos, self._safety = servos, safety
         self._name = name
         self._truth, self._kept_zero = truth, kept_zero
         self._lock, self._releasing = threading.Lock(), threading.Lock()
-        self._prestarted = process
+        self._prestarted, self._backups = process, backups
         self._client: BusClient | None = None
         self._closes = 0
         self._supervised = False
@@ -91,7 +94,7 @@ class ServoRobot:
         try:
             with ExitStack() as undo:
                 prestarted, self._prestarted = self._prestarted, None
-                client = BusClient(self._servos, self._safety, prestarted)
+                client = BusClient(self._servos, self._safety, prestarted, self._backups)
                 undo.callback(client.close)
                 client.request("open", _OPEN_S)
                 with self._lock:

@@ -18,10 +18,14 @@ from core.calibration.camera import BoardError, BoardSpec, BoardView, find_board
 from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import load_config
 from core.config.rig_file import find_rig, make_rig, rig_path, write_rig
+from core.config.safety import ServosConfig
 from core.devices import DeviceError, UserError
 from hardware.calibration.rig_draft import RigDraft
 from hardware.calibration.servo_identification import Zeros
 from hardware.rig import RigKind
+from hardware.servos.dynamixel_bus import ServoBus
+from hardware.servos.eeprom import backups_folder
+from hardware.twin.servos.bus import SoftServoBus
 
 runner = CliRunner()
 
@@ -62,6 +66,32 @@ def test_a_rig_is_shown() -> None:
     assert json.loads(_run("show", "bench 1", "--json"))["calibration"]["scale"]["mm_per_px"] == 0.32
     with pytest.raises(UserError, match="unknown rig 'x'; known: twin, realsense, webcam, bench 1"):
         _run("show", "x")
+
+
+@pytest.mark.real_time
+def test_servos_are_restored_as_they_were_before_the_program_changed_them() -> None:
+    twin = SoftServoBus(ServosConfig())
+    twin.start()
+    try:
+        config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": twin.port}})
+        write_rig(make_rig(config, "bench 1", None))
+        with pytest.raises(UserError, match="there is no backup of these servos"):
+            _run("restore-servos", "bench 1")
+        bus = ServoBus(config.servos, backups=backups_folder())
+        bus.open()
+        bus.close()
+        lines = _run("restore-servos", "bench 1").splitlines()
+    finally:
+        twin.stop()
+    assert len(lines) == 7
+    assert "operating mode" in lines[0]
+    assert all(twin.servo(joint.id).table["operating_mode"] == 3 for joint in ServosConfig().joints)
+
+
+def test_a_rig_without_servos_has_none_to_restore() -> None:
+    write_rig(make_rig(load_config(), "bench 1", None))
+    with pytest.raises(UserError, match="rig bench 1 has no servos of its own"):
+        _run("restore-servos", "bench 1")
 
 
 def test_the_board_is_printed_at_true_size(tmp_path: Path) -> None:

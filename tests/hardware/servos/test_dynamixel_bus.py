@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from core.config.safety import JOINT_NAMES, JointConfig, ServosConfig
 from core.config.servo_models import SERVO_MODELS, ServoModel
-from core.devices import DeviceError
+from core.devices import DeviceError, UserError
 from hardware.servos import registers
 from hardware.servos.dynamixel_bus import ServoBus
 from hardware.servos.dynamixel_port import (
@@ -24,6 +24,7 @@ from hardware.servos.dynamixel_port import (
     PortError,
     PortLost,
     PortTaken,
+    ServoError,
     ServoLine,
     StoppedMeanwhile,
     StuffingHandler,
@@ -31,6 +32,7 @@ from hardware.servos.dynamixel_port import (
     WriteRefused,
     WrongServo,
 )
+from hardware.servos.eeprom import CHANGED, restore_eeprom
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.device import SoftServo
@@ -391,6 +393,135 @@ def test_a_wrong_model_and_a_wrong_id_are_refused(
     with pytest.raises(WrongServo, match=rf"servo down \(id 4\) {words}"):
         closed.open()
     assert not closed.is_open
+
+
+WRITES = {Instruction.WRITE, Instruction.SYNC_WRITE}
+
+
+@pytest.mark.parametrize(
+    ("register", "value", "words"),
+    [
+        ("shutdown", 0, r"does not switch itself off at overheating, overload: set its Shutdown \(register 63\) to 52, with DYN"),
+        ("shutdown", 4, r"does not switch itself off at overload: set"),
+        ("shutdown", 32, r"does not switch itself off at overheating: set"),
+        (
+            "temperature_limit",
+            100,
+            r"gets 100 °C hot before it switches itself off: set its Temperature Limit \(register 31\) to 80",
+        ),
+        ("secondary_id", 3, r"also obeys what is sent to id 3: set its Secondary ID \(register 12\) to 255"),
+        ("firmware", 37, r"has firmware 37, which has no bus watchdog: update it with DYNAMIXEL Wizard 2"),
+    ],
+)
+def test_a_servo_that_cannot_protect_itself_is_refused_before_anything_is_written(
+    twin: SoftServoBus, closed: ServoBus, register: str, value: int, words: str
+) -> None:
+    twin.modify_servo(6, lambda servo: servo.table.__setitem__(register, value))
+    with pytest.raises(WrongServo, match=rf"^servo delivery_1 \(id 6\) {words}"):
+        closed.open()
+    assert not closed.is_open
+    assert not any(packet.instruction in WRITES for packet in twin.log)
+
+
+@pytest.mark.parametrize(("register", "value"), [("shutdown", 0), ("secondary_id", 5), ("temperature_limit", 81)])
+def test_protection_that_was_taken_away_since_hinders_arming(twin: SoftServoBus, bus: ServoBus, register: str, value: int) -> None:
+    bus.set_zero()
+    twin.modify_servo(6, lambda servo: servo.table.__setitem__(register, value))
+    with pytest.raises(WrongServo, match="register"):
+        bus.arm()
+    assert all(twin.servo(joint.id).table["torque"] == 0 for joint in CONFIG.joints)
+
+
+@pytest.mark.parametrize(
+    ("register", "value"), [("shutdown", 36), ("secondary_id", 253), ("temperature_limit", 60), ("firmware", 38)]
+)
+def test_what_protects_a_servo_enough_or_better(twin: SoftServoBus, closed: ServoBus, register: str, value: int) -> None:
+    twin.modify_servo(6, lambda servo: servo.table.__setitem__(register, value))
+    closed.open()
+
+
+def test_nothing_is_written_before_all_seven_are_known(twin: SoftServoBus, closed: ServoBus) -> None:
+    twin.modify_servo(7, lambda servo: servo.table.__setitem__("model_number", 1060))
+    with pytest.raises(WrongServo, match=r"servo delivery_2 \(id 7\) is XL430-W250"):
+        closed.open()
+    assert not any(packet.instruction in WRITES for packet in twin.log)
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_only_the_servo_that_does_not_answer_is_told_to_answer(twin: SoftServoBus, closed: ServoBus, level: int) -> None:
+    twin.modify_servo(3, lambda servo: servo.table.__setitem__("status_return", level))
+    closed.open()
+    assert twin.servo(3).table["status_return"] == 2
+    told = [packet for packet in twin.log if packet.instruction == Instruction.WRITE and packet.parameters[:1] == bytes([68])]
+    assert [packet.id for packet in told] == [3]
+
+
+# --- the EEPROM is kept before it is changed -------------------------------------------------------------------------------------
+
+
+def _eeprom(twin: SoftServoBus, servo_id: int) -> bytes:
+    return twin.servo(servo_id).table.read(0, 64)[1]
+
+
+def test_the_eeprom_is_kept_before_it_is_changed_and_restored(twin: SoftServoBus, tmp_path: Path) -> None:
+    config = CONFIG.model_copy(update={"port": twin.port})
+    twin.modify_servo(2, lambda servo: servo.table.__setitem__("homing_offset", -1234))
+    before = {joint.id: _eeprom(twin, joint.id) for joint in CONFIG.joints}
+    for _ in range(2):  # what the program has made of it is no backup
+        bus = ServoBus(config, backups=tmp_path / "servos")
+        bus.open()
+        bus.close()
+    assert _eeprom(twin, 2) != before[2]
+    kept = sorted((tmp_path / "servos").glob("*.json"))
+    assert [path.name for path in kept] == [f"servos_id{joint.id}_model1020.json" for joint in CONFIG.joints]
+    said: list[str] = []
+    assert restore_eeprom(config, tmp_path / "servos", said.append) == 7
+    assert {joint.id: _eeprom(twin, joint.id) for joint in CONFIG.joints} == before
+    assert "left (id 2), as of 20" in said[1]
+    assert "homing offset 0 -> -1234" in said[1]
+    assert sorted((tmp_path / "servos").glob("*.json")) == kept
+
+
+def test_what_cannot_be_kept_is_not_changed(twin: SoftServoBus, tmp_path: Path) -> None:
+    (tmp_path / "servos").write_text("a file where the folder should be")
+    before = {joint.id: _eeprom(twin, joint.id) for joint in CONFIG.joints}
+    with pytest.raises(ServoError, match=r"cannot be saved .*so it is not changed"):
+        ServoBus(CONFIG, twin.port, tmp_path / "servos").open()
+    assert {joint.id: _eeprom(twin, joint.id) for joint in CONFIG.joints} == before
+
+
+def test_servos_that_hold_are_not_restored(twin: SoftServoBus, tmp_path: Path) -> None:
+    config = CONFIG.model_copy(update={"port": twin.port})
+    bus = ServoBus(config, backups=tmp_path)
+    bus.open()
+    bus.set_zero()
+    bus.arm()
+    bus.close()
+    with pytest.raises(WrongServo, match=r"servo right \(id 1\) holds: switch the torque off first"):
+        restore_eeprom(config, tmp_path, lambda _: None)
+
+
+@pytest.mark.parametrize("content", ["", "{}", '{"eeprom": "00 01", "made_utc": "x"}', '{"eeprom": 5, "made_utc": "x"}', "[1, 2]"])
+def test_a_damaged_backup_is_named_and_nothing_is_written(twin: SoftServoBus, tmp_path: Path, content: str) -> None:
+    config = CONFIG.model_copy(update={"port": twin.port})
+    (tmp_path / "servos_id4_model1020.json").write_text(content)
+    with pytest.raises(UserError, match=r"servos_id4_model1020\.json: (no|the) backup of a"):
+        restore_eeprom(config, tmp_path, lambda _: None)
+
+
+def test_without_backups_there_is_nothing_to_restore(twin: SoftServoBus, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="there is no backup of these servos"):
+        restore_eeprom(CONFIG.model_copy(update={"port": twin.port}), tmp_path, lambda _: None)
+
+
+def test_all_that_the_driver_changes_is_restored(closed: ServoBus, twin: SoftServoBus) -> None:
+    before = {joint.id: _eeprom(twin, joint.id) for joint in CONFIG.joints}
+    closed.open()
+    for joint in CONFIG.joints:
+        changed = {
+            at for at, (one, other) in enumerate(zip(before[joint.id], _eeprom(twin, joint.id), strict=True)) if one != other
+        }
+        assert changed <= {address + n for address, (_, size) in CHANGED.items() for n in range(size)}
 
 
 def test_a_mode_that_was_altered_is_mended_but_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
