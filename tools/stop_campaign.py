@@ -91,9 +91,6 @@ class LockstepLine:
         self._take_due()
         self._buffer.clear()
 
-    def close(self) -> None:
-        """The servos go on as they are."""
-
     def write(self, data: bytes) -> int:
         """Execute the packets; their answers come after the latency."""
         self.now_s += _WRITE_S

@@ -64,8 +64,12 @@ class OneStep:
 
 RELEASE_MM_S = 2.0
 """Speed at which a tendon is let go: the whole pull of 2.8 mm in 1.4 s, so that neither wire nor head snaps back."""
-RELEASED = frozenset({Cause.STRAINED, Cause.TRACKING})
-"""Stops after which the tendons are let go instead of held: the tension that they hold is what went wrong."""
+RELAX_MM_S = 1.0
+"""And when the operator leaves, and there is no hurry."""
+RELEASED = frozenset({Cause.STRAINED, Cause.TRACKING, Cause.HOT})
+"""Faults after which the tendons are let go instead of held: the tension that they hold is what went wrong."""
+_RELEASE_AGAIN_C = 2.0
+"""Servos that get hotter by so much after a release that was broken off are released again."""
 _RELEASE_EXTRA_S = 0.5
 """Beyond the time that the way takes; a drum that cannot turn ends it."""
 _SLACK_MM = 0.05
@@ -86,10 +90,10 @@ class ReleaseRamp:
     from_mm : positions of the joints at the start, at `now_s` (monotonic).
     """
 
-    def __init__(self, joints: Sequence[JointConfig], from_mm: Joints, now_s: float) -> None:
-        self._joints, self._from_mm, self._start_s = joints, from_mm, now_s
+    def __init__(self, joints: Sequence[JointConfig], from_mm: Joints, now_s: float, speed_mm_s: float = RELEASE_MM_S) -> None:
+        self._joints, self._from_mm, self._start_s, self._speed_mm_s = joints, from_mm, now_s, speed_mm_s
         longest_mm = max(at for at, joint in zip(from_mm, joints, strict=True) if joint.name in TENDONS)
-        self._end_s = now_s + max(0.0, longest_mm) / RELEASE_MM_S + _RELEASE_EXTRA_S
+        self._end_s = now_s + max(0.0, longest_mm) / speed_mm_s + _RELEASE_EXTRA_S
 
     def goals(self, at_mm: Sequence[float], now_s: float) -> tuple[float | None, ...] | None:
         """The goals now, None for a joint that keeps its own; None altogether when it is over.
@@ -101,7 +105,7 @@ class ReleaseRamp:
         tight = [at > _SLACK_MM for at, joint in zip(at_mm, self._joints, strict=True) if joint.name in TENDONS]
         if now_s > self._end_s or not any(tight):
             return None
-        gone_mm = RELEASE_MM_S * max(0.0, now_s - self._start_s)
+        gone_mm = self._speed_mm_s * max(0.0, now_s - self._start_s)
         return tuple(
             min(at, max(0.0, start - gone_mm, at - joint.max_step_mm)) if joint.name in TENDONS and at > 0.0 else None
             for at, start, joint in zip(at_mm, self._from_mm, self._joints, strict=True)
@@ -150,6 +154,7 @@ class BusGuard:
         self.rejections: Counter[RejectReason] = Counter()
         self.clamp_count = 0
         self.followed: BusOrder | None = None
+        self._too_hot_c = self._released_at_c = -math.inf
         self._watch = BusMonitor()
         self._gate = GateState()
         self._one_step = OneStep(servos.joints)
@@ -182,6 +187,7 @@ class BusGuard:
         if self.armed:
             faults += self._motion_faults(beat, now_s)
         self._cycle_s = now_s
+        self._note_heat(readings)
         self._activate(faults)
         return (worst(self.active, Reaction.STOP) or worst(self.active, Reaction.DISARM)) if self.armed else None
 
@@ -195,6 +201,17 @@ class BusGuard:
         if self._measurement is not None and (problem := self._tracking.update(self._written_mm, self._measurement)) is not None:
             faults.append(Fault(Cause.TRACKING, problem))
         return faults
+
+    def _note_heat(self, readings: Sequence[ServoReading]) -> None:
+        """By how much the hottest servo with torque is above its limit; NaN counts as hot."""
+        above = [
+            reading.temperature_c - self._servos.hottest_c(joint)
+            for reading, joint in zip(readings, self._servos.joints, strict=False)
+            if isinstance(reading, ServoState) and reading.torque
+        ]
+        self._too_hot_c = max((0.0 if math.isnan(one) else one for one in above), default=-math.inf)
+        if self._too_hot_c < 0.0:
+            self._released_at_c = -math.inf
 
     def _activate(self, faults: Sequence[Fault]) -> None:
         known = {fault.cause for fault in self.active}
@@ -226,12 +243,21 @@ class BusGuard:
         self.followed = None
         self.rejection, self.clamps, self.at_end = None, (), ()
 
-    def release_ramp(self, now_s: float) -> ReleaseRamp | None:
+    @property
+    def must_relax(self) -> bool:
+        """Whether servos that hold are too hot: they are relaxed before they shut themselves down, whatever the mode.
+
+        A release that was broken off, by STOP, is made again when they get hotter still.
+        """
+        return not self.armed and self._too_hot_c >= max(0.0, self._released_at_c + _RELEASE_AGAIN_C)
+
+    def release_ramp(self, now_s: float, speed_mm_s: float = RELEASE_MM_S) -> ReleaseRamp | None:
         """The ramp that lets the tendons go from where they are; None when that is not known."""
         at = self._measurement
         if at is None or now_s - at.measured_s > self._safety.measurement_max_age_s:
             return None
-        return ReleaseRamp(self._servos.joints, tuple(at.positions_mm), now_s)
+        self._released_at_c = max(self._released_at_c, self._too_hot_c)
+        return ReleaseRamp(self._servos.joints, tuple(at.positions_mm), now_s, speed_mm_s)
 
     def acknowledge(self) -> None:
         """The operator has seen the cause. Faults that are still there go on to hinder arming."""

@@ -125,6 +125,7 @@ class BusStatus:
     rejection, clamps, at_end : what the gate said in this cycle.
     rejections, clamp_count : the same counted.
     zeroed : by joint.
+    releasing : whether tendons are being let go slowly.
     torque_offs : how often the torque was switched off and read back; ``torque_problem`` why a requested one is not confirmed yet.
     """
 
@@ -146,6 +147,7 @@ class BusStatus:
     restarts: int
     times: CycleTimes
     zeroed: tuple[bool, ...]
+    releasing: bool = False
     torque_offs: int = 0
     torque_problem: str = ""
 

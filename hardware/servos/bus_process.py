@@ -28,7 +28,7 @@ from pathlib import Path
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
 from core.messages import message
-from hardware.servos.bus_guard import RELEASED, BusGuard, ReleaseRamp
+from hardware.servos.bus_guard import RELAX_MM_S, RELEASE_MM_S, RELEASED, BusGuard, ReleaseRamp
 from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, Request
 from hardware.servos.dynamixel_bus import ServoBus
 from hardware.servos.dynamixel_port import LATE_S, NotReady, PortError, PortLost, ServoError, StoppedMeanwhile, TorqueStillOn
@@ -135,8 +135,8 @@ _READS_BEFORE_ARMING = 3
 _SETTLE_CYCLES, _SETTLED_MM = 5, 0.2
 """After a hold it is checked, and repeated, for so many cycles; so far a goal may be from the position."""
 _WINDOW_S = 10.0
-_ENDS_RAMP = frozenset({"zero", "arm", "reboot", "torque off"})
-"""Requests after which tendons are no longer let go slowly."""
+_WAITS_FOR_RAMP = frozenset({"zero", "arm", "reboot"})
+"""Requests that are refused while tendons are let go slowly."""
 _INTERRUPTED_BY_STOP = frozenset({"open", "zero", "arm", "reboot"})
 """Requests that end at a STOP; the others hold the servos or release them, and are finished first."""
 _TRIES_ON_REQUEST, _TRIES_AT_END = 4, 15
@@ -156,6 +156,7 @@ class BusLoop:
         self._corrupt = self._bad_packets = 0
         self._settle = 0
         self._ramp: ReleaseRamp | None = None
+        self._is_off_after_ramp = False
         self._ended = self._quiet = self._lost = False
         self._reopen_at_s = 0.0
         self._open_problem = ""
@@ -169,6 +170,7 @@ class BusLoop:
             "acknowledge": lambda _: self._guard.acknowledge(),
             "reboot": self._reboot,
             "torque off": lambda _: self._torque_off(),
+            "relax": lambda _: self._relax(),
         }
 
     def end(self) -> None:
@@ -288,23 +290,40 @@ class BusLoop:
             self._release.release()
         elif self._ramp is not None:
             self._follow_ramp(self._ramp)
+        elif self._guard.must_relax:
+            self._let_go_slowly(RELEASE_MM_S, then_off=False)
         elif self._settle > 0:
             self._settle -= 1
             if not self._holds():
                 self._bus.hold()
 
+    def _let_go_slowly(self, speed_mm_s: float, *, then_off: bool) -> None:
+        """Begin a ramp from where the servos are; where that is not known, the torque goes off at once if it is to."""
+        self._ramp = self._guard.release_ramp(time.monotonic(), speed_mm_s)
+        self._is_off_after_ramp = then_off
+        if self._ramp is None:
+            self._end_ramp()
+
     def _follow_ramp(self, ramp: ReleaseRamp) -> None:
-        """Let the tendons go a little further; in the end all servos hold where they are."""
+        """Let the tendons go a little further; in the end all servos hold where they are, or the torque goes off."""
         at_mm = [r.position_mm for r in self._readings if isinstance(r, ServoState) and r.position_mm is not None]
         if len(at_mm) < len(self._servos.joints):
-            self._ramp = ramp if any(isinstance(r, MissingServo) and not r.restarted for r in self._readings) else None
+            if not any(isinstance(r, MissingServo) and not r.restarted for r in self._readings):
+                self._end_ramp()
             return
         goals_mm = ramp.goals(at_mm, time.monotonic())
         if goals_mm is None:
-            self._ramp, self._settle = None, _SETTLE_CYCLES
+            self._settle = _SETTLE_CYCLES
             self._bus.hold()
+            self._end_ramp()
         else:
             self._bus.slacken(goals_mm, self._readings)
+
+    def _end_ramp(self) -> None:
+        self._ramp = None
+        if self._is_off_after_ramp:
+            self._is_off_after_ramp = False
+            self._release.request()
 
     def _drive(self) -> None:
         order, beat = self._server.order(), self._server.heartbeat()
@@ -323,9 +342,11 @@ class BusLoop:
         self._hold_after(fault)
 
     def _hold_after(self, fault: Fault) -> None:
-        """Goal = measured. The torque goes off where that is requested; else a strain or a jam lets the tendons go slowly."""
-        self._ramp = None
-        if fault.cause.reaction is Reaction.STOP and self._servos.torque_off_on_stop:
+        """Goal = measured. What the tension has caused lets the tendons go slowly; the torque goes off where that is requested."""
+        self._ramp, self._is_off_after_ramp = None, False
+        is_off = fault.cause.reaction is Reaction.STOP and self._servos.torque_off_on_stop
+        is_ramp = self._bus.is_open and fault.cause in RELEASED
+        if is_off and not is_ramp:
             self._release.request()
         if not self._bus.is_open:
             return
@@ -333,8 +354,8 @@ class BusLoop:
         self._bus.disarm()
         if self._release.is_requested:
             self._release.release()
-        elif fault.cause in RELEASED:
-            self._ramp = self._guard.release_ramp(time.monotonic())
+        elif is_ramp:
+            self._let_go_slowly(RELEASE_MM_S, then_off=is_off)
 
     def _holds(self) -> bool:
         """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
@@ -353,6 +374,7 @@ class BusLoop:
 
     def _lose_port(self) -> None:
         self._guard.end_motion(self._guard.lose_port())
+        self._ramp = None
         if self._release.is_requested or self._servos.torque_off_on_stop:
             self._release.request()
         self._readings = ()
@@ -407,7 +429,7 @@ class BusLoop:
 
     def _disarm(self) -> None:
         self._guard.disarm()
-        if self._bus.is_open:
+        if self._bus.is_open and self._ramp is None:
             self._settle = _SETTLE_CYCLES
             self._bus.disarm()
 
@@ -416,9 +438,18 @@ class BusLoop:
             raise NotReady("the servos are armed: disarm before a reboot")
         self._bus.reboot(int(request.details.get("servo_id", -1)))
 
+    def _relax(self) -> None:
+        """Begin to let the tension off slowly; the torque goes off at the end. The status tells of both. Raises NotReady."""
+        if not self._bus.is_open:
+            raise NotReady("the servo port is not open: switch the torque off")
+        self._disarm()
+        self._read()
+        self._let_go_slowly(RELAX_MM_S, then_off=True)
+
     def _torque_off(self) -> None:
         """Requested from now on, whatever becomes of the first tries: each cycle tries again."""
         self._guard.disarm()
+        self._ramp, self._is_off_after_ramp = None, False
         self._settle = 0
         self._release.request()
         if self._bus.is_open:
@@ -436,8 +467,8 @@ class BusLoop:
                 raise NotReady(f"the servo bus process does not know how to {request.what}")
             if after_stop and request.what == "acknowledge":
                 raise NotReady("STOP was pressed meanwhile: acknowledge again")
-            if request.what in _ENDS_RAMP:
-                self._ramp = None
+            if request.what in _WAITS_FOR_RAMP and self._ramp is not None:
+                raise NotReady("the tension is being let off: wait a moment, then try again")
             if request.what in _INTERRUPTED_BY_STOP:
                 with self._bus.interruptible(self._check_request):
                     action(request)
@@ -483,6 +514,7 @@ class BusLoop:
                 line=replace(self._bus.counts),
                 bad_packets=self._bad_packets,
                 restarts=guard.restarts,
+                releasing=self._ramp is not None,
                 torque_offs=self._release.confirmed,
                 torque_problem=self._release.problem,
                 times=self._timer.summary,

@@ -414,6 +414,8 @@ class ServoBus:
     def slacken(self, goals_mm: Sequence[float | None], readings: Sequence[ServoReading]) -> None:
         """Let tendons go by a step, also while no goals are taken; None leaves a joint alone, and so does a servo that is missing.
 
+        A watchdog that has tripped is cleared first, and speed and acceleration set again: until then the servo takes no goals.
+
         Raises ValueError, and sends nothing: a goal that would tighten, is more than a step away, or is that of no tendon.
         """
         goals: dict[int, int] = {}
@@ -424,6 +426,12 @@ class ServoBus:
             if joint.name not in TENDONS or not lowest_mm <= goal_mm <= reading.position_mm:
                 raise ValueError(f"joint {joint.name}: from {reading.position_mm:g} mm it cannot be slackened to {goal_mm:g} mm")
             goals[joint.id] = registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
+        tripped = [r.id for r in readings if isinstance(r, ServoState) and r.watchdog_tripped]
+        for joint in self._joints:
+            if joint.id in goals and joint.id in tripped:
+                for units in (0, registers.watchdog_units(self.config.watchdog_s)):
+                    self._line.write(joint.id, _WATCHDOG, bytes([units]))
+                self._set_profile(joint)
         if goals:
             self._send_goals(goals)
 

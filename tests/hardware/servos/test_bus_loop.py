@@ -51,8 +51,14 @@ class PaperBus:
     def disarm(self) -> None:
         self.told.append("hold")
 
+    def hold(self) -> None:
+        self.told.append("hold")
+
     def arm(self) -> None:
         self.told.append("arm")
+
+    def slacken(self, goals_mm: tuple[float | None, ...], readings: object) -> None:
+        self.told.append(f"slacken to {goals_mm[0]:.2f}" if goals_mm[0] is not None else "slacken")
 
     def read(self) -> tuple[MissingServo, ...]:
         return tuple(MissingServo(joint.name, joint.id, 0.0, 1, "silent") for joint in ServosConfig().joints)
@@ -92,6 +98,9 @@ class PaperEnd:
         taken, self.waiting = self.waiting, None
         return taken
 
+    def heartbeat(self) -> None:
+        """None has come."""
+
     def publish(self, status: BusStatus) -> None:
         self.told = status
 
@@ -104,6 +113,8 @@ class PaperEnd:
 
 class Paper:
     """Loop, bus and application, with a clock that the test turns."""
+
+    temperature_c, tendon_mm = 30.0, 0.0
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **servos: bool) -> None:
         self.now_s = 100.0
@@ -123,11 +134,13 @@ class Paper:
         self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
         self.loop._read_decide_write()
 
-    def reads(self, advance_mm: float = 0.0) -> None:
-        """From now on all servos tell that they stand at zero, but for one."""
-        places = zip(ServosConfig().joints, (0.0, 0.0, 0.0, 0.0, advance_mm, 0.0, 0.0), strict=True)
+    def reads(self, advance_mm: float = 0.0, tendon_mm: float = 0.0) -> None:
+        """From now on all servos tell that they hold at zero, but for one or two."""
+        self.tendon_mm = tendon_mm
+        places = zip(ServosConfig().joints, (tendon_mm, 0.0, 0.0, 0.0, advance_mm, 0.0, 0.0), strict=True)
+        hot_c = self.temperature_c
         states = tuple(
-            ServoState(joint.name, joint.id, self.now_s, 0, 0, at_mm, 0.0, 0.0, 8.0, 12.0, 30.0, HardwareError(0), False, False)
+            ServoState(joint.name, joint.id, self.now_s, 0, 0, at_mm, at_mm, 0.0, 8.0, 12.0, hot_c, HardwareError(0), True, False)
             for joint, at_mm in places
         )
         self.bus.read = lambda: states  # type: ignore[method-assign]
@@ -234,6 +247,93 @@ def test_servos_are_not_switched_on_for_an_application_that_has_gone(paper: Pape
     paper.reads()
     paper.hear(request="arm")
     assert "the application ended meanwhile" in str(paper.end.answers[0][1])
+
+
+def _follow(paper: Paper, cycles: int) -> None:
+    """The right servo goes where it is sent."""
+    for _ in range(cycles):
+        paper.now_s += 0.02
+        at_mm = float(paper.bus.told[-1].split()[-1]) if paper.bus.told[-1].startswith("slacken to") else paper.tendon_mm
+        paper.reads(tendon_mm=at_mm)
+        paper.loop._read_decide_write()
+
+
+def test_wires_that_are_to_be_relaxed_are_let_out_slowly_and_then_let_go(paper: Paper) -> None:
+    paper.reads(tendon_mm=2.0)
+    paper.hear(request="relax")
+    assert paper.end.answers == [("relax", None)]
+    assert paper.end.told.releasing
+    _follow(paper, 50)
+    assert paper.bus.told[-1] == "slacken to 1.00"
+    _follow(paper, 60)
+    assert paper.bus.told[-2:] == ["hold", "torque off"]
+    paper.loop._publish(paper.now_s)
+    assert not paper.end.told.releasing
+    assert paper.end.told.torque_offs == 1
+
+
+def test_stop_ends_it_and_the_wires_stay_as_they_are(paper: Paper) -> None:
+    paper.reads(tendon_mm=2.0)
+    paper.hear(request="relax")
+    _follow(paper, 20)
+    paper.hear(stop=True)
+    _follow(paper, 160)
+    assert paper.bus.told[-1] == "hold"
+    assert "torque off" not in paper.bus.told
+    assert paper.stopped
+
+
+def test_where_the_pull_is_not_known_the_torque_goes_off_at_once(paper: Paper) -> None:
+    paper.hear(request="relax")
+    paper.turn()
+    assert paper.bus.told == ["hold", "torque off"]
+
+
+@pytest.mark.parametrize("request_", ["arm", "zero", "reboot"])
+def test_nothing_else_is_begun_while_the_wires_are_let_out(paper: Paper, request_: str) -> None:
+    paper.reads(tendon_mm=2.0)
+    paper.hear(request="relax")
+    paper.hear(request=request_)
+    assert "the tension is being let off: wait" in str(paper.end.answers[1][1])
+
+
+def test_a_torque_off_does_not_wait_for_it(paper: Paper) -> None:
+    paper.reads(tendon_mm=2.0)
+    paper.hear(request="relax")
+    paper.hear(request="torque off")
+    assert paper.bus.told[-1] == "torque off"
+    _follow(paper, 5)
+    assert paper.bus.told[-1] == "torque off"
+
+
+def test_a_strained_servo_is_relaxed_before_the_torque_goes_off_by_policy(monkeypatch: pytest.MonkeyPatch) -> None:
+    paper = Paper(monkeypatch, torque_off_on_stop=True)
+    paper.reads(tendon_mm=2.0)
+    paper.loop._read_decide_write()
+    paper.loop._end_motion(Fault(Cause.STRAINED, "right"))
+    _follow(paper, 70)
+    assert paper.bus.told[0] == "hold"
+    assert "slacken to 1.00" in paper.bus.told
+    assert paper.bus.told[-1] == "torque off"
+
+
+def test_servos_that_hold_and_are_too_hot_are_relaxed_once_and_again_when_it_gets_worse(paper: Paper) -> None:
+    paper.temperature_c = 69.0
+    paper.reads(tendon_mm=2.0)
+    paper.loop._read_decide_write()
+    assert paper.bus.told == []
+    paper.bus.told.append("hot")
+    paper.temperature_c = 70.0
+    _follow(paper, 20)
+    assert paper.bus.told[-1] == "slacken to 1.24"
+    paper.hear(stop=True)
+    paper.tendon_mm = 1.24
+    _follow(paper, 20)
+    assert paper.bus.told[-1] == "hold"
+    paper.temperature_c = 72.0
+    _follow(paper, 60)
+    assert paper.bus.told[-2].startswith("slacken to 0.0")
+    assert "torque off" not in paper.bus.told
 
 
 def test_the_first_cause_stays_when_the_torque_cannot_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:

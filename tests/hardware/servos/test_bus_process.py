@@ -557,6 +557,35 @@ def test_stop_holds_tendons_that_are_being_let_go(servos: SoftServoBus, armed: S
     assert servos.positions_mm()[0] == pytest.approx(at_mm, abs=0.02)
 
 
+def test_fault_24_a_servo_that_overheats_is_let_go_slowly(servos: SoftServoBus, armed: ServoRobot) -> None:
+    """It held the wires, got hotter, and shut itself down with a snap."""
+    _bend(armed)
+    servos.modify_servo(1, lambda servo: servo.heat(71.0))
+    _seen(armed, lambda status: status.releasing)
+    with pytest.raises(NotReady, match="the tension is being let off"):
+        armed.arm()
+    seen_mm = [servos.positions_mm()[0]]
+    while armed.bus_status().releasing:
+        armed.beat(Source.OPERATOR)
+        seen_mm.append(servos.positions_mm()[0])
+        time.sleep(0.01)
+    _settle_mm(servos)
+    assert max(before - after for before, after in zip(seen_mm, seen_mm[1:], strict=False)) < 0.5, "no snap"
+    assert servos.positions_mm()[:2] == pytest.approx((0.0, -1.7), abs=0.1)
+    assert _torques(servos) == [1] * 7
+    assert _latched(Cause.HOT)(armed.bus_status())
+
+
+def test_servos_that_overheat_while_they_hold_after_a_stop_are_let_go_slowly(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _bend(armed)
+    armed.stop()
+    _seen(armed, lambda status: status.phase is BusPhase.STOPPED)
+    servos.modify_servo(1, lambda servo: servo.heat(71.0))
+    _seen(armed, lambda status: all(at is not None and at <= 0.06 for at in _positions(status)[:4]))
+    assert armed.bus_status().phase is BusPhase.STOPPED
+    assert _torques(servos) == [1] * 7
+
+
 @pytest.mark.parametrize("startup", [0, 2, 3])
 def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot, startup: int) -> None:
     """It is silent for 0.3 s, and then has lost its zero, whatever Startup Configuration(60) brings back of its settings."""

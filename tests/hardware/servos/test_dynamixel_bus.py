@@ -1294,3 +1294,19 @@ def _until_all(bus: ServoBus, wanted: Callable[[Sequence[ServoReading]], bool]) 
             return readings
         time.sleep(0.01)
     raise AssertionError(readings)
+
+
+def test_tendons_are_let_go_though_the_watchdogs_have_tripped(twin: SoftServoBus, armed: ServoBus, clock: Clock) -> None:
+    """After it a servo takes no goals, and has neither speed nor acceleration to keep to."""
+    armed.write([0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    _until(armed, 0, lambda state: state.position_mm == pytest.approx(0.5, abs=0.02))
+    clock.ahead_s += 2.1
+    states = _states(armed)
+    assert all(state.watchdog_tripped for state in states)
+    armed.disarm()
+    armed.slacken([0.2] + [None] * 6, states)
+    _until(armed, 0, lambda state: state.position_mm == pytest.approx(0.2, abs=0.02))
+    first, second = twin.servo(1).table, twin.servo(2).table
+    assert (first["profile_velocity"], first["profile_acceleration"], first["watchdog"]) == (65, 83, 100)
+    assert second["watchdog"] == -1, "it is not needed"
+    assert not armed.is_armed
