@@ -18,7 +18,7 @@ import typer
 from app.commands.options import ConfigOption, ModelOption, PresetOption
 from app.commands.progress import LineOutput, check_apart, check_no_input, is_same, make_folder, progress_bar
 from app.ui.display import check_qt
-from core.bench.bench import Bench, bench_from_pictures, read_bench
+from core.bench.bench import Bench, bench_from_pictures, check_size, read_bench
 from core.config.models import choose_model, load_config
 from core.control.policies import table_policy
 from core.devices import UserError
@@ -108,7 +108,9 @@ def _read_bench(folder: Path | None, empty: list[Path], vessel: Path | None, wor
     if folder is not None:
         if empty or vessel is not None:
             raise UserError("--bench already has empty picture and vessel: leave --empty and --vessel out")
-        return read_bench(folder)
+        bench = read_bench(folder)
+        check_size(bench, working_size_px, str(folder))
+        return bench
     if not empty:
         if vessel is not None:
             raise UserError("--vessel needs --empty: a picture of the same bench without the robot")

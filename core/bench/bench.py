@@ -73,6 +73,7 @@ class Bench:
     known : bool (h, w); False where the empty picture is not known, because something always lay there.
     vessel : the lumen, bool (h, w), drawn once; None: not drawn.
     landmarks : corners of the empty picture (N, 2), by which a moved camera is noticed.
+    stamp : see ``bench_stamp``; None where it was not read from a folder.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Bench:
     known: Mask
     vessel: Mask | None
     landmarks: Points
+    stamp: int | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -411,9 +413,30 @@ def _drawn_vessel(vessel: Mask | None, shape: tuple[int, int]) -> Mask | None:
     return np.asarray(cv2.resize(vessel.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA) >= 0.5)
 
 
+def bench_stamp(folder: Path) -> int | None:
+    """When the bench in `folder` was written, in nanoseconds; None where there is none."""
+    try:
+        return (folder / INFO).stat().st_mtime_ns
+    except OSError:
+        return None
+
+
+def check_size(bench: Bench, working_size_px: int, where: str) -> None:
+    """Raise BenchError for a bench (of the folder `where`) that was made for another working size."""
+    if max(bench.size) != working_size_px:
+        raise BenchError(
+            message(
+                "{path}: was made for a working size of {a} px, and {b} px are set; make the bench again",
+                path=where,
+                a=max(bench.size),
+                b=working_size_px,
+            )
+        )
+
+
 def read_bench(folder: Path) -> Bench:
     """Raises BenchError: not there, damaged, or of a newer version."""
-    path = folder / INFO
+    path, stamp = folder / INFO, bench_stamp(folder)
     try:
         info = _BenchInfo.model_validate_json(path.read_bytes())
     except OSError as error:
@@ -447,7 +470,7 @@ def read_bench(folder: Path) -> Bench:
     if any(one is not None and one.shape != size for one in (noise, known, vessel)):
         raise BenchError(message("{path}: its pictures differ in size; make the bench again", path=path))
     landmarks = np.array(info.landmarks, np.float64).reshape(-1, 2)
-    return Bench(info.name, empty, np.asarray(noise / np.float32(_NOISE_STEPS), np.float32), known, vessel, landmarks)
+    return Bench(info.name, empty, np.asarray(noise / np.float32(_NOISE_STEPS), np.float32), known, vessel, landmarks, stamp)
 
 
 def _decoded_mask(data: bytes) -> Mask:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -232,10 +233,10 @@ def _contrast(strong: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(cv2.blur(cv2.dilate(strong, _square(_CONTRAST_PX)), (5, 5)), np.float32)
 
 
-def _components(mask: Mask | NDArray[np.uint8]) -> tuple[int, NDArray[np.uint16], NDArray[np.int32], NDArray[np.float64]]:
+def _components(mask: NDArray[Any]) -> tuple[int, NDArray[np.uint16], NDArray[np.int32], NDArray[np.float64]]:
     """Count, labels (h, w), statistics and centers of the components; labels of 16 bits take a third of the time."""
     count, labels, stats, centers = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8, ltype=cv2.CV_16U)
-    return count, np.asarray(labels, np.uint16), np.asarray(stats, np.int32), centers
+    return count, np.asarray(labels, np.uint16), np.asarray(stats, np.int32), np.asarray(centers, np.float64)
 
 
 def _darkest(image: Image) -> NDArray[np.uint8]:

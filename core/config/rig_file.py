@@ -21,7 +21,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.files import settings_folder
-from core.config.models import CameraConfig, Config, RigConfig, TwinConfig
+from core.config.models import CameraConfig, Config, RigConfig, SegmentationConfig, TwinConfig
 from core.config.safety import ServosConfig
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
@@ -245,10 +245,20 @@ def with_rig(base: Config, rig: RigFile, path: Path) -> Config:
     update: dict[str, Any] = {"rig": chosen, "camera": rig.camera, "servos": rig.servos}
     if rig.twin is not None:
         update["twin"] = rig.twin
-    if rig.model is not None:
-        segmentation = base.perception.segmentation.model_copy(update={"model": rig.model})
+    model = rig.model or (SegmentationConfig().model if _has_own_model(base) else None)
+    if model is not None:
+        segmentation = base.perception.segmentation.model_copy(update={"model": model})
         update["perception"] = base.perception.model_copy(update={"segmentation": segmentation})
     return base.model_copy(update=update)
+
+
+def _has_own_model(config: Config) -> bool:
+    """Whether the model is the one that the rig in use was taught with, which another rig must not keep."""
+    try:
+        found = rig_in_use(config)
+    except RigFileError:
+        return False
+    return found is not None and found[1].model is not None and found[1].model == config.perception.segmentation.model
 
 
 def sections_of_rig(running: Config, settings: Config) -> frozenset[str]:

@@ -12,11 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.bench.bench import Bench, BenchError, reachable, read_bench
+from core.bench.bench import Bench, bench_stamp, check_size, reachable, read_bench
 from core.bench.difference import combined, robot_by_difference
 from core.bench.registration import BenchView, register, window_of
 from core.config.models import PathConfig, PerceptionConfig
-from core.messages import message
 from core.perception import compiled, quality, robot_path, segmentation, skeleton
 from core.perception.centerline import find as find_centerline
 from core.perception.centerline import route_or_reason
@@ -181,6 +180,8 @@ class Pipeline:
         """
         before = self._config
         is_same = config.bench == before.bench and config.working_size_px == before.working_size_px
+        if is_same and self._bench is not None and self._bench.stamp is not None and config.bench is not None:
+            is_same = self._bench.stamp == bench_stamp(Path(config.bench))  # made again in the same folder
         bench = self._bench if is_same else configured_bench(config)
         return Pipeline(self._stream, config, single=self._single, roi=self._offered_roi, bench=bench)
 
@@ -572,15 +573,7 @@ def configured_bench(config: PerceptionConfig) -> Bench | None:
     if config.bench is None:
         return None
     bench = read_bench(Path(config.bench))
-    if max(bench.size) != config.working_size_px:
-        raise BenchError(
-            message(
-                "{path}: was made for a working size of {a} px, and {b} px are set; make the bench again",
-                path=config.bench,
-                a=max(bench.size),
-                b=config.working_size_px,
-            )
-        )
+    check_size(bench, config.working_size_px, config.bench)
     return bench
 
 

@@ -234,6 +234,16 @@ def test_a_rig_that_is_calibrated_again_keeps_what_it_was_taught(tmp_path: Path)
     assert make_rig(running, "bench 1", KNOWN).bench is None
 
 
+def test_a_rig_without_a_model_does_not_keep_the_one_of_the_rig_before(tmp_path: Path) -> None:
+    taught, plain = (write_rig(make_rig(REAL, name, None)) for name in ("bench 1", "bench 2"))
+    set_bench(taught, tmp_path / "lab", "mine")
+    config = with_rig(load_config(), read_rig(taught), taught)
+    assert config.perception.segmentation.model == "mine"
+    assert with_rig(config, read_rig(plain), plain).perception.segmentation.model == "default"
+    chosen = load_config(overrides={"perception": {"segmentation": {"model": "own"}}})
+    assert with_rig(chosen, read_rig(plain), plain).perception.segmentation.model == "own"
+
+
 def test_a_session_tells_its_calibration_again() -> None:
     manifest = Manifest(id="x", kind="LIVE", started_utc=MADE, started_monotonic_s=0.0)
     assert manifest.known is None

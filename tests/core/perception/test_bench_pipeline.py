@@ -212,6 +212,12 @@ def test_the_configured_bench_is_read(bench: Bench, tmp_path: Path) -> None:
     opened = Pipeline(Blind(), CONFIG).with_config(config).bench
     assert opened is not None
     assert opened.name == "b"
+    pipeline = Pipeline(Blind(), config, bench=opened)
+    assert pipeline.with_config(config).bench is opened
+    write_bench(replace(bench, name="made again"), tmp_path / "b")
+    again = pipeline.with_config(config).bench
+    assert again is not None
+    assert again.name == "made again"
     other = config.model_copy(update={"working_size_px": 320})
     with pytest.raises(BenchError, match="working size of 640 px"):
         Pipeline(Blind(), CONFIG).with_config(other)
