@@ -77,7 +77,8 @@ class CalibratedSegmenter:
 
     ``calibration``: of its confidence; None: not calibrated. ``sensitivity``: whether the confidence features include the threshold
     sensitivity, which takes some four times as long as the geometry alone. ``known``: the kinds of pictures that the network was
-    trained on; None: not recorded. ``all_orientations``: it averages over all orientations of a picture.
+    trained on; None: not recorded. ``all_orientations``: it averages over all orientations of a picture. ``is_taught``: it was
+    taught on a bench, so that ``known`` is right for pictures of that bench, too.
     """
 
     segment: Segmenter
@@ -85,6 +86,7 @@ class CalibratedSegmenter:
     sensitivity: bool = False
     known: OutOfDistributionReference | None = None
     all_orientations: bool = False
+    is_taught: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -309,7 +311,7 @@ class Pipeline:
         state, novelty = run.state, run.scene.novelty
         refused_before = state is not None and state.is_unfamiliar
         unfamiliar = quality.check_kind(novelty, self._config.quality, refused_before=refused_before)
-        if run.view is not None:  # a picture of the bench is known, whatever it looks like
+        if run.view is not None and not segmenter.is_taught:  # a picture of the bench is known, whatever it looks like
             unfamiliar = None
         if state is not None and novelty is not None:  # a region of interest has no novelty
             state.is_unfamiliar = unfamiliar is not None
@@ -596,9 +598,10 @@ def open_calibrated(config: PerceptionConfig, *, recalibrating: bool = False) ->
     calibration = info.calibration_mirrored or info.calibration
     sensitivity = recalibrating or (calibration is not None and calibration.needs_sensitivity)
     known = info.familiarity if not recalibrating else None
+    is_taught = "taught" in info.training
     return (
-        CalibratedSegmenter(plain, info.calibration, known=known),
-        CalibratedSegmenter(averaged, calibration, sensitivity, known, all_orientations=True),
+        CalibratedSegmenter(plain, info.calibration, known=known, is_taught=is_taught),
+        CalibratedSegmenter(averaged, calibration, sensitivity, known, all_orientations=True, is_taught=is_taught),
     )
 
 

@@ -129,6 +129,9 @@ def test_a_picture_of_the_bench_is_known_whatever_it_looks_like(bench: Bench) ->
     scene = Pipeline(calibrated, CONFIG, bench=bench).perceive_single(Frame(0, 0.0, picture(400)))
     assert scene.refusal is None
     assert scene.novelty == 5.0
+    taught = Pipeline(replace(calibrated, is_taught=True), CONFIG, bench=bench).perceive_single(Frame(0, 0.0, picture(400)))
+    assert taught.refusal is not None
+    assert taught.refusal.reason is Reason.UNLIKE_TRAINING, "what a model was taught on this bench holds good for it"
 
 
 def test_in_a_stream_windows_follow_the_robot_and_the_drawn_vessel_is_traced_once(
