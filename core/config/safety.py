@@ -139,6 +139,9 @@ class ServosConfig(ConfigSection):
     baud: int = Field(1_000_000, ge=9600, le=4_500_000, description="speed of the bus")
     model: int = Field(1020, ge=0, le=65535, description="model number of the servos (1020: XM430-W350); a joint may have another")
     pretension_mm: float = Field(0.3, ge=0.0, le=5.0, description="pull of every tendon at zero bend")
+    pretension_mm_s: float = Field(
+        1.0, gt=0.0, le=5.0, description="speed at which wires are pulled to it after the servos were switched on"
+    )
     max_pull_mm: float = Field(2.0, gt=0.0, le=20.0, description="pull at a bend or pitch of 1")
     bus_hz: float = Field(50.0, ge=5.0, le=200.0, description="how often the servos are asked and told")
     heartbeat_timeout_s: float = Field(0.5, ge=0.05, le=5.0, description="silence of the application after which the bus holds")

@@ -73,21 +73,28 @@ def joint_goals(
 
 
 def _tendon_goals(command: Command, last_mm: Joints, elapsed_s: float, servos: ServosConfig) -> list[tuple[float, bool]]:
+    """A bend moves the tendons of a pair against each other at their speed; to the pretension they go together, and slowly.
+
+    So servos that were just switched on pull slack wires tight at ``pretension_mm_s``, whatever the operator does.
+    """
     goals = []
     for first, share in ((0, command.bend), (2, command.pitch)):
         pulling, letting = servos.joints[first], servos.joints[first + 1]
+        common_mm, bent_mm = (last_mm[first] + last_mm[first + 1]) / 2.0, (last_mm[first] - last_mm[first + 1]) / 2.0
+        fastest_mm_s = min(pulling.max_speed_mm_s, letting.max_speed_mm_s)
+        tighter_mm = limited(servos.pretension_mm - common_mm, min(servos.pretension_mm_s, fastest_mm_s) * elapsed_s)
+        common_mm += tighter_mm
         asked_mm = limited(share, 1.0) * servos.max_pull_mm
-        pull_mm = _pair_pull(asked_mm, pulling, letting, servos.pretension_mm)
-        for place, signed_mm in ((first, pull_mm), (first + 1, -pull_mm)):
-            old_mm, reach_mm = last_mm[place], servos.joints[place].max_speed_mm_s * elapsed_s
-            goals.append((old_mm + limited(servos.pretension_mm + signed_mm - old_mm, reach_mm), pull_mm != asked_mm))
+        pull_mm = _pair_pull(asked_mm, pulling, letting, common_mm)
+        bent_mm += limited(pull_mm - bent_mm, fastest_mm_s * elapsed_s - abs(tighter_mm))
+        goals += [(common_mm + bent_mm, pull_mm != asked_mm), (common_mm - bent_mm, pull_mm != asked_mm)]
     return goals
 
 
-def _pair_pull(asked_mm: float, one: JointConfig, other: JointConfig, pretension_mm: float) -> float:
+def _pair_pull(asked_mm: float, one: JointConfig, other: JointConfig, common_mm: float) -> float:
     """One tendon pulls as far as the other lets go, within the envelope of both, so that no wire hangs slack."""
-    most_mm = max(0.0, min(one.high_mm - pretension_mm, pretension_mm - other.low_mm))
-    least_mm = min(0.0, max(one.low_mm - pretension_mm, pretension_mm - other.high_mm))
+    most_mm = max(0.0, min(one.high_mm - common_mm, common_mm - other.low_mm))
+    least_mm = min(0.0, max(one.low_mm - common_mm, common_mm - other.high_mm))
     return min(max(asked_mm, least_mm), most_mm)
 
 

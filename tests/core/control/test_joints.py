@@ -56,6 +56,30 @@ def test_tendons_go_there_at_their_speed() -> None:
     assert _goals(Command(bend=1.0)).goals_mm == pytest.approx((0.5, 0.1, 0.3, 0.3, 10.0, 20.0, 20.0))
 
 
+def test_wires_are_pulled_to_the_pretension_slowly_whatever_is_commanded() -> None:
+    """Servos that were switched on pulled slack wires tight at full speed, without a held control."""
+    slack = (-2.0, -2.0, 0.3, 0.3, 10.0, 20.0, 20.0)
+    assert _goals(Command(), slack).goals_mm[:2] == pytest.approx((-1.98, -1.98))
+    assert _goals(Command(bend=1.0), slack).goals_mm[:2] == pytest.approx((-1.98 + 0.18, -1.98 - 0.18))
+    tight = (1.0, 1.0, 0.3, 0.3, 10.0, 20.0, 20.0)
+    assert _goals(Command(), tight).goals_mm[:2] == pytest.approx((0.98, 0.98))
+    goals = slack
+    for cycles in (1, 50, 64):
+        for _ in range(cycles):
+            goals = _goals(Command(), goals).goals_mm
+    assert goals[:2] == pytest.approx((0.3, 0.3))
+
+
+@pytest.mark.parametrize("bend", [-1.0, 0.0, 1.0])
+def test_slack_wires_stay_inside_their_envelope_and_speed_at_every_bend(bend: float) -> None:
+    goals = (-2.4, -2.3, -2.4, 0.3, 10.0, 20.0, 20.0)
+    for _ in range(200):
+        before, goals = goals, _goals(Command(bend=bend, pitch=bend), goals).goals_mm
+        assert all(-2.4 - 1e-9 <= goal <= 2.8 + 1e-9 for goal in goals[:4])
+        assert all(abs(goal - old) <= 0.2 + 1e-9 for goal, old in zip(goals[:4], before[:4], strict=True))
+    assert goals[:2] == pytest.approx((0.3 + 2.0 * bend, 0.3 - 2.0 * bend))
+
+
 def test_feeds_integrate_their_speed_over_the_time_since_the_last_goal() -> None:
     assert _goals(Command(advance_mm_s=5.0, delivery_mm_s=-2.0)).goals_mm[4:] == pytest.approx((10.1, 19.96, 19.96))
     assert _goals(Command(advance_mm_s=-5.0, delivery_mm_s=2.0), elapsed_s=0.05).goals_mm[4:] == pytest.approx((9.75, 20.1, 20.1))
