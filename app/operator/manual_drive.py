@@ -521,6 +521,8 @@ class OperatorDevices(QObject):
             self._stop()
         if (pilot := self._pilot()) is not None:
             pilot.deadman("pedal", report.deadman)
+            if report.estop is not None:
+                pilot.estop(report.estop)
 
     def _on_gamepad_device(self, name: str | None, problem: GamepadError | None) -> None:
         before, self._gamepad_name = self._gamepad_name, name

@@ -234,11 +234,15 @@ class AlertReporter:
         self.report(raised, now_s, before.mode, changed=decision.mode is not before.mode)
 
 
+_ALWAYS = frozenset({Cause.STOP_PRESSED, Cause.ESTOP_PRESSED, Cause.SERVOS_WRONG, Cause.TORQUE_ON})
+"""Faults that are told in every mode."""
+
+
 def _matters(fault: Fault, before: SupervisorState) -> bool:
     """Whether a fault is worth an alert: in ADVISORY the screen shows perception's doubts anyway, and servos that are off endanger
     nothing."""
     cause = fault.cause
-    if before.mode in ARMED_MODES or cause in {Cause.STOP_PRESSED, Cause.SERVOS_WRONG, Cause.TORQUE_ON}:
+    if before.mode in ARMED_MODES or cause in _ALWAYS:
         return True
     if cause.area is Area.SERVOS or cause is Cause.CLOCK:
         return before.health.servos_ready

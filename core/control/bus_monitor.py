@@ -54,6 +54,8 @@ class BusReport:
 
 STRAIN_S = 0.5
 """So long a current must be above the limit."""
+_NO_SUPPLY_SHARE = 0.75
+"""Of the recommended supply: when all servos tell less, it is not weak but going away, and they fall silent next."""
 _RIPPLE_S, _RIPPLE_CYCLES = 0.06, 2.5
 """Longest pause of a ripple, in seconds and in cycles of the bus; the longer of both counts."""
 _ROUNDING_S = 1e-9
@@ -184,7 +186,12 @@ class BusMonitor:
             found.append(
                 (Cause.BUS_NOISE, message("{a} in {b:g} s (at most {c})", a=bad, b=safety.bus_errors_window_s, c=safety.bus_errors))
             )
-        if silent := _listed(newest.misses, lambda misses: misses >= safety.missed_answers, ""):
+        silent = _listed(newest.misses, lambda misses: misses >= safety.missed_answers, "")
+        if (
+            silent and min(newest.misses) > 0 and bad <= safety.bus_errors
+        ):  # the port is still there, so the adapter has its power, and the servos have none
+            found.append((Cause.SUPPLY_LOST, "all servos fell silent together"))
+        elif silent:
             found.append((Cause.SERVO_SILENT, silent))
         elif self.gap_run > safety.bus_disarm_s * servos.bus_hz:
             # each one answers often enough, but the positions of all seven, which the motion needs, are never there
@@ -194,6 +201,8 @@ class BusMonitor:
         # room to each joint's own limit: its model's, or a tighter one of the configuration
         cooler_c = [servos.hottest_c(joint) - c for joint, c in zip(servos.joints, newest.temperatures_c, strict=False)]
         spare_v = [v - servos.lowest_v(joint) for joint, v in zip(servos.joints, newest.voltages_v, strict=False)]
+        least_v = [_NO_SUPPLY_SHARE * servos.model_of(joint).recommended_v for joint in servos.joints]
+        is_gone = not silent and bool(spare_v) and all(v < least for v, least in zip(newest.voltages_v, least_v, strict=False))
         hot, low = _short(newest.temperatures_c, cooler_c, 0.0, " {:.0f} °C"), _short(newest.voltages_v, spare_v, 0.0, " {:.1f} V")
         warm = _short(newest.temperatures_c, cooler_c, safety.temperature_warn_margin_c, " {:.0f} °C")
         sags = _short(newest.voltages_v, spare_v, safety.voltage_warn_margin_v, " {:.1f} V")
@@ -207,7 +216,8 @@ class BusMonitor:
             (Cause.WATCHDOG, newest.watchdog_tripped),
             (Cause.HOT, hot),
             (Cause.WARM, not hot and warm),
-            (Cause.VOLTAGE_LOW, low),
+            (Cause.SUPPLY_LOST, is_gone and message("{a:.1f} V at most", a=max(newest.voltages_v))),
+            (Cause.VOLTAGE_LOW, not is_gone and low),
             (Cause.VOLTAGE_SAGS, not low and sags),
         ]
         return [Fault(cause, "" if told is True else told) for cause, told in found if told]

@@ -68,6 +68,8 @@ class Cause(StrEnum):
     # fmt: off
     STOP_PRESSED = ("stop pressed", Area.OPERATOR, Reaction.STOP,
         "STOP pressed", "acknowledge, check the servos, arm again; an emergency needs the power cut")
+    ESTOP_PRESSED = ("e-stop pressed", Area.SERVOS, Reaction.DISARM,
+        "E-stop pressed", "release the E-stop, acknowledge, then zero the servos and arm again", True)
     PORT_LOST = ("servo port lost", Area.SERVOS, Reaction.STOP,
         "Servo port lost", "plug the servo cable in, check the servos, then acknowledge", True)
     SERVO_ALERT = ("servo reports a hardware error", Area.SERVOS, Reaction.STOP,
@@ -85,6 +87,8 @@ class Cause(StrEnum):
     # before the silence that it causes: the first cause is the one that is shown
     BUS_NOISE = ("bad packets on the servo bus", Area.SERVOS, Reaction.DISARM,
         "Too many bad packets from the servos", "check plugs and shielding of the servo cable, then acknowledge")
+    SUPPLY_LOST = ("servo power lost", Area.SERVOS, Reaction.DISARM,
+        "No servo power: E-stop pressed, or supply off", "release the E-stop or switch the supply on; acknowledge, zero", True)
     SERVO_SILENT = ("servo silent", Area.SERVOS, Reaction.DISARM,
         "A servo does not answer", "check its cable and power, then acknowledge", True)
     BUS_DEAD = ("servo bus lost", Area.SERVOS, Reaction.DISARM,

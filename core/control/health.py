@@ -39,6 +39,13 @@ class DeadmanReport:
         return now_s if self.said_s is None else min(self.said_s, now_s)
 
 
+@dataclass(frozen=True, slots=True)
+class EstopReport:
+    """What the E-stop button's second contact says, which is an input of the pedal board. Silence changes nothing."""
+
+    pressed: bool
+
+
 class Part(StrEnum):
     """Threads that must show signs of life."""
 
@@ -92,6 +99,7 @@ Report = (
     | BusReport
     | Beat
     | DeadmanReport
+    | EstopReport
     | ModelReport
     | ServoCheckReport
     | ServoRequestBegun
@@ -169,6 +177,7 @@ class Health:
     rejection: RejectReason | None = None
     rejected_run: int = 0
     reported: tuple[Fault, ...] = ()
+    estop_pressed: bool = False
 
     @property
     def servos_ready(self) -> bool:
@@ -192,6 +201,8 @@ class Health:
             case DeadmanReport(pressed, _, source, alone):
                 deadman = self.deadmen.get(source, Deadman()).update(pressed, report.at_s(now_s), armed=armed, alone=alone)
                 return replace(self, deadmen={**self.deadmen, source: deadman})
+            case EstopReport(pressed):
+                return replace(self, estop_pressed=pressed)
             case ModelReport():
                 return replace(self, model=report)
             case ServoCheckReport(problems):
@@ -251,6 +262,8 @@ class Health:
                 faults.append(Fault(cause, silence))
         if self.servo_problems:
             faults.append(Fault(Cause.SERVOS_WRONG, "; ".join(self.servo_problems)))
+        if self.estop_pressed:
+            faults.append(Fault(Cause.ESTOP_PRESSED))
         if not self.model.ok:
             faults.append(Fault(Cause.MODEL_UNFIT, self.model.detail))
         if self.rejected_run >= safety.broken_results:

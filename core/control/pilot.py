@@ -23,7 +23,7 @@ from core.control.drive_view import AdviceAdherence, CommandLatency, DriveNews, 
 from core.control.faults import Cause, Fault
 from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.gate import Rejection, RejectReason, Source
-from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part, ServoCheckReport, ServosBusy
+from core.control.health import Beat, DeadmanReport, EstopReport, GateReport, ModelReport, Part, ServoCheckReport, ServosBusy
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, combined
 from core.control.policies import Policy
@@ -249,6 +249,10 @@ class Pilot:
         """A deadman as it is now (None: it cannot tell); to be repeated many times a second. One that is held is enough."""
         is_enough = source != KEYBOARD or self._readiness.keyboard_deadman
         self._inputs.post(DeadmanReport(pressed, self._clock(), source, is_enough))
+
+    def estop(self, pressed: bool) -> None:
+        """What the E-stop button's own contact says; to be repeated while the board talks."""
+        self._inputs.post(EstopReport(pressed))
 
     def window_alive(self) -> None:
         """A sign of life of the window's thread."""

@@ -74,7 +74,7 @@ def _read_clock(state: SupervisorState, now_s: float, safety: SafetyConfig) -> t
     fresh = replace(
         state,
         time_s=known_s if math.isfinite(now_s) else state.time_s,
-        health=Health(model=state.health.model),
+        health=Health(model=state.health.model, estop_pressed=state.health.estop_pressed),
         camera_unwell_s=known_s,
         perception_unwell_s=known_s,
         input_s=None,
@@ -107,9 +107,12 @@ def _collect_faults(
 
 
 def _react(state: SupervisorState, in_use: bool, now_s: float, safety: SafetyConfig) -> SupervisorState:
-    """The state after the active faults took effect. Servos not `in_use` hinder arming, but there is nothing to stop."""
+    """The state after the active faults took effect. Servos not `in_use` hinder arming, but there is nothing to stop.
+
+    A pressed E-stop is latched all the same: it must be released, and then acknowledged.
+    """
     state = _note_unwell(state, now_s)
-    faults = tuple(fault for fault in state.active if in_use or fault.cause.area is not Area.SERVOS)
+    faults = tuple(f for f in state.active if in_use or f.cause.area is not Area.SERVOS or f.cause is Cause.ESTOP_PRESSED)
     recheck = any(fault.cause.recheck for fault in state.active)
     stop, disarm = worst(faults, Reaction.STOP), worst(faults, Reaction.DISARM)
     if state.mode is Mode.ADVISORY:

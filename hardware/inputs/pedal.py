@@ -8,13 +8,14 @@ byte    meaning
 0       ``P``
 1       number of the report, 0 to 31 and then 0 again, as ``0x40 + number`` (``@ A B ... _``)
 2       ``D``: the deadman switch (normally open) is closed, the foot is on it; ``-``: it is open, or its wire is broken
-3       ``S``: the STOP switch (normally closed) is open, it is pressed, or its wire is broken; ``-``: it is closed
+3       ``S``: the STOP switch (normally closed) is open, it is pressed, or its wire is broken; ``-``: it is closed; ``E``: the
+        second contact (normally closed) of the E-stop button is open, whatever STOP is. Boards without that pin never say so
 4, 5    CRC-8 (polynomial 0x07, start 0) of bytes 0 to 3, its upper and lower half as ``0x40 + half`` (``@ A B ... O``)
 6       line feed
 ======  ==============================================================================================================
 
 As every varying bit stands for itself, the CRC finds any one, two or three wrong bits. ``D`` and ``-``, and ``S`` and ``-``, differ
-in four and six bits anyway.
+in four and six bits anyway, ``E`` in three from either.
 """
 
 from __future__ import annotations
@@ -143,11 +144,12 @@ def _port_error(config: PedalConfig, error: Exception) -> PedalPortError:
 
 @dataclass(frozen=True, slots=True)
 class PedalLine:
-    """One whole report. ``down``: foot on the deadman; ``stop``: STOP pressed, or its wire broken."""
+    """One whole report. ``down``: foot on the deadman; ``stop``: STOP pressed, or its wire broken; ``estop``: the E-stop is."""
 
     number: int
     down: bool
     stop: bool
+    estop: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,12 +157,14 @@ class PedalReport:
     """What the pedal means now, at ``time_s`` on the monotonic clock.
 
     ``deadman`` is True only while unbroken reports say so, False only when a whole one in its turn says that the foot is up, and
-    None otherwise: the foot may be up or down. ``stop`` is what a whole report said; it is never guessed.
+    None otherwise: the foot may be up or down. ``stop`` is what a whole report said; it is never guessed. ``estop`` is what a whole
+    report said of the E-stop button, and None without one: what it was before, it still is.
     """
 
     deadman: bool | None
     stop: bool
     time_s: float
+    estop: bool | None = None
 
 
 def crc8(data: bytes) -> int:
@@ -175,16 +179,19 @@ def crc8(data: bytes) -> int:
 
 def line_bytes(line: PedalLine) -> bytes:
     """The seven bytes of a report."""
-    body = bytes([ord("P"), 0x40 | line.number % NUMBERS, ord("D" if line.down else "-"), ord("S" if line.stop else "-")])
+    switch = "E" if line.estop else "S" if line.stop else "-"
+    body = bytes([ord("P"), 0x40 | line.number % NUMBERS, ord("D" if line.down else "-"), ord(switch)])
     crc = crc8(body)
     return body + bytes([0x40 | crc >> 4, 0x40 | crc & 0x0F, ord("\n")])
 
 
+_SWITCHES = ((False, False), (True, False), (False, True))
+"""STOP and E-stop of a line."""
 _LINES = {
     line_bytes(line)[:-1]: line
-    for line in (PedalLine(n, d, s) for n in range(NUMBERS) for d in (False, True) for s in (False, True))
+    for line in (PedalLine(n, d, s, e) for n in range(NUMBERS) for d in (False, True) for s, e in _SWITCHES)
 }
-"""All 128 lines that there are: what is not among them, letter for letter, is damaged."""
+"""All 192 lines that there are: what is not among them, letter for letter, is damaged."""
 
 
 class PedalParser:
@@ -224,7 +231,7 @@ class PedalFilter:
 
     A STOP counts at once, from any whole line, even one that comes late or with a wrong number: a false STOP costs a restart, a
     missed one more. Damage and silence are no STOP: it is latched and may switch the torque off, so an unplugged cable must not
-    cause it. They make the deadman unknown, which holds.
+    cause it. They make the deadman unknown, which holds. An E-stop counts in the same way, and is over when a whole line says so.
     """
 
     def __init__(self, config: PedalConfig) -> None:
@@ -248,14 +255,14 @@ class PedalFilter:
         self._number, self._heard_s = line.number, now_s
         if not in_order:
             self._run = 0
-            return PedalReport(None, line.stop, now_s)
+            return PedalReport(None, line.stop, now_s, line.estop)
         if now_s - self._sound_s > self._config.resume_s:
             self._lifted = False
         self._sound_s = now_s
         self._lifted = self._lifted or not line.down
         self._run = self._run + 1 if line.down and self._lifted else 0
         is_press = self._run >= self._config.press_reports
-        return PedalReport((is_press or None) if line.down else False, line.stop, now_s)
+        return PedalReport((is_press or None) if line.down else False, line.stop, now_s, line.estop)
 
     def silence(self, now_s: float) -> PedalReport:
         """Nothing whole has come for too long."""

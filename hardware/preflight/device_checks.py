@@ -301,6 +301,9 @@ def check_pedal(config: PedalConfig, listen_s: float = _LISTEN_S) -> Check:
                         message("{port}: STOP is pressed, or its wire is broken", port=config.port),
                         "release STOP; check its wire",
                     )
+                if line is not None and line.estop:
+                    what = message("{port}: the E-stop is pressed, or its wire is broken", port=config.port)
+                    return Check(name, False, what, "release the E-stop; check the wire of its second contact")
                 if line is not None:
                     return Check(name, True, f"{config.port} reports; deadman {'pressed' if line.down else 'released'}")
     except DeviceError as error:

@@ -424,6 +424,8 @@ class BusLoop:
                 return
             if left:
                 self._bus.pause(LATE_S)
+        if len(missing) == len(self._servos.joints):
+            raise NotReady("not armed: no servo answers: release the E-stop or switch their supply on, check the cable")
         silent = ", ".join(f"{one.name} (id {one.id}): {one.reason}" for one in missing)
         raise NotReady(message("not armed: {why}; check its supply and cable", why=silent))
 

@@ -159,7 +159,9 @@ def _silence(line: ServoLine, config: ServosConfig, silent: list[JointConfig]) -
                     return NoAnswer(f"the servos talk at {baud} baud: set servos.baud = {baud}")
             finally:
                 other.close()
-    return NoAnswer(f"no servo answers on {line.port} at {config.baud} baud: check the servos' power and the cable")
+    return NoAnswer(
+        f"no servo answers on {line.port} at {config.baud} baud: release the E-stop, check the servos' power and the cable"
+    )
 
 
 def _title(joint: JointConfig) -> str:

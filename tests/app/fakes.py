@@ -214,6 +214,7 @@ class FakePilot:
         self.jogs: list[Jog] = []
         self.acts: list[Act] = []
         self.deadman_said: list[bool | None] = []
+        self.estop_said: list[bool] = []
         self.beats = 0
         self.speed = 0.0
         self.asked: list[str] = []
@@ -255,6 +256,9 @@ class FakePilot:
 
     def deadman(self, source: object, pressed: bool | None) -> None:
         self.deadman_said.append(pressed)
+
+    def estop(self, pressed: bool) -> None:
+        self.estop_said.append(pressed)
 
     def window_alive(self) -> None:
         self.beats += 1

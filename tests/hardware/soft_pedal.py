@@ -32,6 +32,7 @@ class SoftPedal:
         self._stop_closed = True
         self._stop_wire = True
         self._stop_left = 0
+        self._estop = False
         self._muted = self._stuck = False
         self._damaged = 0
         self._noise = b""
@@ -94,6 +95,13 @@ class SoftPedal:
     def release_stop(self) -> None:
         self._stop_closed = True
 
+    def press_estop(self) -> None:
+        """Open the second contact of the E-stop button."""
+        self._estop = True
+
+    def release_estop(self) -> None:
+        self._estop = False
+
     def break_stop_wire(self, broken: bool = True) -> None:
         self._stop_wire = not broken
 
@@ -145,7 +153,7 @@ class SoftPedal:
         """Send one report."""
         if not (self._stop_closed and self._stop_wire):
             self._stop_left = _STOP_REPORTS
-        line = bytearray(line_bytes(PedalLine(self._number, self._deadman_closed, self._stop_left > 0)))
+        line = bytearray(line_bytes(PedalLine(self._number, self._deadman_closed, self._stop_left > 0, self._estop)))
         self._stop_left = max(0, self._stop_left - 1)
         if not self._stuck:
             self._number = (self._number + 1) % NUMBERS

@@ -61,6 +61,12 @@ def test_silence_of_the_bus(age_s: float, causes: list[Cause]) -> None:
         ({"errors": 5}, []),
         ({"errors": 6}, [Cause.BUS_NOISE]),
         ({"errors": 26, "misses": (3,) * 7}, [Cause.BUS_NOISE, Cause.SERVO_SILENT]),
+        ({"misses": (3,) * 7}, [Cause.SUPPLY_LOST]),  # the E-stop: all at once, and the port is there
+        ({"errors": 5, "misses": (3, 2, 2, 3, 2, 2, 2)}, [Cause.SUPPLY_LOST]),  # the last answer was cut
+        ({"misses": (3, 3, 3, 3, 3, 3, 0)}, [Cause.SERVO_SILENT]),  # a cable in the chain
+        ({"misses": (2,) * 7}, []),
+        ({"voltages_v": (8.9,) * 7}, [Cause.SUPPLY_LOST]),
+        ({"voltages_v": _one(9.0, 8.9)}, [Cause.VOLTAGE_LOW]),
     ],
 )
 def test_one_report_of_the_bus(change: dict[str, object], causes: list[Cause]) -> None:

@@ -13,7 +13,16 @@ from core.control.bus_monitor import BusReport
 from core.control.camera_monitor import FrameArrived, FrameLate, FrameReport, RouteState
 from core.control.faults import AFTER_SOME, AT_ONCE, CAUSES, Area, Cause, Fault, Reaction
 from core.control.gate import RejectReason, Source
-from core.control.health import Beat, DeadmanReport, GateReport, ModelReport, Part, ServoCheckReport, ServoRequestBegun
+from core.control.health import (
+    Beat,
+    DeadmanReport,
+    EstopReport,
+    GateReport,
+    ModelReport,
+    Part,
+    ServoCheckReport,
+    ServoRequestBegun,
+)
 from core.control.modes import Act, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.supervisor import supervise
 from core.types import Reason
@@ -163,6 +172,7 @@ def _joint(value: object, place: int, rest: object) -> tuple[object, ...]:
 
 INJECTIONS: dict[Cause, Inject] = {
     Cause.STOP_PRESSED: _events(Act.STOP),
+    Cause.ESTOP_PRESSED: _events(EstopReport(True)),
     Cause.PORT_LOST: _bus(port_open=False),
     Cause.SERVO_ALERT: _bus(hardware_errors=_joint(0x20, 3, 0)),
     Cause.TRACKING: _bus(ticks=8, tracking_mm=_joint(-1.6, 4, 0.0)),
@@ -170,6 +180,7 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.TORQUE_ON: _bus(torque_problem="torque of up is not proven to be off: cut the servos' power"),
     Cause.SERVOS_WRONG: _events(ServoCheckReport(("id 4: model 1060 instead of 1020",))),
     Cause.CLOCK: lambda bench: bench.tick(after_s=1.03125),
+    Cause.SUPPLY_LOST: _bus(misses=(3,) * 7),
     Cause.SERVO_SILENT: _bus(misses=_joint(3, 2, 0)),
     Cause.BUS_NOISE: _bus(ticks=6, errors=1),
     Cause.BUS_DEAD: _mute(BusReport, 0.53125),
@@ -905,7 +916,17 @@ def test_after_a_stop_the_servos_must_be_checked_before_anything_moves(benches: 
 
 
 @pytest.mark.parametrize(
-    "cause", [Cause.SERVO_SILENT, Cause.BUS_DEAD, Cause.REBOOTED, Cause.TORQUE_TAKEN, Cause.WATCHDOG, Cause.CLOCK, Cause.PORT_LOST]
+    "cause",
+    [
+        Cause.SUPPLY_LOST,
+        Cause.SERVO_SILENT,
+        Cause.BUS_DEAD,
+        Cause.REBOOTED,
+        Cause.TORQUE_TAKEN,
+        Cause.WATCHDOG,
+        Cause.CLOCK,
+        Cause.PORT_LOST,
+    ],
 )
 def test_after_these_the_servos_must_be_checked_again(cause: Cause, benches: dict[Mode, Bench]) -> None:
     bench = benches[R].copy()
@@ -913,6 +934,27 @@ def test_after_these_the_servos_must_be_checked_again(cause: Cause, benches: dic
     bench.tick(Act.ACKNOWLEDGE)
     assert bench.tick().permitted is None
     assert bench.tick(ServoCheckReport()).permitted is Source.OPERATOR
+
+
+@pytest.mark.parametrize("servos_on", [True, False])
+def test_a_pressed_e_stop_must_be_released_and_then_acknowledged(servos_on: bool, benches: dict[Mode, Bench]) -> None:
+    bench = benches[V].copy()
+    if not servos_on:
+        bench.tick(ServoRequestBegun())
+    assert bench.tick(EstopReport(True)).latched == Fault(Cause.ESTOP_PRESSED)
+    decision = bench.tick(Act.ACKNOWLEDGE)  # a board that has fallen silent says nothing of the button: it is still pressed
+    assert decision.latched == Fault(Cause.ESTOP_PRESSED)
+    assert _refused(decision, Act.ACKNOWLEDGE) == {Cause.ESTOP_PRESSED}
+    assert Cause.ESTOP_PRESSED in _refused(bench.tick(Act.ARM), Act.ARM)
+    assert Cause.ESTOP_PRESSED in {fault.cause for fault in bench.tick(after_s=1.5).active}, "known after a gap of the clock, too"
+    decision = bench.tick(EstopReport(False))
+    assert decision.latched == Fault(Cause.ESTOP_PRESSED), "released: still to be acknowledged"
+    bench.run(1.1)
+    assert Hindrance.UNACKNOWLEDGED in _refused(bench.tick(Act.ARM), Act.ARM)
+    assert bench.tick(Act.ACKNOWLEDGE).latched is None
+    assert _refused(bench.tick(Act.ARM), Act.ARM) == {Hindrance.SERVOS_UNCHECKED}
+    bench.tick(ServoCheckReport())
+    assert bench.tick(Act.ARM).mode is R
 
 
 def test_a_servo_fault_while_driving_by_hand_is_latched_a_perception_fault_is_not(benches: dict[Mode, Bench]) -> None:

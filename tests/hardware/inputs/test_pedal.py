@@ -39,7 +39,13 @@ from tests.hardware.soft_pedal import SoftPedal
 ROOT = Path(__file__).resolve().parents[3]
 BENCH = ROOT / "docs" / "bench.md"
 CONFIG = PedalConfig(port="pedal")
-LINES = [PedalLine(number, down, stop) for number in range(32) for down in (False, True) for stop in (False, True)]
+ESTOP_LINE = b"PDDE@B\n"
+LINES = [
+    PedalLine(number, down, stop, estop)
+    for number in range(32)
+    for down in (False, True)
+    for stop, estop in ((False, False), (True, False), (False, True))
+]
 
 # --- lines -----------------------------------------------------------------------------------------------------------------------
 
@@ -49,8 +55,8 @@ def test_the_crc_is_the_well_known_one() -> None:
 
 
 def test_the_lines_of_the_document() -> None:
-    lines = [PedalLine(1, False, False), PedalLine(2, True, False), PedalLine(3, False, True)]
-    assert [line_bytes(line) for line in lines] == [b"PA--IE\n", b"PBD-F@\n", b"PC-SCN\n"]
+    lines = [PedalLine(1, False, False), PedalLine(2, True, False), PedalLine(3, False, True), PedalLine(4, True, False, True)]
+    assert [line_bytes(line) for line in lines] == [b"PA--IE\n", b"PBD-F@\n", b"PC-SCN\n", ESTOP_LINE]
     for line in lines:
         assert f"`{line_bytes(line).decode().strip()}`" in BENCH.read_text(encoding="utf-8")
 
@@ -81,7 +87,7 @@ def test_endless_garbage_is_told_at_once_and_once_and_kept_nowhere() -> None:
     assert parser.feed(b"x\n" + line_bytes(LINES[7])) == [LINES[7]]
 
 
-@pytest.mark.parametrize(("flips", "lines"), [(1, LINES), (2, LINES[::8]), (3, LINES[2:3])])
+@pytest.mark.parametrize(("flips", "lines"), [(1, LINES), (2, LINES[::9]), (3, LINES[1:2] + LINES[5:6])])
 def test_no_line_with_up_to_three_wrong_bits_is_taken_for_another(flips: int, lines: list[PedalLine]) -> None:
     after = line_bytes(PedalLine(9, False, False))
     for line in lines:
@@ -185,10 +191,10 @@ def test_a_press_counts_however_soon_a_foot_must_be_lifted_after_an_interruption
 
 def test_stop_counts_from_any_whole_report_and_from_nothing_else() -> None:
     watch = PedalFilter(CONFIG)
-    assert watch.update(PedalLine(7, False, True), 1.0) == PedalReport(None, True, 1.0)
+    assert watch.update(PedalLine(7, False, True), 1.0) == PedalReport(None, True, 1.0, False)
     assert watch.update(PedalLine(7, True, True), 1.02).stop  # stuck
     assert watch.update(PedalLine(20, False, True), 1.04, late=True).stop
-    assert watch.update(PedalLine(21, False, False), 1.06) == PedalReport(False, False, 1.06)
+    assert watch.update(PedalLine(21, False, False), 1.06) == PedalReport(False, False, 1.06, False)
     assert watch.update(None, 1.08) == PedalReport(None, False, 1.08)
     assert watch.silence(1.2) == PedalReport(None, False, 1.2)
 
@@ -215,6 +221,14 @@ def test_a_press_is_always_the_second_good_report_of_a_foot_that_was_seen_lifted
             assert first.down and second.down and second.number == (first.number + 1) % 32
             assert second_s - first_s <= CONFIG.silence_s
             assert any(line is not None and not line.down for line, _ in lines)
+
+
+def test_an_e_stop_counts_at_once_and_silence_says_nothing_of_it() -> None:
+    watch = PedalFilter(CONFIG)
+    assert watch.update(PedalLine(7, True, False, True), 1.0, late=True).estop is True
+    assert watch.update(None, 1.02).estop is None
+    assert watch.silence(1.2).estop is None
+    assert watch.update(PedalLine(9, True, False), 1.22).estop is False
 
 
 # --- the driver ------------------------------------------------------------------------------------------------------------------
@@ -292,6 +306,13 @@ def test_it_says_released_first_and_then_follows_the_foot(soft: SoftPedal, liste
     times = [report.time_s for report in listener.states]
     assert times == sorted(times)
     assert began_s <= times[-1] <= time.monotonic()
+
+
+@pytest.mark.real_time
+def test_an_e_stop_is_told_while_it_is_pressed(soft: SoftPedal, listener: PedalListener, pedal: Pedal) -> None:
+    reports = listener.since(soft.press_estop, lambda reports: bool(reports) and reports[-1].estop is True)
+    assert not any(report.stop for report in reports)
+    listener.since(soft.release_estop, lambda reports: bool(reports) and reports[-1].estop is False)
 
 
 @pytest.mark.real_time

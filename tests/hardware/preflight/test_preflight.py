@@ -576,6 +576,9 @@ def test_the_pedal_is_heard() -> None:
         pedal.press_stop()
         _bad(device_checks.check_pedal(config), "STOP is pressed", "release STOP")
         pedal.release_stop()
+        pedal.press_estop()
+        _bad(device_checks.check_pedal(config), "E-stop is pressed", "release the E-stop")
+        pedal.release_estop()
         pedal.mute()
         _bad(device_checks.check_pedal(config, listen_s=0.1), "is silent", "power")
 

@@ -494,6 +494,27 @@ def test_faults_end_the_motion(
     _settle_mm(servos)
 
 
+def test_an_e_stop_is_told_from_a_broken_cable_and_nothing_arms_before_power_is_back(
+    servos: SoftServoBus, armed: ServoRobot
+) -> None:
+    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
+    servos.brown_out(for_s=PATIENCE_S)
+    status = _drive(armed, until=lambda status: status.latched is not None)
+    assert status.latched.cause is Cause.SUPPLY_LOST
+    assert not status.armed
+    armed.acknowledge()
+    with pytest.raises(NotReady, match="release the E-stop or switch their supply on"):
+        armed.arm()
+    for joint in CONFIG.joints:
+        servos.modify_servo(joint.id, lambda servo: servo.brown_out(0.0))  # power is back: they start again
+    _seen(armed, lambda status: bool(status.servos) and all(isinstance(one, ServoState) for one in status.servos))
+    with pytest.raises(NotReady, match="not zeroed"):
+        armed.arm()
+    armed.acknowledge()
+    armed.zero()
+    armed.arm()
+
+
 def test_fault_29_another_master_switches_the_torque_off(servos: SoftServoBus, armed: ServoRobot) -> None:
     """No servo has restarted: the zeros hold, and the cause is named."""
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
