@@ -1,7 +1,7 @@
 """A software servo: answers, motion and force by its registers, protection, and its motor with current and heat.
 
-Figures are those of an XM430-W350 at 12 V, from its data sheet and performance graph where they have them (speed, stall current,
-torque, friction), and what a register does is that of the Robotis e-Manual.
+Speed, stall current and torque are those of the model (``core/config/servo_models.py``), friction is that of an XM430-W350 at 12 V;
+what a register does is as in the Robotis e-Manual.
 """
 
 from __future__ import annotations
@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from core.config.servo_models import SERVO_MODELS
+from core.config.servo_models import SERVO_MODELS, ServoModel
 from hardware.twin.servos.protocol import (
     ALERT,
-    BACKED_UP,
     CURRENT_POSITION,
     EEPROM,
     POSITION,
     POSITION_MODES,
     RAM_START,
-    STARTUP_SINCE,
     WATCHDOG_TRIPPED,
     ControlTable,
     ErrorCode,
@@ -26,14 +24,14 @@ from hardware.twin.servos.protocol import (
 )
 
 TICKS_PER_TURN = 4096
-MAX_TICKS_S = 46.0 / 60.0 * TICKS_PER_TURN
-"""No-load speed."""
-STALL_MA = 2300.0
-TORQUE_NM_PER_A = 1.78
-"""Stall torque over stall current; the slope of the performance graph is 1.79."""
+_XM430 = SERVO_MODELS[1020]
+MAX_TICKS_S = _XM430.no_load_rpm / 60.0 * TICKS_PER_TURN
+"""No-load speed of an XM430-W350."""
+STALL_MA = _XM430.stall_ma
 GEAR_FRICTION_MNM = 233.0
-"""Torque below which the gear holds without current: where the line of the performance graph (0.84 A at 0.60 N m, 2.45 A at 1.50)
-ends at no current. It is friction of motion, taken for that of standing still too."""
+"""Torque below which its gear holds without current: where the line of the performance graph (0.84 A at 0.60 N m, 2.45 A at 1.50)
+ends at no current. It is friction of motion, taken for that of standing still too; other models have the same share of their stall
+torque."""
 _STAND_MA, _FRICTION_MA = 8.0, 40.0
 _FULL_PWM = 885
 """Goal PWM(100) at the whole supply voltage."""
@@ -94,18 +92,21 @@ class ServoMotor:
     ----------
     load_mnm, wire : torque against the positive direction: constant, and of an elastic wire.
     gear_mnm : a load above this torque, beyond what the motor gives, turns the horn back.
+    stall_ma, mnm_per_ma, max_ticks_s : the model's figures, of its winding at the recommended supply.
     grinds_ma : additional current as of a damaged gear.
     carried_ticks_s : a speed forced from outside.
     """
 
-    def __init__(self, position: float, ambient_c: float = 25.0) -> None:
+    def __init__(self, position: float, ambient_c: float = 25.0, model: ServoModel = _XM430) -> None:
+        self.stall_ma, self.max_ticks_s = model.stall_ma, model.no_load_rpm / 60.0 * TICKS_PER_TURN
+        self.mnm_per_ma = 1000.0 * model.stall_nm / model.stall_ma
         self.position = self.trajectory = position
         self.velocity = self.horn_ticks_s = 0.0
         self.ambient_c = ambient_c
         self.temperature_c = ambient_c
         self.load_mnm = 0.0
         self.wire: ElasticWire | None = None
-        self.gear_mnm = GEAR_FRICTION_MNM
+        self.gear_mnm = GEAR_FRICTION_MNM * model.stall_nm / _XM430.stall_nm
         self.grinds_ma = self.carried_ticks_s = 0.0
         self.frozen = False
         self._overloaded_s = 0.0
@@ -113,7 +114,7 @@ class ServoMotor:
     def step(self, drive: MotorGoal, duration_s: float) -> None:
         """Advance time; motion is limited to 10 s of it."""
         self._warm(drive, duration_s)
-        strained = drive.torque and abs(self.current_ma(drive)) > _OVERLOAD_SHARE * STALL_MA
+        strained = drive.torque and abs(self.current_ma(drive)) > _OVERLOAD_SHARE * self.stall_ma
         self._overloaded_s = self._overloaded_s + duration_s if strained else 0.0
         if self.carried_ticks_s:
             self.position += self.carried_ticks_s * duration_s
@@ -147,13 +148,13 @@ class ServoMotor:
             and self.wire is None
             and self.position == self.trajectory
             and load_ma + _FRICTION_MA + abs(self.grinds_ma) <= drive.limit_ma
-            and min(drive.speed, MAX_TICKS_S) <= MAX_TICKS_S * (drive.duty - load_ma / STALL_MA)
+            and min(drive.speed, self.max_ticks_s) <= self.max_ticks_s * (drive.duty - load_ma / self.stall_ma)
         )
 
     def _load_ma(self) -> float:
         """Current that the load takes, signed."""
         wire_mnm = self.wire.torque_mnm(self.position) if self.wire is not None else 0.0
-        return (self.load_mnm + wire_mnm) / TORQUE_NM_PER_A
+        return (self.load_mnm + wire_mnm) / self.mnm_per_ma
 
     def _follow(self, drive: MotorGoal, part_s: float) -> None:
         """One step of the horn towards the trajectory as far as the current allows it, or back as far as the load turns it."""
@@ -165,25 +166,25 @@ class ServoMotor:
         limit_ma = drive.limit_ma if drive.torque else 0.0
         spare_ma = limit_ma - _FRICTION_MA - abs(self.grinds_ma) - way * load_ma
         if lag and spare_ma >= 0.0:
-            fastest = MAX_TICKS_S * max(0.0, drive.duty - max(0.0, way * load_ma) / STALL_MA)
+            fastest = self.max_ticks_s * max(0.0, drive.duty - max(0.0, way * load_ma) / self.stall_ma)
             move = min(abs(lag), fastest * part_s)
             if self.wire is not None and self.wire.sign == way:
                 slack = max(0.0, way * (self.wire.slack_ticks - self.position))
-                move = min(move, slack + spare_ma * TORQUE_NM_PER_A / self.wire.mnm_per_tick)
+                move = min(move, slack + spare_ma * self.mnm_per_ma / self.wire.mnm_per_tick)
             if move > _STANDS_TICKS:
                 self.position += way * move
                 self.horn_ticks_s = way * move / part_s
             return
         excess_ma = load_ma - max(-limit_ma, min(limit_ma, drive.gain_ma * lag))
-        beyond_ma = abs(excess_ma) - self.gear_mnm / TORQUE_NM_PER_A
+        beyond_ma = abs(excess_ma) - self.gear_mnm / self.mnm_per_ma
         if beyond_ma > 0.0:
-            self.horn_ticks_s = -math.copysign(min(1.0, beyond_ma / STALL_MA) * MAX_TICKS_S, excess_ma)
+            self.horn_ticks_s = -math.copysign(min(1.0, beyond_ma / self.stall_ma) * self.max_ticks_s, excess_ma)
             self.position += self.horn_ticks_s * part_s
 
     def _move(self, drive: MotorGoal, part_s: float) -> None:
         """One step along the profile, at the highest speed from which it can still brake in time."""
         way = drive.goal - self.trajectory
-        fastest = min(drive.speed, MAX_TICKS_S)
+        fastest = min(drive.speed, self.max_ticks_s)
         if drive.acceleration <= 0.0:
             self.velocity = math.copysign(min(fastest, abs(way) / part_s), way)
         else:
@@ -221,7 +222,7 @@ class ServoMotor:
         return self._overloaded_s > _OVERLOAD_S
 
     def _warm(self, drive: MotorGoal, duration_s: float) -> None:
-        end_c = self.ambient_c + _HEAT_C * (self.current_ma(drive) / STALL_MA) ** 2
+        end_c = self.ambient_c + _HEAT_C * (self.current_ma(drive) / self.stall_ma) ** 2
         self.temperature_c += (end_c - self.temperature_c) * -math.expm1(-duration_s / _HEAT_TIME_S)
 
 
@@ -268,17 +269,17 @@ class SoftServo:
 
     def __init__(self, servo_id: int, model: int, position: int, baud_code: int = 3) -> None:
         self.id = servo_id
-        kind = SERVO_MODELS[model]
-        self.table = ControlTable(kind.is_small)
+        self.model = kind = SERVO_MODELS[model]
+        self.table = ControlTable(kind)
         self.table["temperature_limit"] = round(kind.max_temperature_c)
         self.table["min_voltage_limit"] = round(10.0 * min(kind.supply_v[0], 0.8 * kind.recommended_v))
         self.table["max_voltage_limit"] = round(10.0 * max(kind.supply_v[1], 1.2 * kind.recommended_v))
         self.table["id"] = servo_id
         self.table["model_number"] = model
         self.table["baud_rate"] = baud_code
-        self.motor = ServoMotor(float(position))
+        self.motor = ServoMotor(float(position), model=kind)
         self.supply_v = self._nominal_v = kind.recommended_v
-        self._current_unit_ma = kind.current_unit_ma or STALL_MA / 1000.0  # else a load in 0.1 %
+        self._current_unit_ma = kind.current_unit_ma or kind.stall_ma / 1000.0  # else a load in 0.1 %
         self._grinds_ma, self._ripples = 0.0, False
         self._lost_turns = 0
         self._heard_s = 0.0
@@ -294,13 +295,25 @@ class SoftServo:
 
     @property
     def current_ma(self) -> float:
-        """Motor current, signed; what register 126 rounds."""
+        """Current of the motor's winding, signed."""
         return self.motor.current_ma(self._drive())
+
+    @property
+    def told_ma(self) -> float:
+        """The current that register 126 rounds: of the 330 size that of the supply, which is the winding's times the duty."""
+        current_ma = self.current_ma
+        return current_ma * min(1.0, self._duty(current_ma)) if self.model.is_small else current_ma
+
+    def _duty(self, current_ma: float) -> float:
+        """Share of the supply that the winding gets."""
+        motor = self.motor
+        share = abs(current_ma) / motor.stall_ma + abs(motor.horn_ticks_s) / motor.max_ticks_s
+        return share * self._nominal_v / max(self.supply_v, 1.0)
 
     @property
     def torque_mnm(self) -> float:
         """Torque of the motor at the horn, signed, its friction included; 0 without torque."""
-        return self.current_ma * TORQUE_NM_PER_A
+        return self.current_ma * self.motor.mnm_per_ma
 
     @property
     def is_booting(self) -> bool:
@@ -332,10 +345,10 @@ class SoftServo:
         table.reset_ram()
         for goal, limit in _OUTPUT_LIMITS:
             table[goal] = table[limit]
-        startup = table["startup"] if table["firmware"] >= STARTUP_SINCE else 0
+        startup = table["startup"] if table["firmware"] >= table.startup_since else 0
         table["backup_ready"] = int(self._backup is not None)
         if startup & _RAM_RESTORE and self._backup is not None:
-            for name in BACKED_UP:
+            for name in table.backed_up:
                 table[name] = self._backup[name]
         self.motor.stop()
         self.motor.step(MotorGoal(), 0.0)
@@ -352,7 +365,7 @@ class SoftServo:
 
     def backup(self) -> None:
         """Store the backup: the EEPROM, gains, profile and indirect addresses (instruction Control Table Backup)."""
-        self._backup = {name: self.table[name] for name in (*EEPROM, *BACKED_UP)}
+        self._backup = {name: self.table[name] for name in (*EEPROM, *self.table.backed_up)}
         self.table["backup_ready"] = 1
 
     def _forget_turns(self) -> None:
@@ -378,7 +391,7 @@ class SoftServo:
 
     def _store(self, parameters: bytes) -> StatusReply:
         """Store or restore the backup, which needs the torque off; a restored EEPROM restarts the servo."""
-        if self.table["firmware"] < STARTUP_SINCE:
+        if self.table["firmware"] < self.table.startup_since:
             return self._reply(ErrorCode.INSTRUCTION)
         restored = self._backup if parameters == _RESTORE else None
         if self.table["torque"] or (parameters != _STORE and restored is None):
@@ -439,25 +452,33 @@ class SoftServo:
 
     def _drive(self) -> MotorGoal:
         table, mode = self.table, self.table["operating_mode"]
-        halted = table["watchdog"] == WATCHDOG_TRIPPED or mode not in POSITION_MODES
+        # the small motor runs on
+        halted = (table["watchdog"] == WATCHDOG_TRIPPED and not self.model.is_small) or mode not in POSITION_MODES
         volts = self.supply_v / self._nominal_v
         duty = abs(table["goal_pwm"]) / _FULL_PWM * volts
         gain = table["position_p_gain"] / _P_GAIN_UNIT
         by_current = mode == CURRENT_POSITION
+        stall_ma, goal_ma = self.motor.stall_ma, abs(table["goal_current"]) * self._current_unit_ma
+        if (
+            self.model.is_small
+        ):  # it limits the current of the supply: the winding's times a duty that is its share of the stall current
+            goal_ma = math.sqrt(goal_ma * stall_ma * volts)
         return MotorGoal(
             torque=table["torque"] == 1,
             goal=round(self.motor.trajectory) if halted else table["goal_position"] + self._lost_turns * TICKS_PER_TURN,
             speed=(table["profile_velocity"] or table["velocity_limit"]) * _VELOCITY_TICKS_S,
             acceleration=table["profile_acceleration"] * _ACCELERATION_TICKS_S2,
-            limit_ma=min(duty * STALL_MA, abs(table["goal_current"]) * self._current_unit_ma if by_current else math.inf),
+            limit_ma=min(duty * stall_ma, goal_ma if by_current else math.inf),
             duty=duty,
-            gain_ma=gain * self._current_unit_ma if by_current else gain / _FULL_PWM * STALL_MA * volts,
+            gain_ma=gain * self._current_unit_ma if by_current else gain / _FULL_PWM * stall_ma * volts,
         )
 
     def _check_watchdog(self) -> None:
         limit = self.table["watchdog"]
         if self.table["torque"] and limit > 0 and self._now_s - self._heard_s > limit * _WATCHDOG_S:
             self.table["watchdog"] = WATCHDOG_TRIPPED
+            if self.model.is_small:
+                return
             self.motor.stop()
             self.table["goal_position"] = self._count(self.motor.position)
             self.table["profile_velocity"] = self.table["profile_acceleration"] = 0
@@ -508,14 +529,13 @@ class SoftServo:
     def _refresh(self) -> None:
         """Update the registers with the present values."""
         table, motor = self.table, self.motor
-        current_ma, limit = self.current_ma, abs(table["goal_pwm"])
-        pwm = round(_FULL_PWM * (current_ma / STALL_MA + motor.velocity / MAX_TICKS_S) * self._nominal_v / max(self.supply_v, 1.0))
+        limit, pwm = abs(table["goal_pwm"]), round(math.copysign(_FULL_PWM * self._duty(self.current_ma), self.current_ma))
         table["present_pwm"] = max(-limit, min(limit, pwm)) if table["torque"] else 0
         table["present_position"] = self._count(motor.position)
         table["position_trajectory"] = self._count(motor.trajectory)
         table["present_velocity"] = round(motor.horn_ticks_s / _VELOCITY_TICKS_S)
         table["velocity_trajectory"] = round(motor.velocity / _VELOCITY_TICKS_S)
-        table["present_current"] = round(current_ma / self._current_unit_ma)
+        table["present_current"] = round(self.told_ma / self._current_unit_ma)
         table["moving"] = int(motor.horn_ticks_s != 0.0)
         table["temperature"] = round(motor.temperature_c)
         table["voltage"] = round(10.0 * self.supply_v)

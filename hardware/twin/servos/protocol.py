@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from core.config.servo_models import SERVO_MODELS, ServoModel
+
 HEADER = b"\xff\xff\xfd"
 BROADCAST = 0xFE
 MAX_ID = 252
@@ -161,9 +163,11 @@ WATCHDOG_TRIPPED = -1
 POSITION, EXTENDED_POSITION, CURRENT_POSITION = 3, 4, 5
 POSITION_MODES = frozenset({POSITION, EXTENDED_POSITION, CURRENT_POSITION})
 """Operating modes that follow Goal Position(116); the last two count 256 turns in both directions."""
+CURRENT_MODES = frozenset({0, CURRENT_POSITION})
+"""Operating modes that need a goal current."""
 RAM_START = 64
-WATCHDOG_SINCE, STARTUP_SINCE = 38, 45
-"""Firmware of the X430 and X540 from which there are a bus watchdog, and a startup configuration with backup."""
+WATCHDOG_SINCE, STARTUP_SINCE, SMALL_STARTUP_SINCE = 38, 45, 46
+"""Firmware of the X430 and X540 from which there are a bus watchdog, and a startup configuration with backup; that of the X330."""
 MAX_TICKS = 256 * 4096 - 1
 
 
@@ -171,7 +175,7 @@ MAX_TICKS = 256 * 4096 - 1
 class Register:
     """``eeprom`` registers are locked while the torque is on. ``low`` and ``high`` limit written values; None: read-only.
 
-    ``limit`` names the register whose value the amount must not exceed; ``since`` is the firmware that has the register.
+    ``limit`` names the register whose value the amount must not exceed; ``since`` is the firmware of the X430 that has it.
     """
 
     name: str
@@ -245,13 +249,11 @@ _REGISTERS = (
     ),
 )
 BY_NAME = {register.name: register for register in _REGISTERS}
-_BY_ADDRESS = {register.address: register for register in _REGISTERS}
 EEPROM = tuple(register.name for register in _REGISTERS if register.eeprom)
-BACKED_UP = (
+_BACKED_UP = (
     "velocity_i_gain", "velocity_p_gain", "position_d_gain", "position_i_gain", "position_p_gain", "feedforward_2nd",
-    "feedforward_1st", "profile_acceleration", "profile_velocity", *(f"indirect_address_{n + 1}" for n in range(INDIRECT_COUNT)),
+    "feedforward_1st", "profile_acceleration", "profile_velocity",
 )  # fmt: skip
-"""What a backup holds of the RAM."""
 GOALS = frozenset({"goal_pwm", "goal_current", "goal_velocity", "goal_position"})
 _SIGNED = {register.name for register in _REGISTERS if register.low is not None and register.low < 0} | {
     "watchdog", "present_pwm", "present_current", "present_velocity", "present_position", "velocity_trajectory",
@@ -262,14 +264,29 @@ _SIGNED = {register.name for register in _REGISTERS if register.low is not None 
 class ControlTable:
     """One servo's registers. Values go in and out as signed numbers by name, or as bytes over the line.
 
-    `is_small`: a servo of the 330 size, whose indirect data lie behind 20 addresses instead of 28.
+    A model of the 330 size has its indirect data behind 20 addresses instead of 28; one that reports a load has neither goal
+    current nor the modes that use it.
+
+    Attributes
+    ----------
+    backed_up : what a backup holds of the RAM.
+    startup_since : firmware from which there is a startup configuration with backup.
     """
 
-    def __init__(self, is_small: bool = False) -> None:
-        self._data, self._count = (SMALL_INDIRECT_DATA, SMALL_INDIRECT_COUNT) if is_small else (INDIRECT_DATA, INDIRECT_COUNT)
+    def __init__(self, model: ServoModel = SERVO_MODELS[1020]) -> None:
+        self._data, self._count = (SMALL_INDIRECT_DATA, SMALL_INDIRECT_COUNT) if model.is_small else (INDIRECT_DATA, INDIRECT_COUNT)
+        self._has_current_mode = model.has_current_mode
+        self.startup_since = SMALL_STARTUP_SINCE if model.is_small else STARTUP_SINCE
+        self._since = {WATCHDOG_SINCE: model.watchdog_firmware, STARTUP_SINCE: self.startup_since}
+        absent = set() if model.has_current_mode else {"current_limit", "goal_current"}
+        addresses = [f"indirect_address_{n + 1}" for n in range(INDIRECT_COUNT)]
+        absent.update(addresses[self._count :])
+        self._registers = [register for register in _REGISTERS if register.name not in absent]
+        self._by_address = {register.address: register for register in self._registers}
+        self.backed_up = (*_BACKED_UP, *addresses[: self._count])
         self._bytes = bytearray(SIZE)
-        for register in _REGISTERS:
-            self[register.name] = register.initial
+        for register in self._registers:
+            self.reset(register.name)
 
     def __getitem__(self, name: str) -> int:
         register = BY_NAME[name]
@@ -284,13 +301,15 @@ class ControlTable:
 
     def reset(self, name: str) -> None:
         """Set a register to its initial value."""
-        self[name] = BY_NAME[name].initial
+        register = BY_NAME[name]
+        points_at = self._data + (register.address - INDIRECT_ADDRESS) // 2
+        self[name] = points_at if name.startswith("indirect_address") else register.initial
 
     def reset_ram(self) -> None:
         """Set the RAM as after power-up; the EEPROM stays."""
-        for register in _REGISTERS:
+        for register in self._registers:
             if not register.eeprom:
-                self[register.name] = register.initial
+                self.reset(register.name)
         self._bytes[self._data : self._data + self._count] = bytes(self._count)
 
     def read(self, address: int, length: int) -> tuple[ErrorCode, bytes]:
@@ -312,7 +331,7 @@ class ControlTable:
 
         Indirect data take a byte as long as their indirect address is their own; what it would do elsewhere is refused.
         """
-        if INDIRECT_DATA <= address and data and address + len(data) <= INDIRECT_DATA + INDIRECT_COUNT:
+        if self._data <= address and data and address + len(data) <= self._data + self._count:
             if any(self._resolved(at) != at for at in range(address, address + len(data))):
                 return ErrorCode.ACCESS, []
             self._bytes[address : address + len(data)] = data
@@ -320,7 +339,7 @@ class ControlTable:
         values: list[tuple[Register, int]] = []
         at = 0
         while at < len(data):
-            register = _BY_ADDRESS.get(address + at)
+            register = self._by_address.get(address + at)
             if register is None:
                 return ErrorCode.ACCESS, []
             part = data[at : at + register.size]
@@ -342,11 +361,13 @@ class ControlTable:
             register.low is None
             or register.high is None
             or (register.eeprom and self["torque"])
-            or self["firmware"] < register.since
+            or self["firmware"] < self._since.get(register.since, 0)
         ):
             return ErrorCode.ACCESS, 0
         value = int.from_bytes(part, "little", signed=register.low < 0)
         if register.name in GOALS and self["watchdog"] == WATCHDOG_TRIPPED:
+            return ErrorCode.DATA_RANGE, 0
+        if register.name == "operating_mode" and value in CURRENT_MODES and not self._has_current_mode:
             return ErrorCode.DATA_RANGE, 0
         if not register.low <= value <= register.high:
             return ErrorCode.DATA_RANGE, 0

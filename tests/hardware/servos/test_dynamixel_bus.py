@@ -1270,12 +1270,12 @@ def test_small_and_strong_servos_work_together(mixed: tuple[SoftServoBus, ServoB
 
 def test_currents_of_several_models_are_told_in_their_units(mixed: tuple[SoftServoBus, ServoBus]) -> None:
     twin, bus = mixed
-    for servo_id in (1, 5):
-        twin.modify_servo(servo_id, lambda servo: servo.grind(100.0))
+    twin.modify_servo(1, lambda servo: servo.grind(1000.0))  # in the winding: 1008 mA, of 1470 mA at stall
+    twin.modify_servo(5, lambda servo: servo.grind(100.0))
     small, strong = (_until(bus, index, lambda r: isinstance(r, ServoState) and (r.current_ma or 0.0) > 90.0) for index in (0, 4))
     assert isinstance(small, ServoState)
     assert isinstance(strong, ServoState)
-    assert small.current_ma == pytest.approx(108.0, abs=1.0)
+    assert small.current_ma == pytest.approx(1008.0**2 / 1470.0, abs=1.0), "of the supply"
     assert strong.current_ma == pytest.approx(108.0, abs=3.0)
 
 

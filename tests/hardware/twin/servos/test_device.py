@@ -9,6 +9,7 @@ import pytest
 from dynamixel_sdk import COMM_SUCCESS, PortHandler, Protocol2PacketHandler
 
 from core.config.safety import ServosConfig
+from core.config.servo_models import SERVO_MODELS, ServoModel
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.device import GEAR_FRICTION_MNM, STALL_MA, ElasticWire, SoftServo
 
@@ -77,7 +78,7 @@ def test_in_mode_5_no_block_draws_more_than_the_goal_current(blocked: str, goal:
     _write(servo, 116, goal, 4)
     _run(servo, 4.0, each=lambda: currents.append(abs(servo.current_ma)))
     assert max(currents) == pytest.approx(74 * 2.69)
-    assert abs(servo.torque_mnm) == pytest.approx(74 * 2.69 * 1.78)
+    assert abs(servo.torque_mnm) == pytest.approx(74 * 2.69 * 4100 / 2300)
     assert servo.table["torque"] == 1
     assert abs(servo.table["present_position"] - goal) > 1000
 
@@ -188,6 +189,47 @@ def test_forces_of_a_joint_in_newtons() -> None:
     assert bus.motor_n(2) == pytest.approx(464.0 + 10.0 + 0.008 * 1780 / RADIUS_MM, abs=2.0)
 
 
+@pytest.mark.parametrize("model", [1060, 1070, 1080, 1090, 1160])
+def test_models_that_report_a_load_have_no_goal_current(model: int) -> None:
+    servo = SoftServo(1, model, 100)
+    assert [_write(servo, 11, mode, 1) for mode in (0, 5)] == [RANGE] * 2
+    assert [_write(servo, register, 100, 2) for register in (38, 102)] == [ACCESS] * 2
+    for address, value, size in ((11, 4, 1), (100, 300, 2), (64, 1, 1), (116, 3000, 4)):
+        assert _write(servo, address, value, size) == 0
+    servo.freeze(True)
+    _run(servo, 0.9)
+    kind = SERVO_MODELS[model]
+    assert servo.torque_mnm == pytest.approx(1000.0 * kind.stall_nm * 300 / 885)
+    assert servo.table["present_current"] == pytest.approx(1000 * 300 / 885, abs=1)
+
+
+@pytest.mark.parametrize(
+    "model", [model for model in SERVO_MODELS.values() if model.has_current_mode], ids=lambda model: model.name
+)
+def test_the_goal_current_of_every_model_means_the_torque_of_the_table(model: ServoModel) -> None:
+    """Those of the 330 size limit and tell the current of their supply."""
+    units = round(0.1 * model.stall_ma / model.current_unit_ma)
+    servo = SoftServo(1, model.number, 100)
+    for address, value, size in ((11, 5, 1), (102, units, 2), (64, 1, 1), (116, 9000, 4)):
+        assert _write(servo, address, value, size) == 0
+    servo.freeze(True)
+    _run(servo, 0.5)
+    assert servo.table["present_current"] == pytest.approx(units, abs=1)
+    assert servo.torque_mnm == pytest.approx(1000.0 * model.torque_nm(units * model.current_unit_ma))
+
+
+def test_the_small_motor_runs_on_when_its_watchdog_trips() -> None:
+    servo = SoftServo(1, 1200, 100)
+    for address, value, size in ((11, 4, 1), (112, 50, 4), (64, 1, 1), (98, 10, 1), (116, 4000, 4)):
+        assert _write(servo, address, value, size) == 0
+    _run(servo, 0.5)
+    at = servo.table["present_position"]
+    assert servo.table["watchdog"] == -1
+    assert _write(servo, 116, 100, 4) == RANGE
+    _run(servo, 0.5)
+    assert servo.table["present_position"] > at + 100
+
+
 # --- restart ---------------------------------------------------------------------------------------------------------------------
 
 
@@ -214,7 +256,21 @@ def test_a_restart_brings_back_what_the_startup_configuration_says(startup: int)
     assert table["torque"] == startup % 2
     assert (table["indirect_address_1"], table["profile_velocity"]) == ((132, 90) if startup >= 2 else (224, 0))
     assert (table["led"], servo.answer(2, 250, 1).data) == (0, b"\0")
-    assert servo.answer(2, 120, 2).data < (500).to_bytes(2, "little")
+    assert table["tick_ms"] < 500
+
+
+def test_the_small_size_restores_its_20_addresses_and_no_datum() -> None:
+    servo = SoftServo(1, 1200, 100)
+    addresses = b"".join(number.to_bytes(2, "little") for number in (208, 132))
+    assert servo.answer(WRITE, 168, data=addresses).error == 0
+    assert _write(servo, 208, 9, 1) == 0
+    assert servo.answer(2, 208, 2).data == b"\x09" + (100).to_bytes(1, "little")
+    servo.backup()
+    servo.table["startup"] = 2
+    servo.restart(silent_s=0.0)
+    assert servo.answer(2, 168, 4).data == addresses
+    assert servo.answer(2, 208, 2).data == b"\0" + (100).to_bytes(1, "little")
+    assert _write(servo, 210, 5, 2) == 0, "two data, not the 22nd address"
 
 
 def test_without_a_backup_nothing_is_restored() -> None:
