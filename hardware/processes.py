@@ -60,6 +60,10 @@ def _program(folder: Path) -> str:
     return f"{name} {script}" if name.startswith("python") and script else name
 
 
+_LEFT: list[subprocess.Popen[bytes]] = []
+"""Children that go on by themselves."""
+
+
 class DeviceProcess:
     """``python -m module``, which loads at once and waits for its first message: it may be started before it is needed.
 
@@ -154,8 +158,13 @@ class DeviceProcess:
         self._process.wait()
         return not self._has_message
 
+    def leave(self) -> None:
+        """After ``request_end``: it goes on without us."""
+        _LEFT.append(self._process)
+
     def release(self) -> None:
         """Give socket and memory back, after the end."""
+        _LEFT[:] = [one for one in _LEFT if one.poll() is None]  # no zombie stays of those that have ended since
         self.socket.close()
         if self._memory is not None:
             self._memory.close()

@@ -35,7 +35,8 @@ Sample = tuple[float, tuple[float, ...]]
 class StrikeOutcome:
     """``stop_ms`` until the last servo stood still for good, ``steps`` the longest way of a servo in its own bounded steps.
 
-    ``before_mm`` is how far the fastest servo went in the 100 ms before; ``bus_gone`` whether the bus process ended without us.
+    ``before_mm`` is how far the fastest servo went in the 100 ms before; ``bus_gone`` whether the bus process ended without us: one
+    that has lost its application goes on, and watches the servos, which hold.
     The strike itself fell within ``blur_ms``: times count from its beginning, ways from its end.
     """
 
@@ -101,8 +102,8 @@ def strike(servos: SoftServoBus, victim: str, number: signal.Signals, delay_s: f
         time.sleep(_WATCH_S)
         samples = recorder.end()
         gone = _gone(bus_pid, 0.0)
-        if not gone and victim != "application":
-            os.kill(bus_pid, signal.SIGKILL)  # a stopped process does not end by itself
+        if not gone:
+            os.kill(bus_pid, signal.SIGKILL)  # a stopped process does not end by itself, and one that watches only after minutes
     joints = ServosConfig().joints
     after = [sample for sample in samples if sample[0] >= hit_s]
     end_mm = after[-1][1]

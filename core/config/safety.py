@@ -127,6 +127,8 @@ _MOST = {"heartbeat_timeout_s": 0.5, "watchdog_s": 0.5, "max_current_ma": 1500.0
 2300 mA. A joint that is 3 mm from its goal has left it by more than any step that may be ordered."""
 _MIN_BUS_HZ = 20.0
 """Floor with real servos: two cycles pass within the 100 ms of the rules."""
+_LEAST_UNATTENDED_S = 10.0
+"""Floor of ``unattended_s`` with real servos: the program can be started again before the wires are relaxed."""
 _MOST_TENDON_STEP_MM, _MOST_FEED_STEP_MM = 1.0, 2.0
 """Ceilings of ``max_step_mm`` with real servos: so far a joint goes when the program dies."""
 
@@ -159,6 +161,12 @@ class ServosConfig(ConfigSection):
         description="a servo that draws more for half a second is stopped; small ones (XL330, XC330) stall at 1500 to 1800",
     )
     tracking_error_mm: float = Field(1.5, gt=0.0, le=50.0, description="distance of goal and measured position that counts as jam")
+    unattended_s: float = Field(
+        300.0,
+        ge=0.0,
+        le=86_400.0,
+        description="servos that hold without the program are watched for so long, then relaxed and switched off; 0: they hold on",
+    )
     torque_off_on_stop: bool = Field(False, description="also switch the torque off at STOP; it releases the tension of the wires")
     joints: tuple[JointConfig, ...] = Field(
         (
@@ -205,6 +213,8 @@ class ServosConfig(ConfigSection):
             limit = _MOST_TENDON_STEP_MM if joint.name in TENDONS else _MOST_FEED_STEP_MM
             if joint.max_step_mm > limit:
                 return f"joint {joint.name}: max_step_mm must be {limit:g} at most with real servos"
+        if self.unattended_s < _LEAST_UNATTENDED_S:
+            return f"unattended_s must be {_LEAST_UNATTENDED_S:g} at least with real servos"
         return "" if self.bus_hz >= _MIN_BUS_HZ else f"bus_hz must be {_MIN_BUS_HZ:g} at least with real servos"
 
     @model_validator(mode="after")

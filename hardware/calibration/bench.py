@@ -82,7 +82,8 @@ class CalibrationBench:
         """`servos` on this bench's port; raises DeviceError when the rig has no servos."""
         if self.port is None:
             raise DeviceError("this rig has no servo port: choose one, or leave the servos out")
-        return servos.model_copy(update={"port": self.port})
+        ends_with_us = {"unattended_s": 0.0} if self.kind is RigKind.SIM else {}
+        return servos.model_copy(update={"port": self.port, **ends_with_us})
 
     def board_picture(self, spec: BoardSpec) -> Image:
         """A picture in which the printed board is looked for, as the lens sees it. In the twin it lies elsewhere in every picture.

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
 
 from core.config.safety import TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusMonitor, BusReport
@@ -95,6 +97,10 @@ class ReleaseRamp:
         longest_mm = max(at for at, joint in zip(from_mm, joints, strict=True) if joint.name in TENDONS)
         self._end_s = now_s + max(0.0, longest_mm) / speed_mm_s + _RELEASE_EXTRA_S
 
+    def is_over(self, now_s: float) -> bool:
+        """Whether its time is over, wherever the joints are."""
+        return now_s > self._end_s
+
     def goals(self, at_mm: Sequence[float], now_s: float) -> tuple[float | None, ...] | None:
         """The goals now, None for a joint that keeps its own; None altogether when it is over.
 
@@ -103,13 +109,81 @@ class ReleaseRamp:
         at_mm : measured positions.
         """
         tight = [at > _SLACK_MM for at, joint in zip(at_mm, self._joints, strict=True) if joint.name in TENDONS]
-        if now_s > self._end_s or not any(tight):
+        if self.is_over(now_s) or not any(tight):
             return None
         gone_mm = self._speed_mm_s * max(0.0, now_s - self._start_s)
         return tuple(
             min(at, max(0.0, start - gone_mm, at - joint.max_step_mm)) if joint.name in TENDONS and at > 0.0 else None
             for at, start, joint in zip(at_mm, self._from_mm, self._joints, strict=True)
         )
+
+
+class Attention(Enum):
+    """What is done for servos that hold while the application is silent or gone."""
+
+    REST = "rest"
+    """Nothing: the servos' own watchdogs trip, which any packet would keep from it."""
+    LOOK = "look"
+    """They are read once."""
+    RELAX = "relax"
+    """They are let go slowly, then switched off."""
+
+
+LINGER_S = 0.2
+"""After disarming for silence the servos are polled for so long, to see that they hold."""
+_TRIPPED_S = 0.5
+"""So long after the servos' watchdogs should have tripped they are looked at for the first time."""
+_LOOK_EVERY_S = 1.0
+_STRAINED_LOOKS = 3
+"""A current that is too high at so many looks in a row is no peak."""
+
+
+@dataclass(frozen=True, slots=True)
+class UnattendedWatch:
+    """Heat, supply, current and errors of servos that hold without an application, from look to look. Pure.
+
+    Attributes
+    ----------
+    looked_s : when, last.
+    strained : by joint, at how many looks in a row the current was too high.
+    problem : why they must not hold on, "" for nothing.
+    """
+
+    looked_s: float = -math.inf
+    strained: tuple[int, ...] = ()
+    problem: str = ""
+
+    def next(self, silent_s: float, now_s: float, servos: ServosConfig) -> Attention:
+        """What is to be done now; `silent_s` is since the application's last sign of life."""
+        if silent_s <= servos.heartbeat_timeout_s + LINGER_S + servos.watchdog_s + _TRIPPED_S:
+            return Attention.REST
+        if self.problem or silent_s >= servos.unattended_s:
+            return Attention.RELAX
+        return Attention.LOOK if now_s - self.looked_s >= _LOOK_EVERY_S else Attention.REST
+
+    def update(self, readings: Sequence[ServoReading], now_s: float, servos: ServosConfig) -> UnattendedWatch:
+        """The state after a look. A servo that does not answer keeps what was known; NaN counts as too much."""
+        before = self.strained or (0,) * len(servos.joints)
+        strained, problem = [], ""
+        for joint, reading, count in zip(servos.joints, readings, before, strict=True):
+            if not isinstance(reading, ServoState):
+                strained.append(count)
+                continue
+            ma = abs(reading.current_ma) if reading.current_ma is not None else 0.0
+            strained.append(0 if ma <= servos.max_current_ma else count + 1)
+            if reading.torque and not problem:
+                problem = _against_holding(joint, reading, strained[-1], servos)
+        return UnattendedWatch(now_s, tuple(strained), problem)
+
+
+def _against_holding(joint: JointConfig, state: ServoState, strained: int, servos: ServosConfig) -> str:
+    if not state.temperature_c < servos.hottest_c(joint):
+        return f"{joint.name} {state.temperature_c:.0f} °C"
+    if not state.voltage_v > servos.lowest_v(joint):
+        return f"{joint.name} {state.voltage_v:.1f} V"
+    if state.error:
+        return f"{joint.name} reports an error ({int(state.error):#04x})"
+    return f"{joint.name} draws too much current" if strained >= _STRAINED_LOOKS else ""
 
 
 def report_of(readings: Sequence[ServoReading], *, armed: bool, errors: int, rebooted: bool = False) -> BusReport:

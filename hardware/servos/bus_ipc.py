@@ -14,6 +14,7 @@ import os
 import pickle
 import select
 import signal
+import socket
 import struct
 import threading
 import time
@@ -40,9 +41,14 @@ _SLOTS = (64, 64, 65_536)
 """Bytes of an order, a heartbeat and a status in the shared memory."""
 _MEMORY_BYTES = sum(map(SharedSlot.size, _SLOTS))
 _STOP = b"S"
+_STAYS = "stays"
+"""Key of the message that the process goes on without the application."""
 _PIPE_BYTES = 65_536
 END_S = 5.0
 """Longer than a requested torque-off is tried at the end."""
+_END_CHECK_S = 0.02
+_SUCCESSION_S = 2.0
+"""A bus process that only watches gives its port to a new one within this time."""
 
 
 class BusPhase(StrEnum):
@@ -224,7 +230,7 @@ class BusClient:
         self._lock, self._requesting = threading.Lock(), threading.Lock()
         self._request_id = 0
         self._fatal = ""
-        self._closed = False
+        self._closed = self._stays = False
         self._newest: tuple[int, BusStatus] | None = None
         self._process, memory = DeviceProcess.claim(prestarted, start_bus, _MEMORY_BYTES)
         self._order, self._heartbeat, self._status = SharedSlot.row(memory, _SLOTS)
@@ -307,6 +313,7 @@ class BusClient:
         while (left_s := until - time.monotonic()) > 0.0:
             if (answer := self._process.receive(left_s)) is not None:
                 self._fatal = answer.get("fatal", self._fatal)
+                self._stays = answer.get(_STAYS, self._stays)
                 if answer.get("id") == number:
                     return answer["error"]  # type: ignore[no-any-return]
         raise BusProcessLost(message("the servo bus process did not answer within {a:g} s: connect the robot again", a=timeout_s))
@@ -316,16 +323,29 @@ class BusClient:
         for _ in range(2):
             with contextlib.suppress(OSError, ValueError):
                 while data := self._process.socket.recv(MESSAGE_BYTES):
-                    self._fatal = json.loads(data).get("fatal", self._fatal)
+                    said = json.loads(data)
+                    self._fatal = said.get("fatal", self._fatal)
+                    self._stays = said.get(_STAYS, self._stays)
 
     def close(self, patience_s: float = END_S) -> None:
-        """Let the process hold the servos and end; kill it when it does not in so long. May be called twice."""
+        """Let the process hold the servos and end; kill it when it does not in so long. May be called twice.
+
+        Servos that pull are not left alone: their process stays, watches them, and lets them go when ``unattended_s`` is over. The
+        next one gets the port from it.
+        """
         with self._lock:
             if self._closed:
                 return
             self._closed = True
             self._process.request_end()
-        if not self._process.await_end(patience_s):
+        until_s = time.monotonic() + patience_s
+        while not self._stays and time.monotonic() < until_s and not self._process.wait(_END_CHECK_S):
+            if self._requesting.acquire(blocking=False):  # else the thread that waits for an answer reads it
+                self._read_fatal()
+                self._requesting.release()
+        if self._stays:
+            self._process.leave()
+        elif not self._process.await_end(0.0):
             _log.error("the servo bus process did not end and was killed: the servos hold by their own watchdogs")
         with self._requesting:
             known = self._fatal
@@ -334,6 +354,58 @@ class BusClient:
                 _log.error(self._fatal)
             with self._lock:
                 self._process.release()
+
+
+class PortSuccession:
+    """How a bus process that only watches gives its port to the next one: a socket that is named after the port."""
+
+    def __init__(self, port: str) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._heir: socket.socket | None = None
+        with contextlib.suppress(
+            OSError
+        ):  # the name of a pseudo-terminal that is gone may be in use: then the watch just ends in time
+            self._socket.bind(_succession(port))
+            self._socket.listen(1)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Whether another process of the same user asks for the port; waits for one so long."""
+        until_s = time.monotonic() + timeout_s
+        ready, _, _ = select.select([self._socket], [], [], max(0.0, timeout_s))
+        try:
+            heir, _ = self._socket.accept() if ready else (None, None)
+        except OSError:  # the name was not to be had
+            heir = None
+        if heir is None:
+            time.sleep(max(0.0, until_s - time.monotonic()))
+            return False
+        _, user, _ = struct.unpack("3i", heir.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i")))
+        if user != os.getuid():
+            heir.close()
+            return False
+        self._heir = heir
+        return True
+
+    def close(self) -> None:
+        """The port is free, or the watch is over: the other process is told by the end of the connection."""
+        for one in (self._socket, self._heir):
+            if one is not None:
+                one.close()
+
+
+def _succession(port: str) -> str:
+    return f"\0lumenpilot servos {os.path.realpath(port)}"
+
+
+def ask_for_port(port: str) -> bool:
+    """Ask a bus process that only watches for its port, and wait until it is free; False when there is no such process."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
+        asking.settimeout(_SUCCESSION_S)
+        try:
+            asking.connect(_succession(port))
+            return asking.recv(1) == b""
+        except OSError:
+            return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -393,6 +465,10 @@ class BusServer(ParentLink):
     def answer(self, request: Request, error: Exception | None) -> None:
         """Tell how a request ended."""
         self.send({"id": request.id, "error": None if error is None else [type(error).__name__, str(error)]})
+
+    def send_stay(self) -> None:
+        """Tell that this process goes on without the application."""
+        self.send({"id": 0, _STAYS: True})
 
     def send_fatal(self, text: str) -> None:
         """Tell why this process ends."""

@@ -6,7 +6,9 @@ The application starts it (``bus_ipc.start_bus``) as ``python -m hardware.servos
 - An order is good for 100 ms and for one bounded step. Heartbeats that stop for ``heartbeat_timeout_s`` disarm; then the process
   falls silent, so that the servos' own watchdogs trip as a second layer. When the application wakes up, it finds the cause latched.
 - STOP has a pipe of its own, which is also read between any two transactions of opening, zeroing, arming and restarting.
-  When the application is gone, that pipe ends: the servos hold, and the process ends.
+- When the application is gone, that pipe ends, and the servos hold. Servos that pull are not left alone: once their watchdogs have
+  tripped they are read every second; when ``unattended_s`` is over, or one is too hot, they are let go slowly, then switched off,
+  and the process ends. The next one gets the port from it. The same is done for an application that is silent for so long.
 - The process itself stopped or killed: each servo ends at its last goal, within one step; then its watchdog trips.
 """
 
@@ -28,10 +30,28 @@ from pathlib import Path
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
 from core.messages import message
-from hardware.servos.bus_guard import RELAX_MM_S, RELEASE_MM_S, RELEASED, BusGuard, ReleaseRamp
-from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, Request
+from hardware.servos.bus_guard import (
+    LINGER_S,
+    RELAX_MM_S,
+    RELEASE_MM_S,
+    RELEASED,
+    Attention,
+    BusGuard,
+    ReleaseRamp,
+    UnattendedWatch,
+)
+from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, PortSuccession, Request, ask_for_port
 from hardware.servos.dynamixel_bus import ServoBus
-from hardware.servos.dynamixel_port import LATE_S, NotReady, PortError, PortLost, ServoError, StoppedMeanwhile, TorqueStillOn
+from hardware.servos.dynamixel_port import (
+    LATE_S,
+    NotReady,
+    PortError,
+    PortLost,
+    PortTaken,
+    ServoError,
+    StoppedMeanwhile,
+    TorqueStillOn,
+)
 from hardware.servos.registers import MissingServo, ServoReading, ServoState
 
 _log = logging.getLogger(__name__)
@@ -46,8 +66,8 @@ class BusTorqueRelease:
     ``problem`` says why it is not confirmed yet; ``confirmed`` counts how often all servos have confirmed.
     """
 
-    def __init__(self, bus: ServoBus, guard: BusGuard) -> None:
-        self._bus, self._guard = bus, guard
+    def __init__(self, bus: ServoBus, guard: BusGuard, port: str | None) -> None:
+        self._bus, self._guard, self._port = bus, guard, port
         self.is_requested = False
         self.problem = ""
         self.confirmed = 0
@@ -75,7 +95,7 @@ class BusTorqueRelease:
         """On a port whose bus cannot be opened: one missing servo is no reason for six to go on pulling."""
         if self.is_requested:
             with contextlib.suppress(PortError, PortLost):
-                self._try(self._bus.let_go)
+                _with_port(self._port, lambda: self._try(self._bus.let_go))
 
     def _try(self, switch_off: Callable[[], None]) -> None:
         try:
@@ -96,6 +116,16 @@ class BusTorqueRelease:
             detail = first.detail.removesuffix(self.problem).strip()
             self._guard.latched = replace(first, detail=f"{detail} {problem}".strip())
         self.problem = problem
+
+
+def _with_port(port: str | None, action: Callable[[], None]) -> None:
+    """Do it; a bus process that only watches, without an application, gives the port away for it."""
+    try:
+        action()
+    except PortTaken:
+        if port is None or not ask_for_port(port):
+            raise
+        action()
 
 
 class CycleTimer:
@@ -125,8 +155,6 @@ def _percentiles(values: Sequence[float]) -> tuple[float, float]:
     return ordered[len(ordered) // 2], ordered[min(len(ordered) - 1, int(0.99 * len(ordered)))]
 
 
-_LINGER_S = 0.2
-"""After disarming for silence the servos are polled for so long, to see that they hold."""
 _REOPEN_S = 1.0
 """Between two tries to open a lost port."""
 _SAME_STOP_S = 0.5
@@ -140,6 +168,10 @@ _WAITS_FOR_RAMP = frozenset({"zero", "arm", "reboot"})
 _INTERRUPTED_BY_STOP = frozenset({"open", "zero", "arm", "reboot"})
 """Requests that end at a STOP; the others hold the servos or release them, and are finished first."""
 _TRIES_ON_REQUEST, _TRIES_AT_END = 4, 15
+_LOST_ALONE_S = 10.0
+"""Without an application a lost port is waited for so long."""
+_OFF_ALONE_S = 30.0
+"""And so long it is tried to prove that the torque is off."""
 
 
 class BusLoop:
@@ -148,7 +180,7 @@ class BusLoop:
     def __init__(self, server: BusServer, bus: ServoBus, servos: ServosConfig, safety: SafetyConfig) -> None:
         self._server, self._bus, self._servos = server, bus, servos
         self._guard = BusGuard(servos, safety, time.monotonic())
-        self._release = BusTorqueRelease(bus, self._guard)
+        self._release = BusTorqueRelease(bus, self._guard, servos.port)
         self._period_s = 1.0 / servos.bus_hz
         self._timer = CycleTimer(round(_WINDOW_S * servos.bus_hz))
         self._cycle = 0
@@ -158,6 +190,10 @@ class BusLoop:
         self._ramp: ReleaseRamp | None = None
         self._is_off_after_ramp = False
         self._ended = self._quiet = self._lost = False
+        self._watch = UnattendedWatch()
+        self._is_let_go = False
+        self._succession: PortSuccession | None = None
+        self._give_up_s = math.inf
         self._reopen_at_s = 0.0
         self._open_problem = ""
         self._stop_s = -math.inf
@@ -191,6 +227,8 @@ class BusLoop:
                 self._release_at_end()
             finally:
                 self._bus.close()
+                if self._succession is not None:
+                    self._succession.close()
 
     def _release_at_end(self) -> None:
         """A STOP that was not read yet, and a torque-off that is not confirmed: after this process they are lost."""
@@ -210,15 +248,62 @@ class BusLoop:
         """Handle STOP and requests at once, until the next cycle is due."""
         while not self._ended:
             left_s = due_s - time.monotonic()
+            if self._succession is not None:
+                self._ended = self._succession.wait(left_s)
+                return
             in_pipe, requests = self._server.wait(left_s)
             stop = in_pipe and self._server.read_stop()
             if stop:
                 self._handle_stop()
             if requests and (request := self._server.read_request()) is not None:
                 self._handle_request(request, after_stop=stop)
-            self._ended = self._ended or self._server.is_alone
+            if self._server.is_alone and not self._ended:
+                self._go_on_alone()
             if left_s <= 0.0:
                 return
+
+    def _go_on_alone(self) -> None:
+        """The application is gone: hold. Servos that pull are watched; without any there is nothing left to do."""
+        if self._bus.is_open and self._guard.armed:
+            self._guard_port(lambda: self._end_motion(Fault(Cause.HEARTBEAT_LOST, "the application ended")))
+        if self._servos.unattended_s <= 0.0 or self._release.is_requested or not self._bus.is_open:
+            self._ended = True
+            return
+        self._guard_port(self._look)
+        self._ended = not self._bus.is_open or self._is_slack()
+        if not self._ended and self._servos.port is not None:
+            self._succession = PortSuccession(self._servos.port)
+            self._server.send_stay()
+            _log.warning(
+                "the servos hold and are watched for %.0f s, then relaxed and switched off; the program started again takes over",
+                self._servos.unattended_s,
+            )
+
+    def _look(self) -> None:
+        self._read()
+        self._watch = self._watch.update(self._readings, time.monotonic(), self._servos)
+
+    def _is_slack(self) -> bool:
+        """Whether all servos tell that their torque is off."""
+        return all(isinstance(reading, ServoState) and not reading.torque for reading in self._readings)
+
+    def _attend(self, silent_s: float) -> None:
+        """One cycle of a bus whose application is silent or gone."""
+        now_s = time.monotonic()
+        if not self._is_let_go and self._servos.unattended_s > 0.0 and self._bus.is_open:
+            attention = self._watch.next(silent_s, now_s, self._servos)
+            if attention is not Attention.REST:
+                self._guard_port(self._look)
+                if self._bus.is_open and self._is_slack():
+                    self._is_let_go = True
+                elif self._bus.is_open and attention is Attention.RELAX:
+                    self._is_let_go, self._give_up_s = True, now_s + _OFF_ALONE_S
+                    why = self._watch.problem or f"no program for {silent_s:.0f} s"
+                    _log.warning("the servos are relaxed and switched off: %s", why)
+                    self._let_go_slowly(RELAX_MM_S, then_off=True)
+        is_busy = self._ramp is not None or self._release.is_requested
+        if self._succession is not None and self._is_let_go and not is_busy:
+            self._ended = True
 
     def _handle_stop(self) -> None:
         if self._latch_stop():
@@ -260,7 +345,7 @@ class BusLoop:
         self._cycle += 1
         silence_s = self._guard.silence_s(self._server.heartbeat(), started_s)
         is_settled = not self._guard.armed and not self._release.is_requested and self._ramp is None
-        self._quiet = is_settled and silence_s > self._servos.heartbeat_timeout_s + _LINGER_S
+        self._quiet = is_settled and silence_s > self._servos.heartbeat_timeout_s + LINGER_S
         self._readings = ()
         if self._bus.is_open and not self._quiet:
             with contextlib.suppress(StoppedMeanwhile), self._bus.interruptible(self._check_stop):
@@ -268,6 +353,12 @@ class BusLoop:
             self._finish_stop()
         elif self._lost and started_s >= self._reopen_at_s:
             self._reopen(started_s)
+        if self._quiet:
+            self._attend(silence_s)
+        elif silence_s <= self._servos.heartbeat_timeout_s:
+            self._watch, self._is_let_go = UnattendedWatch(), False
+        if self._succession is not None and started_s > self._give_up_s:
+            self._ended = True
         self._publish(time.monotonic())
         self._timer.add(started_s, time.monotonic())
 
@@ -308,7 +399,8 @@ class BusLoop:
         """Let the tendons go a little further; in the end all servos hold where they are, or the torque goes off."""
         at_mm = [r.position_mm for r in self._readings if isinstance(r, ServoState) and r.position_mm is not None]
         if len(at_mm) < len(self._servos.joints):
-            if not any(isinstance(r, MissingServo) and not r.restarted for r in self._readings):
+            is_silent = any(isinstance(r, MissingServo) and not r.restarted for r in self._readings)
+            if not is_silent or ramp.is_over(time.monotonic()):
                 self._end_ramp()
             return
         goals_mm = ramp.goals(at_mm, time.monotonic())
@@ -379,6 +471,8 @@ class BusLoop:
             self._release.request()
         self._readings = ()
         self._lost, self._open_problem = True, ""
+        if self._succession is not None:
+            self._give_up_s = min(self._give_up_s, time.monotonic() + _LOST_ALONE_S)
         self._reopen_at_s = time.monotonic() + _REOPEN_S
 
     def _reopen(self, now_s: float) -> None:
@@ -392,7 +486,8 @@ class BusLoop:
 
     def _open(self) -> None:
         if not self._bus.is_open:
-            self._bus.open()
+            _with_port(self._servos.port, self._bus.open)
+            self._give_up_s = math.inf
             self._corrupt = self._bus.counts.corrupt
             self._lost = False
             self._open_problem = ""

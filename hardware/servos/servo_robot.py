@@ -20,10 +20,12 @@ from core.types import Command, RobotStatus
 from hardware.processes import DeviceProcess
 from hardware.servos.bus_guard import report_of
 from hardware.servos.bus_ipc import END_S, BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, IssuedGoals
-from hardware.servos.dynamixel_port import BusProcessLost, NotReady, ServoError
+from hardware.servos.dynamixel_port import BusProcessLost, NotReady, ServoError, TorqueStillOn
 from hardware.servos.registers import ServoReading, ServoState, wire_force_mn
 
 _OPEN_S, _ARM_S, _REQUEST_S, _TORQUE_OFF_S = 20.0, 10.0, 5.0, 10.0
+_RELAX_S, _LOOK_S = 15.0, 0.05
+"""Longer than letting go slowly takes; and between two looks whether it is done."""
 _HUNG_S = 0.2
 """For the end of a bus process that has just left a request unanswered."""
 
@@ -35,7 +37,7 @@ class ServoRobot:
     ----------
     servos, safety : the configuration; ``servos.port`` must be set.
     name : shown to the operator.
-    truth : tells the status instead of the servos, where the robot is simulated.
+    truth : tells the status instead of the servos, where the robot is simulated; its servos are not watched when the program ends.
     kept_zero : of the rig file; arming without a zero then says whether the servos have lost their turns since.
     process : a bus process that was started ahead, for the first connection.
     backups : folder that keeps the servos' EEPROM as it was before it is changed; None for software servos.
@@ -59,7 +61,8 @@ class ServoRobot:
         process: DeviceProcess | None = None,
         backups: Path | None = None,
     ) -> None:
-        self._servos, self._safety = servos, safety
+        self._servos = servos if truth is None else servos.model_copy(update={"unattended_s": 0.0})
+        self._safety = safety
         self._name = name
         self._truth, self._kept_zero = truth, kept_zero
         self._lock, self._releasing = threading.Lock(), threading.Lock()
@@ -146,6 +149,26 @@ class ServoRobot:
     def reboot(self, servo_id: int) -> None:
         """Restart a servo, which clears its hardware error; its joint must be zeroed again."""
         self._connected().request("reboot", _REQUEST_S, servo_id=servo_id)
+
+    def relax(self) -> None:
+        """Let the tension off slowly, then switch all torque off; waits for both, some seconds.
+
+        Raises NotReady: STOP came meanwhile, and the wires are as they were then; TorqueStillOn.
+        """
+        client = self._connected()
+        before = self.bus_status()
+        known = before.torque_offs if before is not None else 0
+        client.request("relax", _REQUEST_S)
+        until_s = time.monotonic() + _RELAX_S
+        while time.monotonic() < until_s:
+            status = self._connected().status()
+            if status is not None and status.torque_offs > known:
+                return
+            if status is not None and status.phase is BusPhase.STOPPED and not status.releasing and not status.torque_problem:
+                raise NotReady("stopped meanwhile: the wires are as they were then")
+            self._beat_unsupervised()
+            time.sleep(_LOOK_S)
+        raise TorqueStillOn("the wires were not let go in time: cut the servos' power")
 
     def torque_off(self) -> None:
         """Disarm and switch all torque off, which releases the tension of the wires.

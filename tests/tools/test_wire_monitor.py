@@ -110,7 +110,8 @@ def bus() -> Iterator[MonitoredBus]:
 
 @pytest.mark.real_time
 def test_a_real_motion_is_monitored_and_safe(bus: MonitoredBus) -> None:
-    robot = ServoRobot(SERVOS.model_copy(update={"port": bus.port, "watchdog_s": 2.5, "heartbeat_timeout_s": 3.0}), SafetyConfig())
+    patient = {"watchdog_s": 2.5, "heartbeat_timeout_s": 3.0, "unattended_s": 0.0}
+    robot = ServoRobot(SERVOS.model_copy(update={"port": bus.port, **patient}), SafetyConfig())
     robot.connect()
     try:
         robot.zero()

@@ -26,7 +26,7 @@ from hardware.twin.servos.protocol import Instruction, InstructionPacket
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_behind")]
 
-CONFIG, SAFETY = ServosConfig(), SafetyConfig()
+CONFIG, SAFETY = ServosConfig(unattended_s=0.0), SafetyConfig()  # no process stays behind to watch the servos
 LIMITS = ProbeLimits(-2.0, 2.0)
 
 

@@ -15,7 +15,7 @@ from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import Rejection, RejectReason, Source
 from core.types import Command
-from hardware.servos.bus_guard import RELEASE_MM_S, BusGuard, OneStep, ReleaseRamp
+from hardware.servos.bus_guard import RELEASE_MM_S, Attention, BusGuard, OneStep, ReleaseRamp, UnattendedWatch
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
 from hardware.servos.dynamixel_port import NotReady
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
@@ -484,3 +484,60 @@ def test_a_hold_is_everybodys(bench: Bench) -> None:
     bench.order = BusOrder(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
     bench.cycle()
     assert bench.reason is RejectReason.WRONG_SOURCE
+
+
+# --- servos that hold without an application -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("silent_s", "looked_ago_s", "problem", "attention"),
+    [
+        (0.1, 99.0, "", Attention.REST),
+        (1.39, 99.0, "hot", Attention.REST),  # 0.5 s heartbeat, 0.2 s polled, 0.2 s watchdog, 0.5 s more: they must trip first
+        (1.41, 99.0, "", Attention.LOOK),
+        (1.41, 0.9, "", Attention.REST),
+        (1.41, 1.0, "", Attention.LOOK),
+        (1.41, 0.1, "right 71 °C", Attention.RELAX),
+        (299.9, 0.5, "", Attention.REST),
+        (300.0, 0.5, "", Attention.RELAX),
+    ],
+)
+def test_servos_without_an_application_rest_until_their_watchdogs_have_tripped_then_are_looked_at_and_then_relaxed(
+    silent_s: float, looked_ago_s: float, problem: str, attention: Attention
+) -> None:
+    assert UnattendedWatch(100.0 - looked_ago_s, (), problem).next(silent_s, 100.0, SERVOS) is attention
+
+
+def _held(**changes: object) -> ServoState:
+    joint = SERVOS.joints[0]
+    state = ServoState(joint.name, joint.id, 100.0, 0, 0, 0.3, 0.3, 0.0, 8.0, 12.0, 30.0, HardwareError(0), True, True)
+    return replace(state, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({}, ""),
+        ({"temperature_c": 69.0}, ""),
+        ({"temperature_c": 70.0}, "right 70 °C"),
+        ({"temperature_c": math.nan}, "right nan °C"),
+        ({"temperature_c": 90.0, "torque": False}, ""),
+        ({"voltage_v": 10.4}, "right 10.4 V"),
+        ({"error": HardwareError(4)}, "right reports an error (0x04)"),
+        ({"current_ma": -900.0}, ""),
+        ({"current_ma": None}, ""),
+    ],
+)
+def test_what_a_look_finds(changes: dict[str, object], problem: str) -> None:
+    others = [MissingServo(joint.name, joint.id, 100.0, 1, "no answer") for joint in SERVOS.joints[1:]]
+    assert UnattendedWatch().update([_held(**changes), *others], 100.0, SERVOS) == UnattendedWatch(
+        100.0, (int("current_ma" in changes and changes["current_ma"] is not None),) + (0,) * 6, problem
+    )
+
+
+def test_a_current_that_is_too_high_at_three_looks_in_a_row_is_no_peak() -> None:
+    others = [MissingServo(joint.name, joint.id, 100.0, 1, "no answer") for joint in SERVOS.joints[1:]]
+    watch = UnattendedWatch()
+    for ma, problem in ((700, ""), (700, ""), (20, ""), (700, ""), (700, ""), (700, "right draws too much current")):
+        watch = watch.update([_held(current_ma=float(ma)), *others], 100.0, SERVOS)
+        assert watch.problem == problem

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -106,6 +107,9 @@ class PaperEnd:
 
     def send_fatal(self, text: str) -> None:
         self.words.append(text)
+
+    def send_stay(self) -> None:
+        self.words.append("stays")
 
     def answer(self, request: Request, error: ServoError | None) -> None:
         self.answers.append((request.what, error))
@@ -334,6 +338,40 @@ def test_servos_that_hold_and_are_too_hot_are_relaxed_once_and_again_when_it_get
     _follow(paper, 60)
     assert paper.bus.told[-2].startswith("slacken to 0.0")
     assert "torque off" not in paper.bus.told
+
+
+@pytest.mark.parametrize("loses", ["nothing", "torque"])
+def test_without_an_application_only_servos_that_pull_are_watched(
+    paper: Paper, monkeypatch: pytest.MonkeyPatch, loses: str
+) -> None:
+    class PaperSuccession:
+        def __init__(self, port: str) -> None:
+            paper.bus.told.append("watches")
+
+        def wait(self, timeout_s: float) -> bool:
+            paper.now_s += max(0.0, timeout_s)
+            return False
+
+        def close(self) -> None:
+            paper.bus.told.append("leaves")
+
+    monkeypatch.setattr(bus_process, "PortSuccession", PaperSuccession)
+    paper.loop._servos = paper.loop._servos.model_copy(update={"port": "/dev/none", "unattended_s": 60.0})
+    paper.reads(tendon_mm=2.0)
+    if loses == "torque":
+        states = tuple(replace(state, torque=False) for state in paper.bus.read())  # type: ignore[type-var]
+        paper.bus.read = lambda: states  # type: ignore[method-assign,assignment,return-value]
+    paper.end.is_alone = True
+    begun_s = paper.now_s
+    paper.loop.run()
+    told = [one for one in paper.bus.told if not one.startswith("slacken")]
+    if loses == "torque":
+        assert told == ["close"]
+    else:
+        assert told[:1] == ["watches"]
+        assert told[-3:] == ["torque off", "close", "leaves"]
+        assert 60.0 <= paper.now_s - begun_s <= 70.0
+    assert ("stays" in paper.end.words) is (loses == "nothing")
 
 
 def test_the_first_cause_stays_when_the_torque_cannot_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:

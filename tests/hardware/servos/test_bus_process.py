@@ -36,7 +36,8 @@ pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_b
 
 ROOT = Path(__file__).resolve().parents[3]
 # Watchdog and heartbeat are patient, so that a machine that stalls does not trip them; what is about them says so.
-CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0), SafetyConfig()
+# So that no process stays behind, servos that hold are not watched; what is about that says so, too.
+CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0, unattended_s=0.0), SafetyConfig()
 FORWARD = Command(advance_mm_s=5.0)
 PATIENCE_S = 10.0
 STRAIN_MA = 700.0
@@ -737,7 +738,7 @@ def test_fault_32_killed_or_stopped_every_servo_stops_in_time_and_within_one_ste
     assert outcome.stop_ms <= 1000.0 * BOUND_S
     assert outcome.steps <= BOUND_STEPS
     if number is signal.SIGKILL:
-        assert outcome.bus_gone
+        assert outcome.bus_gone is (victim == "bus process"), "it goes on, and watches the servos that hold"
 
 
 def test_an_application_that_forgets_to_close_leaves_nothing_behind(servos: SoftServoBus) -> None:
@@ -745,7 +746,8 @@ def test_an_application_that_forgets_to_close_leaves_nothing_behind(servos: Soft
     program = (
         "import os, sys, time\nfrom core.config.safety import SafetyConfig\nfrom core.config.safety import ServosConfig\n"
         "from hardware.servos.servo_robot import ServoRobot\n"
-        "robot = ServoRobot(ServosConfig(port=sys.argv[1]), SafetyConfig())\nrobot.connect()\nrobot.zero()\nrobot.arm()\n"
+        "robot = ServoRobot(ServosConfig(port=sys.argv[1], unattended_s=0.0), SafetyConfig())\n"
+        "robot.connect()\nrobot.zero()\nrobot.arm()\n"
         "child = os.fork()\nif child == 0:\n    time.sleep(30)\n    os._exit(0)\n"
         "print(robot._client.pid, child, flush=True)\nos._exit(0)\n"
     )
@@ -766,6 +768,160 @@ def _lives(pid: int) -> bool:
     with contextlib.suppress(psutil.NoSuchProcess):
         return bool(psutil.Process(pid).status() != psutil.STATUS_ZOMBIE)
     return False
+
+
+# --- servos that hold when the application is gone or silent ---------------------------------------------------------------------
+
+
+WATCHED: dict[str, Any] = {"watchdog_s": 0.3, "heartbeat_timeout_s": 0.3}
+BENDS = """
+import sys, time
+from core.config.safety import SafetyConfig, ServosConfig
+from core.types import Command
+from hardware.servos.servo_robot import ServoRobot
+
+servos = ServosConfig(port=sys.argv[1], unattended_s=float(sys.argv[2]), watchdog_s=0.3, heartbeat_timeout_s=0.3)
+robot = ServoRobot(servos, SafetyConfig())
+robot.connect()
+robot.zero()
+robot.arm()
+until_s = time.monotonic() + 20.0
+while time.monotonic() < until_s and (robot.bus_status().servos[0].position_mm or 0.0) < 1.8:
+    robot.send(Command(bend=0.8))
+    time.sleep(0.02)
+print(robot._client.pid, flush=True)
+time.sleep(60.0)
+"""
+
+
+@contextlib.contextmanager
+def _bent(servos: SoftServoBus, unattended_s: float) -> Iterator[tuple[int, int]]:
+    """An application that holds the robot bent: its process id, and that of its bus process, which is gone afterwards."""
+    run = subprocess.Popen(
+        [sys.executable, "-c", BENDS, servos.port, str(unattended_s)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    assert run.stdout is not None
+    bus_pid = int(run.stdout.readline())
+    try:
+        yield run.pid, bus_pid
+    finally:
+        run.kill()
+        run.wait()
+        run.stdout.close()
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(bus_pid, signal.SIGKILL)
+
+
+def _fall_mm(servos: SoftServoBus, until: Callable[[], bool]) -> tuple[float, float]:
+    """The longest way of the right tendon (mm), and the longest pause (s), between two looks until something is so."""
+    fall_mm = pause_s = 0.0
+    at_mm, at_s, end_s = servos.positions_mm()[0], time.monotonic(), time.monotonic() + PATIENCE_S
+    while not until() and time.monotonic() < end_s:
+        time.sleep(0.005)
+        now_mm, now_s = servos.positions_mm()[0], time.monotonic()
+        fall_mm, pause_s = max(fall_mm, at_mm - now_mm), max(pause_s, now_s - at_s)
+        at_mm, at_s = now_mm, now_s
+    assert until()
+    return fall_mm, pause_s
+
+
+def test_servos_of_a_dead_application_hold_are_watched_and_then_relaxed_and_switched_off(servos: SoftServoBus) -> None:
+    """All seven pulled on for ever, and not a packet was sent any more."""
+    with _bent(servos, 4.0) as (pid, bus_pid):
+        os.kill(pid, signal.SIGKILL)
+        at_mm = servos.positions_mm()[0]
+        time.sleep(2.5)
+        assert _torques(servos) == [1] * 7
+        assert servos.positions_mm()[0] == pytest.approx(at_mm, abs=0.05)
+        assert [servos.servo(joint.id).table["watchdog"] for joint in CONFIG.joints] == [-1] * 7
+        assert _lives(bus_pid)
+        heard = len(servos.log)
+        _wait_for(lambda: len(servos.log) > heard)  # it looks at them
+        fall_mm, pause_s = _fall_mm(servos, lambda: _torques(servos) == [0] * 7)
+        assert fall_mm <= 1.5 * pause_s + 0.3, "no snap"
+        assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
+        _wait_for(lambda: not _lives(bus_pid))
+        assert not _lives(bus_pid)
+
+
+def test_a_servo_that_gets_hot_meanwhile_is_relaxed_at_once(servos: SoftServoBus) -> None:
+    with _bent(servos, 600.0) as (pid, bus_pid):
+        os.kill(pid, signal.SIGKILL)
+        time.sleep(2.0)
+        servos.modify_servo(2, lambda servo: servo.heat(72.0))
+        _wait_for(lambda: not _lives(bus_pid))
+        assert _torques(servos) == [0] * 7
+        assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
+
+
+def test_an_application_that_is_silent_for_so_long_finds_the_servos_switched_off(servos: SoftServoBus) -> None:
+    robot = _robot(servos, unattended_s=2.5, **WATCHED)
+    robot.connect()
+    try:
+        robot.zero()
+        robot.arm()
+        _bend(robot)
+        _wait_for(lambda: _torques(servos) == [0] * 7)
+        assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
+        status = _drive(robot, 0.2)
+        assert status.phase is BusPhase.DISARMED
+        assert status.latched.cause is Cause.HEARTBEAT_LOST
+        robot.acknowledge()
+        robot.arm()
+        assert _torques(servos) == [1] * 7
+    finally:
+        robot.torque_off()
+        robot.close()
+
+
+def test_a_closed_robot_that_holds_is_watched_and_the_next_one_takes_over(servos: SoftServoBus) -> None:
+    robot = _robot(servos, unattended_s=600.0, **WATCHED)
+    robot.connect()
+    robot.zero()
+    robot.arm()
+    _bend(robot)
+    watcher = robot._client.pid
+    robot.close()
+    at_mm = servos.positions_mm()[0]
+    assert _lives(watcher)
+    servos.log.clear()
+    following = _robot(servos, unattended_s=600.0, **WATCHED)
+    following.connect()
+    try:
+        assert not _lives(watcher)
+        assert _torques(servos) == [1] * 7
+        assert servos.positions_mm()[0] == pytest.approx(at_mm, abs=0.05)
+        assert not any(packet.parameters[:3] == b"\x40\x00\x00" for packet in servos.log), "no torque went off meanwhile"
+    finally:
+        following.torque_off()
+        following.close()
+    assert psutil.Process().children() == [], "with the torque off there is nothing to watch"
+
+
+def test_a_watched_port_is_not_given_away_while_an_application_drives(servos: SoftServoBus, armed: ServoRobot) -> None:
+    with pytest.raises(PortTaken):
+        _robot(servos).connect()
+    assert _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0).armed
+
+
+def test_wires_are_relaxed_slowly_and_let_go_on_request(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _bend(armed)
+    begun_s, from_mm = time.monotonic(), servos.positions_mm()[0]
+    armed.relax()
+    assert time.monotonic() - begun_s > 0.9 * from_mm, "1 mm/s"
+    assert _torques(servos) == [0] * 7
+    assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
+
+
+def test_stop_while_wires_are_relaxed_is_told(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _bend(armed)
+    stopper = threading.Timer(0.5, armed.stop)
+    stopper.start()
+    with pytest.raises(NotReady, match="stopped meanwhile"):
+        armed.relax()
+    stopper.join()
+    assert servos.positions_mm()[0] > 0.5
+    assert _torques(servos) == [1] * 7
 
 
 # --- the link by itself, and the rig ---------------------------------------------------------------------------------------------
