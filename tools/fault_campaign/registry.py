@@ -112,8 +112,9 @@ FAULTS = {
     28: FaultText("wrong id, model, mode",
         "a servo with another model number; one with another id inside; one whose mode is altered while it stands by",
         "named; the rig does not open, or the servos cannot be switched on: nothing to arm", quick=False),
-    29: FaultText("two programs on one port", "a second program opens the port while the first one drives",
-        "the second is refused by name; the first drives on", quick=False),
+    29: FaultText("two programs on one port", "a second program opens the port while the first one drives; on another bench it "
+        "is on the line all the same, and switches the torque off",
+        "the second is refused by name; the first drives on; torque off: DISARM by its own cause, the zeros hold", quick=False),
     30: FaultText("GUI hangs",
         "a slot of the window sleeps for 0.8 s: no sign of life, and the deadman that it reports is silent, too",
         "HOLD by the silent deadman within 100 ms, DISARM after 500 ms"),

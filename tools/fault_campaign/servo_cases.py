@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -11,6 +12,7 @@ from core.control.alerts import Note
 from core.control.faults import Cause
 from core.control.modes import Act, Mode
 from hardware.servos.bus_ipc import BusPhase, BusStatus
+from hardware.servos.dynamixel_bus import TORQUE
 from hardware.servos.dynamixel_port import WrongServo
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.bus import SoftServoBus
@@ -268,6 +270,19 @@ def _refusal(kit: Kit, register: str, value: int) -> str:
 
 @fault(29)
 def two_programs(kit: Kit) -> Observation:
+    def take_torque(bench: FaultBench) -> list[str]:
+        bench.bus.write_by_other(TORQUE, b"\0")
+        problems = _await_end(bench, Mode.ADVISORY)
+        return problems + check((all(_status(bench).zeroed), "a zero is lost, though no servo has restarted"))
+
+    return run_parts(
+        kit,
+        ("opened", _open_twice),
+        ("torque switched off", partial(_run, inject=take_torque, expected=_expect(_DISARM, Cause.TORQUE_TAKEN))),
+    )
+
+
+def _open_twice(kit: Kit) -> Observation:
     with open_bench(kit, live=True) as bench:
         bench.hand_over().mark()
         with start_child("open", bench.bus.port) as process:
@@ -279,6 +294,7 @@ def two_programs(kit: Kit) -> Observation:
         )
         seen = judge(bench, ExpectedReaction((), alternatives=((Mode.HOLD,),), may_hold=True), *problems)
         message = str(answer.get("message", "")).replace(bench.bus.port, "PORT")
+        message = re.sub(r"another program, .*?:", "another program, PROGRAM:", message)
         return replace(seen, reaction=f"refused: {message}; the first one goes on")
 
 
