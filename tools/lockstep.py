@@ -109,6 +109,10 @@ class LockStepServos:
     def reboot(self, servo_id: int) -> None:
         """Nothing to do."""
 
+    def relax(self) -> None:
+        """At once."""
+        self.torque_off()
+
     def torque_off(self) -> None:
         self._guard.disarm()
         self._torque, self._torque_off_done = False, True

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,13 +17,14 @@ from app.commands.progress import Interrupt, progress_bar
 from app.operator.rig_engine import EngineMaker
 from core.config.models import Config, sessions_folder
 from core.config.rig_file import as_calibrated
+from core.config.safety import AtClose
 from core.devices import DeviceError, EndOfStream
 from core.perception.model_file import check_model
 from core.perception.pipeline import configured_bench
 from core.session.files import check_parent
 from core.session.manifest import SessionError, about_rig, event_of_alert
 from core.session.writer import SessionWriter
-from hardware.rig import rig_config
+from hardware.rig import RigKind, rig_config
 
 if TYPE_CHECKING:
     from app.operator.rig_engine import RigEngine
@@ -63,7 +65,11 @@ def record(
         try:
             is_whole = writer.close() if writer is not None else True
         finally:
-            engine.close()
+            try:
+                if kind is RigKind.LIVE:
+                    leave_servos(engine, config.servos.at_close, print_line=lambda text: sys.stderr.write(f"{text}\n"))
+            finally:
+                engine.close()
     status = writer.status()
     kept = f"; what was written is in {status.folder}" if status.folder else ""
     if status.problem:
@@ -89,6 +95,46 @@ def record(
         sys.stdout.write(json.dumps(result) + "\n")
     else:
         _print(result, config)
+
+
+_RELEASED_WITHIN_S = 20.0
+"""Longer than letting the wires go slowly, and proving that the torque is off, take."""
+_KEYS: dict[str, AtClose] = {"": "hold", "h": "hold", "r": "relax", "o": "torque off"}
+
+
+def leave_servos(engine: RigEngine, how: AtClose, print_line: Callable[[str], object]) -> None:
+    """What becomes of servos that hold: asked in a terminal where the rig says "ask"; without one they hold, and are watched."""
+    pilot, status = engine.pilot, engine.bus_status()
+    if pilot is None or status is None or not status.pulls:
+        return
+    if how == "ask":
+        how = _ask_in_terminal(print_line) if sys.stdin is not None and sys.stdin.isatty() else "hold"
+    if how == "hold":
+        return
+    print_line("the wires are let out, then the torque goes off" if how == "relax" else "the torque goes off")
+    if not (pilot.relax() if how == "relax" else pilot.torque_off()):
+        print_line("the servos are busy: they hold")
+        return
+    until_s = time.monotonic() + _RELEASED_WITHIN_S
+    with Interrupt() as interrupt:
+        while time.monotonic() < until_s and not interrupt.asked:
+            if (status := engine.bus_status()) is None or not status.pulls:
+                return
+            pilot.window_alive()
+            time.sleep(_STEP_S)
+    print_line("the torque is not proven to be off: cut the servos' power")
+
+
+def _ask_in_terminal(print_line: Callable[[str], object]) -> AtClose:
+    """What the person at the terminal wants; Enter, Ctrl-C and its end mean "hold"."""
+    while True:
+        print_line("The servos hold the wires: h = hold (watched, then relaxed), r = relax slowly, o = torque off at once [h]")
+        try:
+            answer = input().strip().lower()[:1]
+        except (EOFError, KeyboardInterrupt):
+            return "hold"
+        if answer in _KEYS:
+            return _KEYS[answer]
 
 
 @dataclass(slots=True)

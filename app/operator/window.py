@@ -12,6 +12,7 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QComboBox, QLineEdit
 
 from app.operator.engine_thread import EnginePhase
+from app.operator.leaving import LeavingQuestion
 from app.operator.manual_drive import DriveController
 from app.operator.panels import OperatorPanels
 from app.operator.recording import Recorder
@@ -107,6 +108,8 @@ class OperatorWindow(WindowFrame):
         self.setCentralWidget(self.panels)  # before event filters are installed: this makes hundreds of events
         self.recorder = Recorder(self.rig, self)
         self.controls = DriveController(self, self.rig, self.panels, self.recorder)
+        self.leaving = LeavingQuestion(self, self.rig, self.say)
+        self.leaving.done.connect(self.close)
         self.tour = TourOverlay(self.panels, kept_clear=(self.panels.mode_bar.stop, self.panels.alerts))
         self._add_menus()
         self._twin = TwinMenuController(self, self.rig, self.panels, self.say) if self.panels.picker is not None else None
@@ -378,6 +381,9 @@ class OperatorWindow(WindowFrame):
             self.clear_target()
 
     # ---- the end
+
+    def _may_close(self) -> bool:
+        return self.leaving.may_close()
 
     def _let_go(self) -> None:
         self.rig.shut()

@@ -171,7 +171,7 @@ class WindowFrame(QMainWindow):
         return ()
 
 
-_ENDS = "is_asked_to_end"
+_ENDS, _MAY_ASK = "is_asked_to_end", "may_be_asked"
 _SWITCH_S = 0.001
 """How long a thread may keep the interpreter while another waits: at Python's 5 ms the window stood still for 198 to 221 ms, so for
 125 to 158 (alternating runs on a busy machine)."""
@@ -199,9 +199,13 @@ def make_application(look: WindowConfig | None = None) -> QApplication:
     return application
 
 
-def close_all(application: QApplication) -> None:
-    """Close all windows because the program is asked to end: they ask no questions that only results depend on."""
+def close_all(application: QApplication, *, may_ask: bool = False) -> None:
+    """Close all windows because the program is asked to end: they ask no questions that only results depend on.
+
+    `may_ask`: a person has asked for it, by Ctrl-C, who can answer what the robot depends on.
+    """
     application.setProperty(_ENDS, True)
+    application.setProperty(_MAY_ASK, may_ask)
     application.closeAllWindows()
     application.setProperty(_ENDS, False)
 
@@ -214,6 +218,14 @@ def is_asked_to_end() -> bool:
     return application is not None and bool(application.property(_ENDS))
 
 
+def may_be_asked() -> bool:
+    """Whether there is a person who has asked the program to end, and not the system."""
+    from PySide6.QtCore import QCoreApplication
+
+    application = QCoreApplication.instance()
+    return application is not None and bool(application.property(_MAY_ASK))
+
+
 def quit_on_signal(application: QApplication) -> QTimer:
     """Ctrl-C and a termination request close the window properly. Python sees signals only between Qt events, hence the timer."""
     import signal
@@ -222,7 +234,8 @@ def quit_on_signal(application: QApplication) -> QTimer:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         # Not at once: a signal may come while a widget is painting, and its window must not go from under it.
-        signal.signal(number, lambda *_: QTimer.singleShot(0, lambda: close_all(application)))
+        may_ask = number is signal.SIGINT
+        signal.signal(number, lambda *_, ask=may_ask: QTimer.singleShot(0, lambda: close_all(application, may_ask=ask)))
     timer = QTimer(application)
     timer.timeout.connect(lambda: None)
     timer.start(200)

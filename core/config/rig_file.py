@@ -22,7 +22,7 @@ from pydantic import Field, ValidationError, model_validator
 from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.files import settings_folder
 from core.config.models import CameraConfig, Config, RigConfig, SegmentationConfig, TwinConfig
-from core.config.safety import ServosConfig
+from core.config.safety import AtClose, ServosConfig
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
 from core.files import write_atomic
@@ -350,6 +350,12 @@ def set_bench(path: Path, folder: Path | None, model: str | None = None) -> None
     """Name the bench's folder in a rig file, and the model that was taught on it; None: not known. Raises RigFileError."""
     bench = str(folder.absolute()) if folder is not None else None
     write_rig(read_rig(path).model_copy(update={"bench": bench, "model": model}), path, keeps_older=False)
+
+
+def set_at_close(path: Path, how: AtClose) -> None:
+    """Save in a rig file what becomes of servos that hold when the program is closed. Raises RigFileError."""
+    rig = read_rig(path)
+    write_rig(rig.model_copy(update={"servos": rig.servos.model_copy(update={"at_close": how})}), path, keeps_older=False)
 
 
 def set_port(path: Path, port: PortConfig | None) -> None:

@@ -133,6 +133,10 @@ _MOST_TENDON_STEP_MM, _MOST_FEED_STEP_MM = 1.0, 2.0
 """Ceilings of ``max_step_mm`` with real servos: so far a joint goes when the program dies."""
 
 
+AtClose = Literal["ask", "hold", "relax", "torque off"]
+"""What becomes of servos that hold when the program is closed."""
+
+
 class ServosConfig(ConfigSection):
     """The bus and its seven joints."""
 
@@ -166,6 +170,9 @@ class ServosConfig(ConfigSection):
         ge=0.0,
         le=86_400.0,
         description="servos that hold without the program are watched for so long, then relaxed and switched off; 0: they hold on",
+    )
+    at_close: AtClose = Field(
+        "ask", description="servos that hold when the program is closed; without a window or terminal to ask in they hold"
     )
     torque_off_on_stop: bool = Field(False, description="also switch the torque off at STOP; it releases the tension of the wires")
     joints: tuple[JointConfig, ...] = Field(

@@ -210,6 +210,12 @@ class Pilot:
             self._requests.reboot(servo_id)
         return is_free
 
+    def relax(self) -> bool:
+        """Let the wires go slowly, then switch the torque off; also while a fault waits to be acknowledged."""
+        if is_free := self._may_request(although_latched=True):
+            self._requests.relax()
+        return is_free
+
     def torque_off(self) -> bool:
         """Let the wires go slack; also while a fault waits to be acknowledged, and after whatever is under way."""
         if is_free := self._may_request(although_latched=True, although_busy=True):

@@ -171,6 +171,10 @@ class ServoRequests:
         """Restart a servo, which clears its hardware error."""
         self._request(message("restarting servo {a}", a=servo_id), lambda: self._disarm_and(lambda: self._robot.reboot(servo_id)))
 
+    def relax(self) -> None:
+        """Let the wires go slowly, then switch the torque off."""
+        self._request("relaxing the wires", lambda: self._disarm_and(self._robot.relax))
+
     def torque_off(self, *, is_bus_lost: bool = False) -> None:
         """Let the wires go slack after what is under way; servos being switched on stay off. A lost bus is not held first."""
         with self._lock:

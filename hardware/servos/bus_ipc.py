@@ -34,7 +34,7 @@ from core.types import Command
 from hardware.processes import MESSAGE_BYTES, DeviceProcess, ParentLink, SharedSlot
 from hardware.servos import dynamixel_port
 from hardware.servos.dynamixel_port import BusProcessLost, LineCounts, ServoError
-from hardware.servos.registers import ServoReading
+from hardware.servos.registers import ServoReading, ServoState
 
 _log = logging.getLogger(__name__)
 _SLOTS = (64, 64, 65_536)
@@ -160,6 +160,13 @@ class BusStatus:
     @property
     def armed(self) -> bool:
         return self.phase is BusPhase.ARMED
+
+    @property
+    def pulls(self) -> bool:
+        """Whether a servo of an open bus has torque, or it is not known that none has."""
+        if self.phase is BusPhase.CLOSED:
+            return False
+        return not self.servos or any(isinstance(reading, ServoState) and reading.torque for reading in self.servos)
 
 
 _SOURCES: tuple[Source | None, ...] = (None, *Source)

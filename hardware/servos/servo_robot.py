@@ -14,6 +14,7 @@ from core.calibration.servos import zero_advice
 from core.config.calibration import ZeroConfig
 from core.config.safety import JointName, SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
+from core.control.faults import Cause
 from core.control.gate import Rejection, Source
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
@@ -157,14 +158,14 @@ class ServoRobot:
         """
         client = self._connected()
         before = self.bus_status()
-        known = before.torque_offs if before is not None else 0
+        offs, stops = (before.torque_offs, _stops(before)) if before is not None else (0, 0)
         client.request("relax", _REQUEST_S)
         until_s = time.monotonic() + _RELAX_S
         while time.monotonic() < until_s:
             status = self._connected().status()
-            if status is not None and status.torque_offs > known:
+            if status is not None and status.torque_offs > offs:
                 return
-            if status is not None and status.phase is BusPhase.STOPPED and not status.releasing and not status.torque_problem:
+            if status is not None and _stops(status) > stops:
                 raise NotReady("stopped meanwhile: the wires are as they were then")
             self._beat_unsupervised()
             time.sleep(_LOOK_S)
@@ -335,3 +336,8 @@ class ServoRobot:
         """A sign of life of a program without a supervisor."""
         if (client := self._client) is not None and not self._supervised:
             client.put_heartbeat(Heartbeat(time.monotonic(), Source.OPERATOR))
+
+
+def _stops(status: BusStatus) -> int:
+    """How often STOP was pressed."""
+    return status.fault_counts.get(Cause.STOP_PRESSED, 0)

@@ -338,6 +338,9 @@ class DirectRobot:
     def reboot(self, servo_id: int) -> None:
         """No servos."""
 
+    def relax(self) -> None:
+        self.stop()
+
     def torque_off(self) -> None:
         self.stop()
 

@@ -242,8 +242,13 @@ class FakePilot:
     def reboot(self, servo_id: int) -> None:
         self.asked.append(f"reboot {servo_id}")
 
-    def torque_off(self) -> None:
+    def relax(self) -> bool:
+        self.asked.append("relax")
+        return True
+
+    def torque_off(self) -> bool:
         self.asked.append("torque off")
+        return True
 
     def halt(self) -> None:
         self.halted = True

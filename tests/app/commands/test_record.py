@@ -19,10 +19,14 @@ from mcap.reader import make_reader
 
 from app.commands import record as record_command
 from app.commands.session import describe
+from core.config.safety import AtClose
 from core.devices import DeviceError
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
 from core.types import Tick
+from hardware.servos.bus_ipc import BusStatus
+from tests.app.bus_status import bus, servo
+from tests.app.fakes import FakePilot
 from tests.app.program import MAIN, run
 from tests.core.session_data import tick_of
 
@@ -311,3 +315,64 @@ def test_what_the_rig_file_knows_of_the_rig_is_recorded_as_it_was_used(
     )
     session = record_flaky(FlakyEngine((99.0, 99.0)), 0.3)
     assert read_manifest(session).config["perception"]["path"]["port_x_share"] == 0.03
+
+
+# ---- servos that hold at the end
+
+
+class HoldingEngine:
+    """A LIVE rig of which only the servos are there."""
+
+    def __init__(self, torque: bool = True) -> None:
+        self.pilot = FakePilot()
+        self.torque = torque
+
+    def bus_status(self) -> BusStatus:
+        if "relax" in self.pilot.asked or "torque off" in self.pilot.asked:
+            self.torque = False
+        return bus(*(servo(place, torque=self.torque) for place in range(7)))
+
+
+class Terminal:
+    """What a person types, line by line; then the end of the input."""
+
+    def __init__(self, *lines: str, is_terminal: bool = True) -> None:
+        self._lines, self._is_terminal = list(lines), is_terminal
+        self.encoding, self.errors = "utf-8", "strict"
+
+    def isatty(self) -> bool:
+        return self._is_terminal
+
+    def readline(self) -> str:
+        return f"{self._lines.pop(0)}\n" if self._lines else ""
+
+
+@pytest.mark.parametrize(
+    ("at_close", "terminal", "asked"),
+    [
+        ("ask", Terminal("r"), ["relax"]),
+        ("ask", Terminal("off"), ["torque off"]),
+        ("ask", Terminal("what?", "R"), ["relax"]),
+        ("ask", Terminal(""), []),
+        ("ask", Terminal(), []),
+        ("ask", Terminal("r", is_terminal=False), []),
+        ("hold", Terminal("r"), []),
+        ("relax", Terminal(is_terminal=False), ["relax"]),
+        ("torque off", Terminal("h"), ["torque off"]),
+    ],
+)
+def test_what_becomes_of_servos_that_hold(
+    monkeypatch: pytest.MonkeyPatch, at_close: AtClose, terminal: Terminal, asked: list[str]
+) -> None:
+    engine, lines = HoldingEngine(), list[str]()
+    monkeypatch.setattr(sys, "stdin", terminal)
+    record_command.leave_servos(engine, at_close, lines.append)  # type: ignore[arg-type]
+    assert engine.pilot.asked == asked
+    assert any("not proven" in line for line in lines) is False
+
+
+def test_servos_without_torque_are_no_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, lines = HoldingEngine(torque=False), list[str]()
+    monkeypatch.setattr(sys, "stdin", Terminal("r"))
+    record_command.leave_servos(engine, "ask", lines.append)  # type: ignore[arg-type]
+    assert (engine.pilot.asked, lines) == ([], [])
