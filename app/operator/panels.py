@@ -18,7 +18,7 @@ from app.widgets.alerts import AlertStrip
 from app.widgets.basics import Card, card_note, column, holder, row
 from app.widgets.command_panel import CommandPanel
 from app.widgets.event_log import EventLog, LogKind
-from app.widgets.jog_panel import JogPanel
+from app.widgets.jog_panel import JogPanel, advised_motions
 from app.widgets.messages import Notice, NoticeKind, OfferStrip, Toast
 from app.widgets.mode_bar import ModeBar
 from app.widgets.performance_panel import PerformancePanel
@@ -120,6 +120,7 @@ class OperatorPanels(ScenePanels):
         if self._blanked and not before:  # at once, and not with the next picture: it may be long in coming
             self.live.drop_ghost()
             self.advice.show_advice(None, None, self._blanked)
+            self.jog.show_advised(frozenset())
         self.mode.show_view(view, why_not)
         self.mode_bar.show_view(view, why_not)
         if view is not None:
@@ -158,10 +159,11 @@ class OperatorPanels(ScenePanels):
         self._has_picture = True
         scene = tick.scene
         renew_text = self._renews_text(scene)
-        self.badge.show_scene(scene, renew_text=renew_text)
+        self.badge.show_scene(scene, tick.advice, renew_text=renew_text)
         if self._needle_pace.due() or renew_text:
             self._show_dials(scene, tick.status, renew_text=renew_text)
             self.jog.show_status(tick.status)
+        self.jog.show_advised(advised_motions(tick.advice))
         self._show_advice(tick, self._blanked or tr("the pose is not steady yet"), renew_text=renew_text)
         self.trends.add(scene)
         self.performance.add(tick, max_block_ms)
@@ -171,6 +173,7 @@ class OperatorPanels(ScenePanels):
         self._beside = None
         self._has_picture = False
         self.live.blank_overlays()
+        self.jog.show_advised(frozenset())
         self._blank_dials(title, why)
 
     def show_phase(self, phase: EnginePhase, what: str, message: str) -> None:

@@ -213,7 +213,7 @@ class PlayerPanels(ScenePanels):
         self.notice.clear()
         self.live.show_frame(tick.frame, scene, tick.advice)
         self.live.show_target(target)
-        self.badge.show_scene(scene, renew_text=renew_text)
+        self.badge.show_scene(scene, tick.advice, renew_text=renew_text)
         self._show_dials(scene, tick.status, renew_text=renew_text)
         why_none = row.drive.blanked if row.drive is not None and row.drive.blanked else tr("none was recorded")
         self._show_advice(tick, why_none, renew_text=renew_text)

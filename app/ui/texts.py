@@ -214,6 +214,28 @@ STATE_MEANING = {
 }
 
 
+_WAY_DECIDES = mark("The way ahead may ask for something else: then badge and advice say so, and the advice counts.")
+
+_TABLE: dict[PoseState, tuple[Speed, bool, str]] = {
+    PoseState.A: (Speed.FAST, False, mark("fast, no steering")),
+    PoseState.B: (Speed.SLOW, False, mark("slow, no steering")),
+    PoseState.C: (Speed.SLOWEST, True, mark("slowest, steer")),
+    PoseState.D: (Speed.MODERATE, True, mark("moderate, steer")),
+}
+"""The state table: speed, whether the head is turned, and both in words."""
+_STRAIGHT_DEG = 0.5
+"""Less steering is shown as straight."""
+
+
+def override_line(advice: Advice | None, state: PoseState | None) -> str:
+    """That the way ahead decides and not the state table, in one line for badge and advice; "" where both agree."""
+    if advice is None or state is None:
+        return ""
+    speed, steers, rule = _TABLE[state]
+    agrees = advice.speed is speed and advice.advance_mm_s > 0.0 and (abs(advice.steer_deg) >= _STRAIGHT_DEG) is steers
+    return "" if agrees else tr("the way decides, not state {state} ({rule})", state=state.value, rule=tr(rule))
+
+
 @dataclass(frozen=True, slots=True)
 class ReasonText:
     """A refusal in plain words, and what the operator can do about it."""
@@ -334,7 +356,7 @@ def advice_headline(advice: Advice) -> str:
     how = speed if advice.advance_mm_s >= 0.0 else tr("Back off, {speed}", speed=speed.lower())
     if advice.speed is Speed.STOP:
         return speed
-    if abs(advice.steer_deg) < 0.5:
+    if abs(advice.steer_deg) < _STRAIGHT_DEG:
         return tr("{how}, straight", how=how)
     return tr("{how}, {angle:.0f}° {side}", how=how, angle=abs(advice.steer_deg), side=side(advice.steer_deg))
 
@@ -392,7 +414,7 @@ QUANTITY = {
         "",
         mark("Head and tail of the robot's line lie on opposite sides of the vessel's line: one of them is past it."),
     ),
-    "state": Quantity(mark("Pose state"), "", "\n".join(STATE_MEANING.values())),
+    "state": Quantity(mark("Pose state"), "", "\n".join((*STATE_MEANING.values(), _WAY_DECIDES))),
     "confidence": Quantity(
         "confidence",
         mark("0 to 1"),

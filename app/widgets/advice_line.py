@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.ui.texts import advice_headline, tip
+from app.ui.texts import advice_headline, override_line, tip
 from app.widgets.painting import PaintedWidget, draw_box, draw_text, polygon, set_colours
 from core.types import Advice, PoseState, Speed
 
@@ -19,7 +17,8 @@ _CHEVRONS = {Speed.STOP: 0, Speed.SLOWEST: 1, Speed.SLOW: 2, Speed.MODERATE: 3, 
 class AdviceLine(PaintedWidget):
     """An arrow turned by the steering angle, the speed as word and as one to four chevrons, the degrees and the reason.
 
-    Without advice it is blank and says why. Where the pose is unsure it says so.
+    Arrow and chevrons point up to advance and down to back off, as the keys do. Where the way decides and not the state, it says
+    so, as the badge does. Without advice it is blank and says why. Where the pose is unsure it says so.
     """
 
     def __init__(self) -> None:
@@ -54,7 +53,7 @@ class AdviceLine(PaintedWidget):
         self.update()
 
     def _why(self, advice: Advice) -> str:
-        why = tr_text(advice.why)
+        why = "; ".join(part for part in (tr_text(advice.why), override_line(advice, self._state)) if part)
         return tr("the pose is unsure; {why}", why=why) if self._is_unsure else why
 
     def paint(self, painter: QPainter) -> None:
@@ -65,8 +64,9 @@ class AdviceLine(PaintedWidget):
             return
         accent = theme.STATE_COLOUR[self._state]
         draw_box(painter, QRectF(frame.left(), frame.top(), 6, frame.height()), 3, accent)
-        _paint_arrow(painter, QPointF(frame.left() + 48, frame.center().y()), 24.0, advice.steer_deg, accent)
-        _paint_chevrons(painter, QPointF(frame.left() + 92, frame.center().y()), _CHEVRONS[advice.speed], advice.advance_mm_s < 0.0)
+        is_back = advice.advance_mm_s < 0.0
+        _paint_arrow(painter, QPointF(frame.left() + 48, frame.center().y()), 24.0, advice.steer_deg, accent, is_back=is_back)
+        _paint_chevrons(painter, QPointF(frame.left() + 92, frame.center().y()), _CHEVRONS[advice.speed], is_back=is_back)
         left = frame.left() + 168
         headline = QRectF(left, frame.top() + 6, frame.right() - left - 16, 34)
         draw_text(painter, headline, advice_headline(advice), theme.bold(theme.Size.TITLE), theme.TEXT, smallest_px=11)
@@ -75,11 +75,16 @@ class AdviceLine(PaintedWidget):
         draw_text(painter, why, self._why(advice), theme.font(15), colour, elided=True)
 
 
-def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: float, colour: str) -> None:
-    """An arrow upwards (straight on), turned clockwise by the advised steering (to the robot's right)."""
+def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: float, colour: str, *, is_back: bool) -> None:
+    """An arrow upwards (straight on), turned clockwise by the advised steering (to the robot's right).
+
+    Backing off, it points down, and its upper end, where the head is, leans to the side to which the head turns.
+    """
     painter.save()
     painter.translate(middle)
     painter.rotate(max(-90.0, min(90.0, turn_deg)))
+    if is_back:
+        painter.scale(1.0, -1.0)
     head, shaft = size * 0.62, size * 0.24
     right = [(0, -size), (head, -size * 0.28), (shaft, -size * 0.28), (shaft, size * 0.9)]
     set_colours(painter, colour, theme.edge_of(colour))
@@ -87,17 +92,18 @@ def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: floa
     painter.restore()
 
 
-def _paint_chevrons(painter: QPainter, left_middle: QPointF, count: int, backwards: bool) -> None:
-    """Four chevrons, `count` of them lit, that point back where the advice is to retract; a square where it is to stop."""
+def _paint_chevrons(painter: QPainter, left_middle: QPointF, count: int, *, is_back: bool) -> None:
+    """Four chevrons, `count` of them lit, that point up, or down where the advice is to back off; a square where it is to stop."""
     if count == 0:
         set_colours(painter, theme.TEXT)
         painter.drawRect(QRectF(left_middle.x() + 20, left_middle.y() - 11, 22, 22))
         return
-    dx, dy = 8 * math.cos(math.radians(30)), 10.0
-    base, tip_x = (dx, 0.0) if backwards else (0.0, dx)
+    across, along = 5.5, 4.5
+    tip_y = along if is_back else -along
     for k in range(max(_CHEVRONS.values())):
-        pen = QPen(QColor(theme.TEXT if k < count else theme.LINE), 4.0)
+        pen = QPen(QColor(theme.TEXT if k < count else theme.LINE), 3.5)
         pen.setCapStyle(Qt.PenCapStyle.RoundCap)
         pen.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
         set_colours(painter, None, pen)
-        painter.drawPolyline(polygon([(base, -dy), (tip_x, 0.0), (base, dy)], left_middle + QPointF(14 * k, 0)))
+        middle = left_middle + QPointF(across + 16 * k, 0)
+        painter.drawPolyline(polygon([(-across, -tip_y), (0.0, tip_y), (across, -tip_y)], middle))

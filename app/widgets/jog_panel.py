@@ -28,7 +28,7 @@ from app.widgets.painting import (
 from core.config.models import JogConfig
 from core.config.safety import ServosConfig
 from core.control.motion import hand_speeds
-from core.types import RobotStatus
+from core.types import Advice, RobotStatus
 
 
 class Motion(Enum):
@@ -56,6 +56,20 @@ KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
     Motion.WITHDRAW: (Qt.Key.Key_PageDown,),
     Motion.STRAIGHTEN: (Qt.Key.Key_X,),
 }
+_STRAIGHT_DEG = 0.5
+"""Less steering is shown as straight (``texts.advice_headline``)."""
+
+
+def advised_motions(advice: Advice | None) -> frozenset[Motion]:
+    """The motions by hand that follow an advice."""
+    if advice is None:
+        return frozenset()
+    feed = {Motion.ADVANCE} if advice.advance_mm_s > 0.0 else {Motion.RETRACT} if advice.advance_mm_s < 0.0 else set()
+    if abs(advice.steer_deg) >= _STRAIGHT_DEG:
+        feed.add(Motion.STEER_RIGHT if advice.steer_deg > 0.0 else Motion.STEER_LEFT)
+    return frozenset(feed)
+
+
 _LINE_PX, _BETWEEN_PX, _SMALLEST_PX = 17, 6, 10
 
 
@@ -212,6 +226,16 @@ class JogPanel(QWidget):
         for motion, cap in self._caps.items():
             cap.light(motion in held)
 
+    def show_advised(self, advised: frozenset[Motion]) -> None:
+        """Frame the caps of the motions that are advised."""
+        for motion, cap in self._caps.items():
+            cap.advise(motion in advised)
+
+    @property
+    def advised(self) -> frozenset[Motion]:
+        """The motions whose caps are framed."""
+        return frozenset(motion for motion, cap in self._caps.items() if cap.is_advised)
+
     def show_status(self, status: RobotStatus | None) -> None:
         """How the head is bent, as the tendons are pulled, and how far in the robot is; None: not known."""
         self._status = status
@@ -269,12 +293,17 @@ class _Cap(MouseHeld):
         self._key = key
         self._text = text
         self._wide = wide
-        self.is_lit = False
+        self.is_lit = self.is_advised = False
         self.setMaximumHeight(28 if wide else 44)
 
     def light(self, on: bool) -> None:
         if on != self.is_lit:
             self.is_lit = on
+            self.update()
+
+    def advise(self, on: bool) -> None:
+        if on != self.is_advised:
+            self.is_advised = on
             self.update()
 
     def on_held(self, held: bool) -> None:
@@ -287,7 +316,8 @@ class _Cap(MouseHeld):
             back, text, label = theme.SKY, theme.INK, theme.INK
         elif not self.isEnabled():
             back, text, label = theme.PANEL, theme.TEXT_FAINT, theme.TEXT_FAINT
-        draw_box(painter, frame, 5, back, theme.SKY if self.is_lit else theme.LINE)
+        is_framed = self.is_advised and self.isEnabled()
+        draw_box(painter, frame, 5, back, theme.SKY if self.is_lit or is_framed else theme.LINE, 2.0 if is_framed else 1.0)
         if self._wide:
             draw_text(painter, frame, f"{self._key}:  {self._text}", theme.semi_bold(12), text, CENTER)
             return

@@ -11,10 +11,10 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPen
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.ui.texts import REASON_TEXT, STATE_TITLE, refusal_line, tip, why_line
+from app.ui.texts import REASON_TEXT, STATE_TITLE, override_line, refusal_line, tip, why_line
 from app.widgets.painting import CENTER, NONE, RIGHT, PaintedWidget, draw_text, polygon, set_colours
 from core.config.models import PoseConfig
-from core.types import Point, Points, PoseState, Scene
+from core.types import Advice, Point, Points, PoseState, Scene
 
 _HEIGHT = 104
 _WRAPPED = int(Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap)
@@ -53,11 +53,18 @@ class StateBadge(PaintedWidget):
     def letter(self) -> str:
         return self._state.value if self._state is not None else "-"
 
-    def show_scene(self, scene: Scene, *, renew_text: bool = True) -> None:
-        """The state of `scene`, or the reason why it has none. A new letter or title always renews the sentence too."""
+    def show_scene(self, scene: Scene, advice: Advice | None = None, *, renew_text: bool = True) -> None:
+        """The state of `scene`, or the reason why it has none. A new letter or title always renews the sentence too.
+
+        Where `advice` is not what the state alone would ask for, it says so.
+        """
         pose, refusal = scene.pose, scene.refusal
         if pose is not None:
-            self._set(pose.state, tr(STATE_TITLE[pose.state]), lambda: why_line(pose, self._limits), renew_text, pose.confidence)
+
+            def why() -> str:
+                return "; ".join(line for line in (why_line(pose, self._limits), override_line(advice, pose.state)) if line)
+
+            self._set(pose.state, tr(STATE_TITLE[pose.state]), why, renew_text, pose.confidence)
         elif refusal is not None:
             self._set(None, tr(REASON_TEXT[refusal.reason].title), lambda: refusal_line(refusal), renew_text)
         else:
