@@ -27,9 +27,9 @@ _LEAST_HIGH, _LEAST_LOW = 14.0, 6.0
 """Least difference (grey levels of Lab, 0 to 255) of a robot's clearest parts, and of its faintest."""
 _HIGH_SIGMAS, _LOW_SIGMAS = 9.0, 4.0
 """The same in deviations of what the rest of the vessel differs by."""
-_EDGE_SHARE = 0.43
+_EDGE_SHARE = 0.4
 """The robot's edge lies at this share of its contrast there."""
-_CONTRAST_PX = 7
+_CONTRAST_PX = 9
 """Side of the surroundings whose clearest place is the contrast."""
 _LEAST_AREA_PX = 40
 """A smaller part is noise or a bubble."""
