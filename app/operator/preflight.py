@@ -14,9 +14,9 @@ from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, sentence
 from app.ui.workers import ChildProcess, module_of
 from core.config.models import Config
-from core.control.alerts import ALERTS
+from core.control.alerts import alert_of
 from core.control.drive_view import DriveView
-from core.control.faults import Area
+from core.control.faults import Area, Cause
 from core.control.modes import OF_THE_RIG
 from hardware.preflight.checks import Check
 from hardware.preflight.preflight import Level, level_of
@@ -43,12 +43,16 @@ class PreflightFinding:
 
 @dataclass(frozen=True, slots=True)
 class Preflight:
-    """What is known. ``is_running``: more is to come. ``age_s`` None: never finished, or for another configuration."""
+    """What is known. ``is_running``: more is to come. ``age_s`` None: never finished, or for another configuration.
+
+    ``waiting`` is why arming would be refused now though all checks are good, in a line that the bar below the advice has, too.
+    """
 
     findings: tuple[PreflightFinding, ...] = ()
     is_running: bool = False
     age_s: float | None = None
     problem: str = ""
+    waiting: tuple[str, ...] = ()
 
     @property
     def is_fresh(self) -> bool:
@@ -61,24 +65,40 @@ class Preflight:
 
     @property
     def headline(self) -> str:
-        """In one line."""
-        good = sum(finding.level is Level.GOOD for finding in self.findings)
+        """In one line. What is not configured is neither good nor bad, and is not counted."""
+        used = [finding for finding in self.findings if finding.level is not Level.UNUSED]
+        good = sum(finding.level is Level.GOOD for finding in used)
         if self.problem:
             return tr("The checks could not be made: {problem}", problem=self.problem)
         if self.is_running:
             return tr("Checking: {count} looked at", count=len(self.findings))
         if self.against:
             count = len(self.against)
-            whole = len(self.findings)
+            whole = len(used)
             if count == 1:
                 return tr("Not ready: 1 of {whole} checks stands against driving", whole=whole)
             return tr("Not ready: {count} of {whole} checks stand against driving", count=count, whole=whole)
         if not self.is_fresh:
             return tr("Not checked yet")
-        warned = len(self.findings) - good
-        return tr("Ready: {good} of {count} checks good", good=good, count=len(self.findings)) + (
+        if self.waiting:
+            return tr("The checks are good, but not yet ready to arm: {why}", why=self.waiting[0])
+        warned = len(used) - good
+        return tr("Ready: {good} of {count} checks good", good=good, count=len(used)) + (
             tr(", {warned} to note", warned=warned) if warned else ""
         )
+
+    @property
+    def step(self) -> tuple[str, str] | None:
+        """What the bar says instead of "press F6", and what to do; None when the checks are no reason against arming."""
+        key = OperatorStep.ARM.value.key
+        if self.is_running:
+            return tr("Checking before driving"), tr("this takes some seconds; then press {key} to arm", key=key)
+        if self.against:
+            first = self.against[0]
+            return f"{tr_text(first.name)}: {tr_text(first.detail)}", tr("What to do: {fix}", fix=tr_text(first.fix))
+        if not self.is_fresh:
+            return tr("You steer"), tr("the checks before driving come first: {key}, some seconds, {key} again", key=key)
+        return None
 
 
 def live_findings(view: DriveView | None) -> tuple[PreflightFinding, ...]:
@@ -93,12 +113,25 @@ def live_findings(view: DriveView | None) -> tuple[PreflightFinding, ...]:
         if worst is None:
             found.append(PreflightFinding(name, Level.GOOD, tr("no fault")))
             continue
-        spec = ALERTS[worst.cause]
+        spec = alert_of(worst.cause, simulated=view.simulated)
         detail = f"{tr(spec.text)} ({tr_text(worst.detail)})" if worst.detail else tr(spec.text)
         found.append(PreflightFinding(name, Level.BAD if held else Level.WARNING, detail, tr(spec.what_to_do)))
-    specs = [ALERTS[reason] for reason in view.against_arming if reason in OF_THE_RIG]
+    specs = [alert_of(reason, simulated=view.simulated) for reason in view.against_arming if reason in OF_THE_RIG]
     found += [PreflightFinding(tr("rig"), Level.BAD, tr(spec.text), tr(spec.what_to_do)) for spec in specs]
     return tuple(found)
+
+
+def waiting_for(view: DriveView | None) -> tuple[str, ...]:
+    """Why the supervisor would refuse arming now, apart from what ``live_findings`` has."""
+    if view is None:
+        return ()
+    told = {Area.CAMERA, Area.SERVOS}
+    reasons = (
+        reason
+        for reason in view.against_arming
+        if reason not in OF_THE_RIG and not (isinstance(reason, Cause) and reason.area in told)
+    )
+    return tuple(tr(alert_of(reason, simulated=view.simulated).text) for reason in reasons)
 
 
 class PreflightModel(QObject):
@@ -154,7 +187,8 @@ class PreflightModel(QObject):
             if is_of_now
             else ()
         )
-        return Preflight((*live_findings(self._view()), *made), self._child is not None, age_s, self._problem)
+        view = self._view()
+        return Preflight((*live_findings(view), *made), self._child is not None, age_s, self._problem, waiting_for(view))
 
     def begin_soon(self) -> None:
         """Make the checks soon after a rig's first picture, so that they are ready before arming."""

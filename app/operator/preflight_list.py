@@ -18,12 +18,14 @@ _LEAST_PX, _ABOVE_PX = 300, 8
 _TITLE_PX = 40  # about what the desktop's title bar takes
 _UPDATE_MS = 1000
 _TICK = polygon([(4.0, 12.0), (9.0, 17.0), (18.0, 6.0)])
+_DASH = polygon([(5.0, 11.0), (17.0, 11.0)])
 _LOOK: dict[Level, tuple[Sign | None, str, str]] = {
     Level.GOOD: (None, "ALLOWED", mark("good")),
+    Level.UNUSED: (None, "TEXT_FAINT", mark("not used")),
     Level.WARNING: (Sign.WARNING, "ORANGE", mark("notice")),
     Level.BAD: (Sign.BARRED, "FAULT", mark("NOT READY")),
 }
-"""Sign, colour and word; the good ones have a tick."""
+"""Sign, colour and word; the good ones have a tick, those that are not used a dash."""
 
 
 class _Badge(PaintedWidget):
@@ -40,7 +42,7 @@ class _Badge(PaintedWidget):
         if sign is None:
             pen = QPen(colour, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
             set_colours(painter, None, pen)
-            painter.drawPolyline(_TICK)
+            painter.drawPolyline(_DASH if self._level is Level.UNUSED else _TICK)
         else:
             paint_sign(painter, QRectF(2, 2, 18, 18), sign, colour)
         draw_text(painter, QRectF(28, 0, 84, 20), tr(word), theme.semi_bold(13), colour)
@@ -65,6 +67,7 @@ class PreflightList(QDialog):
         self._headline = QLabel(wordWrap=True)
         self._headline.setFont(theme.bold(18))
         self._note = card_note("")
+        self._note.setFont(theme.font(theme.Size.BODY))
         content = QWidget()
         self._rows = QGridLayout(content)
         self._rows.setContentsMargins(8, 6, 8, 6)
@@ -136,7 +139,7 @@ class PreflightList(QDialog):
         self._note.setText(_note(now))
         self.again.setEnabled(not now.is_running)
         self.again.setText(tr("Check &again") if now.age_s is not None else tr("Check &now"))
-        self.arm.setEnabled(self._model.has_robot and now.is_fresh and not now.against and not now.is_running)
+        self.arm.setEnabled(self._model.has_robot and now.is_fresh and not (now.against or now.waiting or now.is_running))
         self.arm.setToolTip("" if self.arm.isEnabled() else _why_not(now, self._model.has_robot))
         if now.findings != self._shown:
             self._shown = now.findings
@@ -157,7 +160,7 @@ class PreflightList(QDialog):
                 widget.deleteLater()
         for row in range(self._rows.rowCount()):
             self._rows.setRowStretch(row, 0)
-        order = {Level.BAD: 0, Level.WARNING: 1, Level.GOOD: 2}
+        order = {Level.BAD: 0, Level.WARNING: 1, Level.GOOD: 2, Level.UNUSED: 3}
         for place, finding in enumerate(sorted(self._shown, key=lambda one: order[one.level])):
             shown = tr_text(finding.name)
             name = QLabel(shown[0].upper() + shown[1:])
@@ -183,6 +186,8 @@ def _note(now: Preflight) -> str:
 def _why_not(now: Preflight, has_robot: bool) -> str:
     if not has_robot:
         return tr("There is nothing to arm: no servos are open")
+    if now.is_fresh and now.waiting and not now.against:
+        return now.waiting[0]
     if now.against:
         return tr("First mend what is NOT READY, and check again")
     return tr("First the checks must be done")

@@ -47,6 +47,8 @@ _SEARCH_AFTER_MS = 1500
 _CRASH = "crash"
 _TAUGHT = "taught"
 _FAMILIARITY_EVERY_MS = 1000
+_CHECKS_EVERY_MS = 1000
+"""How often the bar is told what the checks say: the state of the open rig, and their age, change without a signal."""
 _UNFAMILIAR_S = 5
 """Pictures that are refused for so long as unlike the training data are not a hand that passes."""
 
@@ -85,6 +87,9 @@ class WindowServices(QObject):
         self._was_offered: set[str] = set()
         self._familiarity = QTimer(self, interval=_FAMILIARITY_EVERY_MS)
         self._familiarity.timeout.connect(self._look_for_unfamiliar)
+        self._check_state = QTimer(self, interval=_CHECKS_EVERY_MS)
+        self._check_state.timeout.connect(self._show_checks)
+        self.preflight.changed.connect(self._show_checks)
         self._saved: Path | None = None
         self._is_recording = False
         self._stopped = StopOutcome.UNKNOWN
@@ -127,6 +132,7 @@ class WindowServices(QObject):
         """Offer what the last run left: cut sessions, a crash report."""
         QTimer.singleShot(_SEARCH_AFTER_MS, self, self.recovery.search)
         self._familiarity.start()
+        self._check_state.start()
         crash = crash_of_last_run(self._state / "crashes")
         if crash is not None and crash.report is not None:
             self._offer_report(tr("The last run of the program crashed"), crash)
@@ -137,6 +143,7 @@ class WindowServices(QObject):
             part.close()
         self.checks.close()
         self._familiarity.stop()
+        self._check_state.stop()
         if self.training is not None:
             self.training.end()
         if self.teaching is not None:
@@ -174,6 +181,10 @@ class WindowServices(QObject):
     def _on_phase(self, phase: EnginePhase) -> None:
         if phase is EnginePhase.RUNNING:
             self.preflight.begin_soon()
+
+    def _show_checks(self) -> None:
+        """The bar and the list of checks say the same."""
+        self._window.panels.mode_bar.show_checks(self.preflight.preflight.step)
 
     def _on_not_armed(self, line: str) -> None:
         self._window.say(line, True)

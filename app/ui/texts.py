@@ -10,7 +10,7 @@ from enum import Enum
 from app.ui.i18n import ENGLISH, language_in_use, mark, tr, tr_text
 from core.config.models import PoseConfig
 from core.config.rig_file import RigFile
-from core.control.alerts import ALERTS, AlertKey
+from core.control.alerts import AlertKey, alert_of
 from core.control.drive_view import DriveView
 from core.control.faults import Area, Cause
 from core.control.gate import Source
@@ -55,6 +55,7 @@ class NextStep:
     granted : it would be granted now. A request that would be refused may still be made: the answer names all reasons.
     headline, rest : what is the matter, and what to do or what happens next.
     reasons : all that `headline` is the first of.
+    simulated : camera and servos are the twin's.
     """
 
     step: OperatorStep
@@ -63,6 +64,7 @@ class NextStep:
     rest: str
     reasons: tuple[AlertKey, ...] = ()
     other: OperatorStep | None = None
+    simulated: bool = False
 
     @property
     def text(self) -> str:
@@ -73,7 +75,8 @@ class NextStep:
     @property
     def all_reasons(self) -> str:
         """Every reason on a line of its own."""
-        return "\n".join(f"{sentence(ALERTS[key].text)} {sentence(ALERTS[key].what_to_do)}" for key in self.reasons)
+        specs = (alert_of(key, simulated=self.simulated) for key in self.reasons)
+        return "\n".join(f"{sentence(spec.text)} {sentence(spec.what_to_do)}" for spec in specs)
 
 
 NO_ROBOT = NextStep(OperatorStep.SERVOS_ON, False, mark("This rig has no robot"), mark("pictures and advice only"))
@@ -129,7 +132,7 @@ def next_step(view: DriveView) -> NextStep:
         faults = tuple(fault.cause for fault in view.active if fault.cause.area is Area.SERVOS and fault.holds)
         rest = tr("press {key}: they are checked with the torque off, then tighten the wires", key=OperatorStep.SERVOS_ON.value.key)
         if faults:
-            step = _refused(OperatorStep.SERVOS_ON, faults)
+            step = _refused(OperatorStep.SERVOS_ON, faults, view)
             # The servos' process has named what is not as configured, and what to do depends on it.
             said = next((fault.detail for fault in view.active if fault.cause is Cause.SERVOS_WRONG), "")
             return replace(step, rest=said) if said and faults[0] is Cause.SERVOS_WRONG else step
@@ -137,7 +140,7 @@ def next_step(view: DriveView) -> NextStep:
     if view.mode is Mode.ARMED:
         return _hand_over(view)
     if view.against_arming:
-        return _refused(OperatorStep.ARM, view.against_arming)
+        return _refused(OperatorStep.ARM, view.against_arming, view)
     return NextStep(
         OperatorStep.ARM,
         True,
@@ -152,10 +155,10 @@ def sentence(text: str) -> str:
     return tr("{sentence}.", sentence=f"{shown[0].upper()}{shown[1:]}") if shown else ""
 
 
-def _refused(step: OperatorStep, reasons: tuple[AlertKey, ...], other: OperatorStep | None = None) -> NextStep:
-    first = ALERTS[reasons[0]]
+def _refused(step: OperatorStep, reasons: tuple[AlertKey, ...], view: DriveView, other: OperatorStep | None = None) -> NextStep:
+    first = alert_of(reasons[0], simulated=view.simulated)
     # servos that are in trouble can still be checked: that is the way out
-    return NextStep(step, step is OperatorStep.SERVOS_ON, first.text, first.what_to_do, reasons, other)
+    return NextStep(step, step is OperatorStep.SERVOS_ON, first.text, first.what_to_do, reasons, other, view.simulated)
 
 
 def _acknowledge(view: DriveView) -> NextStep:
@@ -169,12 +172,13 @@ def _acknowledge(view: DriveView) -> NextStep:
     cause = view.latched.cause
     # a fault of servos in use that is still there latches again at once
     remains = view.servos_on and cause.area is Area.SERVOS and any(fault.cause is cause for fault in view.active)
-    return NextStep(OperatorStep.ACKNOWLEDGE, not remains, ALERTS[cause].text, ALERTS[cause].what_to_do, (cause,))
+    spec = alert_of(cause, simulated=view.simulated)
+    return NextStep(OperatorStep.ACKNOWLEDGE, not remains, spec.text, spec.what_to_do, (cause,), simulated=view.simulated)
 
 
 def _hand_over(view: DriveView) -> NextStep:
     if view.against_hand_over:
-        return _refused(OperatorStep.HAND_OVER, view.against_hand_over, OperatorStep.DISARM)
+        return _refused(OperatorStep.HAND_OVER, view.against_hand_over, view, OperatorStep.DISARM)
     key = OperatorStep.HAND_OVER.value.key
     held, loose = (
         tr("press {key}: the program drives while you hold", key=key),
@@ -187,8 +191,8 @@ def _interrupted(view: DriveView) -> NextStep:
     causes = tuple(fault.cause for fault in view.active if fault.holds)
     back, again = OperatorStep.TAKE_BACK.value.key, OperatorStep.HAND_OVER.value.key
     if causes:
-        first = ALERTS[causes[0]]
-        return NextStep(OperatorStep.TAKE_BACK, True, first.text, first.what_to_do, causes, OperatorStep.DISARM)
+        first = alert_of(causes[0], simulated=view.simulated)
+        return NextStep(OperatorStep.TAKE_BACK, True, first.text, first.what_to_do, causes, OperatorStep.DISARM, view.simulated)
     deadman = _deadman_of(view)
     rest = tr("hold {deadman} and press {again} to go on, or {back} to take back", deadman=deadman, again=again, back=back)
     return NextStep(OperatorStep.TAKE_BACK, True, tr("Interrupted"), rest, other=OperatorStep.DISARM)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from html import escape
 
 from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal, Slot
@@ -391,6 +392,7 @@ class ModeBar(PaintedWidget):
         self._mode: Mode | None = None
         self._shown = NOT_YET
         self._shown_s = 0.0
+        self._checks: tuple[str, str] | None = None
         self.main = StepButton(filled=True, clock=clock)
         self.second = StepButton(filled=False, clock=clock)
         self.deadman = DeadmanField()
@@ -420,13 +422,23 @@ class ModeBar(PaintedWidget):
         usable, mode = view is not None, view.mode if view is not None else None
         if usable is not self.deadman.isEnabled():
             self._set_usable(usable)
-        step = next_step(view) if view is not None else why_not.step
+        step = self._checked(next_step(view)) if view is not None else why_not.step
         self.deadman.show_deadman(view.deadman if view is not None else None, matters=mode in ARMED_MODES)
         if (step, mode) == (self._shown, self._mode) or (view is not None and self._is_too_soon(step, view)):
             return
         self._mode, self._shown_s = mode, view.time_s if view is not None else 0.0
         self._show_step(step)
         self.update()
+
+    def show_checks(self, checks: tuple[str, str] | None) -> None:
+        """What the checks before driving say against arming, and what to do; None: nothing. It is shown with the next view."""
+        self._checks = checks
+
+    def _checked(self, step: NextStep) -> NextStep:
+        """A step that the checks would refuse says so, as their list does."""
+        if self._checks is None or step.step is not OperatorStep.ARM or not step.granted:
+            return step
+        return replace(step, granted=False, headline=self._checks[0], rest=self._checks[1])
 
     def _is_too_soon(self, step: NextStep, view: DriveView) -> bool:
         """Reasons may alternate with every picture: one that is shown stays long enough to be read."""

@@ -131,6 +131,37 @@ ALERTS: dict[AlertKey, AlertSpec] = {
 """All lines. Those of faults come from the fault table (``faults.Cause``)."""
 
 
+_TWIN_LATE = "the twin is behind: close other programs; if it stays, F5 starts it again"
+_TWIN_FAILED = "the twin has failed: F5 starts it again, then acknowledge"
+_IN_THE_TWIN: dict[AlertKey, str] = {
+    Cause.PORT_LOST: _TWIN_FAILED,
+    Cause.SUPPLY_LOST: _TWIN_FAILED,
+    Cause.SERVO_SILENT: _TWIN_FAILED,
+    Cause.BUS_NOISE: _TWIN_FAILED,
+    Cause.TORQUE_ON: _TWIN_FAILED,
+    Cause.VOLTAGE_LOW: _TWIN_FAILED,
+    Cause.VOLTAGE_SAGS: _TWIN_FAILED,
+    Cause.CAMERA_LOST: _TWIN_FAILED,
+    Cause.WRONG_FORMAT: _TWIN_FAILED,
+    Cause.CAMERA_MOVED: _TWIN_FAILED,
+    Cause.STOP_PRESSED: "acknowledge, switch the servos on, arm again",
+    Cause.FRAMES_LOST_LONG: f"{_TWIN_LATE}; then acknowledge",
+    Cause.BUS_SILENT: _TWIN_LATE,
+    Cause.CAMERA_SILENT: _TWIN_LATE,
+    Cause.FRAMES_LOST: _TWIN_LATE,
+    Cause.FRAMES_DROPPED: _TWIN_LATE,
+    RejectReason.NO_MEASUREMENT: _TWIN_LATE,
+    RejectReason.STALE_MEASUREMENT: _TWIN_LATE,
+}
+"""What to do where camera and servos are simulated, and have no cable, plug, supply or port."""
+
+
+def alert_of(key: AlertKey, *, simulated: bool) -> AlertSpec:
+    """The line of a key, for a real rig or a simulated one."""
+    spec = ALERTS[key]
+    return replace(spec, what_to_do=_IN_THE_TWIN[key]) if simulated and key in _IN_THE_TWIN else spec
+
+
 @dataclass(frozen=True, slots=True)
 class Alert:
     """A line to show now. ``detail`` is the measured value; ``repeats`` counts how often it was suppressed since the last time."""
@@ -149,9 +180,13 @@ _NO_ALERT = frozenset({RejectReason.NOT_ARMED, RejectReason.WRONG_SOURCE, Reject
 
 
 class AlertReporter:
-    """Throttles repeats and keeps alerts until they are taken. All methods may be called from any thread."""
+    """Throttles repeats and keeps alerts until they are taken. All methods may be called from any thread.
 
-    def __init__(self) -> None:
+    `simulated` : camera and servos are the twin's.
+    """
+
+    def __init__(self, *, simulated: bool = False) -> None:
+        self._simulated = simulated
         self._lock = threading.Lock()
         self._alerts: list[Alert] = []
         self._shown_s: dict[AlertKey, float] = {}
@@ -166,7 +201,7 @@ class AlertReporter:
     def report_refusal(self, reason: Hindrance, detail: str) -> None:
         """A request is refused: reported each time, without a sound."""
         with self._lock:
-            self._alerts.append(Alert(reason, ALERTS[reason], detail))
+            self._alerts.append(Alert(reason, alert_of(reason, simulated=self._simulated), detail))
 
     def report(
         self, raised: Iterable[tuple[AlertKey, str]], now_s: float, mode: Mode = Mode.ADVISORY, *, changed: bool = False
@@ -184,7 +219,7 @@ class AlertReporter:
         with self._lock:
             alerts: list[Alert] = []
             for key, detail in raised:
-                spec = ALERTS[key]
+                spec = alert_of(key, simulated=self._simulated)
                 always = changed and spec.priority >= Priority.HOLD
                 # a clock that went back ends the cooldown
                 if not always and key in self._shown_s and 0.0 <= now_s - self._shown_s[key] < spec.cooldown_s:

@@ -30,6 +30,7 @@ class DriveView:
     against_arming, against_hand_over : why either request would be refused now; empty: it would be granted. The reasons against a
         hand-over leave out the deadman, which the operator presses with it.
     keyboard_deadman : the keyboard alone may be the deadman on this rig.
+    simulated : camera and servos are the twin's.
     deadman : held now, whether the press counts or not; None when no deadman has reported yet.
     servos_on : checked, torque on, following the permitted source.
     busy : what the servos are doing that takes time ("checking the servos"), else empty.
@@ -51,6 +52,7 @@ class DriveView:
     against_arming: tuple[Hindrance | Cause, ...] = ()
     against_hand_over: tuple[Hindrance | Cause, ...] = ()
     keyboard_deadman: bool = True
+    simulated: bool = False
     deadman: bool | None = None
     servos_on: bool = False
     busy: str = ""

@@ -143,7 +143,8 @@ class Pilot:
         self._inputs = InputQueue(config.safety, [model])
         self._requests = ServoRequests(robot, self._inputs.post)
         self._release = TorqueRelease(is_enabled=config.servos.torque_off_on_stop)
-        self._alerts = AlertReporter()
+        self._simulated = config.rig.camera == "twin"
+        self._alerts = AlertReporter(simulated=self._simulated)
         self._reports = FrameReports(config.policy.pursuit)
         self._state = SupervisorState(against_program=readiness.hindrances)
         if left_over is not None:
@@ -482,6 +483,7 @@ class Pilot:
             against_arming=arming,
             against_hand_over=hand_over,
             keyboard_deadman=self._readiness.keyboard_deadman,
+            simulated=self._simulated,
             deadman=self._state.health.deadman_down(now_s, safety),
             servos_on=self._state.health.servos_ready,
             busy=self._requests.busy,

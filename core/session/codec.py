@@ -308,6 +308,7 @@ class _DriveLayout(JsonLayout):
     against_arming: _Reasons
     against_hand_over: _Reasons
     keyboard_deadman: bool = True
+    simulated: bool = False
     deadman: bool | None = None
     servos_on: bool
     busy: Text

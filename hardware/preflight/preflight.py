@@ -16,13 +16,15 @@ from pydantic import ValidationError
 
 from core.config.models import Config
 from hardware.preflight import checks, device_checks, model_checks
-from hardware.preflight.checks import Check
+from hardware.preflight.checks import NOT_CONFIGURED, Check
 
 
 class Level(StrEnum):
     """How much a check's finding matters to driving."""
 
     GOOD = "good"
+    UNUSED = "not used"
+    """Nothing of the kind is configured, so there is nothing to be good."""
     WARNING = "warning"
     BAD = "not ready"
 
@@ -71,7 +73,9 @@ def driving_checks(config: Config) -> Iterator[Check]:
 
 def level_of(check: Check) -> Level:
     """Whether a finding stands against driving, or is only worth knowing."""
-    return Level.GOOD if check.ok else (CHECKS[check.name][1] if check.name in CHECKS else None) or Level.BAD
+    if check.ok:
+        return Level.UNUSED if check.detail.startswith(NOT_CONFIGURED) else Level.GOOD
+    return (CHECKS[check.name][1] if check.name in CHECKS else None) or Level.BAD
 
 
 def main() -> int:

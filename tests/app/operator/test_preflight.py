@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,9 +16,11 @@ from pytestqt.qtbot import QtBot
 from app.operator.preflight import KEPT_S, PreflightModel, live_findings
 from app.operator.preflight_list import PreflightList
 from app.operator.window import OperatorWindow
-from app.ui.texts import OperatorStep
+from app.ui.texts import OperatorStep, next_step
 from app.ui.workers import module_of
+from app.widgets.mode_bar import ModeBar
 from core.config.models import Config
+from core.control.alerts import ALERTS, AlertKey, AlertReporter, alert_of
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.modes import Act, Hindrance
@@ -80,6 +83,101 @@ def test_a_red_check_refuses_with_its_reason_and_what_to_do(qtbot: QtBot) -> Non
     assert bench.asked == ["Not armed. Self-test: it gives no pose. What to do: git checkout -- resources/models"]
     for step in OperatorStep:
         assert desk.may_ask(step) is (step is not OperatorStep.ARM)
+
+
+UNUSED = {"name": "gamepad", "ok": True, "detail": "not configured; none is plugged in", "fix": ""}
+
+
+def test_what_is_not_configured_is_not_counted_as_good(qtbot: QtBot) -> None:
+    """ "Ready: 11 of 11 checks good", of which two were "not configured"."""
+    bench = Bench()
+    model = bench.desk(says(GOOD, UNUSED))
+    model.begin()
+    done(model, qtbot)
+    assert model.preflight.headline == "Ready: 3 of 3 checks good"
+    assert model.may_ask(OperatorStep.ARM)
+    shown = PreflightList(model)
+    qtbot.addWidget(shown)
+    assert shown.texts[-1] == "not used gamepad: not configured; none is plugged in"
+
+
+@pytest.mark.parametrize(
+    ("against", "says_"),
+    [
+        ((Hindrance.SERVOS_UNCHECKED,), "The servos follow nobody"),
+        ((Hindrance.PERCEPTION_SETTLING,), "Waiting for a steady pose (1 s)"),
+        ((Cause.HEAD_LOST, Hindrance.SERVOS_UNCHECKED), "The robot's head is out of sight"),
+        ((Hindrance.ALREADY_ARMED,), "Armed"),
+    ],
+)
+def test_good_checks_do_not_say_ready_while_arming_would_be_refused(
+    qtbot: QtBot, against: tuple[Hindrance | Cause, ...], says_: str
+) -> None:
+    """The list said "Ready", with a bright button, while the bar below it said why not."""
+    bench = Bench(view=DriveView(0.0, against_arming=against, servos_on=True))
+    model = bench.desk(says(GOOD))
+    model.begin()
+    done(model, qtbot)
+    shown = PreflightList(model)
+    qtbot.addWidget(shown)
+    assert shown.headline == f"The checks are good, but not yet ready to arm: {says_}"
+    assert not shown.arm.isEnabled()
+    assert shown.arm.toolTip() == says_
+    bar = ModeBar()
+    qtbot.addWidget(bar)
+    bar.show_checks(model.preflight.step)
+    bar.show_view(bench.view)
+    assert bar.text.startswith(says_)
+    assert model.may_ask(OperatorStep.ARM), "the supervisor refuses it, with its reason"
+    bench.view = DriveView(0.0, servos_on=True)
+    shown.renew()
+    assert shown.headline == "Ready: 3 of 3 checks good"
+    assert shown.arm.isEnabled()
+
+
+def test_the_bar_does_not_offer_arming_that_the_checks_would_refuse(qtbot: QtBot) -> None:
+    bench = Bench(view=DriveView(0.0, servos_on=True))
+    bar = ModeBar()
+    qtbot.addWidget(bar)
+
+    def shown(model: PreflightModel) -> str:
+        bar.show_checks(model.preflight.step)
+        bar.show_view(bench.view)
+        return bar.text
+
+    model = bench.desk(says(GOOD, BAD))
+    assert shown(model) == "You steer. The checks before driving come first: F6, some seconds, F6 again."
+    model.begin()
+    assert shown(model).startswith("Checking before driving.")
+    done(model, qtbot)
+    assert shown(model) == "Self-test: it gives no pose. What to do: git checkout -- resources/models."
+    assert not model.may_ask(OperatorStep.ARM)
+    model = bench.desk(says(GOOD))
+    model.begin()
+    done(model, qtbot)
+    assert "Press F6 to arm" in shown(model)
+    bench.now_s += KEPT_S + 1.0
+    assert "come first" in shown(model)
+
+
+@pytest.mark.parametrize("key", list(ALERTS))
+def test_a_simulated_rig_never_tells_to_check_a_cable(key: AlertKey) -> None:
+    """The first thing that a new user read on the twin was "Check the servo cable."."""
+    spec = alert_of(key, simulated=True)
+    assert not re.search(r"\b(cable|plug|USB|power|supply|shielding)\b", spec.what_to_do), spec.what_to_do
+    assert (spec.text, spec.priority, spec.sound) == (ALERTS[key].text, ALERTS[key].priority, ALERTS[key].sound)
+
+
+def test_the_lines_of_a_simulated_rig_say_so_everywhere() -> None:
+    fault = Fault(Cause.SERVO_SILENT, "up")
+    for simulated in (False, True):
+        view = DriveView(0.0, latched=fault, active=(fault,), against_arming=(Cause.SERVO_SILENT,), simulated=simulated)
+        bar, finding = next_step(view), next(one for one in live_findings(view) if one.level is Level.BAD)
+        assert ("cable" in bar.text) is not simulated
+        assert ("cable" in finding.fix) is not simulated
+        reporter = AlertReporter(simulated=simulated)
+        reporter.report([(Cause.SERVO_SILENT, "up")], 1.0)
+        assert ("cable" in reporter.take()[0].spec.what_to_do) is not simulated
 
 
 def test_another_model_needs_new_checks_and_another_phantom_does_not(qtbot: QtBot) -> None:

@@ -23,7 +23,7 @@ from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import RejectReason, Source
 from core.devices import DeviceError, Robot
-from core.types import Command
+from core.types import Command, RobotStatus
 from hardware.processes import PARENT_CHECK_S
 from hardware.servos.bus_ipc import BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, start_bus
 from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
@@ -212,6 +212,22 @@ def test_a_port_that_is_none_and_servos_that_are_not_there(servos: SoftServoBus)
     servos.faults.mute(3)
     with pytest.raises(NoAnswer, match="servo up"):
         _robot(servos).connect()
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_a_simulated_robot_names_no_cable(servos: SoftServoBus, simulated: bool) -> None:
+    truth = RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4)
+    robot = ServoRobot(CONFIG.model_copy(update={"port": servos.port}), SAFETY, truth=(lambda: truth) if simulated else None)
+    robot.connect()
+    try:
+        servos.faults.mute(3)
+        with pytest.raises(NoAnswer) as told:
+            robot.zero()
+        assert ("cable" in str(told.value)) is not simulated
+        assert ("the twin's servos did not answer in time" in str(told.value)) is simulated
+    finally:
+        servos.faults.clear()
+        robot.close()
 
 
 def test_fault_29_a_second_program_is_refused_and_the_first_one_drives_on(servos: SoftServoBus, armed: ServoRobot) -> None:
