@@ -66,18 +66,10 @@ class TrainOptions:
 
 def train(
     out: Annotated[Path, typer.Option(help="folder of the new model")],
-    data: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="labelled folder as synth writes it, perhaps with empty/NAME.png: the bench without robot; may be repeated"
-        ),
-    ] = None,
+    data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
     scenes: Annotated[
         list[Path] | None,
-        typer.Option(
-            help="folder of synth --scenes: crops of benches painted from them, with a picture of the empty bench in half of them; "
-            "may be repeated"
-        ),
+        typer.Option(help="folder of synth --scenes, from which crops of benches are painted; may be repeated"),
     ] = None,
     scene_share: Annotated[
         float, typer.Option(min=0, max=1, help="share of the crops painted from --scenes where there is --data, too")

@@ -21,7 +21,7 @@ from core.config.models import SegmentationConfig
 from core.devices import UserError
 from core.evaluation.accuracy import difficulty
 from core.learning.augmentation import Crop, CropDataset, FrameCrops, PriorViews, TipCrops
-from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample, find_samples, with_empty, write_png
+from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample, find_samples, write_png
 from core.learning.model_writer import save_model, save_with_second_look
 from core.learning.scene_crops import CROPS_PER_BENCH, MixedCrops, SceneCrops
 from core.learning.training import HeldOutFrame, HeldOutResult, TrainingProgress, measure_held_out, train
@@ -30,7 +30,7 @@ from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import SECOND_LOOK, ModelError, check_model, load_network, model_folder, second_look_of
 from core.perception.segmentation import OrientationAverage
 from core.perception.tip_refinement import WINDOW_PX, Planes
-from core.perception.unet import DualUNet, UNetShape, with_empty_planes, with_prior_planes
+from core.perception.unet import DualUNet, UNetShape, with_prior_planes
 from core.types import Image
 
 _EXAMPLES = 40
@@ -79,8 +79,8 @@ class TrainingTask(Protocol):
 class FrameTraining:
     """The network of whole pictures: from nothing, or from the model `init`, whose tip refinement is kept.
 
-    With `scenes`, files of ``core.learning.scenes``, or samples with a picture of the empty bench, the network takes that, too.
-    `examples`: frames from which its eight-bit copy learns; None: ``_EXAMPLES``.
+    `scenes`: files of ``core.learning.scenes``, from which crops are painted. `examples`: frames from which its eight-bit copy
+    learns; None: ``_EXAMPLES``.
     """
 
     measures_held_out = True
@@ -98,14 +98,11 @@ class FrameTraining:
         self._samples, self._init, self._examples, self._scenes = samples, init, examples or _EXAMPLES, scenes
         self._tip_model: Path | None = None
         self._crops: Dataset[Crop] | None = None
-        compares = bool(scenes) or any(sample.empty is not None for sample in samples)
         if init is None:
-            shape = UNetShape.of_base(base) if base else default_shape(deep=not shallow)
-            self.network = DualUNet(replace(shape, inputs=6) if compares else shape)
+            self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
         else:
             check_model(init)  # a damaged tip refinement is refused before hours of training, too
-            network = load_network(model_folder(init))[0]
-            self.network = with_empty_planes(network) if compares and network.shape.inputs == 3 else network
+            self.network = load_network(model_folder(init))[0]
             self._tip_model = second_look_of(model_folder(init))
 
     def crop_size(self, crop: tuple[int, int]) -> tuple[int, int]:
@@ -125,26 +122,24 @@ class FrameTraining:
                     return None
                 found.append(difficulty(sample, segment))
             weights = np.array(found)
-        frames = FrameCrops(self._samples, plan, weights, self.network.shape.inputs)
+        frames = FrameCrops(self._samples, plan, weights)
         self._crops = MixedCrops(self._scenes, frames, plan) if self._scenes else frames
         return self._crops
 
     def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
-        examples = list(self._example_planes()) if whole else []
+        examples = list(self._example_images()) if whole else []
         save_model(network, out, training=training, figures=figures, examples=examples, second_look=self._tip_model)
 
-    def _example_planes(self) -> Iterator[Planes]:
-        """Whole frames, every second one with the empty bench where it is known; with scenes, crops of the training."""
+    def _example_images(self) -> Iterator[Image]:
+        """Whole frames; with scenes, crops of the training."""
         if self._scenes and self._crops is not None:
             for number in range(_CROPS_A_FRAME * self._examples):
                 with suppress(DatasetError):  # the training reports it, and keeps what it learnt without that one
                     yield np.ascontiguousarray(self._crops[number * CROPS_PER_BENCH][0].numpy().transpose(1, 2, 0))
             return
-        for number, sample in enumerate(self._samples[:: max(1, len(self._samples) // self._examples)]):
+        for sample in self._samples[:: max(1, len(self._samples) // self._examples)]:
             with suppress(DatasetError):
-                image = sample.load(WORKING_SIZE_PX)[0]
-                knows = number % 2 == 1 and self.network.shape.inputs == 6 and sample.empty is not None
-                yield with_empty(image, sample.load_empty(image.shape)) if knows else image
+                yield sample.load(WORKING_SIZE_PX)[0]
 
 
 class TipTraining:

@@ -92,12 +92,6 @@ class BenchView:
     window: Window | None = None
     """The part of the picture that is meant; None: all of it."""
 
-    def beside(self, image: Image) -> Image:
-        """`image` (h, w, 3) and the empty picture as six planes (h, w, 6), where it is not known 0, elsewhere at least 1."""
-        empty = np.maximum(self.empty, 1)
-        empty[~self.known] = 0
-        return np.concatenate([image, empty], axis=2)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Level:

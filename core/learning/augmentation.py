@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import dataclass
 
 import cv2
@@ -14,8 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from core.learning.dataset import WORKING_SIZE_PX, KeptFrames, Sample, with_empty
-from core.learning.painting import expose_pair
+from core.learning.dataset import WORKING_SIZE_PX, KeptFrames, Sample
 from core.learning.training_plan import TrainingPlan
 from core.perception import compiled
 from core.perception.segmentation import Probability, Segmenter, window_around
@@ -27,8 +25,8 @@ from core.types import Image, Mask, Point
 def random_crop(image: Image, masks: Sequence[Mask], size: tuple[int, int], rng: Generator) -> tuple[Image, list[Mask]]:
     """A turned, scaled, perhaps mirrored cut-out of `size` (height, width), in one warp so that nothing is blurred twice.
 
-    `image` has three planes, or six with the empty bench. `masks` are vessel, robot, and others of the same image. Two of three
-    cut-outs are centred on the robot, which is one or two percent of the pixels.
+    `masks` are vessel, robot, and others of the same image. Two of three cut-outs are centred on the robot, which is one or two
+    percent of the pixels.
     """
     height, width = size
     robot = masks[1]
@@ -40,11 +38,10 @@ def random_crop(image: Image, masks: Sequence[Mask], size: tuple[int, int], rng:
         center = float(rng.uniform(0.2, 0.8) * robot.shape[1]), float(rng.uniform(0.2, 0.8) * robot.shape[0])
     matrix = random_placement(center, size, rng)
     # Beyond the picture lies one colour without labels; mirrored, robots would meet their own reflection.
-    fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1])), :3])
-    parts = [np.ascontiguousarray(image[:, :, first : first + 3]) for first in range(0, image.shape[2], 3)]
-    cuts = [cv2.warpAffine(part, matrix, (width, height), flags=cv2.INTER_LINEAR, borderValue=fill) for part in parts]
+    fill = tuple(float(v) for v in image[int(rng.integers(image.shape[0])), int(rng.integers(image.shape[1]))])
+    cut = cv2.warpAffine(image, matrix, (width, height), flags=cv2.INTER_LINEAR, borderValue=fill)
     moved_masks = [cv2.warpAffine(m.astype(np.uint8) * 255, matrix, (width, height), flags=cv2.INTER_LINEAR) > 127 for m in masks]
-    return np.asarray(np.dstack(cuts), np.uint8), [np.asarray(mask) for mask in moved_masks]
+    return np.asarray(cut, np.uint8), [np.asarray(mask) for mask in moved_masks]
 
 
 def random_placement(
@@ -191,8 +188,6 @@ _WRONG_PLACES = 32
 """About so many places are kept of the pixels that were wrong."""
 END_REACH_PX = 20.0
 """Standard deviation of what counts as near to a robot's end: half of the 40 px that its vector and the vessel's are fitted to."""
-UNKNOWN_SHARE, HIDDEN_SHARE = 0.5, 0.08
-"""Share of the crops without picture of the empty bench; of the others, share with a part of it not known."""
 BORDER_PX = 8.0
 """Distance from a crop's border within which thinning may have drawn back an end, at least."""
 
@@ -240,15 +235,11 @@ class CropDataset(Dataset[Crop]):
 class FrameCrops(CropDataset):
     """Crops for the network of whole pictures: of ``plan.crop``, turned, scaled and mirrored, most of them near the robot.
 
-    `difficulty`, one weight > 0 per sample, says where ``plan.focus_share`` of the crops come from. With six `planes` they come
-    with the empty bench, where it is known and not left out.
+    `difficulty`, one weight > 0 per sample, says where ``plan.focus_share`` of the crops come from.
     """
 
-    def __init__(
-        self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None, planes: int = 3
-    ) -> None:
+    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
         super().__init__(samples, plan)
-        self._planes = planes
         self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
 
     def __getitem__(self, index: int) -> Crop:
@@ -262,43 +253,12 @@ class FrameCrops(CropDataset):
                 place = int(np.searchsorted(self._chances, rng.random(), side="right"))
             whole, *masks = self._kept.frame(self._samples[place])
             masks.append(self._kept.doubtful(self._samples[place], whole.shape))
-            if self._planes == 6 and (empty := self._kept.empty(self._samples[place], whole.shape)) is not None:
-                whole = with_empty(whole, empty)
             image, (vessel, robot, doubtful) = random_crop(whole, masks, size, rng)
             if self._plan.strip_share > 0 and rng.random() < self._plan.strip_share:
-                again = deepcopy(rng)  # the same clips lie in the empty bench, too
-                parts = [image[:, :, first : first + 3] for first in range(0, image.shape[2], 3)]
-                pictures = [with_strips(part, vessel, robot, its) for part, its in zip(parts, (rng, again), strict=False)]
-                image = np.dstack(pictures)
-        has_look = rng.random() < self._plan.look_share
-        if image.shape[2] == 6:
-            image = _with_exposed(rng, image, vessel, has_look=has_look)
-        elif has_look:
+                image = with_strips(image, vessel, robot, rng)
+        if rng.random() < self._plan.look_share:
             image = random_look(image, rng)
-        if self._planes == 6 and image.shape[2] == 3:
-            image = with_empty(image, None)
         return self.tensors(image, vessel, robot, doubtful)
-
-
-def _with_exposed(rng: Generator, image: NDArray[np.uint8], vessel: Mask, *, has_look: bool) -> NDArray[np.uint8]:
-    """A crop (h, w, 6) of two exposures; in half of the crops the empty bench is left out."""
-    planes = np.ascontiguousarray(image.transpose(2, 0, 1))
-    if has_look:
-        levels = planes * np.float32(1 / 255)
-        pair = expose_pair(rng, levels[:3], levels[3:], vessel, 0.0)
-    else:
-        pair = planes[:3], np.maximum(planes[3:], 1)
-    return np.concatenate([pair[0], forget_empty(rng, pair[1])]).transpose(1, 2, 0)
-
-
-def forget_empty(rng: Generator, empty: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The empty bench (3, h, w), not known (0) at all in half of the crops, and now and then in a part."""
-    if rng.random() < UNKNOWN_SHARE:
-        return np.zeros_like(empty)
-    if rng.random() < HIDDEN_SHARE:
-        (y, x), (down, right) = rng.integers(empty.shape[1:]), rng.integers(20, 140, 2)
-        empty[:, max(0, y - down) : y + down, max(0, x - right) : x + right] = 0
-    return empty
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Labelled frames on disk: ``images/<stem>.png``, ``masks/<stem>_vessel.png``, ``masks/<stem>_robot.png``, ``truth.jsonl``.
 
 ``synth`` writes this layout and ``train --data`` reads it; truth is optional for training, and so is ``masks/<stem>_doubtful.png``:
-where the robot's label is unsure and is not trained on, and ``empty/<stem>.png``: the same bench without robot.
+where the robot's label is unsure and is not trained on.
 """
 
 from __future__ import annotations
@@ -36,18 +36,13 @@ class DatasetError(UserError):
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Paths of one labelled frame.
-
-    ``doubtful``: a mask of where the robot's label is unsure, and not trained on; None: nowhere. ``empty``: a picture of the bench
-    without robot; None: not known.
-    """
+    """Paths of one labelled frame. ``doubtful``: a mask of where the robot's label is unsure, and not trained on; None: nowhere."""
 
     stem: str
     image: Path
     vessel: Path
     robot: Path
     doubtful: Path | None = None
-    empty: Path | None = None
 
     def load(self, longer_side_px: int | None = None) -> tuple[Image, Mask, Mask]:
         """Image (H, W, 3) and both masks (H, W), scaled to `longer_side_px` if given; raises DatasetError."""
@@ -77,21 +72,6 @@ class Sample:
         if mask.shape == shape[:2]:
             return mask
         return np.asarray(_resized(mask.astype(np.uint8) * 255, (shape[1], shape[0])) > 127)
-
-    def load_empty(self, shape: tuple[int, ...]) -> Image | None:
-        """The bench without robot, (H, W, 3) scaled to `shape`; None where it is not known. Raises DatasetError."""
-        if self.empty is None:
-            return None
-        try:
-            image = read_image(self.empty)
-        except ImageError as error:
-            raise DatasetError(str(error)) from None
-        if image.shape[:2] == shape[:2]:
-            return image
-        height, width = image.shape[:2]
-        if abs(height * shape[1] - width * shape[0]) > max(height, width):  # more than what rounding to whole pixels gives
-            raise DatasetError(f"{self.empty}: {width}x{height}, which is not the shape of its image {self.image.name}")
-        return _resized(image, (shape[1], shape[0]))
 
 
 def read_mask(path: Path) -> Mask:
@@ -132,18 +112,9 @@ def find_samples(folders: Sequence[Path]) -> list[Sample]:
 
 
 def sample_at(image: Path, masks: Path) -> Sample:
-    """The paths of an image and of its masks in the folder `masks`, whether they are there or not.
-
-    The doubtful mask and the picture in the folder ``empty`` beside `masks` are None where they are not there.
-    """
-    empty = masks.parent / "empty" / f"{image.stem}.png"
+    """The paths of an image and of its masks in the folder `masks`, whether they are there or not, but for the doubtful one."""
     vessel, robot, doubtful = (masks / f"{image.stem}_{name}.png" for name in ("vessel", "robot", "doubtful"))
-    return Sample(image.stem, image, vessel, robot, doubtful if doubtful.is_file() else None, empty if empty.is_file() else None)
-
-
-def with_empty(image: Image, empty: Image | None) -> NDArray[np.uint8]:
-    """Six planes (h, w, 6) for a network that knows of empty benches: the last three are 0 where the bench is not known."""
-    return np.dstack([image, np.zeros_like(image) if empty is None else np.maximum(empty, 1)])
+    return Sample(image.stem, image, vessel, robot, doubtful if doubtful.is_file() else None)
 
 
 def without_masks(folders: Sequence[Path]) -> list[Path]:
@@ -336,12 +307,6 @@ class KeptFrames:
         if sample.doubtful not in self._doubtful:
             self._doubtful[sample.doubtful] = sample.load_doubtful(shape)
         return self._doubtful[sample.doubtful]
-
-    def empty(self, sample: Sample, shape: tuple[int, ...]) -> Image | None:
-        """The bench without robot, (h, w, 3) as `shape`; None where it is not known. Raises DatasetError."""
-        if sample.empty is None:
-            return None
-        return self.get(sample.empty, lambda: (np.asarray(sample.load_empty(shape)),))[0]
 
     def get(self, key: Hashable, make: Callable[[], tuple[NDArray[Any], ...]]) -> tuple[NDArray[Any], ...]:
         """What was kept under `key`, or what `make` gives."""

@@ -18,12 +18,10 @@ from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from core.config.models import SegmentationConfig
 from core.files import replace_folder, sync_folder
-from core.learning.dataset import with_empty
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import (
     BENCH,
@@ -54,9 +52,6 @@ if TYPE_CHECKING:
 
 _INFO_SCRATCH = f".{INFO}.new"
 _PLANES = {"image": "RGB and the first look's vessel and robot, uint8 (1, H, W, 5), working pixels, values 0..255"}
-_SIX_PLANES = {"image": "RGB and RGB of the empty bench (0: not known), uint8 (1, H, W, 6), working pixels, values 0..255"}
-_STAND_IN_PX = 21
-"""Side of the window whose median stands for an empty bench."""
 _MOST_WINDOWS = 160
 """More of them say no more about the ranges of a tip refinement."""
 
@@ -150,21 +145,6 @@ def whole_strides(images: Sequence[Image], stride: int) -> list[Image]:
     return [cut for cut in cuts if cut.size]
 
 
-def _with_stand_ins(examples: Sequence[Image], inputs: int) -> list[Image]:
-    """Examples for a network that also takes the empty bench: without one, half of them are compared with their own median.
-
-    It lacks what is as thin as a robot, so that the ranges of differences are learnt, too.
-    """
-    if inputs != 6:
-        return list(examples)
-    return [
-        with_empty(image, np.asarray(cv2.medianBlur(image, _STAND_IN_PX), np.uint8) if place % 2 else None)
-        if image.shape[2] == 3
-        else image
-        for place, image in enumerate(examples)
-    ]
-
-
 def export_eight_bit(network: DualUNet, examples: Sequence[Image], path: Path) -> None:
     """Export a copy that learns its ranges and rounding from the `examples`, which are ``whole_strides`` of pictures."""
     import torch
@@ -201,7 +181,7 @@ def save_model(
     with _put_in_place(folder) as scratch:
         network = rounded(network)
         export_onnx(network, network.shape.stride, scratch / ONNX)
-        cuts = whole_strides(_with_stand_ins(examples, network.shape.inputs), network.shape.stride)
+        cuts = whole_strides(examples, network.shape.stride)
         if cuts:
             export_eight_bit(network, cuts, scratch / ONNX_INT8)
         info = ModelInfo(
@@ -215,7 +195,7 @@ def save_model(
             second_look_sha256=read_model_info(second_look, verify=()).weights_sha256 if second_look is not None else None,
             training=training,
             figures=figures,
-            **{5: _PLANES, 6: _SIX_PLANES}.get(network.shape.inputs, {}),
+            **_PLANES if network.shape.inputs == 5 else {},
         )
         (scratch / INFO).write_text(info.model_dump_json(indent=1) + "\n", encoding="utf-8")
         if second_look is not None:
@@ -420,7 +400,7 @@ def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
         The model is damaged, or there is no picture of the network's stride or more among the examples.
     """
     network = load_network(folder)[0]
-    cuts = whole_strides(_with_stand_ins(examples, network.shape.inputs), network.shape.stride)
+    cuts = whole_strides(examples, network.shape.stride)
     if not cuts:
         raise ModelError("nothing to make an eight-bit copy from; give pictures that can be read and show a robot")
     export_eight_bit(network, cuts, folder / ONNX_INT8)

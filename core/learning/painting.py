@@ -1,9 +1,8 @@
 """Pictures of benches painted from their geometry: any board, tube and robot, and the same bench without the robot.
 
 A bench is given by two maps of its vessel, the distance to the wall and the ratio of the distance to the centerline and the radius.
-All else is drawn at random, so that a network does not learn the paint of one simulator. ``expose_pair`` makes of the pictures with
-and without the robot what a camera sees at two moments, between which a real bench changes a little. Pictures are float32
-(3, h, w), RGB of 0..1, as in ``boards``.
+All else is drawn at random, so that a network does not learn the paint of one simulator. ``exposed`` makes of such a picture what a
+camera sees at one moment. Pictures are float32 (3, h, w), RGB of 0..1, as in ``boards``.
 """
 
 from __future__ import annotations
@@ -171,7 +170,7 @@ class PaintedBench:
         self.tube = tube or drawn(rng, {kind: look.share for kind, look in TUBES.items()})
         self.vessel: Mask = np.asarray(distance_px < 0)
         self.blur_px = float(rng.uniform(0, 1.2)) if rng.random() < 0.7 else 0.0
-        """Of the camera, for ``expose_pair``."""
+        """Of the camera, for ``exposed``."""
         look, is_xray = TUBES[self.tube], self.tube == XRAY
         softness = float(rng.uniform(0.7, 2.5) if is_xray else rng.uniform(0.5, 1.1))
         self._surface = _Surface.of(rng, distance_px, ratio, softness)
@@ -478,37 +477,20 @@ def _shade_robot(rng: Generator, band: _Band, body: F32, lamp: tuple[float, floa
         lay_over(body, np.exp(-away * away) * np.float32(rng.uniform(0.1, 0.9)), 1.0)
 
 
-# ---- two exposures of one bench
+# ---- exposure
 
 
-def expose_pair(
-    rng: Generator, picture: F32, empty: F32, vessel: Mask, blur_px: float
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """What one camera sees of a bench with and without the robot, as uint8 (3, h, w) each.
-
-    Between both lie moved shadows, foreign objects, bubbles, glare, another focus, a small shift. Of the second one no pixel is 0
-    in all colours: that says that it is not known.
-    """
-    noise = abs(float(rng.normal(0, 0.018))) if rng.random() < 0.85 else 0.0
-    quality = int(rng.integers(45, 95)) if rng.random() < 0.25 else None
-    pair = [_changed(rng, picture, vessel, blur_px), _changed(rng, empty, vessel, blur_px, is_empty=True)]
-    if rng.random() < 0.6:
-        shift = rng.normal(0, 0.4 if rng.random() < 0.85 else 1.6, 2)
-        matrix = np.array([[1, 0, shift[0]], [0, 1, shift[1]]])
-        size = vessel.shape[::-1]
-        moved = [cv2.warpAffine(plane, matrix, size, borderMode=cv2.BORDER_REPLICATE) for plane in pair[1]]
-        pair[1] = np.stack(moved)
-    pair = _developed(rng, pair)
-    seen = _sensed(rng, pair[0], noise, quality)
-    return seen, np.maximum(_sensed(rng, pair[1], noise * float(rng.uniform(0.3, 1)), quality), 1)
+def exposed(rng: Generator, picture: F32, vessel: Mask, blur_px: float) -> Levels:
+    """What a camera sees of a bench at one moment, uint8 (3, h, w)."""
+    return _sensed(rng, _developed(rng, _changed(rng, picture, vessel, blur_px)))
 
 
-def _changed(rng: Generator, scene: F32, vessel: Mask, blur_px: float, *, is_empty: bool = False) -> F32:
-    """A scene at one moment; a hand or a tool is in it only beside the robot."""
+def _changed(rng: Generator, scene: F32, vessel: Mask, blur_px: float) -> F32:
+    """With cables, hands, bubbles, glare and shadows that come and go, in other light and focus."""
     picture = scene.copy()
     changes: tuple[tuple[float, Callable[[Generator, F32, Mask], None]], ...] = (
         (0.12, lambda rng, picture, _: lay_cable(rng, picture)),
-        (0.0 if is_empty else 0.04, _add_hand),
+        (0.04, _add_hand),
         (0.15, _add_bubbles),
         (0.10, _add_glare),
         (0.35, _add_shadow),
@@ -556,24 +538,23 @@ def _add_shadow(rng: Generator, picture: F32, vessel: Mask) -> None:
     picture *= 1 - float(rng.uniform(0.1, 0.55)) * shadow
 
 
-def _developed(rng: Generator, pair: list[F32]) -> list[F32]:
-    """Contrast, greys, gamma and negatives, alike in both."""
+def _developed(rng: Generator, picture: F32) -> F32:
+    """Contrast, greys, gamma and negatives."""
     if rng.random() < 0.5:
-        mean, contrast, offset = float(pair[0].mean()), float(rng.uniform(0.65, 1.4)), float(rng.uniform(-0.15, 0.15))
-        pair = [picture * contrast + (mean * (1 - contrast) + offset) for picture in pair]
+        mean, contrast, offset = float(picture.mean()), float(rng.uniform(0.65, 1.4)), float(rng.uniform(-0.15, 0.15))
+        picture = picture * contrast + (mean * (1 - contrast) + offset)
     if rng.random() < 0.22:
-        pair = [np.repeat(picture.mean(axis=0, keepdims=True), 3, axis=0) for picture in pair]
+        picture = np.repeat(picture.mean(axis=0, keepdims=True), 3, axis=0)
     if rng.random() < 0.3:
         gamma = np.float32(np.exp(rng.uniform(-0.5, 0.5)))
-        pair = [np.clip(picture, 0, 1) ** gamma for picture in pair]
-    if rng.random() < 0.05:
-        pair = [1 - picture for picture in pair]
-    return pair
+        picture = np.clip(picture, 0, 1) ** gamma
+    return 1 - picture if rng.random() < 0.05 else picture
 
 
-def _sensed(rng: Generator, picture: F32, noise: float, quality: int | None) -> Levels:
-    """With the sensor's noise, coloured or grey, and compressed where a `quality` is given."""
-    if noise > 0:
+def _sensed(rng: Generator, picture: F32) -> Levels:
+    """With the sensor's noise, coloured or grey, and now and then compressed."""
+    if rng.random() < 0.85:
+        noise = abs(float(rng.normal(0, 0.018)))
         grains = _GRAINS[rng.integers(256, size=picture.shape if rng.random() < 0.7 else picture.shape[1:], dtype=np.uint8)]
         level = np.sqrt(np.clip(picture, 0, 1))
         level *= np.float32(0.8 * noise)
@@ -581,8 +562,9 @@ def _sensed(rng: Generator, picture: F32, noise: float, quality: int | None) -> 
         level *= grains
         picture = level + picture
     levels = np.clip(picture * np.float32(255) + np.float32(0.5), 0, 255).astype(np.uint8)
-    if quality is not None:
-        coded = cv2.imencode(".jpg", np.ascontiguousarray(levels.transpose(1, 2, 0)), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    if rng.random() < 0.25:
+        options = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(45, 95))]
+        coded = cv2.imencode(".jpg", np.ascontiguousarray(levels.transpose(1, 2, 0)), options)[1]
         decoded = np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR), np.uint8)
         levels = np.ascontiguousarray(decoded.transpose(2, 0, 1))
     return np.asarray(levels, np.uint8)

@@ -18,7 +18,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from core.perception.unet import DualUNet, with_difference
+from core.perception.unet import DualUNet
 
 WEIGHT_STEPS = 63
 """Steps to each side of zero: seven bits, not eight. Processors without VNNI add pairs of products in 16 bits, which overflow
@@ -206,11 +206,8 @@ class EightBitUNet(nn.Module):
         self.decoders = nn.ModuleList([_EightBitDecoder(decoder) for decoder in (network.vessel, network.robot)])
         first: Any = self.encoder[0]
         first = first.convolutions[0].conv
-        # Half a level, by which the zero of the picture's planes was moved. At the picture's edges, padded with zeros, it is
-        # slightly too much.
-        moved = network.shape.inputs if network.shape.inputs != 6 else 3
-        planes = first.weight.detach()[:, : moved * network.shape.fold**2]
-        first.bias.data += 0.5 * _PIXEL_STEP * planes.sum(dim=(1, 2, 3))
+        # Half a level, by which the input's zero was moved. At the picture's edges, padded with zeros, it is slightly too much.
+        first.bias.data += 0.5 * _PIXEL_STEP * first.weight.detach().sum(dim=(1, 2, 3))
 
     def learn(self, images: Iterable[Tensor]) -> None:
         """Choose all ranges, and how weights are rounded, from the given (N, planes, H, W) batches of levels in 0..1."""
@@ -227,7 +224,7 @@ class EightBitUNet(nn.Module):
             step.learning = False
 
     def forward(self, image: Tensor) -> Tensor:
-        x = with_difference(image, 128 / 255) if self.shape.inputs == 6 else (image - 128 / 255) * 4.0
+        x = (image - 128 / 255) * 4.0
         if self.shape.fold > 1:
             x = nn.functional.pixel_unshuffle(x, self.shape.fold)
         x = self.input_steps(x)

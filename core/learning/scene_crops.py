@@ -1,4 +1,4 @@
-"""Training crops painted from scenes: picture and empty bench, with the labels of vessel, robot and the robot's ends."""
+"""Training crops painted from scenes, with the labels of vessel, robot and the robot's ends."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from torch.utils.data import Dataset
 
-from core.learning.augmentation import BORDER_PX, Crop, CropDataset, FrameCrops, forget_empty, nearness_to, random_placement
+from core.learning.augmentation import BORDER_PX, Crop, CropDataset, FrameCrops, nearness_to, random_placement
 from core.learning.boards import F32
-from core.learning.painting import Levels, PaintedBench, expose_pair
+from core.learning.painting import Levels, PaintedBench, exposed
 from core.learning.scenes import MOST_RATIO, REACH_PX, BenchScene, read_scene
 from core.learning.training_plan import TrainingPlan
 from core.types import Mask, Points
 
 CROPS_PER_BENCH = 3
-"""Crops that share a painted bench, which costs as much as a robot in it and two exposures together."""
+"""Crops that share a painted bench, which costs four times as much as a robot in it and its exposure."""
 TWIN_SHARE = 0.3
 """Share of the benches that are the twin's own pictures, where the scene has some."""
 EMPTY_SHARE = 0.07
@@ -39,13 +39,12 @@ class _PaintedView:
     """A painted bench: its crop's placement in the scene, and the robots (N, 2) in the crop's pixels in random order."""
 
     bench: PaintedBench
-    empty: F32
     lines: list[Points]
     radius_px: float
 
 
 class SceneCrops(CropDataset):
-    """Crops of six planes, picture and empty bench, from scenes' files; ``CROPS_PER_BENCH`` in a row share a bench.
+    """Crops from scenes' files; ``CROPS_PER_BENCH`` in a row share a bench.
 
     Most are painted at random; some are cut from the twin's pictures. The last bench is kept, so that it is painted once for crops
     that are asked for in their order.
@@ -62,15 +61,15 @@ class SceneCrops(CropDataset):
             self._last = group, self._view(group)
         view, rng = self._last[1], np.random.default_rng((self._plan.seed, index))
         if isinstance(view, _PaintedView):
-            picture, empty, vessel, robot, line = _painted_crop(rng, view, member)
+            picture, vessel, robot, line = _painted_crop(rng, view, member)
         else:
-            picture, empty, vessel, robot, line = _twin_crop(rng, view, member, self._plan.crop)
+            picture, vessel, robot, line = _twin_crop(rng, view, member, self._plan.crop)
         labels = [vessel.astype(np.uint8), robot.astype(np.uint8)]
         if self._plan.end_weight > 0:
             labels.append(nearness_to(_ends(line, robot), robot.shape))
         if self.has_doubt:
             labels += [np.zeros_like(labels[0])] * (4 - len(labels))
-        return torch.from_numpy(np.concatenate([picture, forget_empty(rng, empty)])), torch.from_numpy(np.stack(labels))
+        return torch.from_numpy(picture), torch.from_numpy(np.stack(labels))
 
     def _view(self, group: int) -> BenchScene | _PaintedView:
         """The scene whose pictures are shown, or a bench painted from it; depends on the seed and `group` alone."""
@@ -89,11 +88,11 @@ class SceneCrops(CropDataset):
         ratio = _placed(scene.ratio, placement, size, MOST_RATIO)
         bench = PaintedBench(rng, distance, ratio)
         lines = [_moved(scene.lines[place], placement) for place in order]
-        return _PaintedView(bench, bench.empty(), lines, scene.radius_px * scale)
+        return _PaintedView(bench, lines, scene.radius_px * scale)
 
 
 class MixedCrops(Dataset[Crop]):
-    """Crops of scenes, for ``plan.scene_share``, and of labelled frames with six planes."""
+    """Crops of scenes, for ``plan.scene_share``, and of labelled frames."""
 
     def __init__(self, files: Sequence[Path], frames: FrameCrops, plan: TrainingPlan) -> None:
         self._scenes, self._frames, self._plan = SceneCrops(files, plan, has_doubt=frames.has_doubt), frames, plan
@@ -126,18 +125,18 @@ def _moved(line: Points, placement: NDArray[np.float64]) -> Points:
     return np.asarray(line @ placement[:, :2].T + placement[:, 2])
 
 
-_Parts = tuple[Levels, Levels, Mask, Mask, Points]
-"""Picture, empty bench, vessel, robot, and the robot's line (N, 2)."""
+_Parts = tuple[Levels, Mask, Mask, Points]
+"""Picture, vessel, robot, and the robot's line (N, 2)."""
 
 
 def _painted_crop(rng: Generator, view: _PaintedView, member: int) -> _Parts:
     bench, line = view.bench, view.lines[member % len(view.lines)]
     if rng.random() < EMPTY_SHARE or not bench.vessel.any():
-        picture, robot = view.empty, np.zeros(bench.vessel.shape, bool)
+        picture, robot = bench.empty(), np.zeros(bench.vessel.shape, bool)
     else:
         radius_px = float(np.clip(view.radius_px * np.exp(rng.normal(0, _RADIUS_SPREAD)), *_RADII_PX))
         picture, robot = bench.with_robot(rng, line, radius_px)
-    return *expose_pair(rng, picture, view.empty, bench.vessel, bench.blur_px), bench.vessel, robot, line
+    return exposed(rng, picture, bench.vessel, bench.blur_px), bench.vessel, robot, line
 
 
 def _twin_crop(rng: Generator, scene: BenchScene, member: int, size: tuple[int, int]) -> _Parts:
@@ -155,14 +154,14 @@ def _twin_crop(rng: Generator, scene: BenchScene, member: int, size: tuple[int, 
     placement = random_placement(center, size, rng)
     # Beyond the picture lies one colour without labels, as in crops of frames.
     fill = tuple(float(level) for level in image[int(rng.integers(height)), int(rng.integers(width))])
-    cuts = [cv2.warpAffine(part, placement, size[::-1], flags=cv2.INTER_LINEAR, borderValue=fill) for part in (image, scene.empty)]
-    planes = [np.ascontiguousarray(cut.transpose(2, 0, 1), np.float32) * np.float32(1 / 255) for cut in cuts]
+    cut = cv2.warpAffine(image, placement, size[::-1], flags=cv2.INTER_LINEAR, borderValue=fill)
+    picture = np.ascontiguousarray(cut.transpose(2, 0, 1), np.float32) * np.float32(1 / 255)
     vessel, seen = (
         cv2.warpAffine(mask.astype(np.uint8) * 255, placement, size[::-1], flags=cv2.INTER_LINEAR) > 127
         for mask in (scene.vessel, robot)
     )
     line = _moved(scene.lines[place], placement)
-    return *expose_pair(rng, planes[0], planes[1], vessel, 0.0), vessel, seen, line
+    return exposed(rng, picture, vessel, 0.0), vessel, seen, line
 
 
 def _ends(line: Points, robot: Mask) -> list[tuple[float, float]]:

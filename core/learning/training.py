@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from torch.utils.data import DataLoader, Dataset
 
 from core.learning.augmentation import Crop
-from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample, with_empty
+from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample
 from core.learning.training_plan import TrainingPlan
 from core.perception.inference import cores, padded
 from core.perception.unet import DualUNet
@@ -278,10 +278,7 @@ class HeldOutResult:
 
 @torch.no_grad()
 def measure_held_out(network: DualUNet, samples: Sequence[Sample]) -> HeldOutResult:
-    """Run the network, as it is, on whole frames, with the empty bench where it is known; its mode is left as it was.
-
-    Raises DatasetError.
-    """
+    """Run the network, as it is, on whole frames; its mode is left as it was. Raises DatasetError."""
     device, frames = next(network.parameters()).device, []
     was_training = network.training
     network.eval()
@@ -289,8 +286,7 @@ def measure_held_out(network: DualUNet, samples: Sequence[Sample]) -> HeldOutRes
         for sample in samples:
             image, vessel, robot = sample.load(WORKING_SIZE_PX)
             height, width = image.shape[:2]
-            planes = with_empty(image, sample.load_empty(image.shape)) if network.shape.inputs == 6 else image
-            whole = padded(planes, network.shape.stride)  # as perception does it, and cut back
+            whole = padded(image, network.shape.stride)  # as perception does it, and cut back
             batch = torch.from_numpy(np.ascontiguousarray(whole.transpose(2, 0, 1)))[None].to(device).float() / 255
             found = (network(batch)[0] > 0).cpu().numpy()[:, :height, :width]
             frames.append(HeldOutFrame(sample.stem, image, vessel, robot, found[0], found[1]))

@@ -47,13 +47,6 @@ def padded(image: Image, stride: int) -> Image:
     return np.asarray(cv2.copyMakeBorder(image, 0, down, 0, right, border), np.uint8)
 
 
-def with_planes(image: Image, planes: int) -> Image:
-    """A picture (h, w, 3) with planes of zeros for an empty bench that is not known, where the network has planes for it."""
-    if planes != 6 or image.shape[2] == 6:
-        return image
-    return np.concatenate([image, np.zeros_like(image)], axis=2)
-
-
 def _cropped(probability: Probability, image: Image) -> Probability:
     """A copy without the padding: the next call overwrites the engine's output."""
     return probability[: image.shape[0], : image.shape[1]].copy()
@@ -128,7 +121,7 @@ class OpenVinoSegmenter(Segmenter):
             raise ModelError(f"{folder / name}: cannot be read ({reason}); restore the model folder") from None
         self._file = folder / name
         # Windows of the tip refinement are parts of pictures and have no signature.
-        deepest = _deepest_output(self._model) if self.info.planes != 5 else None
+        deepest = _deepest_output(self._model) if self.info.planes == 3 else None
         self._has_signature = deepest is not None
         if deepest is not None:
             self._model.add_outputs(deepest)
@@ -139,10 +132,6 @@ class OpenVinoSegmenter(Segmenter):
     @property
     def engine(self) -> str:
         return f"OpenVINO CPU {'int8' if self.is_eight_bit else 'fp32'}"
-
-    @property
-    def takes_empty(self) -> bool:
-        return self.info.planes == 6
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         return self.segment_batch([image])[0]
@@ -171,7 +160,7 @@ class OpenVinoSegmenter(Segmenter):
         results: list[_Result] = []
         for first in range(0, len(images), _BATCH):
             some = images[first : first + _BATCH]
-            batch = np.stack([padded(with_planes(image, self.info.planes), self.info.stride) for image in some])
+            batch = np.stack([padded(image, self.info.stride) for image in some])
             with self._lock:
                 outputs = self._request(batch.shape[:3], robot_alone).infer({0: batch}, share_inputs=True, share_outputs=True)
                 deepest = outputs[1] if self._has_signature and not robot_alone else [None] * len(some)
@@ -248,10 +237,6 @@ class TorchSegmenter(Segmenter):
     def engine(self) -> str:
         return f"torch {self._device.type.upper()}"
 
-    @property
-    def takes_empty(self) -> bool:
-        return self.info.planes == 6
-
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         return _segmentation(image, self._run(image, self._network)[0], None)[:2]
 
@@ -264,8 +249,7 @@ class TorchSegmenter(Segmenter):
     def _run(self, image: Image, network: Callable[[Any], Any]) -> list[NDArray[np.float32]]:
         """The outputs of a part of the network for one padded image, without the batch axis."""
         torch = self._torch
-        planes = padded(with_planes(image, self.info.planes), self.info.stride)
-        batch = torch.from_numpy(np.ascontiguousarray(planes))[None].to(self._device)
+        batch = torch.from_numpy(np.ascontiguousarray(padded(image, self.info.stride)))[None].to(self._device)
         with torch.inference_mode(), torch.autocast("cuda", torch.float16, enabled=self._device.type == "cuda"):
             outputs = network(batch)
         return [one[0].float().cpu().numpy() for one in (outputs if isinstance(outputs, tuple) else (outputs,))]
@@ -299,12 +283,12 @@ def open_second_look(config: SegmentationConfig) -> OpenVinoSegmenter | TorchSeg
     Raises ModelError, as ``open_segmenter`` does, and when the model has lost that network.
     """
     folder = second_look_of(model_folder(config.model)) if config.second_look else None
-    return _open(folder, config, planes=(5,)) if folder is not None else None
+    return _open(folder, config, planes=5) if folder is not None else None
 
 
-def _open(folder: Path, config: SegmentationConfig, planes: Sequence[int] = (3, 6)) -> OpenVinoSegmenter | TorchSegmenter:
-    if (found := read_model_info(folder, verify=()).planes) not in planes:
-        raise ModelError(f"{folder / INFO}: the network takes {found} planes, not {planes[0]}; restore the model folder")
+def _open(folder: Path, config: SegmentationConfig, planes: int = 3) -> OpenVinoSegmenter | TorchSegmenter:
+    if (found := read_model_info(folder, verify=()).planes) != planes:
+        raise ModelError(f"{folder / INFO}: the network takes {found} planes, not {planes}; restore the model folder")
     if config.device == "torch" or (config.device == "auto" and cuda_present()):
         return TorchSegmenter(folder, config.threads)
     return OpenVinoSegmenter(folder, config.threads, config.precision)

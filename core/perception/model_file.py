@@ -71,7 +71,7 @@ class ModelInfo(BaseModel):
 
     @property
     def planes(self) -> int:
-        """Of its input: 3 of a picture, 5 with probabilities, 6 with the empty bench."""
+        """Of its input: 3 of a picture, 5 with probabilities."""
         return int(self.shape.get("inputs", 3))
 
     @property
@@ -85,8 +85,8 @@ class ModelInfo(BaseModel):
         fold, inputs = self.shape.get("fold"), self.shape.get("inputs", 3)
         if type(fold) is not int or self.stride != 16 * fold:
             raise ValueError(f"stride {self.stride} is not 16 times the shape's fold {fold!r}")
-        if type(inputs) is not int or inputs not in (3, 5, 6):
-            raise ValueError(f"the shape's inputs are 3, 5 or 6, not {inputs!r}")
+        if type(inputs) is not int or inputs not in (3, 5):
+            raise ValueError(f"the shape's inputs are 3 or 5, not {inputs!r}")
         widths = self.shape.get("widths")
         deepest = widths[-1] if isinstance(widths, list | tuple) and widths else None
         if self.familiarity is not None and (not isinstance(deepest, int) or self.familiarity.size != 2 * deepest):

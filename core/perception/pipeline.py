@@ -333,13 +333,12 @@ class Pipeline:
         if state is not None and self._roi is not None and not self._roi.all_orientations and run.drawn is None:
             average = state.begin_full_frame()
         with run.watch.stage("network"):
-            image = self._planes(run, segmenter.segment)
             signature = None
             if state is not None and run.drawn is not None:  # without the vessel's decoder a third of the time is saved
                 vessel = run.drawn.probability
-                robot = segmenter.segment.segment_robot_beside(vessel, image)
+                robot = segmenter.segment.segment_robot_beside(vessel, run.image)
             else:
-                image = image if average is None else average.orient(image)
+                image = run.image if average is None else average.orient(run.image)
                 vessel, robot, signature = segmenter.segment.segment_signed([image])[0]
             if average is not None:
                 vessel, robot = average.orient(vessel), average.orient(robot)
@@ -364,11 +363,6 @@ class Pipeline:
             if known is not None and known.working_size_px == self._config.working_size_px and masks.vessel.any():
                 run.add(novelty=known.novelty(signature) if signature is not None else None)
         return self._trace(run, masks)
-
-    @staticmethod
-    def _planes(run: _Run, segment: Segmenter) -> Image:
-        """The image (h, w, 3), with the empty bench (h, w, 6) where it is known and the network takes it."""
-        return run.image if run.view is None or not segment.takes_empty else run.view.beside(run.image)
 
     def _with_bench(
         self, view: BenchView, image: Image, robot: NDArray[np.float32], vessel: NDArray[np.float32]
@@ -409,7 +403,7 @@ class Pipeline:
         config, state = self._config, run.state
         run.add(window=window)
         with run.watch.stage("network"):
-            robot_probability = segment_roi(self._roi.segment, self._planes(run, self._roi.segment), window, background)
+            robot_probability = segment_roi(self._roi.segment, run.image, window, background)
         if run.view is not None:
             with run.watch.stage("bench"):
                 x, y, width, height = window

@@ -29,11 +29,6 @@ class Segmenter:
         """Where the network runs, in words."""
         return type(self).__name__
 
-    @property
-    def takes_empty(self) -> bool:
-        """Whether images may have six planes: RGB, and RGB of the empty bench at the same place and in the same light."""
-        return False
-
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         raise NotImplementedError
 
@@ -69,10 +64,6 @@ class OrientationAverage(Segmenter):
     @property
     def engine(self) -> str:
         return f"{self._segment.engine}, {2 * len(self._turns)} orientations"
-
-    @property
-    def takes_empty(self) -> bool:
-        return self._segment.takes_empty
 
     def __call__(self, image: Image) -> tuple[Probability, Probability]:
         return self._average(image, signed=False)[:2]

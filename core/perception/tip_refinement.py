@@ -42,7 +42,7 @@ Planes = NDArray[np.uint8]
 def stack_planes(image: Image, vessel: Probability, robot: Probability) -> Planes:
     """The second network's input of an RGB image (h, w, 3) and the first network's probabilities (h, w)."""
     planes = np.empty((*image.shape[:2], 5), np.uint8)
-    planes[:, :, :3] = image[:, :, :3]
+    planes[:, :, :3] = image
     planes[:, :, 3] = np.rint(vessel * np.float32(255))
     planes[:, :, 4] = np.rint(robot * np.float32(255))
     return planes
@@ -90,10 +90,6 @@ class TipRefinement(Segmenter):
     @property
     def engine(self) -> str:
         return f"{self._first.engine}, second look{f' {self.passes} times' if self.passes > 1 else ''}"
-
-    @property
-    def takes_empty(self) -> bool:
-        return self._first.takes_empty
 
     def warm_up(self, *, beside: bool = False) -> None:
         """Compile the second network; a picture without a robot would not run it. `beside`: for ``segment_robot_beside``."""

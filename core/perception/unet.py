@@ -38,11 +38,6 @@ class UNetShape:
         return cls((base, base * 2, base * 4, base * 8, base * 16), (base, base * 2, base * 4, base * 8), 2, 1)
 
     @property
-    def channels(self) -> int:
-        """Planes that the first convolution sees, before folding: picture, difference and known pixels for 6 inputs."""
-        return 7 if self.inputs == 6 else self.inputs
-
-    @property
     def stride(self) -> int:
         """Input height and width must be multiples of this."""
         return 16 * self.fold
@@ -65,8 +60,8 @@ class UNetShape:
         if len(depths) != 5 or min(depths) < 1 or max(depths) > 8:
             raise ValueError("encoder_convolutions are five counts between 1 and 8")
         inputs = int(data.get("inputs", 3))
-        if inputs not in (3, 5, 6):
-            raise ValueError("inputs are 3 (a picture), 5 (with the first network's probabilities) or 6 (with the empty bench)")
+        if inputs not in (3, 5):
+            raise ValueError("inputs are 3 (a picture) or 5 (with the first network's probabilities)")
         return cls(widths, decoder, convolutions, fold, depths, inputs)
 
 
@@ -109,7 +104,7 @@ class DualUNet(nn.Module):
     def __init__(self, shape: UNetShape) -> None:
         super().__init__()
         self.shape = shape
-        channels = shape.channels * shape.fold**2
+        channels = shape.inputs * shape.fold**2
         encoder = []
         for width, count in zip(shape.widths, shape.encoder_convolutions, strict=True):
             encoder.append(_convolutions(channels, width, count))
@@ -133,7 +128,7 @@ class DualUNet(nn.Module):
 
     def _encoded(self, image: Tensor) -> tuple[Tensor, list[Tensor]]:
         """What the encoder's last level gives, and the levels above it from fine to coarse."""
-        x = with_difference(image) if self.shape.inputs == 6 else (image - 0.5) * 4.0
+        x = (image - 0.5) * 4.0
         if self.shape.fold > 1:
             x = nn.functional.pixel_unshuffle(x, self.shape.fold)
         skips: list[Tensor] = []
@@ -147,34 +142,6 @@ class DualUNet(nn.Module):
         return nn.functional.pixel_shuffle(output, self.shape.fold) if self.shape.fold > 1 else output
 
 
-def with_difference(image: Tensor, middle: float = 0.5) -> Tensor:
-    """Picture, its difference to the empty bench, and whether that is known: (N, 6, H, W) of 0..1 -> (N, 7, H, W) of -2..2.
-
-    Where the empty bench is not known (0 in all its planes), the difference is 0. `middle` is the picture's value that becomes 0.
-    """
-    picture, empty = image[:, :3], image[:, 3:]
-    known = (empty.amax(1, keepdim=True) > 0).to(picture.dtype)
-    return torch.cat([(picture - middle) * 4.0, (picture - empty) * known * 2.0, known], dim=1)
-
-
-def with_empty_planes(network: DualUNet) -> DualUNet:
-    """A copy of a network of pictures that also takes the empty bench (6 planes); without a bench its answers are the same.
-
-    Raises
-    ------
-    ValueError
-        The network does not take pictures alone.
-    """
-    if network.shape.inputs != 3:
-        raise ValueError("the network takes more than a picture already")
-    wider = DualUNet(replace(network.shape, inputs=6)).eval()
-    state, name = network.state_dict(), "encoder.0.0.weight"
-    kernel = wider.state_dict()[name].mul_(0.3)  # small random weights of the new planes: equal ones would learn alike
-    kernel[:, : state[name].shape[1]] = state[name]
-    wider.load_state_dict(state | {name: kernel})
-    return wider
-
-
 def with_prior_planes(network: DualUNet) -> DualUNet:
     """A copy of `network` that also takes probabilities (5 planes), with weights of 0 for them.
 
@@ -183,14 +150,13 @@ def with_prior_planes(network: DualUNet) -> DualUNet:
     ValueError
         The network takes them already.
     """
-    if network.shape.inputs == 5:
+    if network.shape.inputs != 3:
         raise ValueError("the network takes probabilities already")
     wider = DualUNet(replace(network.shape, inputs=5)).eval()
     state, name = network.state_dict(), "encoder.0.0.weight"
     kernel = wider.state_dict()[name].zero_()
-    # Folding keeps the pixels of a plane together: the planes of the picture come first as before. Those of an empty bench go.
-    picture = 3 * network.shape.fold**2
-    kernel[:, :picture] = state[name][:, :picture]
+    # Folding keeps the pixels of a plane together: the planes of the picture come first as before.
+    kernel[:, : state[name].shape[1]] = state[name]
     wider.load_state_dict(state | {name: kernel})
     return wider
 

@@ -298,13 +298,13 @@ def test_scenes_are_trained_on_beside_frames_for_a_given_time(frames: Path, tmp_
     done = run("train", "--scenes", tmp_path / "set", "--out", out, "--base", 4, "--minutes", 0.02, *few)
     assert done.returncode == 0, done.stderr
     info = read_model_info(out)
-    assert (info.planes, info.training["scenes"], info.training["scene_sets"][0]["scenes"]) == (6, 2, True)
+    assert (info.planes, info.training["scenes"], info.training["scene_sets"][0]["scenes"]) == (3, 2, True)
     assert f"({info.training['steps_done']} steps)" in done.stderr
     both = ("--data", frames, "--scenes", tmp_path / "set", "--held-out", Path(shutil.copytree(frames, tmp_path / "held_out")))
     done = run("train", *both, "--init", out, "--out", tmp_path / "both", "--steps", 2, *few)
     assert done.returncode == 0, done.stderr
     info = read_model_info(tmp_path / "both")
-    assert (info.planes, info.training["frames"], info.figures["held_out"]) == (6, 6, True)
+    assert (info.planes, info.training["frames"], info.figures["held_out"]) == (3, 6, True)
 
 
 @pytest.mark.parametrize(

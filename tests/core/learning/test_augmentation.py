@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from core.learning.augmentation import FrameCrops, end_nearness, random_clutter, random_crop, random_look, with_strips
-from core.learning.dataset import DatasetError, Sample, find_samples, write_png
+from core.learning.dataset import Sample, find_samples
 from core.learning.training_plan import TrainingPlan
-from tests.core.learning.toy_set import toy_set, with_empty_pictures
+from tests.core.learning.toy_set import toy_set
 
 
 def test_crops_keep_image_and_labels_together(tmp_path: Path) -> None:
@@ -115,43 +115,3 @@ def test_hard_frames_are_shown_more_often(tmp_path: Path) -> None:
         crops[index]
     # Half evenly over four frames, half nearly always the hard one: 1/8 + 0.49.
     assert drawn.count(samples[3].stem) / 400 == pytest.approx(0.61, abs=0.06)
-
-
-def test_a_crop_comes_with_the_empty_bench_in_half_of_all_cases(tmp_path: Path) -> None:
-    samples = find_samples([with_empty_pictures(toy_set(tmp_path / "set", 2))])
-    assert all(sample.empty is not None for sample in samples)
-    plan = TrainingPlan(steps=30, batch=2, crop=(64, 64), clutter_share=0.1, look_share=0.0, strip_share=0.5)
-    crops = FrameCrops(samples, plan, planes=6)
-    known = 0
-    for index in range(60):
-        image, labels = (part.numpy() for part in crops[index])
-        assert image.shape == (6, 64, 64)
-        if not image[3:].any():
-            continue
-        known += 1
-        differences = np.abs(image[:3].astype(int) - image[3:]).max(axis=0) * image[3:].any(axis=0)
-        changed = differences > 60  # a robot beyond the crop's border shines through by interpolation
-        near_robot = cv2.dilate(labels[1], np.ones((5, 5), np.uint8)) > 0
-        assert not (changed & ~near_robot).any(), "clips lie in both, and nothing but the robot differs"
-    assert 15 < known < 45
-    exposed = FrameCrops(samples, replace(plan, look_share=1.0, clutter_share=0.0), planes=6)
-    assert any((exposed[index][0].numpy()[:3] != exposed[index][0].numpy()[3:]).mean() > 0.5 for index in range(10))
-
-
-def test_a_crop_of_a_frame_without_empty_bench_says_so(tmp_path: Path) -> None:
-    crops = FrameCrops(find_samples([toy_set(tmp_path / "set", 2)]), TrainingPlan(steps=3, batch=2, crop=(64, 64)), planes=6)
-    for index in range(6):
-        image = crops[index][0].numpy()
-        assert image.shape == (6, 64, 64)
-        assert image[:3].any()
-        assert not image[3:].any()
-
-
-def test_an_empty_bench_of_another_shape_is_named(tmp_path: Path) -> None:
-    folder = with_empty_pictures(toy_set(tmp_path / "set", 1))
-    write_png(folder / "empty" / "000.png", np.full((50, 128, 3), 90, np.uint8))
-    with pytest.raises(DatasetError, match=r"empty/000\.png: 128x50, which is not the shape of its image 000\.png"):
-        FrameCrops(find_samples([folder]), TrainingPlan(clutter_share=0.0), planes=6)[0]
-    (folder / "empty" / "000.png").write_bytes(b"no picture")
-    with pytest.raises(DatasetError, match=r"empty/000\.png: not a picture"):
-        FrameCrops(find_samples([folder]), TrainingPlan(clutter_share=0.0), planes=6)[0]

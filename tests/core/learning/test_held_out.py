@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from core.learning.training import dice, measure_held_out
 from core.perception.inference import padded
 from core.perception.unet import DualUNet, UNetShape
 from tests.app.annotated import annotate_masks
-from tests.core.learning.toy_set import toy_set, with_empty_pictures
 
 
 def read(store_path: Path) -> tuple[Sequence[StoredAnnotation], list[FoundImage]]:
@@ -73,17 +71,3 @@ def test_a_held_out_frame_is_filled_up_to_whole_strides_as_perception_does_it() 
     assert height % network.shape.stride == 0
     np.testing.assert_array_equal(batch[:, 90:height], batch[:, 88 : 178 - height : -1])
     np.testing.assert_array_equal(batch.transpose(1, 2, 0), padded(seen.image, network.shape.stride))
-
-
-def test_a_network_with_planes_for_the_empty_bench_is_measured_with_it(tmp_path: Path) -> None:
-    samples = find_samples([with_empty_pictures(toy_set(tmp_path / "set", 1))])
-    shown: list[torch.Tensor] = []
-    network = DualUNet(replace(UNetShape.of_base(4), inputs=6))
-    network.register_forward_pre_hook(lambda _, given: shown.append(given[0]))
-    measure_held_out(network, samples)
-    measure_held_out(network, [replace(samples[0], empty=None)])
-    known, unknown = shown
-    robot = samples[0].load(640)[2]
-    assert known[0, 3:, : robot.shape[0], : robot.shape[1]].min() > 0.3, "no dark robot"
-    assert known[0, :3].min() < 0.1
-    assert not unknown[0, 3:].any()

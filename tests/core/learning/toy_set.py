@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from core.files import read_image
 from core.learning.dataset import write_mask, write_png
 
 
@@ -26,14 +25,4 @@ def toy_set(folder: Path, count: int) -> Path:
         write_png(folder / "images" / f"{i:03d}.png", image)
         write_mask(folder / "masks" / f"{i:03d}_vessel.png", vessel)
         write_mask(folder / "masks" / f"{i:03d}_robot.png", robot)
-    return folder
-
-
-def with_empty_pictures(folder: Path) -> Path:
-    """The set with pictures of its boards without robot."""
-    (folder / "empty").mkdir()
-    for path in sorted((folder / "images").glob("*.png")):
-        image = read_image(path)
-        image[image[:, :, 0] == 10] = 200
-        write_png(folder / "empty" / path.name, image)
     return folder

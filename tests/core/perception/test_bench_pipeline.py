@@ -166,38 +166,6 @@ def test_a_moved_camera_is_noticed_in_a_stream(bench: Bench) -> None:
     assert moved.refusal.reason is Reason.BENCH_MOVED
 
 
-def test_a_network_of_six_planes_is_given_the_empty_bench_in_whole_frames_and_in_windows(bench: Bench) -> None:
-    class Keeps(Blind):
-        def __init__(self) -> None:
-            self.given: list[Image] = []
-
-        @property
-        def takes_empty(self) -> bool:
-            return True
-
-        def __call__(self, image: Image) -> tuple[np.ndarray, np.ndarray]:
-            self.given.append(image)
-            return super().__call__(image)
-
-    known = np.ones_like(bench.known)
-    known[:, :50] = False
-    network = Keeps()
-    calibrated = CalibratedSegmenter(network)
-    pipeline = Pipeline(calibrated, CONFIG, roi=calibrated, bench=replace(bench, known=known))
-    for k in range(4):
-        assert pipeline(Frame(k, k / 30, picture(380, seed=k))).pose is not None
-    assert {image.shape[2] for image in network.given} == {6}
-    whole, window = network.given[0], network.given[-1]
-    assert window.shape[0] < whole.shape[0]
-    assert not whole[:, :50, 3:].any()
-    assert whole[:, 50:, 3:].min() >= 1
-    robot = np.abs(whole[CENTER_Y + 4, 60:360, :3].astype(int) - whole[CENTER_Y + 4, 60:360, 3:]).mean()
-    board = np.abs(whole[60, 60:360, :3].astype(int) - whole[60, 60:360, 3:]).mean()
-    assert robot > 10 * board
-    Pipeline(calibrated, CONFIG).perceive_single(Frame(0, 0.0, picture(400)))
-    assert network.given[-1].shape[2] == 3
-
-
 def test_without_a_drawn_vessel_the_networks_is_used(bench: Bench) -> None:
     class SeesTheTube(Blind):
         def __call__(self, image: Image) -> tuple[np.ndarray, np.ndarray]:

@@ -299,8 +299,8 @@ def test_figures_that_cannot_be_stored_are_one_clear_error(model: Path) -> None:
         ({"stride": 7}, "stride 7 is not 16 times the shape's fold 2"),
         ({"stride": 256}, "stride 256 is not 16 times"),
         ({"shape": TINY.to_json() | {"fold": "x"}}, "fold 'x'"),
-        ({"shape": TINY.to_json() | {"inputs": "x"}}, "inputs are 3, 5 or 6, not 'x'"),
-        ({"shape": TINY.to_json() | {"inputs": None}}, "inputs are 3, 5 or 6, not None"),
+        ({"shape": TINY.to_json() | {"inputs": "x"}}, "inputs are 3 or 5, not 'x'"),
+        ({"shape": TINY.to_json() | {"inputs": None}}, "inputs are 3 or 5, not None"),
         ({"shape": TINY.to_json() | {"inputs": 5}}, "takes 5 planes, not 3"),
     ],
 )

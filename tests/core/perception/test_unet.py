@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from core.perception.unet import DualUNet, UNetShape, with_difference, with_empty_planes
+from core.perception.unet import DualUNet, UNetShape
 
 
 def test_the_papers_shape_has_four_downsamplings_and_two_decoders() -> None:
@@ -45,27 +45,3 @@ def test_decoders_share_nothing_but_the_encoder() -> None:
 def test_a_senseless_shape_is_refused(change: dict[str, object]) -> None:
     with pytest.raises(ValueError):
         UNetShape.from_json(UNetShape().to_json() | change)
-
-
-def test_a_network_that_is_given_planes_for_the_empty_bench_answers_as_before_without_one() -> None:
-    torch.manual_seed(1)
-    network = DualUNet(UNetShape((4, 4, 4, 4, 4), (4, 4, 4, 4), 1, 2)).eval()
-    wider = with_empty_planes(network)
-    image = torch.rand(1, 3, 64, 64)
-    with torch.inference_mode():
-        without = wider(torch.cat([image, torch.zeros_like(image)], 1))
-        torch.testing.assert_close(without, network(image))
-        assert not torch.allclose(wider(torch.cat([image, image + 0.1], 1)), without, atol=1e-4)
-    with pytest.raises(ValueError):
-        with_empty_planes(wider)
-
-
-def test_the_difference_counts_only_where_the_empty_bench_is_known() -> None:
-    image = torch.rand(1, 6, 8, 8).clamp_min(0.01)
-    image[:, 3:, :, :4] = 0.0
-    seen = with_difference(image)
-    assert seen.shape == (1, 7, 8, 8)
-    torch.testing.assert_close(seen[:, :3], (image[:, :3] - 0.5) * 4)
-    assert not seen[:, 3:, :, :4].any()
-    torch.testing.assert_close(seen[:, 3:6, :, 4:], (image[:, :3, :, 4:] - image[:, 3:, :, 4:]) * 2)
-    assert (seen[:, 6, :, 4:] == 1).all()
