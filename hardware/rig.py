@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from core.config.calibration import ZeroConfig
+from core.config.files import settings_folder
 from core.config.models import CameraConfig, Config, RigConfig, load_config, merge
 from core.config.rig_file import RESERVED, calibration_of, find_rig, with_rig
 from core.control.robot import GuardedRobot
@@ -130,10 +132,23 @@ def _open_live(config: Config, zero: ZeroConfig | None) -> Rig:
             from hardware.servos.eeprom import backups_folder
             from hardware.servos.servo_robot import ServoRobot
 
-            robot = ServoRobot(config.servos, config.safety, name=rig.name, kept_zero=zero, backups=backups_folder())
+            robot = ServoRobot(
+                config.servos,
+                config.safety,
+                name=rig.name,
+                keep=kept_zeros_file(rig),
+                searched=zero,
+                backups=backups_folder(),
+            )
             robot.connect()
         undo.pop_all()
     return Rig(rig.name, RigKind.LIVE, camera, robot)
+
+
+def kept_zeros_file(rig: RigConfig) -> Path:
+    """Where the bus process keeps how the joints of a rig stand."""
+    name = re.sub(r"[^\w .()+-]", "_", Path(rig.file).stem if rig.file is not None else rig.name)
+    return settings_folder() / "zeros" / f"{name}.json"
 
 
 def real_camera(config: Config) -> Camera:

@@ -5,13 +5,14 @@ A servo is where the previous cycle sent it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
-from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
 from core.control.faults import Cause, Fault
 from core.control.gate import Rejection, Source
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import BusGuard, report_of
@@ -76,8 +77,10 @@ class LockStepServos:
     def beat(self, permitted: Source | None) -> None:
         self._beat = Heartbeat(self._clock(), permitted)
 
-    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
-        self._order = BusOrder(command, source, self._clock(), captured_s)
+    def send(
+        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+    ) -> Command:
+        self._order = BusOrder(command, source, self._clock(), captured_s, retracts)
         return self._guard.sent.motion if self._guard.armed and self._guard.sent is not None else Command()
 
     def hold(self) -> None:
@@ -101,10 +104,8 @@ class LockStepServos:
     def acknowledge(self) -> None:
         self._guard.acknowledge()
 
-    def zero(self, names: Sequence[JointName] | None = None) -> None:
-        self._at_mm = tuple(
-            0.0 if names is None or name in names else at for name, at in zip(JOINT_NAMES, self._at_mm, strict=True)
-        )
+    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
+        self._at_mm = tuple(request.positions_mm.get(name, at) for name, at in zip(JOINT_NAMES, self._at_mm, strict=True))
 
     def reboot(self, servo_id: int) -> None:
         """Nothing to do."""
@@ -129,7 +130,7 @@ class LockStepServos:
         sent = self._guard.sent
         if sent is None or not self._guard.armed:
             return None
-        return sent.sent_motion(self._cycle, self._guard.rejection, self._guard.at_end)
+        return sent.sent_motion(self._cycle, self._guard.rejection, self._guard.at_end, self._servos.joints)
 
     def kept_back(self) -> Rejection | None:
         return self._guard.rejection if self._guard.armed and self._guard.sent is None else None

@@ -29,8 +29,10 @@ import typer
 from app.commands.progress import Interrupt, progress_bar
 from app.operator.rig_engine import EngineMaker, RigEngine
 from core.config.models import Config
+from core.config.safety import JOINT_NAMES, JointName
 from core.control.engine import Perceive
 from core.control.faults import Cause
+from core.control.kept_zero import ZeroRequest
 from core.control.modes import ARMED_MODES, Act, Mode
 from core.control.motion import AT_REST, Jog
 from core.control.pilot import LeftOver, Pilot
@@ -41,6 +43,8 @@ from core.session.writer import RecordStatus, SessionWriter, faults_between
 from core.system import release_memory
 from core.types import Frame, Point, Scene
 from hardware.rig import Rig, RigKind
+from hardware.servos.bus_ipc import BusStatus
+from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.process import drive_world
 from hardware.twin.servos.device import OVERLOAD_BIT
@@ -340,6 +344,7 @@ class SoakOperator:
         self._decide_s = self._hangs_until_s = 0.0
         self._jog, self._held = AT_REST, False
         self._zeroing = False
+        self._zeroed_here: set[JointName] = set()
         self.count: Counter[str] = Counter()
         self.hangs = False
         self.wants_restart = False
@@ -354,9 +359,8 @@ class SoakOperator:
         if not self._jog.is_rest:
             pilot.jog("soak", self._jog)
         if self._zeroing and not pilot.view.busy:
-            # the joints stand: where they are now is what was taken for zero
             self._zeroing = False
-            rig.bus.set_zero()
+            rig.bus.set_zero(self._zeroed_here)  # those joints stand: where they are now is what was taken for zero
             self._do("servos on", pilot.switch_on)
         if now_s >= self._decide_s:
             self._decide_s = now_s + self._draw.uniform(*_DECIDES_S)
@@ -398,10 +402,21 @@ class SoakOperator:
             if errors:
                 self._do("restart a servo", lambda: pilot.reboot(errors[0]))
         elif status is not None and not all(status.zeroed):
-            self._zeroing = True
-            self._do("zero", pilot.zero)
+            self._zero(pilot, status)
         else:
             self._do("servos on", pilot.switch_on)
+
+    def _zero(self, pilot: Pilot, status: BusStatus) -> None:
+        """Kept zeros where they are offered; else the present positions, with the torque off."""
+        lost = {name for name, is_zeroed in zip(JOINT_NAMES, status.zeroed, strict=True) if not is_zeroed}
+        kept = tuple(offer.name for offer in status.offers if offer.name in lost)
+        here = lost - set(kept)
+        if here and any(isinstance(reading, ServoState) and reading.torque for reading in status.servos):
+            self._do("torque off", pilot.torque_off)
+            return
+        self._zeroing, self._zeroed_here = True, here
+        request = ZeroRequest(positions_mm=dict.fromkeys(here, 0.0), kept=kept)
+        self._do("zero", lambda: pilot.zero(request))
 
     def _drive_by_hand(self) -> None:
         draw = self._draw

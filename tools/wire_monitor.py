@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from core.config.safety import JointConfig, JointName, ServosConfig
+from core.config.safety import TENDONS, JointConfig, JointName, ServosConfig
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.device import SoftServo
 from hardware.twin.servos.protocol import BROADCAST, EXTENDED_POSITION, Instruction, InstructionPacket, group_items
@@ -20,6 +20,8 @@ _TORQUE, _GOAL = 64, 116
 _OLD_S = 0.2
 """Age of the position and the command behind a goal."""
 _ROUNDING_MM, _STILL_MM, _JUMP_MM = 0.03, 0.3, 0.5
+_AT_END_MM, _SLOW_LAG_MM = 0.1, 0.3
+"""A feed so near to the low end of its envelope may be pulled out by hand; its goals are so far ahead at most."""
 _AFTER_STOP_S = 0.5
 _MOST_TEXTS = 50
 
@@ -104,6 +106,8 @@ class WireMonitor:
             goal_mm = (at_ticks - self._zero[servo.id]) / joint.ticks_per_mm
             here_mm = (servo.mechanical_ticks - self._zero[servo.id]) / joint.ticks_per_mm
             low_mm, high_mm = min(joint.low_mm, here_mm), max(joint.high_mm, here_mm)  # holding is allowed outside, too
+            if joint.name not in TENDONS and here_mm < joint.low_mm + _AT_END_MM:  # the operator may pull it out, slowly
+                low_mm = min(low_mm, here_mm - _SLOW_LAG_MM)
             if not low_mm - _ROUNDING_MM <= goal_mm <= high_mm + _ROUNDING_MM:
                 self._add_unsafe(f"{joint.name}: goal {goal_mm:.2f} mm ({joint.low_mm:g} to {joint.high_mm:g} mm)")
         if last is not None:

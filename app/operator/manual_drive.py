@@ -6,7 +6,7 @@ directly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
@@ -29,9 +29,10 @@ from app.widgets.basics import SCROLL_KEYS
 from app.widgets.event_log import LogKind
 from app.widgets.jog_panel import KEYS, Motion
 from core.config.models import Config
-from core.config.safety import JointName
+from core.config.safety import JOINT_NAMES
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
+from core.control.kept_zero import ZeroRequest
 from core.control.modes import ARMED_MODES, Act
 from core.control.motion import AT_REST, Jog
 from core.control.pilot import KEYBOARD, Pilot
@@ -389,10 +390,10 @@ class DriveController(QObject):
             self._log(tr("restart servo {servo_id}", servo_id=servo_id))
 
     @Slot(object)
-    def zero(self, names: Sequence[JointName] | None) -> None:
-        if (pilot := self._rig.pilot) is not None and pilot.zero(names):
-            what = ", ".join(tr_text(name) for name in names) if names else tr("all servos")
-            self._log(tr("zero {what}", what=what))
+    def zero(self, request: ZeroRequest) -> None:
+        if (pilot := self._rig.pilot) is not None and pilot.zero(request):
+            names = sorted({*request.positions_mm, *request.kept}, key=JOINT_NAMES.index)
+            self._log(tr("zero {what}", what=", ".join(tr_text(name) for name in names)))
 
     @Slot()
     def torque_off(self) -> None:

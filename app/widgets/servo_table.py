@@ -48,6 +48,7 @@ from app.widgets.painting import (
     text_width,
 )
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.control.kept_zero import ZeroRequest
 from core.types import RobotStatus
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, wire_force_mn
 
@@ -525,7 +526,7 @@ class ServoTable(QWidget):
     Attributes
     ----------
     reboot_asked : servo id.
-    zero_asked : list of joint names, or None for all joints.
+    zero_asked : a ZeroRequest.
     torque_off_asked : all servos.
 
     Parameters
@@ -659,11 +660,12 @@ class ServoTable(QWidget):
         self._ask(self._restart_button, question, tr("Restart"), partial(self.reboot_asked.emit, joint.id))
 
     def _ask_zero(self, name: JointName | None) -> None:
-        what, names = tr("All joints become 0 mm here"), None
+        what = tr("All joints become 0 mm here")
         if name is not None:
-            what, names = tr("{joint} becomes 0 mm here", joint=_plain(name).capitalize()), [name]
+            what = tr("{joint} becomes 0 mm here", joint=_plain(name).capitalize())
         question = tr("Are the wires slack? {what}.", what=what)
-        self._ask(self._zero_button, question, tr("Zero"), partial(self.zero_asked.emit, names))
+        request = ZeroRequest(positions_mm=dict.fromkeys(JOINT_NAMES if name is None else (name,), 0.0))
+        self._ask(self._zero_button, question, tr("Zero"), partial(self.zero_asked.emit, request))
 
     def _ask_torque_off(self) -> None:
         self._ask(self._off_button, tr("All motors let go and the wires hang loose."), tr("Torque off"), self.torque_off_asked.emit)

@@ -1,4 +1,4 @@
-"""Calibration of the servos from what the camera sees: which servo does what, steering, taut wires, feed, and the kept zero. Pure.
+"""Calibration of the servos from what the camera sees: which servo does what, steering, taut wires, and feed. Pure.
 
 Identification: a wire can only pull. Turned one way the servo bends the head, turned the other way it lets the wire go slack and
 nothing happens, while a drum feeds both ways. So the direction with an effect is the one that tightens, and the direction of the
@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.calibration.camera import mm_per_px_at
-from core.config.calibration import ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
-from core.config.safety import JOINT_NAMES, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
+from core.config.calibration import ScaleConfig, SteeringConfig, TendonConfig
+from core.config.safety import JOINT_NAMES, JointName, ServosConfig
 from core.devices import UserError
 from core.messages import message
 from core.perception.vectors import fit_robot_vector
@@ -558,51 +558,3 @@ def feed_disagreement(
         a=seen,
         b=configured,
     )
-
-
-_OVER = "the zero of the rig file does not hold any more"
-
-
-@dataclass(frozen=True, slots=True)
-class KeptZero:
-    """One joint. ``at_mm``: its position from the kept zero, without ``lost_turns`` of the servo."""
-
-    name: JointName
-    lost_turns: int
-    at_mm: float
-    is_inside: bool
-
-
-def kept_zero(joint: JointConfig, zero_ticks: int, ticks: int) -> KeptZero:
-    """A joint's position from its kept zero, by the position registers then and now.
-
-    A servo in extended position mode counts its turns only while it has power: afterwards its register has jumped by whole turns.
-    The travel of a tendon is a small part of a turn, so there the jump shows (turns count as lost only where they take the joint
-    out of its envelope); a feed goes over many turns, and a lost one may not show.
-    """
-    away = ticks - zero_ticks
-    if _is_inside(joint, away):
-        return KeptZero(joint.name, 0, away / joint.ticks_per_mm, True)
-    turns = round(away / TICKS_PER_TURN)
-    left = away - turns * TICKS_PER_TURN
-    if turns and _is_inside(joint, left):
-        return KeptZero(joint.name, turns, left / joint.ticks_per_mm, True)
-    return KeptZero(joint.name, 0, away / joint.ticks_per_mm, False)
-
-
-def zero_advice(servos: ServosConfig, zero: ZeroConfig, ticks: Sequence[int]) -> str:
-    """What happened to the zero of the rig file, for an operator who arms joints that are not zeroed: it is never used by itself.
-
-    `ticks` are the position registers now, in the order of the joints.
-    """
-    found = [kept_zero(joint, *both) for joint, *both in zip(servos.joints, zero.ticks, ticks, strict=True)]
-    if lost := [f"{one.name} by {one.lost_turns:+d}" for one in found if one.lost_turns]:
-        return f"{_OVER}: the servos were without power and lost whole turns ({', '.join(lost)})"
-    if moved := [f"{one.name} by {one.at_mm:+.1f} mm" for one in found if not one.is_inside]:
-        return f"{_OVER}: joints were moved out of their envelope ({', '.join(moved)})"
-    tendons = ", ".join(f"{one.name} {one.at_mm:+.1f}" for one in found[:4])
-    return f"no jump against the zero of the rig file is seen (mm from it: {tendons})"
-
-
-def _is_inside(joint: JointConfig, ticks: int) -> bool:
-    return joint.low_mm <= ticks / joint.ticks_per_mm <= joint.high_mm

@@ -87,11 +87,12 @@ class SteeringConfig(ConfigSection):
 
 
 class ZeroConfig(ConfigSection):
-    """Where the joints were zeroed. It holds until the servos lose power: they lose count of their turns then."""
+    """Where the joints were zeroed. Of a tendon, which never goes a whole turn, it holds modulo one turn of the servo."""
 
     ticks: tuple[int, ...] = Field(min_length=len(JOINT_NAMES), max_length=len(JOINT_NAMES), description="position registers")
     slack_mm: tuple[float, ...] = Field(min_length=4, max_length=4, description="how far each tendon was from taut before")
     pretension_mm: float = Field(ge=0.0, le=5.0)
+    found_utc: datetime | None = Field(None, description="when the wires were searched; None: by an earlier version")
 
 
 class PortConfig(ConfigSection):

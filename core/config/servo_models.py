@@ -15,6 +15,8 @@ _WATCHDOG_FIRMWARE = 38
 """First firmware with Bus Watchdog(98) in the 430 and 540 size; the 330 size had it from its first firmware on."""
 _LOWEST_SUPPLY_SHARE = 0.875
 """Of the recommended supply: 10.5 of 12 V, 4.4 of 5 V. Below, the supply sags, and the motor is weaker than its figures say."""
+_FRICTION_SHARE = 0.05
+"""Of the stall current: what a servo without a load draws at most."""
 _SHUTDOWN_MARGIN_C = 5.0
 """The program ends the driving so far below the temperature at which the servo switches itself off."""
 
@@ -64,6 +66,11 @@ class ServoModel:
     def hottest_c(self) -> float:
         """A hotter servo ends the driving, before it switches itself off."""
         return self.max_temperature_c - _SHUTDOWN_MARGIN_C
+
+    @property
+    def friction_ma(self) -> float:
+        """A higher current is not taken for friction of gear and wire."""
+        return _FRICTION_SHARE * self.stall_ma
 
     def current_ma(self, units: int) -> float | None:
         """Current of a register; None for models that report a load."""

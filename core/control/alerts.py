@@ -23,6 +23,8 @@ class Note(StrEnum):
 
     REACHED = "destination reached"
     AT_END = "joint at its end"
+    AT_LOW_END = "feed at its low end"
+    BEYOND_END = "retracting beyond the end"
     NEW_TARGET = "destination changed"
     TORQUE_OFF = "torque off"
 
@@ -64,6 +66,11 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Note.NEW_TARGET: ("Another destination: you drive again", "hand over again to go there"),
     Note.TORQUE_OFF: ("The torque is off: all servos have said so", "the wires hang loose; switch the servos on to drive"),
     Note.AT_END: ("A joint is at the end of its travel", "drive the other way"),
+    Note.AT_LOW_END: ("A feed is at the end of its way back", "to pull it out farther, slowly: let go, then hold retract again"),
+    Note.BEYOND_END: (
+        "Pulling out beyond the end: slow, while held",
+        "watch the robot; when it is out, say where it is (page Servos, Zero)",
+    ),
     Hindrance.IS_STOPPED: ("Stopped", "acknowledge the stop first"),
     Hindrance.UNACKNOWLEDGED: ("A fault is not acknowledged", "read it and acknowledge it"),
     Hindrance.ALREADY_ARMED: ("Armed", "hand over to a destination; disarm first for anything else"),
@@ -243,8 +250,13 @@ class AlertReporter:
         sent: SentMotion | None,
         kept_back: Rejection | None,
         now_s: float,
+        *,
+        is_beyond: bool = False,
     ) -> None:
-        """Report a turn of the pilot: the state `before` and after it, the decision, and what became of controls and command."""
+        """Report a turn of the pilot: the state `before` and after it, the decision, and what became of controls and command.
+
+        `is_beyond`: the operator holds a retraction that goes beyond the end of a feed's envelope.
+        """
         raised: list[tuple[AlertKey, str]] = [(f.cause, f.detail) for f in decision.raised if _matters(f, before)]
         raised += [(reason, "") for refused in decision.refused for reason in refused.reasons]
         permitted = decision.permitted
@@ -262,7 +274,10 @@ class AlertReporter:
             by_program = permitted is Source.PROGRAM and jog.is_rest
             at_end = [name for name in sent.at_end if not by_program or name == "advance"]
             if at_end and (by_program or not jog.is_rest):
-                raised.append((Note.AT_END, ", ".join(at_end)))
+                is_low = not by_program and all(name in sent.at_low for name in at_end)
+                raised.append((Note.AT_LOW_END if is_low else Note.AT_END, ", ".join(at_end)))
+            if is_beyond:
+                raised.append((Note.BEYOND_END, ", ".join(f"{name} {at:.1f} mm" for name, at in sent.at_low.items())))
         is_moving = not jog.is_rest or decision.mode in DRIVING_MODES
         if kept_back is not None and permitted is not None and is_moving and kept_back.reason not in _NO_ALERT:
             raised.append((kept_back.reason, kept_back.detail))

@@ -15,6 +15,9 @@ falls behind, the goal goes back towards it at up to full speed.
 A hold is the measured position, taken once when the hold begins and kept while the joint stays within ``max_step_mm`` of it:
 writing each measured position would let a loaded tendon creep, as every servo rests a little short of its goal. Without valid
 positions nothing is sent; the servos then keep their last goal, which was within one step of them.
+
+Unless the program drives, a feed below the low end of its envelope is not out of bounds: it stays there, or comes back slowly.
+While the operator holds a retraction that was begun at the end, it goes on backwards, slowly (``joints.by_hand``).
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
-from core.control.joints import ONE_CATHETER, Goal, Joints, Limit, SentGoals, joint_room, limited_goal, together
+from core.control.joints import ONE_CATHETER, Goal, Joints, Limit, SentGoals, by_hand, joint_room, limited_goal, together
 from core.messages import message
 
 _COUNT = len(JOINT_NAMES)
@@ -62,12 +65,16 @@ class RejectReason(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class GoalRequest:
-    """Requested goals (mm). ``captured_s`` is the capture of the frame behind them; the operator's need none."""
+    """Requested goals (mm). ``captured_s`` is the capture of the frame behind them; the operator's need none.
+
+    ``retracts``: the operator holds a retraction that was begun at the low end of a feed's envelope, and may go beyond it.
+    """
 
     goals_mm: Sequence[float]
     source: Source
     issued_s: float
     captured_s: float | None = None
+    retracts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,6 +277,9 @@ def gate_step(
     GateStep
         Either a rejection with a hold, or seven goals inside every limit, with a record of what was limited.
     """
+    if permitted is not Source.PROGRAM and measurement is not None and _not_seven_numbers(measurement.positions_mm) is None:
+        retracts = request is not None and request.retracts and request.source is Source.OPERATOR
+        servos = by_hand(servos, measurement.positions_mm, state.sent, retracts=retracts)
     mistrust = measurement_problem(measurement, now_s, servos, safety)
     believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None
     objection = (

@@ -11,16 +11,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JOINT_NAMES, TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.types import Command
 
 Joints = tuple[float, ...]
 """One value per joint, in the order of JOINT_NAMES; millimetres unless said otherwise."""
 NO_GOALS: Joints = (math.nan,) * len(JOINT_NAMES)
 
+FEEDS = range(len(TENDONS), len(JOINT_NAMES))
+"""Indices of the joints that feed robot and catheter."""
 ONE_CATHETER = slice(JOINT_NAMES.index("delivery_1"), JOINT_NAMES.index("delivery_2") + 1)
 """Indices of the joints that move the same catheter: driven apart they would stretch or buckle it."""
 
+RETRACTION_MM_S = 2.0
+"""Greatest speed of a feed below the low end of its envelope."""
 _TOUCHING_MM = 1e-9
 _ADVANCE = JOINT_NAMES.index("advance")
 
@@ -31,6 +35,33 @@ class SentGoals:
 
     goals_mm: Joints
     time_s: float
+
+
+def by_hand(servos: ServosConfig, at_mm: Sequence[float], last: SentGoals | None, *, retracts: bool) -> ServosConfig:
+    """The servos with the envelope that holds while the operator drives.
+
+    A feed may be below the low end of its envelope, where a wrong zero or a retraction has left it: slowly, and not farther down.
+    While the operator holds a retraction (`retracts`) it has no low end, so that a robot whose insertion is not known can be pulled
+    out.
+
+    Parameters
+    ----------
+    at_mm : measured positions, finite.
+    last : what the gate sent last in this motion.
+    """
+    joints = list(servos.joints)
+    for place in FEEDS:
+        joint = joints[place]
+        lowest_mm = min(at_mm[place], at_mm[place] if last is None else last.goals_mm[place])
+        if not retracts and lowest_mm >= joint.low_mm:
+            continue
+        joints[place] = joint.model_copy(
+            update={
+                "low_mm": -math.inf if retracts else lowest_mm,
+                "max_speed_mm_s": min(joint.max_speed_mm_s, RETRACTION_MM_S),
+            }
+        )
+    return servos.model_copy(update={"joints": tuple(joints)})
 
 
 @dataclass(frozen=True, slots=True)

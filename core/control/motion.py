@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import Enum
 
 from core.config.models import DriveConfig, JogConfig
 from core.config.safety import JointConfig, ServosConfig
@@ -33,6 +34,24 @@ class Jog:
 
 
 AT_REST = Jog()
+
+
+class Retraction(Enum):
+    """How a control that pulls a feed back is held."""
+
+    REST = "not held"
+    WITHIN = "begun within the envelope"
+    BEYOND = "begun at its low end"
+    """It may go on beyond the end, slowly: the operator has let go there and has pulled again."""
+
+
+def next_retraction(state: Retraction, *, pulls: bool, at_low: bool) -> Retraction:
+    """The transition table: whether the control pulls back now, and the feed is at the low end of its envelope or below."""
+    if not pulls:
+        return Retraction.REST
+    if state is Retraction.REST:
+        return Retraction.BEYOND if at_low else Retraction.WITHIN
+    return state
 
 
 @dataclass(frozen=True, slots=True)

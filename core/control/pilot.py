@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from core.config.models import Config
-from core.config.safety import JointName, SafetyConfig
+from core.config.safety import SafetyConfig
 from core.control.alerts import AlertReporter, Note
 from core.control.camera_monitor import FrameArrived, FrameLate, RouteState
 from core.control.drive_view import AdviceAdherence, CommandLatency, DriveNews, DriveView
@@ -24,8 +24,9 @@ from core.control.faults import Cause, Fault
 from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.health import Beat, DeadmanReport, EstopReport, GateReport, ModelReport, Part, ServoCheckReport, ServosBusy
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Mode, SupervisorState
-from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, combined
+from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, Retraction, combined, next_retraction
 from core.control.policies import Policy
 from core.control.readiness import READY, Readiness
 from core.control.robot import GuardedRobot, SentMotion
@@ -155,6 +156,7 @@ class Pilot:
         self._jogging, self._following = JogIntegrator(config.hand), AdviceController(config.policy.drive)
         self._adherence, self._latency = AdviceAdherence(), CommandLatency()
         self._must_rest, self._was_at_rest = False, True
+        self._retractions = (Retraction.REST, Retraction.REST)  # of robot and catheter
         self._operator_command = Command()
         self._reported_cycle = -1
         self._operator_moved_s: float | None = None
@@ -199,10 +201,10 @@ class Pilot:
             self._requests.switch_on()
         return is_free
 
-    def zero(self, names: Sequence[JointName] | None = None) -> bool:
-        """Take the present positions, of all joints or of those named, for zero; refused like ``switch_on``."""
+    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> bool:
+        """Set where joints are now, or confirm their kept zeros; refused like ``switch_on``."""
         if is_free := self._may_request():
-            self._requests.zero(names)
+            self._requests.zero(request)
         return is_free
 
     def reboot(self, servo_id: int) -> bool:
@@ -349,7 +351,10 @@ class Pilot:
             with self._lock:
                 self._must_reset_policy = True
         program_command = self._send(decision, inputs.jog, latest, sent, now_s)
-        self._alerts.report_turn(before, self._state, decision, inputs.jog, sent if is_new else None, kept_back, now_s)
+        is_beyond = Retraction.BEYOND in self._retractions
+        self._alerts.report_turn(
+            before, self._state, decision, inputs.jog, sent if is_new else None, kept_back, now_s, is_beyond=is_beyond
+        )
         view = self._make_view(decision, inputs, program_command, sent, now_s)
         with self._lock:
             if view.is_change_of(self._view):
@@ -446,15 +451,16 @@ class Pilot:
             self._must_rest = self._permitted is None and permitted is Source.OPERATOR and not self._was_at_rest
             self._permitted = permitted
         self._was_at_rest = jog.is_rest
-        self._operator_command, program_command = Command(), None
+        self._operator_command, program_command, used_jog = Command(), None, AT_REST
         try:
             if permitted is Source.OPERATOR:
                 self._must_rest = self._must_rest and not jog.is_rest
                 is_blind = any(fault.cause is Cause.WINDOW_HUNG for fault in decision.active)
-                jog = AT_REST if self._must_rest or is_blind else jog
+                used_jog = AT_REST if self._must_rest or is_blind else jog
                 moving = sent.motion if sent is not None else None
-                self._operator_command = self._jogging.command(jog, now_s, moving, self._hand_speed)
-                robot.send(self._operator_command, source=Source.OPERATOR)
+                self._operator_command = self._jogging.command(used_jog, now_s, moving, self._hand_speed)
+                retracts = self._hold_retraction(used_jog, sent)
+                robot.send(self._operator_command, source=Source.OPERATOR, retracts=retracts)
             elif permitted is Source.PROGRAM and latest is not None:
                 program_command = self._following.command(latest.advice, now_s)
                 robot.send(program_command, source=Source.PROGRAM, captured_s=latest.captured_s)
@@ -462,9 +468,21 @@ class Pilot:
                 robot.hold()
         except DeviceError as error:
             self._inputs.post(Fault(Cause.BUS_DEAD, str(error)))
+        if used_jog.is_rest:
+            self._retractions = (Retraction.REST, Retraction.REST)
         # after the command: the bus never has the permission before the permitted source's command, so no cycle holds in between
         robot.beat(permitted)
         return program_command
+
+    def _hold_retraction(self, jog: Jog, sent: SentMotion | None) -> bool:
+        """Whether the operator holds a retraction that may go beyond the end of a feed's envelope."""
+        low = sent.at_low if sent is not None else {}
+        robot, catheter = self._retractions
+        self._retractions = (
+            next_retraction(robot, pulls=jog.advance < 0.0, at_low="advance" in low),
+            next_retraction(catheter, pulls=jog.delivery < 0.0, at_low="delivery_1" in low or "delivery_2" in low),
+        )
+        return Retraction.BEYOND in self._retractions
 
     def _make_view(
         self, decision: Decision, inputs: Inputs, program_command: Command | None, sent: SentMotion | None, now_s: float

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from core.config.safety import JointName
 from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.devices import Robot
 from core.types import Command
 
@@ -18,7 +19,8 @@ class SentMotion:
     """What left the gate in the newest cycle.
 
     ``motion`` is the commanded one; ``source`` whose command it was (None: a hold) and ``captured_s`` the capture of the frame
-    behind it; ``rejection`` why a command was not followed; ``at_end`` the joints at the end of their envelope.
+    behind it; ``rejection`` why a command was not followed; ``at_end`` the joints at the end of their envelope; ``at_low`` the
+    goals (mm) of feeds at the low end of theirs, or below it.
     """
 
     cycle: int
@@ -28,6 +30,7 @@ class SentMotion:
     captured_s: float | None = None
     rejection: RejectReason | None = None
     at_end: tuple[JointName, ...] = ()
+    at_low: Mapping[JointName, float] = field(default_factory=dict)
 
 
 class GuardedRobot(Robot, Protocol):
@@ -35,18 +38,21 @@ class GuardedRobot(Robot, Protocol):
 
     ``connect``, ``arm``, ``disarm``, ``acknowledge``, ``zero``, ``reboot``, ``relax`` and ``torque_off`` may take seconds and raise
     ``DeviceError``; all the others are quick. ``kept_back`` is why nothing has left the gate since arming, not even a hold: while
-    it is not None there is no ``sent_motion`` either, and neither source can drive.
+    it is not None there is no ``sent_motion`` either, and neither source can drive. A command that ``retracts`` is the operator's,
+    and may pull a feed beyond the low end of its envelope.
     """
 
     @property
     def failure(self) -> str | None: ...
     def beat(self, permitted: Source | None) -> None: ...
-    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command: ...
+    def send(
+        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+    ) -> Command: ...
     def stop(self) -> None: ...
     def arm(self) -> None: ...
     def disarm(self) -> None: ...
     def acknowledge(self) -> None: ...
-    def zero(self, names: Sequence[JointName] | None = None) -> None: ...
+    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None: ...
     def reboot(self, servo_id: int) -> None: ...
     def relax(self) -> None: ...
     def torque_off(self) -> None: ...

@@ -6,13 +6,13 @@ import contextlib
 import logging
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from enum import Enum
 
-from core.config.safety import JointName
 from core.control.faults import Cause, Fault
 from core.control.health import ServoCheckReport, ServoRequestBegun
+from core.control.kept_zero import ZeroRequest
 from core.control.modes import Event
 from core.control.robot import GuardedRobot
 from core.devices import DeviceError
@@ -163,9 +163,9 @@ class ServoRequests:
             self._is_blocked = False
         self._request("acknowledging", self._robot.acknowledge)
 
-    def zero(self, names: Sequence[JointName] | None = None) -> None:
-        """The present positions are zero, of all joints or of those named; the wires must be slack."""
-        self._request("zeroing the servos", lambda: self._disarm_and(lambda: self._robot.zero(names)))
+    def zero(self, request: ZeroRequest) -> None:
+        """Set where joints are now, or confirm their kept zeros."""
+        self._request("zeroing the servos", lambda: self._disarm_and(lambda: self._robot.zero(request)))
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo, which clears its hardware error."""

@@ -305,7 +305,12 @@ class RigDraft:
 
     def _set_zero(self, ticks: tuple[int, ...]) -> None:
         slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
-        self.zero = ZeroConfig(ticks=ticks, slack_mm=slack, pretension_mm=self.config.servos.pretension_mm)
+        self.zero = ZeroConfig(
+            ticks=ticks,
+            slack_mm=slack,
+            pretension_mm=self.config.servos.pretension_mm,
+            found_utc=datetime.now(UTC).replace(microsecond=0),
+        )
 
     @property
     def are_zeros_known(self) -> bool:
@@ -326,11 +331,17 @@ class RigDraft:
             raise
 
     def learn_steering(self) -> SteeringConfig:
-        """Zero the joints where they stand, and learn in which direction each tendon moves the head."""
+        """Learn in which direction each tendon moves the head, from where the wires become taut.
+
+        Raises DeviceError, too, when that is not known: by a search in this draft, or an earlier one whose zero they stand at.
+        """
         if self._is_displaced:
             raise DeviceError("a step was stopped half way and the wires are where it left them: find the zeros anew")
+        kept = None if self.are_zeros_known else self.zero
+        if kept is None and not self.are_zeros_known:
+            raise DeviceError("it is not known where the wires are taut: find the zeros first")
         with self._moving():
-            learnt = servo_identification.learn_steering(self.bench, self.servos, self.say)
+            learnt = servo_identification.learn_steering(self.bench, self.servos, self.say, kept)
         steering = learnt.steering
         self.steering, self.head_px = steering, learnt.head_px
         self._set_zero(learnt.zero_ticks)

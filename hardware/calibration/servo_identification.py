@@ -28,8 +28,9 @@ from core.calibration.servos import (
     learn,
     taut_at_mm,
 )
-from core.config.calibration import SteeringConfig
+from core.config.calibration import SteeringConfig, ZeroConfig
 from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
+from core.control.kept_zero import keep, zero_offer
 from core.devices import DeviceError
 from core.messages import message
 from core.types import Command, Point
@@ -43,6 +44,8 @@ _BELOW_MM, _PARK_MM = 0.3, 1.0
 _PAIRS = (("right", "left"), ("up", "down"))
 _PULLS_MM = (0.3, 0.5, 0.8, 1.2)
 _ENOUGH_PX = 6.5
+_AT_ZERO_MM = 0.1
+"""A tendon so near to its kept zero stands at it."""
 
 Say = Callable[[str], object]
 
@@ -272,11 +275,15 @@ class LearnedSteering:
     zero_ticks: tuple[int, ...]
 
 
-def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say) -> LearnedSteering:
+def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say, kept: ZeroConfig | None = None) -> LearnedSteering:
     """Pull each tendon a little, as far as the head needs to show its way.
 
     The tendons must be taut and without tension where they stand: that becomes zero, and there they are in the end. Without the
     pretension, which would be kept and be added once more each time this is done.
+
+    Parameters
+    ----------
+    kept : zero of an earlier search, at which the tendons must stand; None: a search has just left them there.
 
     Raises SteeringNotSeen, HeadNotSeen, ServoError, DeviceError.
     """
@@ -291,6 +298,8 @@ def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say) -> Learned
     slack = servos.model_copy(update={"pretension_mm": 0.0})
     with bench.steer(slack) as robot, _or_back(lambda: robot.bend_to(Command())):
         ticks = robot.ticks()
+        if kept is not None:
+            _check_at_zero(servos, kept, ticks)
         for name in TENDONS:
             for pull_mm in _PULLS_MM:
                 robot.bend_to(Command())
@@ -308,6 +317,15 @@ def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say) -> Learned
         robot.bend_to(Command())
     assert first is not None
     return LearnedSteering(learn(pulls, first.heading), first.head, ticks)
+
+
+def _check_at_zero(servos: ServosConfig, kept: ZeroConfig, ticks: tuple[int, ...]) -> None:
+    """Raise DeviceError when a tendon does not stand at its kept zero: from a bent head every pull would be added to that."""
+    for joint, zero_ticks, now in zip(servos.joints[: len(TENDONS)], kept.ticks, ticks, strict=False):
+        model = servos.model_of(joint).number
+        offer = zero_offer(joint, model, keep(joint, model, zero_ticks, 0.0, 0.0), now)
+        if offer is None or abs(offer.position_mm) > _AT_ZERO_MM:
+            raise DeviceError(message("tendon {name} does not stand at its kept zero: find the zeros first", name=joint.name))
 
 
 def _look(bench: ServoBench, mover: Probe | Steered) -> Look:

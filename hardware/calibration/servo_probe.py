@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.control.kept_zero import ALL_AT_ZERO, ZeroBasis
 from core.messages import message
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
@@ -175,10 +176,12 @@ def patient(servos: ServosConfig) -> ServosConfig:
 
 
 @contextmanager
-def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
+def armed(robot: ServoRobot, stop: StopSwitch, basis: ZeroBasis) -> Iterator[None]:
     """Connect, zero where the servos stand, arm; in the end hold and close.
 
     A line without an answer is opened again; once it was armed, nothing is.
+
+    `basis`: what the zeros of the tendons rest on.
 
     Raises ServoError when port or servos are not in order, or STOP came.
     """
@@ -186,7 +189,7 @@ def armed(robot: ServoRobot, stop: StopSwitch) -> Iterator[None]:
         for attempt in range(_TRIES):
             try:
                 robot.connect()
-                robot.zero()
+                robot.zero(ALL_AT_ZERO.model_copy(update={"basis": basis}))
                 break
             except NoAnswer:
                 robot.close()
@@ -239,7 +242,7 @@ class ServoProbe:
         servo_id = config.joints[_PLACE].id
         robot = ServoRobot(config, safety, name=f"servo {servo_id}", backups=backups)
         try:
-            with armed(robot, stop):
+            with armed(robot, stop, ZeroBasis.HERE):
                 yield cls(robot, servo_id, limits, stop)
         except ServoError as error:
             raise type(error)(_by_id(str(error), config)) from None
@@ -345,10 +348,13 @@ class SteeredRobot:
     def opened(
         cls, servos: ServosConfig, safety: SafetyConfig, stop: StopSwitch, backups: Path | None = None
     ) -> Iterator[SteeredRobot]:
-        """Connect, zero where the servos stand, and arm; at the end they hold, disarmed."""
+        """Connect, zero where a search has left the wires, and arm; at the end they hold, disarmed.
+
+        Raises NotReady, too, when a servo pulls with more current than friction takes.
+        """
         config = patient(servos)
         robot = ServoRobot(config, safety, name="robot", backups=backups)
-        with armed(robot, stop):
+        with armed(robot, stop, ZeroBasis.SEARCHED):
             yield cls(robot, config.joints, stop)
 
     def bend_to(self, command: Command) -> None:

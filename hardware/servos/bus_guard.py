@@ -24,7 +24,7 @@ from core.control.gate import (
     measurement_problem,
     outside_envelope,
 )
-from core.control.joints import Joints, joint_goals
+from core.control.joints import Joints, by_hand, joint_goals
 from core.messages import message
 from core.types import Command
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
@@ -346,11 +346,13 @@ class BusGuard:
             reasons.append("already armed")
         hinder = [f for f in self.active if f.holds and f.cause not in _MENDED_BY_ARMING]
         reasons += [_text(fault) for fault in hinder]
-        # No goal leads from outside the envelope, so nothing would ever move. Joints without a zero have no positions.
+        # No goal leads from outside the envelope, so nothing would ever move, but for a feed below its low end, which the operator
+        # pulls out or brings back. Joints without a zero have no positions.
         at = self._measurement
         if at is not None and self._cycle_s - at.measured_s <= self._safety.measurement_max_age_s:
             advice = "switch the torque off and move it back by hand, or zero it again"
-            reasons += [f"outside its envelope: {joint}: {advice}" for joint in outside_envelope(at.positions_mm, self._servos)]
+            servos = by_hand(self._servos, at.positions_mm, None, retracts=False)
+            reasons += [f"outside its envelope: {joint}: {advice}" for joint in outside_envelope(at.positions_mm, servos)]
         if reasons:
             raise NotReady(message("not armed: {why}", why="; ".join(reasons)))
 
@@ -403,9 +405,12 @@ class BusGuard:
             return None, ()
         at_mm = tuple(self._measurement.positions_mm)
         before_mm = tuple((self._before or self._measurement).positions_mm)
-        wanted = joint_goals(order.command, self._gate.sent, at_mm, now_s, self._servos, self._safety)
+        servos = self._servos
+        if order.source is Source.OPERATOR:
+            servos = by_hand(servos, at_mm, self._gate.sent, retracts=order.retracts)
+        wanted = joint_goals(order.command, self._gate.sent, at_mm, now_s, servos, self._safety)
         goals_mm = self._one_step.bounded(wanted.goals_mm, (order.issued_s, order.command), before_mm)
-        return GoalRequest(goals_mm, order.source, order.issued_s, order.captured_s), wanted.at_end
+        return GoalRequest(goals_mm, order.source, order.issued_s, order.captured_s, order.retracts), wanted.at_end
 
     def record_sent(self, goals_mm: Joints, order: BusOrder | None, now_s: float) -> None:
         """These goals went out, as the servos count them."""

@@ -24,10 +24,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from core.config.safety import JointName, SafetyConfig, ServosConfig
+from core.config.calibration import ZeroConfig
+from core.config.safety import TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Joints
+from core.control.kept_zero import ZeroOffer
 from core.control.robot import SentMotion
 from core.messages import message
 from core.types import Command
@@ -40,6 +42,8 @@ _log = logging.getLogger(__name__)
 _SLOTS = (64, 64, 65_536)
 """Bytes of an order, a heartbeat and a status in the shared memory."""
 _MEMORY_BYTES = sum(map(SharedSlot.size, _SLOTS))
+_AT_LOW_MM = 0.05
+"""A feed so near to the low end of its envelope stands at it."""
 _STOP = b"S"
 _STAYS = "stays"
 """Key of the message that the process goes on without the application."""
@@ -63,12 +67,16 @@ class BusPhase(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class BusOrder:
-    """The newest command. ``command`` None: hold. Times are monotonic; ``captured_s`` is that of the frame behind it."""
+    """The newest command. ``command`` None: hold. Times are monotonic; ``captured_s`` is that of the frame behind it.
+
+    ``retracts``: a retraction by the operator that may go beyond the low end of a feed's envelope.
+    """
 
     command: Command | None
     source: Source
     issued_s: float
     captured_s: float | None = None
+    retracts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +103,15 @@ class IssuedGoals:
         """The same while nothing new is written: these goals stay, and nothing moves."""
         return replace(self, motion=Command(self.motion.bend, self.motion.pitch), order=None)
 
-    def sent_motion(self, cycle: int, rejection: Rejection | None, at_end: tuple[JointName, ...]) -> SentMotion:
+    def sent_motion(
+        self, cycle: int, rejection: Rejection | None, at_end: tuple[JointName, ...], joints: Sequence[JointConfig]
+    ) -> SentMotion:
         """What the pilot is told of it."""
+        low_mm = {
+            joint.name: goal
+            for joint, goal in zip(joints, self.goals_mm, strict=True)
+            if joint.name not in TENDONS and goal <= joint.low_mm + _AT_LOW_MM
+        }
         return SentMotion(
             cycle=cycle,
             time_s=self.time_s,
@@ -105,6 +120,7 @@ class IssuedGoals:
             captured_s=self.order.captured_s if self.order is not None else None,
             rejection=rejection.reason if rejection is not None else None,
             at_end=at_end,
+            at_low=low_mm,
         )
 
 
@@ -132,6 +148,7 @@ class BusStatus:
     rejections, clamp_count : the same counted.
     zeroed : by joint.
     releasing : whether tendons are being let go slowly.
+    offers : where joints that are not zeroed stand by their kept zeros, for the operator to confirm.
     torque_offs : how often the torque was switched off and read back; ``torque_problem`` why a requested one is not confirmed yet.
     """
 
@@ -154,6 +171,7 @@ class BusStatus:
     times: CycleTimes
     zeroed: tuple[bool, ...]
     releasing: bool = False
+    offers: tuple[ZeroOffer, ...] = ()
     torque_offs: int = 0
     torque_problem: str = ""
 
@@ -170,7 +188,7 @@ class BusStatus:
 
 
 _SOURCES: tuple[Source | None, ...] = (None, *Source)
-_ORDER = struct.Struct("<BBBdd4d")  # has a command, source, has a frame, issued, captured, command
+_ORDER = struct.Struct("<BBBBdd4d")  # has a command, source, has a frame, retracts, issued, captured, command
 _HEARTBEAT = struct.Struct("<Bd")
 
 
@@ -181,6 +199,7 @@ def pack_order(order: BusOrder) -> bytes:
         order.command is not None,
         _SOURCES.index(order.source),
         order.captured_s is not None,
+        order.retracts,
         order.issued_s,
         0.0 if order.captured_s is None else order.captured_s,
         command.bend,
@@ -194,11 +213,11 @@ def unpack_order(data: bytes) -> BusOrder | None:
     """The order; None when the bytes are not one."""
     if len(data) != _ORDER.size:
         return None
-    has_command, source, has_frame, issued_s, captured_s, *numbers = _ORDER.unpack(data)
+    has_command, source, has_frame, retracts, issued_s, captured_s, *numbers = _ORDER.unpack(data)
     sender = _SOURCES[source] if source < len(_SOURCES) else None
-    if sender is None or has_command > 1 or has_frame > 1:
+    if sender is None or max(has_command, has_frame, retracts) > 1:
         return None
-    return BusOrder(Command(*numbers) if has_command else None, sender, issued_s, captured_s if has_frame else None)
+    return BusOrder(Command(*numbers) if has_command else None, sender, issued_s, captured_s if has_frame else None, bool(retracts))
 
 
 def pack_heartbeat(beat: Heartbeat) -> bytes:
@@ -227,12 +246,21 @@ class BusClient:
     ----------
     prestarted : a process from ``start_bus``; without one, or when it has died meanwhile, one is started.
     backups : folder for the EEPROM of servos before it is changed; None: it is not kept.
+    keep : file in which the process keeps where the joints are; None: only as long as it runs.
+    searched : zeros of the last search for slack.
 
     Raises BusProcessLost: when the process cannot be started.
     """
 
     def __init__(
-        self, servos: ServosConfig, safety: SafetyConfig, prestarted: DeviceProcess | None = None, backups: Path | None = None
+        self,
+        servos: ServosConfig,
+        safety: SafetyConfig,
+        prestarted: DeviceProcess | None = None,
+        *,
+        backups: Path | None = None,
+        keep: Path | None = None,
+        searched: ZeroConfig | None = None,
     ) -> None:
         self._lock, self._requesting = threading.Lock(), threading.Lock()
         self._request_id = 0
@@ -242,8 +270,15 @@ class BusClient:
         self._process, memory = DeviceProcess.claim(prestarted, start_bus, _MEMORY_BYTES)
         self._order, self._heartbeat, self._status = SharedSlot.row(memory, _SLOTS)
         with contextlib.suppress(OSError):  # the first request finds out that a process is gone
-            folder = None if backups is None else str(backups)
-            self._process.send({"servos": servos.model_dump(), "safety": safety.model_dump(), "backups": folder})
+            self._process.send(
+                {
+                    "servos": servos.model_dump(),
+                    "safety": safety.model_dump(),
+                    "backups": None if backups is None else str(backups),
+                    "keep": None if keep is None else str(keep),
+                    "searched": None if searched is None else searched.model_dump(mode="json"),
+                }
+            )
 
     @property
     def pid(self) -> int:

@@ -27,8 +27,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from pydantic import ValidationError
+
+from core.config.calibration import ZeroConfig
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
+from core.control.kept_zero import ZeroBasis, ZeroRequest, request_problem
 from core.messages import message
 from hardware.servos.bus_guard import (
     LINGER_S,
@@ -53,6 +57,7 @@ from hardware.servos.dynamixel_port import (
     TorqueStillOn,
 )
 from hardware.servos.registers import MissingServo, ServoReading, ServoState
+from hardware.servos.zero_keeper import ZeroKeeper
 
 _log = logging.getLogger(__name__)
 
@@ -177,8 +182,11 @@ _OFF_ALONE_S = 30.0
 class BusLoop:
     """Owns bus and guard. ``run`` returns when the application ends it, or is gone; the servos hold by then."""
 
-    def __init__(self, server: BusServer, bus: ServoBus, servos: ServosConfig, safety: SafetyConfig) -> None:
+    def __init__(
+        self, server: BusServer, bus: ServoBus, servos: ServosConfig, safety: SafetyConfig, keeper: ZeroKeeper | None = None
+    ) -> None:
         self._server, self._bus, self._servos = server, bus, servos
+        self._keeper = keeper or ZeroKeeper(servos, None)
         self._guard = BusGuard(servos, safety, time.monotonic())
         self._release = BusTorqueRelease(bus, self._guard, servos.port)
         self._period_s = 1.0 / servos.bus_hz
@@ -200,7 +208,7 @@ class BusLoop:
         self._must_hold = False
         self._actions: dict[str, Callable[[Request], None]] = {
             "open": lambda _: self._open(),
-            "zero": lambda request: bus.set_zero(request.details.get("names")),
+            "zero": self._zero,
             "arm": lambda _: self._arm(),
             "disarm": lambda _: self._disarm(),
             "acknowledge": lambda _: self._guard.acknowledge(),
@@ -227,6 +235,7 @@ class BusLoop:
                 self._release_at_end()
             finally:
                 self._bus.close()
+                self._keeper.close(time.monotonic())  # before the next process gets the port, and reads the file
                 if self._succession is not None:
                     self._succession.close()
 
@@ -270,6 +279,7 @@ class BusLoop:
             self._ended = True
             return
         self._guard_port(self._look)
+        self._keeper.write(time.monotonic())
         self._ended = not self._bus.is_open or self._is_slack()
         if not self._ended and self._servos.port is not None:
             self._succession = PortSuccession(self._servos.port)
@@ -369,6 +379,7 @@ class BusLoop:
         self._corrupt += errors
         self._bad_packets += errors
         now_s = time.monotonic()
+        self._keeper.update(self._readings, now_s)
         return self._guard.update(self._readings, errors, self._server.heartbeat(), now_s)
 
     def _read_decide_write(self) -> None:
@@ -435,6 +446,7 @@ class BusLoop:
 
     def _hold_after(self, fault: Fault) -> None:
         """Goal = measured. What the tension has caused lets the tendons go slowly; the torque goes off where that is requested."""
+        self._keeper.write(time.monotonic())
         self._ramp, self._is_off_after_ramp = None, False
         is_off = fault.cause.reaction is Reaction.STOP and self._servos.torque_off_on_stop
         is_ramp = self._bus.is_open and fault.cause in RELEASED
@@ -487,6 +499,7 @@ class BusLoop:
     def _open(self) -> None:
         if not self._bus.is_open:
             _with_port(self._servos.port, self._bus.open)
+            self._keeper.load()
             self._give_up_s = math.inf
             self._corrupt = self._bus.counts.corrupt
             self._lost = False
@@ -496,7 +509,7 @@ class BusLoop:
         if not self._bus.is_open:
             raise NotReady(message("not armed: {why}", why=self._open_problem or "the servo port is not open"))
         if not self._guard.armed:
-            self._read_before_arming()
+            self._check_answers()
         self._guard.check_arming()
         try:
             self._bus.arm()
@@ -507,25 +520,55 @@ class BusLoop:
         self._release.cancel()
         self._guard.set_armed(time.monotonic())
 
-    def _read_before_arming(self) -> None:
+    def _read_all(self) -> list[MissingServo]:
         """Where all joints are: a quiet bus was not read for long, and after a zero the last positions mean nothing.
 
-        The guard takes whole sets only, so one late answer is no reason to use the old positions. Raises NotReady.
+        The guard takes whole sets only, so one late answer is no reason to use the old positions. Returns the servos that do not
+        tell.
         """
         for left in reversed(range(_READS_BEFORE_ARMING)):
             self._read()
             missing = [reading for reading in self._readings if isinstance(reading, MissingServo)]
-            if not missing:
-                return
-            if left:
+            if missing and left:
                 self._bus.pause(LATE_S)
+            elif not missing:
+                break
+        return missing
+
+    def _check_answers(self) -> None:
+        """Raise NotReady when a servo does not tell where it is."""
+        missing = self._read_all()
         if len(missing) == len(self._servos.joints):
             raise NotReady("not armed: no servo answers: release the E-stop or switch their supply on, check the cable")
-        silent = ", ".join(f"{one.name} (id {one.id}): {one.reason}" for one in missing)
-        raise NotReady(message("not armed: {why}; check its supply and cable", why=silent))
+        if missing:
+            raise NotReady(message("not armed: {why}; check its supply and cable", why=_silence_of(missing)))
+
+    def _zero(self, request: Request) -> None:
+        """Set zeros; those of an operator may not contradict what is kept."""
+        try:
+            wanted = ZeroRequest.model_validate(request.details)
+        except ValidationError as error:
+            raise NotReady(f"no zeros that can be set: {error.errors()[0]['msg']}") from None
+        if wanted.basis is not ZeroBasis.SLACK:
+            if self._keeper.has_file:
+                raise NotReady("the zeros of a rig are confirmed or measured by its operator")
+            self._bus.set_zero(wanted.positions_mm, basis=wanted.basis)
+            return
+        if self._guard.armed:
+            raise NotReady("the servos are armed: disarm before zeroing")
+        if missing := self._read_all():
+            raise NotReady(message("not zeroed: {why}; check its supply and cable", why=_silence_of(missing)))
+        if problem := request_problem(wanted, self._keeper.offers(self._readings), self._servos):
+            raise NotReady(problem)
+        kept = {name: found for name in wanted.kept if (found := self._keeper.kept(name)) is not None}
+        self._bus.set_zero(wanted.positions_mm, kept)
+        self._keeper.forget(wanted.forgotten)
+        self._read()
+        self._keeper.write(time.monotonic())
 
     def _disarm(self) -> None:
         self._guard.disarm()
+        self._keeper.write(time.monotonic())
         if self._bus.is_open and self._ramp is None:
             self._settle = _SETTLE_CYCLES
             self._bus.disarm()
@@ -593,6 +636,9 @@ class BusLoop:
 
     def _publish(self, now_s: float) -> None:
         guard = self._guard
+        zeroed = tuple(zero is not None for zero in self._bus.zero_ticks)
+        offers = () if all(zeroed) else self._keeper.offers(self._readings)
+        known = {joint.name for joint, is_zeroed in zip(self._servos.joints, zeroed, strict=True) if is_zeroed}
         self._server.publish(
             BusStatus(
                 cycle=self._cycle,
@@ -615,9 +661,14 @@ class BusLoop:
                 torque_offs=self._release.confirmed,
                 torque_problem=self._release.problem,
                 times=self._timer.summary,
-                zeroed=tuple(zero is not None for zero in self._bus.zero_ticks),
+                zeroed=zeroed,
+                offers=tuple(offer for offer in offers if offer.name not in known),
             )
         )
+
+
+def _silence_of(missing: Sequence[MissingServo]) -> str:
+    return ", ".join(f"{one.name} (id {one.id}): {one.reason}" for one in missing)
 
 
 def main(arguments: list[str]) -> int:
@@ -647,7 +698,11 @@ def _serve(server: BusServer) -> int:
         return 1
     with contextlib.suppress(PermissionError):  # the servos come before the pictures, where the system allows it
         os.setpriority(os.PRIO_PROCESS, 0, _PRIORITY)
-    loop = BusLoop(server, bus, servos, safety)
+    keep, searched = message.get("keep"), message.get("searched")
+    keeper = ZeroKeeper(
+        servos, None if keep is None else Path(keep), None if searched is None else ZeroConfig.model_validate(searched)
+    )
+    loop = BusLoop(server, bus, servos, safety, keeper)
     signal.signal(signal.SIGTERM, lambda *_: loop.end())
     gc.collect()
     gc.freeze()  # what is loaded stays: later collections are short

@@ -6,12 +6,13 @@ import contextlib
 import logging
 import secrets
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from core.config.safety import TENDONS, JointConfig, JointName, ServosConfig
 from core.config.servo_models import ServoModel, model_name
+from core.control.kept_zero import KeptJoint, ZeroBasis, zero_offer
 from core.messages import message
 from hardware.servos import registers
 from hardware.servos.dynamixel_port import (
@@ -46,7 +47,7 @@ _log = logging.getLogger(__name__)
 
 # Registers (Robotis e-Manual, X series)
 _RETURN_DELAY, _DRIVE_MODE, _MODE, _HOMING_OFFSET, _VELOCITY_LIMIT, _STARTUP = 9, 10, 11, 20, 44, 60
-TORQUE, _STATUS_RETURN, _HARDWARE_ERROR, _WATCHDOG, _PROFILE, _GOAL, _POSITION = 64, 68, 70, 98, 108, 116, 132
+TORQUE, _STATUS_RETURN, _HARDWARE_ERROR, _WATCHDOG, _PROFILE, _GOAL, _CURRENT, _POSITION = 64, 68, 70, 98, 108, 116, 126, 132
 _FIRMWARE, _SECONDARY_ID, _TEMPERATURE_LIMIT, _SHUTDOWN = 6, 12, 31, 63
 _NO_SECONDARY_ID = 253
 """From this value on Secondary ID(12) is off."""
@@ -189,8 +190,8 @@ class ServoBus:
 
     Notes
     -----
-    Positions are joint millimetres from where ``set_zero`` was called. Every method but ``close`` may raise ``PortLost``; then the
-    bus is closed, and ``open`` starts again: disarmed, without zeros.
+    Positions are joint millimetres from the zeros of ``set_zero``. Every method but ``close`` may raise ``PortLost``; then the bus
+    is closed, and ``open`` starts again: disarmed, without zeros.
     """
 
     def __init__(self, config: ServosConfig, port: str | None = None, backups: Path | None = None) -> None:
@@ -278,21 +279,75 @@ class ServoBus:
         self._armed = False
         self._line.close()
 
-    def set_zero(self, names: Sequence[JointName] | None = None) -> None:
-        """The present positions become zero, of all joints or of those named. Tendons must be without tension there.
+    def set_zero(
+        self,
+        positions_mm: Mapping[JointName, float] | None = None,
+        kept: Mapping[JointName, KeptJoint] | None = None,
+        basis: ZeroBasis = ZeroBasis.SLACK,
+    ) -> None:
+        """Set where joints are now; all or none of them.
 
-        Raises NoAnswer, and NotReady: when armed, as goals would jump, and when a servo holds in a mode of another program.
+        Parameters
+        ----------
+        positions_mm : in millimetres from zero, 0 of a tendon where its wire is slack; None: all seven are at 0.
+        kept : joints whose kept zero holds.
+        basis : what the zeros of tendons in `positions_mm` rest on.
+
+        Raises NoAnswer, and NotReady: when armed, as goals would jump; when a servo holds in a mode of another program; when a
+        tendon may be pulled; when a kept zero does not fit.
         """
         if self.is_armed:
             raise NotReady("the servos are armed: disarm before zeroing")
-        chosen = [joint for joint in self._joints if names is None or joint.name in names]
-        for joint in chosen:
-            if joint.id not in self._put_off:
-                continue
+        if positions_mm is None and kept is None:
+            positions_mm = dict.fromkeys((joint.name for joint in self._joints), 0.0)
+        zeros: dict[int, int] = {}
+        for joint in self._joints:
+            if joint.name in (kept or {}):
+                self._make_countable(joint)
+                zeros[joint.id] = self._kept_zero(joint, (kept or {})[joint.name])
+            elif joint.name in (positions_mm or {}):
+                self._make_countable(joint)
+                if joint.name in TENDONS and basis is not ZeroBasis.HERE:
+                    self._check_slack(joint, basis)
+                at_ticks = round((positions_mm or {})[joint.name] * joint.ticks_per_mm)
+                zeros[joint.id] = self._read_signed(joint, _POSITION) - at_ticks
+        self._zeros.update(zeros)
+
+    def _make_countable(self, joint: JointConfig) -> None:
+        """Set a servo up that was left as it was because it holds. Raises NotReady when it holds in a mode of another program."""
+        if joint.id in self._put_off:
             self._check_counting(joint)
             if not self._holds(joint):
                 self._configure(joint)
-        self._zeros.update({joint.id: self._read_signed(joint, _POSITION) for joint in chosen})
+
+    def _kept_zero(self, joint: JointConfig, kept: KeptJoint) -> int:
+        """Position register at the kept zero, as the servo counts now. Raises NotReady."""
+        offer = zero_offer(joint, self.config.model_of(joint).number, kept, self._read_signed(joint, _POSITION))
+        if offer is None:
+            raise NotReady(f"{_title(joint)}: its kept zero does not fit any more: give its position, or search for it")
+        return offer.zero_ticks
+
+    def _check_slack(self, joint: JointConfig, basis: ZeroBasis) -> None:
+        """Raise NotReady when the tendon may be pulled: a zero there would add its pull to every later one."""
+        if basis is ZeroBasis.SLACK and self._holds(joint):
+            raise NotReady(
+                message(
+                    "{joint} holds its wire: let the wizard search where it is taut (menu Rig, Calibrate), or switch the torque "
+                    "off and see that it is slack",
+                    joint=_title(joint),
+                )
+            )
+        model = self.config.model_of(joint)
+        drawn_ma = model.current_ma(registers.signed(self._line.read(joint.id, _CURRENT, 2)))
+        if drawn_ma is not None and abs(drawn_ma) > model.friction_ma:
+            raise NotReady(
+                message(
+                    "{joint} pulls with {a:.0f} mA (friction takes {b:.0f} mA at most): slacken its wire, then zero it",
+                    joint=_title(joint),
+                    a=abs(drawn_ma),
+                    b=model.friction_ma,
+                )
+            )
 
     def arm(self) -> None:
         """Torque on, each servo holding where it stands. A servo that holds already goes on holding.
@@ -509,7 +564,7 @@ class ServoBus:
     def _check_zeroed(self) -> None:
         names = ", ".join(joint.name for joint in self._joints if joint.id not in self._zeros)
         if names:
-            raise NotReady(f"not zeroed: {names} (or restarted since then): slacken the wires and zero before arming")
+            raise NotReady(f"not zeroed: {names} (or restarted since then): page Servos, Zero")
 
     def _holds(self, joint: JointConfig) -> bool:
         """Whether its torque is on: then it may hold a wire under tension, which only the operator lets go."""

@@ -79,6 +79,8 @@ class BusProcessLost(ServoError):
 
 _BODY = 7
 """Where instruction and parameters begin, behind header, id and length."""
+_CRC_BYTES = 2
+"""At the end of a packet."""
 _READ_SLICE_S = 0.0005
 
 
@@ -389,11 +391,15 @@ class ServoLine:
         return sorted(found)
 
     def read(self, servo_id: int, address: int, length: int) -> bytes:
-        """`length` bytes of the control table; two retries. Raises NoAnswer, WriteRefused."""
-        data, error = self._request(servo_id, lambda port: self._handler.readTxRx(port, servo_id, address, length), length)
+        """`length` bytes of the control table; two retries. Raises NoAnswer, WriteRefused.
+
+        Three bytes are asked for at least: of an answer without data the vendor's handler takes the two bytes of its CRC for them.
+        """
+        asked = max(length, _CRC_BYTES + 1)
+        data, error = self._request(servo_id, lambda port: self._handler.readTxRx(port, servo_id, address, asked), asked)
         if error & ~ALERT_BIT:
             raise WriteRefused(f"servo {servo_id} answered a read of register {address}: it {_error_text(error)}")
-        return data
+        return data[:length]
 
     def write(self, servo_id: int, address: int, data: bytes) -> None:
         """Write and wait for the servo's consent; two retries (a register write may be repeated). NoAnswer, WriteRefused."""

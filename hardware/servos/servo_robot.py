@@ -6,18 +6,18 @@ import math
 import re
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from core.calibration.servos import zero_advice
 from core.config.calibration import ZeroConfig
-from core.config.safety import JointName, SafetyConfig, ServosConfig
+from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
 from core.control.faults import Cause
 from core.control.gate import Rejection, Source
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
 from hardware.processes import DeviceProcess
@@ -43,7 +43,8 @@ class ServoRobot:
     servos, safety : the configuration; ``servos.port`` must be set.
     name : shown to the operator.
     truth : tells the status instead of the servos, where the robot is simulated; its servos are not watched when the program ends.
-    kept_zero : of the rig file; arming without a zero then says whether the servos have lost their turns since.
+    keep : file in which the bus process keeps where the joints are, to offer it after a restart; None: only while it runs.
+    searched : zeros of the rig file, of the last search for slack; offered, too.
     process : a bus process that was started ahead, for the first connection.
     backups : folder that keeps the servos' EEPROM as it was before it is changed; None for software servos.
 
@@ -62,14 +63,15 @@ class ServoRobot:
         *,
         name: str = "servo robot",
         truth: Callable[[], RobotStatus] | None = None,
-        kept_zero: ZeroConfig | None = None,
+        keep: Path | None = None,
+        searched: ZeroConfig | None = None,
         process: DeviceProcess | None = None,
         backups: Path | None = None,
     ) -> None:
         self._servos = servos if truth is None else servos.model_copy(update={"unattended_s": 0.0})
         self._safety = safety
         self._name = name
-        self._truth, self._kept_zero = truth, kept_zero
+        self._truth, self._keep, self._searched = truth, keep, searched
         self._lock, self._releasing = threading.Lock(), threading.Lock()
         self._prestarted, self._backups = process, backups
         self._client: BusClient | None = None
@@ -102,7 +104,14 @@ class ServoRobot:
         try:
             with ExitStack() as undo:
                 prestarted, self._prestarted = self._prestarted, None
-                client = BusClient(self._servos, self._safety, prestarted, self._backups)
+                client = BusClient(
+                    self._servos,
+                    self._safety,
+                    prestarted,
+                    backups=self._backups,
+                    keep=self._keep,
+                    searched=self._searched,
+                )
                 undo.callback(client.close)
                 self._request(client, "open", _OPEN_S)
                 with self._lock:
@@ -119,23 +128,19 @@ class ServoRobot:
             self._not_connected = str(error)
             raise
 
-    def zero(self, names: Sequence[JointName] | None = None) -> None:
-        """The present positions are zero, of all joints or of those named; the wires must be slack. Raises NotReady, NoAnswer."""
-        self._request(self._connected(), "zero", _REQUEST_S, names=None if names is None else list(names))
+    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
+        """Set where joints are now, or confirm their kept zeros (``BusStatus.offers``).
+
+        Raises NotReady, NoAnswer: the zero of a tendon is refused while its servo holds or pulls, and where one is kept.
+        """
+        self._request(self._connected(), "zero", _REQUEST_S, **request.model_dump(mode="json"))
 
     def arm(self) -> None:
         """Torque on, each servo holding where it stands; from now on the permitted source's orders are followed.
 
         Raises NotReady: with all reasons: not zeroed, a fault that was not acknowledged or is still there.
         """
-        try:
-            self._request(self._connected(), "arm", _ARM_S)
-        except NotReady as error:
-            status, advice = self.bus_status(), ""
-            if self._kept_zero is not None and status is not None and not all(status.zeroed) and self._states:
-                ticks = [reading.ticks for reading in self._states if isinstance(reading, ServoState)]
-                advice = f" ({zero_advice(self._servos, self._kept_zero, ticks)})"
-            raise NotReady(f"{error}{advice}") from None
+        self._request(self._connected(), "arm", _ARM_S)
         self._beat_unsupervised()
 
     def disarm(self) -> None:
@@ -203,13 +208,16 @@ class ServoRobot:
         if (client := self._client) is not None:
             client.put_heartbeat(Heartbeat(time.monotonic(), permitted))
 
-    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
+    def send(
+        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+    ) -> Command:
         """Make `command` the newest order.
 
         Parameters
         ----------
         command : limited to -1..1 and to the joints' speeds.
         captured_s : when the frame behind it was taken (monotonic); needed of the program.
+        retracts : the operator holds a retraction that may go beyond the low end of a feed's envelope, at 2 mm/s.
 
         Returns
         -------
@@ -230,7 +238,7 @@ class ServoRobot:
             delivery_mm_s=max(-delivery_limit, min(delivery_limit, command.delivery_mm_s)),
         )
         client = self._connected()
-        client.put_order(BusOrder(limited, source, time.monotonic(), captured_s))
+        client.put_order(BusOrder(limited, source, time.monotonic(), captured_s, retracts))
         self._beat_unsupervised()
         sent = self._sent(client.status())
         return sent.motion if sent is not None else Command()
@@ -301,7 +309,7 @@ class ServoRobot:
         sent = self._sent(status)
         if status is None or sent is None:
             return None
-        return sent.sent_motion(status.cycle, status.rejection, status.at_end)
+        return sent.sent_motion(status.cycle, status.rejection, status.at_end, self._servos.joints)
 
     def _sent(self, status: BusStatus | None) -> IssuedGoals | None:
         if status is None or status.sent is None or not status.armed or self.failure is not None:

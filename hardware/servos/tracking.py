@@ -166,8 +166,8 @@ class TrackingMonitor:
         if before is None:
             return None
         self._watched_s += min(measurement.measured_s - before.measured_s, self._longest_s)
-        now_s, inside_mm = self._watched_s, self._inside(at_mm)
-        goals = goals_mm if goals_mm is not None else self._inside(before.positions_mm)
+        now_s, inside_mm = self._watched_s, self._inside(at_mm, goals_mm)
+        goals = goals_mm if goals_mm is not None else self._inside(before.positions_mm, None)
         # all of them, in every cycle: each has its own memory
         outside = self._outside.update(inside_mm, at_mm, now_s)
         jam = self._jams.update(goals, at_mm, now_s)
@@ -192,5 +192,9 @@ class TrackingMonitor:
             )
         return None
 
-    def _inside(self, positions_mm: Sequence[float]) -> Joints:
-        return tuple(min(max(at, joint.low_mm), joint.high_mm) for at, joint in zip(positions_mm, self._joints, strict=True))
+    def _inside(self, positions_mm: Sequence[float], goals_mm: Joints | None) -> Joints:
+        """The positions, clipped to the envelopes; that of a feed which was sent below its low end begins there."""
+        lows = [joint.low_mm for joint in self._joints]
+        if goals_mm is not None:
+            lows = [min(low, goal) for low, goal in zip(lows, goals_mm, strict=True)]
+        return tuple(min(max(at, low), joint.high_mm) for at, low, joint in zip(positions_mm, lows, self._joints, strict=True))

@@ -10,15 +10,16 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from core.config.models import PerceptionConfig, TwinConfig
-from core.config.safety import JOINT_NAMES, JointName, SafetyConfig
+from core.config.safety import JOINT_NAMES, SafetyConfig
 from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import SentMotion
 from core.devices import DeviceError, Latest
 from core.perception.centerline import plan_route
@@ -307,7 +308,9 @@ class DirectRobot:
             if waiting is not None and self._beat_s - waiting.time_s <= self._safety.command_max_age_s:
                 self._execute(waiting)
 
-    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
+    def send(
+        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+    ) -> Command:
         """Make the command the current one if its source may drive; otherwise hold."""
         with self._lock:
             return self._execute(SentMotion(0, time.monotonic(), command, source, captured_s))
@@ -332,7 +335,7 @@ class DirectRobot:
     def acknowledge(self) -> None:
         """No fault latches."""
 
-    def zero(self, names: Sequence[JointName] | None = None) -> None:
+    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
         """No servos."""
 
     def reboot(self, servo_id: int) -> None:

@@ -16,6 +16,7 @@ from core.control.alerts import Alert
 from core.control.drive_view import DriveNews, DriveView
 from core.control.faults import Fault
 from core.control.gate import Source
+from core.control.kept_zero import ZeroRequest
 from core.control.modes import Act, Mode
 from core.control.motion import Jog
 from core.types import (
@@ -236,8 +237,9 @@ class FakePilot:
     def switch_on(self) -> None:
         self.asked.append("switch on")
 
-    def zero(self, names: object = None) -> None:
-        self.asked.append(f"zero {names}")
+    def zero(self, request: ZeroRequest) -> bool:
+        self.asked.append(f"zero {list(request.positions_mm)}, kept {list(request.kept)}")
+        return True
 
     def reboot(self, servo_id: int) -> None:
         self.asked.append(f"reboot {servo_id}")

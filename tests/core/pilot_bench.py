@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from core.control.bus_monitor import BusReport
 from core.control.faults import Cause
 from core.control.gate import Rejection, Source
 from core.control.health import ModelReport
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST
 from core.control.pilot import PERIOD_S, LeftOver, Pilot
@@ -36,6 +37,7 @@ class Robot:
         self.calls: list[str] = []
         self.failure: str | None = None
         self.problem = ""
+        self.retracts = False
         self.bus: BusReport | None = WELL
         self.permitted: Source | None = None
         self.ordered: Source | None = None
@@ -48,7 +50,10 @@ class Robot:
         self.calls.append("connect")
         self.failure = None
 
-    def send(self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None) -> Command:
+    def send(
+        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+    ) -> Command:
+        self.retracts = retracts
         if self.failure is not None:
             raise DeviceError(self.failure)
         self.ordered = source
@@ -79,7 +84,7 @@ class Robot:
     def acknowledge(self) -> None:
         self.calls.append("acknowledge")
 
-    def zero(self, names: Sequence[str] | None = None) -> None:
+    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
         self.calls.append("zero")
 
     def reboot(self, servo_id: int) -> None:

@@ -25,6 +25,7 @@ from core.control.alerts import ALERTS, Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import Source
+from core.control.kept_zero import ZeroRequest
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST, Jog
 from core.devices import DeviceError, EndOfStream
@@ -272,10 +273,9 @@ def test_a_recording_that_is_over_still_has_no_robot(make_window: MakeWindow, be
 
 def test_servo_requests_of_the_table_reach_the_servos(running: OperatorWindow, engine: FakeEngine) -> None:
     running.panels.servos.reboot_asked.emit(3)
-    running.panels.servos.zero_asked.emit(None)
-    running.panels.servos.zero_asked.emit(["left"])
+    running.panels.servos.zero_asked.emit(ZeroRequest(positions_mm={"left": 0.0}, kept=("advance",)))
     running.panels.servos.torque_off_asked.emit()
-    assert engine.pilot.asked == ["reboot 3", "zero None", "zero ['left']", "torque off"]
+    assert engine.pilot.asked == ["reboot 3", "zero ['left'], kept ['advance']", "torque off"]
 
 
 NONE = Qt.KeyboardModifier.NoModifier

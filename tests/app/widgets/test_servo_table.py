@@ -14,6 +14,7 @@ from app.ui import theme
 from app.widgets.painting import number
 from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_words, known_joints, pair_balances, servo_rows
 from core.config.safety import SafetyConfig
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
 from hardware.servos.registers import HardwareError, MissingServo
 from tests.app.bus_status import DASH, MINUS, SERVOS, bus, servo
@@ -252,12 +253,12 @@ def test_zeroing_is_asked_back_and_then_told(table: ServoTable, qtbot: QtBot) ->
     assert table.question.text == "Are the wires slack? All joints become 0 mm here."
     assert asked == []
     next(b for b in table.question.findChildren(QPushButton) if b.text() == "Zero").click()
-    assert asked == [None]
+    assert asked == [ALL_AT_ZERO]
     assert table.question.text == ""
     for answer in ("Cancel", "Zero"):
         choose(table.menu_for(SERVOS.joints[5]), "Zero delivery 1")
         button(table.question, answer).click()
-    assert asked == [None, ["delivery_1"]]
+    assert asked == [ALL_AT_ZERO, ZeroRequest(positions_mm={"delivery_1": 0.0})]
 
 
 def test_restart_and_torque_off_are_asked_back(table: ServoTable, qtbot: QtBot) -> None:

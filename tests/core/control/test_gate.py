@@ -11,7 +11,7 @@ import pytest
 
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.gate import Clamp, GateState, GateStep, GoalRequest, JointMeasurement, RejectReason, Source, gate_step
-from core.control.joints import Limit, joint_goals
+from core.control.joints import Limit, by_hand, joint_goals
 from core.types import Command
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
@@ -597,3 +597,92 @@ def test_a_dead_host_leaves_every_joint_within_one_step_of_where_it_was() -> Non
         ]
         assert all(reach)
     assert [clamp.limit for clamp in step.clamps] == [Limit.STEP] * 7
+
+
+# --- a feed below the low end of its envelope ------------------------------------------------------------------------------------
+
+
+def _by_hand(
+    at: float,
+    to: float,
+    *,
+    retracts: bool,
+    name: JointName = "advance",
+    permitted: Source | None = Source.OPERATOR,
+    source: Source = Source.OPERATOR,
+) -> GateStep:
+    """One tick of a motion that was under way at `at`, towards `to`."""
+    places = _moved(**{name: at})
+    state = _running(places, _moved((0.0,) * 7, **{name: math.copysign(2.0, to - at)}))
+    request = GoalRequest(_moved(**{name: to}), source, NOW, NOW, retracts)
+    return gate_step(state, request, _at(places), permitted, NOW, SERVOS, SAFETY)
+
+
+@pytest.mark.parametrize(
+    ("at", "to", "retracts", "permitted", "goal", "reason"),
+    [
+        # within the envelope nothing has changed
+        (-5.0, -5.04, False, Source.OPERATOR, -5.0, RejectReason.OUT_OF_ENVELOPE),
+        (10.0, 10.2, False, Source.OPERATOR, 10.12, None),
+        # a retraction that was begun at the end goes on, at 2 mm/s
+        (-5.0, -5.04, True, Source.OPERATOR, -5.04, None),
+        (-30.0, -30.04, True, Source.OPERATOR, -30.04, None),
+        (-30.0, -30.2, True, Source.OPERATOR, -30.04, None),
+        (-30.0, -30.3, True, Source.OPERATOR, -30.0, RejectReason.OVER_RATE),
+        # let go, it stays; forwards it comes back, as slowly
+        (-30.0, -30.0, False, Source.OPERATOR, -30.0, None),
+        (-30.0, -30.04, False, Source.OPERATOR, -30.0, RejectReason.OUT_OF_ENVELOPE),
+        (-30.0, -29.8, False, Source.OPERATOR, -29.96, None),
+        (-30.0, -29.8, True, Source.OPERATOR, -29.96, None),
+        # the program gets nowhere there; without a permission the feed stays where it is
+        (-30.0, -30.04, True, Source.PROGRAM, None, RejectReason.WRONG_SOURCE),
+        (-5.0, -5.04, True, Source.PROGRAM, -5.0, RejectReason.WRONG_SOURCE),
+        (-30.0, -30.04, True, None, -30.0, RejectReason.NOT_ARMED),
+    ],
+)
+def test_below_its_envelope_a_feed_goes_by_hand_only_slowly_and_held(
+    at: float, to: float, retracts: bool, permitted: Source | None, goal: float | None, reason: RejectReason | None
+) -> None:
+    step = _by_hand(at, to, retracts=retracts, permitted=permitted)
+    assert _reason(step) is reason
+    assert (step.goals_mm[4] if step.goals_mm is not None else None) == (None if goal is None else pytest.approx(goal))
+
+
+@pytest.mark.parametrize("at", [-5.0, -30.0])
+def test_the_program_cannot_say_that_it_retracts(at: float) -> None:
+    step = _by_hand(at, at - 0.04, retracts=True, permitted=Source.PROGRAM, source=Source.PROGRAM)
+    assert _reason(step) in {RejectReason.OUT_OF_ENVELOPE, RejectReason.MEASURED_OUT_OF_ENVELOPE}
+    assert step.goals_mm is None or step.goals_mm[4] == at
+
+
+@pytest.mark.parametrize(("name", "at"), [("right", -2.4), ("down", -2.4), ("right", -3.1)])
+def test_a_tendon_never_leaves_its_envelope(name: JointName, at: float) -> None:
+    step = _by_hand(at, at - 0.04, retracts=True, name=name)
+    assert _reason(step) in {RejectReason.OUT_OF_ENVELOPE, RejectReason.MEASURED_OUT_OF_ENVELOPE}
+
+
+@pytest.mark.parametrize("at", [400.0, 403.0])
+def test_the_high_end_stays_where_it_is(at: float) -> None:
+    step = _by_hand(at, at + 0.04, retracts=True)
+    assert _reason(step) in {RejectReason.OUT_OF_ENVELOPE, RejectReason.MEASURED_OUT_OF_ENVELOPE}
+
+
+def test_a_robot_whose_insertion_is_wrong_comes_out_completely_and_stops_with_the_hand() -> None:
+    """It is 35 mm in where the program says -5; the servos lag by half a step."""
+    at, state, now_s = _moved(advance=-5.0), GateState(), NOW
+    for tick in range(1000):
+        now_s += TICK
+        held = tick % 400 != 399  # a control that is let go in between
+        command = Command(advance_mm_s=-20.0 if held else 0.0)
+        servos = by_hand(SERVOS, at, state.sent, retracts=held)
+        request = GoalRequest(
+            joint_goals(command, state.sent, at, now_s, servos, SAFETY).goals_mm, Source.OPERATOR, now_s, retracts=held
+        )
+        step = gate_step(state, request, JointMeasurement(at, now_s), Source.OPERATOR, now_s, SERVOS, SAFETY)
+        assert step.rejection is None
+        assert step.goals_mm is not None
+        before, goal = state.goals_mm or at, step.goals_mm[4]
+        assert 0.0 <= before[4] - goal <= 2.0 * TICK + 1e-9
+        assert held or goal == before[4]
+        at, state = tuple(here + 0.5 * (to - here) for here, to in zip(at, step.goals_mm, strict=True)), step.state
+    assert at[4] < -5.0 - 38.0

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from core.config.models import DriveConfig, JogConfig
 from core.config.safety import ServosConfig
-from core.control.motion import AdviceController, JogSpeeds, hand_speeds
+from core.control.motion import AdviceController, JogSpeeds, Retraction, hand_speeds, next_retraction
 from core.types import Advice, Command, Speed
 
 PLAIN = DriveConfig(
@@ -141,3 +141,27 @@ def test_the_slowest_joint_that_takes_part_holds_the_others_back() -> None:
     slow = servos(advance=4.0, delivery_2=2.0, left=1.0)
     assert hand_speeds(HAND, slow) == JogSpeeds(advance_mm_s=4.0, delivery_mm_s=2.0, bend_mm_s=1.0, pitch_mm_s=3.0)
     assert hand_speeds(HAND, slow, 0.25) == JogSpeeds(advance_mm_s=2.5, delivery_mm_s=1.25, bend_mm_s=0.75, pitch_mm_s=0.75)
+
+
+REST, WITHIN, BEYOND = Retraction.REST, Retraction.WITHIN, Retraction.BEYOND
+
+
+@pytest.mark.parametrize(
+    ("state", "pulls", "at_low", "then"),
+    [
+        (REST, False, False, REST),
+        (REST, False, True, REST),
+        (REST, True, False, WITHIN),
+        (REST, True, True, BEYOND),
+        (WITHIN, False, False, REST),
+        (WITHIN, False, True, REST),
+        (WITHIN, True, False, WITHIN),
+        (WITHIN, True, True, WITHIN),  # it arrives at the end: only another pull goes on
+        (BEYOND, False, False, REST),
+        (BEYOND, False, True, REST),
+        (BEYOND, True, False, BEYOND),  # its goal is not known for a moment
+        (BEYOND, True, True, BEYOND),
+    ],
+)
+def test_only_a_pull_that_begins_at_the_end_goes_beyond_it(state: Retraction, pulls: bool, at_low: bool, then: Retraction) -> None:
+    assert next_retraction(state, pulls=pulls, at_low=at_low) is then

@@ -926,3 +926,58 @@ def test_a_turn_that_fails_ends_the_turns_with_its_reason() -> None:
 
 def test_the_sleep_so_far_is_read_from_the_system() -> None:
     assert slept_s() > -0.1
+
+
+# --- a retraction beyond the end of the envelope ---------------------------------------------------------------------------------
+
+
+def _at_low(bench: Bench, **feeds_mm: float) -> None:
+    """From now on what was sent says that these feeds are at the low end, or below."""
+    bench.robot.edit = lambda motion: replace(motion, at_end=tuple(feeds_mm), at_low=feeds_mm)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("jog", "feed"), [(Jog(advance=-1.0), "advance"), (Jog(delivery=-0.4), "delivery_2")])
+def test_the_operator_lets_go_at_the_end_and_pulls_again_to_go_beyond_it(bench: Bench, jog: Jog, feed: str) -> None:
+    bench.on()
+    bench.jog = jog
+    bench.turn(5)
+    _at_low(bench, **{feed: -5.0})
+    bench.turn(5)
+    assert not bench.robot.retracts
+    assert Note.AT_LOW_END in bench.alerts()
+    bench.jog = AT_REST
+    bench.seconds(0.2)
+    assert not bench.robot.retracts
+    bench.jog = jog
+    _at_low(bench, **{feed: -6.2})
+    bench.turn(2)
+    assert bench.robot.retracts
+    bench.pilot.news()
+    bench.seconds(2.5)
+    (alert,) = (alert for alert in bench.pilot.news().alerts if alert.key is Note.BEYOND_END)
+    assert alert.detail == f"{feed} -6.2 mm"
+    bench.jog = AT_REST
+    bench.seconds(0.2)
+    assert not bench.robot.retracts
+    bench.jog = Jog(advance=1.0)
+    bench.turn(2)
+    assert not bench.robot.retracts
+
+
+def test_a_pull_at_the_end_that_is_held_over_a_stop_must_begin_again(bench: Bench) -> None:
+    bench.on()
+    _at_low(bench, advance=-5.0)
+    bench.turn(2)
+    bench.jog = Jog(advance=-1.0)
+    bench.turn(2)
+    assert bench.robot.retracts
+    bench.pilot.stop()
+    bench.turn(2).pilot.ask(Act.ACKNOWLEDGE)
+    bench.done().turn(2).on()
+    assert bench.pilot.view.permitted is Source.OPERATOR
+    assert not bench.robot.retracts
+    bench.jog = AT_REST
+    bench.seconds(0.2)
+    bench.jog = Jog(advance=-1.0)
+    bench.turn(2)
+    assert bench.robot.retracts

@@ -19,7 +19,7 @@ from core.control.camera_monitor import FrameReport, RouteState
 from core.control.faults import Cause, Fault
 from core.control.gate import GateState, GateStep, GoalRequest, JointMeasurement, Source, gate_step
 from core.control.health import Beat, DeadmanReport, GateReport, ServoCheckReport
-from core.control.joints import joint_goals
+from core.control.joints import by_hand, joint_goals
 from core.control.modes import Act, Decision, Event, Mode
 from core.types import Command, Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, Bench
@@ -88,7 +88,7 @@ class Drive(RuleBasedStateMachine):
         self.moving = False
         self.speeds = (0.0,) * 7
         self.last_s = self.bench.now_s
-        self.impostor = False
+        self.impostor = self.retracts = False
         self.command = Command()
         self.wild: tuple[float, ...] | None = None
         self.command_age_s = self.frame_age_s = self.measured_age_s = 0.0
@@ -179,6 +179,16 @@ class Drive(RuleBasedStateMachine):
         if not math.isfinite(self.at_mm[place]) or abs(push_mm) > 1.0:
             self.at_mm[place] = kept
 
+    @rule(retracts=st.booleans(), ticks=st.integers(1, 8))
+    def the_operator_pulls_the_feeds_back_at_their_end(self, retracts: bool, ticks: int) -> None:
+        """Whoever drives says so; only the operator may."""
+        self.at_mm[4], self.at_mm[5], self.at_mm[6] = -4.9, -4.95, -4.95
+        self.command, self.wild, self.retracts = Command(advance_mm_s=-20.0, delivery_mm_s=-20.0), None, retracts
+        for _ in range(ticks):
+            self._tick([], 0.02)
+        self.retracts = False
+        self._tick([], 0.02)
+
     @rule(follow=st.sampled_from([0.0, 0.3, 0.7, 1.0]))
     def the_servos_follow(self, follow: float) -> None:
         self.follow = follow
@@ -228,8 +238,11 @@ class Drive(RuleBasedStateMachine):
             source = Source.OPERATOR if source is Source.PROGRAM else Source.PROGRAM
         goals = self.wild
         if goals is None:
-            goals = joint_goals(self.command, self.gate.sent, self.at_mm, now_s, SERVOS, SAFETY).goals_mm
-        return GoalRequest(goals, source, now_s - self.command_age_s, now_s - self.frame_age_s)
+            servos = SERVOS
+            if source is Source.OPERATOR:
+                servos = by_hand(SERVOS, self.at_mm, self.gate.sent, retracts=self.retracts)
+            goals = joint_goals(self.command, self.gate.sent, self.at_mm, now_s, servos, SAFETY).goals_mm
+        return GoalRequest(goals, source, now_s - self.command_age_s, now_s - self.frame_age_s, self.retracts)
 
     def _check_modes(self, before: Mode, latched: object, events: list[Event], decision: Decision, now_s: float) -> None:
         after = decision.mode
@@ -268,10 +281,12 @@ class Drive(RuleBasedStateMachine):
             return
         assert len(goals) == 7
         assert 0.0 <= now_s - measured.measured_s <= 0.1
-        for goal, at, joint in zip(goals, measured.positions_mm, SERVOS.joints, strict=True):
+        for place, (goal, at, joint) in enumerate(zip(goals, measured.positions_mm, SERVOS.joints, strict=True)):
             assert math.isfinite(goal)
-            assert joint.low_mm <= goal <= joint.high_mm
+            assert goal <= joint.high_mm
             assert abs(goal - at) <= joint.max_step_mm + 1e-9
+            if goal < joint.low_mm:
+                self._check_beyond(place, goal, at, request, decision, now_s)
         if step.rejection is not None:
             if self.moving:  # a hold begins where the joints are
                 for goal, at, joint in zip(goals, measured.positions_mm, SERVOS.joints, strict=True):
@@ -285,6 +300,18 @@ class Drive(RuleBasedStateMachine):
             assert request.captured_s is not None
             assert 0.0 <= now_s - request.captured_s <= 0.15
         self._check_motion(goals, measured, now_s)
+
+    def _check_beyond(self, place: int, goal: float, at: float, request: GoalRequest, decision: Decision, now_s: float) -> None:
+        """Below its envelope is a feed only while the program does not drive: where it stands, or farther while it is retracted."""
+        assert place >= 4
+        assert decision.permitted is not Source.PROGRAM
+        SEEN["below the envelope"] += 1
+        last = self.sent_mm[place] if self.sent_mm is not None else at
+        if goal < min(at, last) - 1e-9:
+            assert request.retracts
+            assert request.source is Source.OPERATOR is decision.permitted
+            assert last - goal <= 2.0 * (now_s - self.last_s) + 1e-6
+            SEEN["pulled out"] += 1
 
     def _check_motion(self, goals: tuple[float, ...], measured: JointMeasurement, now_s: float) -> None:
         passed_s = now_s - self.last_s
@@ -340,6 +367,7 @@ def test_nothing_unsafe_ever_leaves_whatever_happens() -> None:
         assert SEEN[f"mode {mode}"] > 100, SEEN
     assert SEEN["moved by program"] > 500, SEEN
     assert SEEN["moved by operator"] > 500, SEEN
+    assert SEEN["pulled out"] > 50, SEEN
     assert len([reason for reason in SEEN if reason.startswith("because")]) >= 10, SEEN
 
 

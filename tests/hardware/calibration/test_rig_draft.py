@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from typing import cast
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from core.calibration.camera import BoardError, BoardSpec
 from core.calibration.servos import Assignment, HeadNotSeen, ServoFinding, SteeringNotSeen
-from core.config.calibration import ZeroConfig
+from core.config.calibration import CalibrationConfig, ZeroConfig
 from core.config.models import Config
 from core.config.safety import wiring_of
 from core.devices import DeviceError
@@ -22,6 +23,7 @@ from hardware.calibration.servo_probe import ProcedureStopped, StopSwitch, Strai
 from hardware.servos.discovery import FoundServo, FoundServos
 from hardware.servos.dynamixel_port import NoAnswer
 
+WHEN = datetime(2026, 1, 1, tzinfo=UTC)
 TICKS = (2048, 2049, 2050, 2051, 0, 1, 2)
 
 
@@ -133,7 +135,33 @@ def test_a_head_without_room_costs_no_zero(draft: RigDraft, monkeypatch: pytest.
 
 def test_zeros_are_kept_without_the_steering(draft: RigDraft) -> None:
     draft.set_pretension(0.4)
-    assert draft.calibration().zero == ZeroConfig(ticks=TICKS, slack_mm=(0.1,) * 4, pretension_mm=0.4)
+    zero = draft.calibration().zero
+    assert zero is not None
+    assert zero.found_utc is not None
+    assert zero == ZeroConfig(ticks=TICKS, slack_mm=(0.1,) * 4, pretension_mm=0.4, found_utc=zero.found_utc)
+
+
+@pytest.mark.parametrize("offered", [None, TICKS])
+def test_without_a_search_the_steering_is_learnt_from_a_kept_zero_or_not_at_all(
+    draft: RigDraft, monkeypatch: pytest.MonkeyPatch, offered: tuple[int, ...] | None
+) -> None:
+    """What the tendons stand at is checked when the servos are open."""
+    kept: list[object] = []
+    monkeypatch.setattr(servo_identification, "learn_steering", lambda *args: kept.append(args[3]) or ends_here())
+
+    def ends_here() -> None:
+        raise SteeringNotSeen("no room")
+
+    zero = None if offered is None else ZeroConfig(ticks=offered, slack_mm=(0.0,) * 4, pretension_mm=0.3)
+    known = CalibrationConfig(made_utc=WHEN, zero=zero)
+    fresh = RigDraft(Bench(), Config(), known)  # type: ignore[arg-type]
+    error, said = (DeviceError, "find the zeros first") if zero is None else (SteeringNotSeen, "no room")
+    with pytest.raises(error, match=said):
+        fresh.learn_steering()
+    assert kept == ([] if zero is None else [zero])
+    with pytest.raises(SteeringNotSeen):
+        draft.learn_steering()
+    assert kept[-1] is None, "a search has just left them there"
 
 
 def test_the_wiring_that_was_found_is_kept(draft: RigDraft) -> None:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import Rejection, RejectReason, Source
+from core.control.kept_zero import ZeroRequest
 from core.types import Command
 from hardware.servos.bus_guard import RELEASE_MM_S, Attention, BusGuard, OneStep, ReleaseRamp, UnattendedWatch
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
@@ -268,24 +269,24 @@ def test_an_order_from_before_the_arming_does_not_count() -> None:
 
 def test_a_joint_from_where_no_goal_leads_hinders_arming_and_is_named() -> None:
     bench = Bench()
-    bench.positions[0], bench.positions[4] = 4.0, -7.0
+    bench.positions[0], bench.positions[4] = 4.0, 402.0
     with pytest.raises(NotReady) as told:
         bench.arm()
     what_to_do = "switch the torque off and move it back by hand, or zero it again"
     assert str(told.value) == (
         f"not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm): {what_to_do}; "
-        f"outside its envelope: advance at -7.00 mm (-5 to 400 mm): {what_to_do}"
+        f"outside its envelope: advance at 402.00 mm (-5 to 400 mm): {what_to_do}"
     )
     assert not bench.guard.armed
-    bench.positions[0], bench.positions[4] = 2.8, -6.0  # one bounded step brings it back
+    bench.positions[0], bench.positions[4] = 2.8, 400.8  # one bounded step brings it back
     bench.arm()
     bench.cycle()
-    assert bench.guard.sent.goals_mm[4] == -5.0
+    assert bench.guard.sent.goals_mm[4] == 400.0
 
 
 def test_positions_from_long_ago_and_unknown_ones_hinder_no_arming() -> None:
     bench = Bench()
-    bench.positions[4] = -7.0
+    bench.positions[4] = 407.0
     bench.cycle()
     bench.alter = lambda state: replace(state, position_mm=None)  # a lost zero, of which the driver tells
     bench.cycles(6)
@@ -296,11 +297,11 @@ def test_why_not_even_a_hold_leaves_is_told_also_while_nobody_may_drive() -> Non
     bench = Bench()
     bench.permitted = None
     bench.arm()
-    bench.positions[4] = -7.0  # moved between the check and the first cycle
+    bench.positions[4] = 402.0  # moved between the check and the first cycle
     bench.cycle()
     assert bench.guard.sent is None
     assert bench.reason is RejectReason.MEASURED_OUT_OF_ENVELOPE
-    assert bench.guard.rejection.detail == "advance at -7.00 mm (-5 to 400 mm)"
+    assert bench.guard.rejection.detail == "advance at 402.00 mm (-5 to 400 mm)"
     bench.positions[4] = 0.0
     bench.cycle()
     assert bench.guard.sent is not None
@@ -310,15 +311,15 @@ def test_why_not_even_a_hold_leaves_is_told_also_while_nobody_may_drive() -> Non
 def test_in_lock_step_the_guard_looks_before_it_arms() -> None:
     servos = LockStepServos(SERVOS, SAFETY, lambda: 100.0)
     servos.cycle()
-    servos._at_mm = (0.0, 0.0, 0.0, 0.0, -7.0, 0.0, 0.0)
-    with pytest.raises(NotReady, match=r"advance at -7\.00 mm"):
+    servos._at_mm = (0.0, 0.0, 0.0, 0.0, 407.0, 0.0, 0.0)
+    with pytest.raises(NotReady, match=r"advance at 407\.00 mm"):
         servos.arm()
-    servos.zero(["advance"])
+    servos.zero(ZeroRequest(positions_mm={"advance": 0.0}))
     servos.arm()
-    servos._at_mm = (0.0, 0.0, 0.0, 0.0, -7.0, 0.0, 0.0)
+    servos._at_mm = (0.0, 0.0, 0.0, 0.0, 407.0, 0.0, 0.0)
     servos.cycle()
     assert servos.sent_motion() is None
-    assert servos.kept_back() == Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at -7.00 mm (-5 to 400 mm)")
+    assert servos.kept_back() == Rejection(RejectReason.MEASURED_OUT_OF_ENVELOPE, "advance at 407.00 mm (-5 to 400 mm)")
     servos.disarm()
     assert servos.kept_back() is None
 

@@ -577,14 +577,14 @@ def test_a_stop_that_nobody_has_heard_is_heard_before_the_process_ends(monkeypat
 
 def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
     """A quiet bus was not read for long: meanwhile somebody has turned a joint by hand."""
-    for before_mm, now_mm, told in ((0.0, -7.0, []), (-7.0, 0.0, ["arm"])):
+    for before_mm, now_mm, told in ((0.0, 407.0, []), (407.0, 0.0, ["arm"])):
         paper.reads(before_mm)
         paper.loop._read_decide_write()
         paper.reads(now_mm)
         paper.hear(request="arm")
         assert paper.bus.told == told
     refused, armed = (error for _, error in paper.end.answers)
-    assert "advance at -7.00 mm (-5 to 400 mm)" in str(refused)
+    assert "advance at 407.00 mm (-5 to 400 mm)" in str(refused)
     assert armed is None
 
 
@@ -618,7 +618,7 @@ def test_a_robot_that_is_closed_while_it_connects_keeps_no_bus_process(monkeypat
     class PaperLink:
         failure = None
 
-        def __init__(self, *_: object) -> None:
+        def __init__(self, *_: object, **__: object) -> None:
             alive.append(self)
 
         def request(self, what: str, timeout_s: float) -> None:

@@ -18,10 +18,10 @@ from typing import Any
 import psutil
 import pytest
 
-from core.config.calibration import ZeroConfig
 from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import RejectReason, Source
+from core.control.kept_zero import ZeroRequest
 from core.devices import DeviceError, Robot
 from core.types import Command, RobotStatus
 from hardware.processes import PARENT_CHECK_S
@@ -42,7 +42,6 @@ FORWARD = Command(advance_mm_s=5.0)
 PATIENCE_S = 10.0
 STRAIN_MA = 700.0
 """Of a gear that grinds: more than a servo may draw."""
-NO_SLACK: dict[str, Any] = {"slack_mm": (0.0,) * 4, "pretension_mm": 0.3}
 
 
 @pytest.fixture
@@ -145,6 +144,7 @@ def test_it_is_a_robot_that_moves_only_when_armed(servos: SoftServoBus, robot: S
     assert status.sent.order.command == FORWARD
     assert robot.send(FORWARD).advance_mm_s == pytest.approx(5.0, abs=2.5)
     assert as_protocol.status().insertion_mm == pytest.approx(servos.positions_mm()[4], abs=0.5)
+    _drive(robot, until=lambda status: abs(servos.positions_mm()[0] - CONFIG.pretension_mm) <= 0.02)
     assert servos.positions_mm()[0] == pytest.approx(CONFIG.pretension_mm, abs=0.02)
 
 
@@ -528,7 +528,8 @@ def test_an_e_stop_is_told_from_a_broken_cable_and_nothing_arms_before_power_is_
     with pytest.raises(NotReady, match="not zeroed"):
         armed.arm()
     armed.acknowledge()
-    armed.zero()
+    status = _seen(armed, lambda status: len(status.offers) == 7)
+    armed.zero(ZeroRequest(kept=tuple(offer.name for offer in status.offers)))
     armed.arm()
 
 
@@ -636,27 +637,8 @@ def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot, star
     _seen(armed, lambda status: all(fault.cause is not Cause.SERVO_SILENT for fault in status.active))
     with pytest.raises(NotReady, match="not zeroed: delivery_1"):
         armed.arm()
-    armed.zero(["delivery_1"])
+    armed.zero(ZeroRequest(kept=("delivery_1",)))
     armed.arm()
-
-
-def test_arming_tells_that_the_rigs_zero_was_lost_with_the_power(servos: SoftServoBus) -> None:
-    """The register of right was a whole turn farther when the rig was calibrated."""
-    kept = ZeroConfig(ticks=tuple(1000 + joint.id + 4096 * (joint.id == 1) for joint in CONFIG.joints), **NO_SLACK)
-    robot = ServoRobot(CONFIG.model_copy(update={"port": servos.port}), SAFETY, kept_zero=kept)
-    robot.connect()
-    try:
-        _seen(robot, lambda status: len(status.servos) == 7)
-        with pytest.raises(NotReady, match=r"zero before arming \(the zero of the rig file does not hold.*turns \(right by -1\)"):
-            robot.arm()
-        robot.zero()
-        robot.arm()
-        robot.stop()
-        with pytest.raises(NotReady) as refused:
-            robot.arm()
-        assert "rig file" not in str(refused.value), "the joints are zeroed"
-    finally:
-        robot.close()
 
 
 def test_fault_26_the_port_vanishes_and_comes_back(servos: SoftServoBus, armed: ServoRobot) -> None:
@@ -675,7 +657,8 @@ def test_fault_26_the_port_vanishes_and_comes_back(servos: SoftServoBus, armed: 
     armed.acknowledge()
     with pytest.raises(NotReady, match="not zeroed"):
         armed.arm()
-    armed.zero()
+    status = _seen(armed, lambda status: len(status.offers) == 7)
+    armed.zero(ZeroRequest(kept=tuple(offer.name for offer in status.offers)))
     armed.arm()
     at_mm = servos.positions_mm()[4]
     _drive(armed, until=lambda status: servos.positions_mm()[4] > at_mm + 1.0)
@@ -699,6 +682,7 @@ def test_a_killed_bus_process_is_seen_and_said(servos: SoftServoBus, armed: Serv
     armed.hold()
     armed.connect()
     assert armed.failure is None
+    armed.torque_off()
     armed.zero()
     armed.arm()
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from core.config.safety import JOINT_NAMES, JointConfig, ServosConfig
 from core.config.servo_models import SERVO_MODELS, ServoModel
+from core.control.kept_zero import ZeroBasis
 from core.devices import DeviceError, UserError
 from hardware.servos import registers
 from hardware.servos.dynamixel_bus import ServoBus
@@ -638,7 +639,7 @@ def test_connecting_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, regi
     armed.open()
     assert _torques(twin) == [1] * 7
     assert twin.servo(3).table[register] == 7
-    armed.set_zero()
+    armed.set_zero(basis=ZeroBasis.SEARCHED)
     assert _torques(twin) == [1] * 7
     armed.arm()
     assert twin.servo(3).table[register] == {"velocity_limit": 65, "return_delay": 0}[register]
@@ -651,7 +652,7 @@ def test_a_servo_that_holds_in_another_mode_is_not_zeroed_before_it_was_let_go(t
     armed.open()
     assert _torques(twin) == [1] * 7
     with pytest.raises(NotReady, match=r"servo up \(id 3\) holds in a mode of another program: switch the torque off"):
-        armed.set_zero()
+        armed.set_zero(basis=ZeroBasis.HERE)
     armed.torque_off()
     armed.set_zero()
     assert twin.servo(3).table["drive_mode"] == 0
@@ -676,7 +677,7 @@ def test_arming_does_not_move_anything(twin: SoftServoBus, bus: ServoBus) -> Non
 
 
 def test_not_armed_without_zeros(bus: ServoBus) -> None:
-    bus.set_zero(["right", "left"])
+    bus.set_zero({"right": 0.0, "left": 0.0})
     with pytest.raises(NotReady, match="not zeroed: up, down, advance, delivery_1, delivery_2"):
         bus.arm()
     assert bus.zero_ticks[:3] == (1001, 1002, None)
@@ -1170,7 +1171,7 @@ def test_27_a_restarted_servo_is_noticed_disarmed_and_must_be_zeroed(twin: SoftS
     assert not states[2].torque
     with pytest.raises(NotReady, match="not zeroed: up"):
         armed.arm()
-    armed.set_zero(["up"])
+    armed.set_zero({"up": 0.0})
     armed.arm()
     assert armed.is_armed
 
@@ -1184,7 +1185,7 @@ def test_27_a_servo_that_restarts_between_disarming_and_arming_is_not_armed(twin
     assert not armed.is_armed
     assert [state.torque for state in _states(armed)] == [True] * 4 + [False] + [True] * 2, "what held goes on holding"
     assert [ticks is None for ticks in armed.zero_ticks] == [False] * 4 + [True] + [False] * 2
-    armed.set_zero(["advance"])
+    armed.set_zero({"advance": 0.0})
     armed.arm()
     assert armed.is_armed
 
@@ -1197,7 +1198,7 @@ def test_27_a_reboot_clears_the_error_and_the_turns(twin: SoftServoBus, bus: Ser
     assert bus.zero_ticks[4] is None
     state = _states(bus)[4]
     assert (state.error, state.ticks, state.position_mm) == (HardwareError(0), 1005, None)
-    bus.set_zero(["advance"])
+    bus.set_zero({"advance": 0.0})
     bus.arm()
 
 

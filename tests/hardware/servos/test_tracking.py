@@ -189,11 +189,24 @@ def test_a_joint_that_drifts_during_a_hold(permitted: Source | None, speed_mm_s:
 def test_a_joint_that_stays_outside_its_envelope_from_the_first_cycle_on() -> None:
     """Moved between the check and the first cycle: no goal leads from there, so none was ever far away."""
     rig = Motors().arm()
-    rig.put(ADVANCE, -7.0)
+    rig.put(ADVANCE, 402.0)
     rig.run(0.2)
     assert rig.guard.armed, "not before 200 ms"
     rig.run(0.1)
-    rig.stopped_for("advance stays at -7.00 mm, outside its envelope (-5 to 400 mm)")
+    rig.stopped_for("advance stays at 402.00 mm, outside its envelope (-5 to 400 mm)")
+
+
+@pytest.mark.parametrize(("permitted", "is_armed"), [(Source.OPERATOR, True), (None, True), (Source.PROGRAM, False)])
+def test_a_feed_below_its_low_end_is_held_there_unless_the_program_drives(permitted: Source | None, is_armed: bool) -> None:
+    rig = Motors()
+    rig.put(ADVANCE, -30.0)
+    rig.arm()
+    rig.command, rig.permitted = FORWARD if permitted is not Source.OPERATOR else None, permitted
+    rig.run(1.0)
+    assert rig.guard.armed is is_armed
+    assert rig.at_mm[ADVANCE] == pytest.approx(-30.0, abs=0.01)
+    if not is_armed:
+        rig.stopped_for("advance stays at -30.00 mm, outside its envelope")
 
 
 def test_a_joint_that_is_pushed_out_of_its_envelope_and_stays_there() -> None:
@@ -202,7 +215,7 @@ def test_a_joint_that_is_pushed_out_of_its_envelope_and_stays_there() -> None:
     rig.motors[ADVANCE].frozen = True
     rig.motors[ADVANCE].position = -7.0 * SERVOS.joints[ADVANCE].ticks_per_mm
     rig.run(0.4)
-    rig.stopped_for("advance off by 7.00 mm")
+    rig.stopped_for("advance went 7.00 mm where nobody sent it")
 
 
 # --- what does not ---------------------------------------------------------------------------------------------------------------
@@ -254,10 +267,10 @@ def test_slow_joints_that_are_under_way_are_no_fault(speed_mm_s: float, accelera
     slow = {"max_speed_mm_s": speed_mm_s, "max_acceleration_mm_s2": acceleration_mm_s2}
     joints = tuple(joint.model_copy(update=slow) for joint in SERVOS.joints)
     rig = Motors(SERVOS.model_copy(update={"joints": joints}))
-    rig.put(ADVANCE, -5.9)
+    rig.put(ADVANCE, 400.9)
     rig.arm().run(6.0)
     assert rig.guard.armed, rig.guard.latched
-    assert rig.at_mm[ADVANCE] > -5.5
+    assert rig.at_mm[ADVANCE] < 400.5
     for command in (FORWARD, None, Command(advance_mm_s=-20.0, bend=1.0), Command(bend=-1.0), None):
         rig.command = command
         rig.run(2.5)
