@@ -105,7 +105,7 @@ and run make again."
 
 is_whole() { [[ ! -f $half ]] && is_python_311 "$venv/bin/python"; }
 
-# Installed packages that requirements.lock does not list, one line; nor does it list what installs them.
+# Installed packages that requirements.lock does not list, one line; nor does it list what installs them, nor the optional packages.
 unlisted_packages() {
     "$venv/bin/python" - <<'PYTHON_CODE'
 import re
@@ -120,7 +120,7 @@ def plain(name):
 with open("requirements.lock", encoding="utf-8") as lock:
     listed = {plain(name) for name in re.findall(r"^([\w.-]+)==", lock.read(), re.MULTILINE)}
 found = {plain(package.metadata["Name"]) for package in metadata.distributions(path=[sysconfig.get_path("purelib")])}
-print(*sorted(found - listed - {"pip", "setuptools", "wheel"}))
+print(*sorted(found - listed - {"pip", "setuptools", "wheel", "pypylon"}))
 PYTHON_CODE
 }
 

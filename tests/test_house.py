@@ -54,6 +54,13 @@ def asked_for() -> set[str]:
     return {canonicalize_name(Requirement(line).name) for line in lines}
 
 
+def extras() -> set[str]:
+    """What pyproject.toml names as optional: neither pinned nor installed by set-up."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    lines = [line for extra in project["project"].get("optional-dependencies", {}).values() for line in extra]
+    return {canonicalize_name(Requirement(line).name) for line in lines}
+
+
 def needs(package: str) -> set[str]:
     """What an installed package needs here; torch's CUDA packages are left to torch."""
     lines = [Requirement(line) for line in metadata.requires(package) or []]
@@ -75,8 +82,8 @@ def imported_packages(paths: list[Path]) -> set[str]:
 def test_every_import_is_asked_for_by_name() -> None:
     owners = metadata.packages_distributions()
     for top in sorted(imported_packages(sources(*OURS))):
-        names = {canonicalize_name(name) for name in owners.get(top, [])}
-        assert names & asked_for(), f"{top} is imported, but pyproject.toml does not ask for {names or 'it'}"
+        names = {canonicalize_name(name) for name in owners.get(top, [top])}
+        assert names & (asked_for() | extras()), f"{top} is imported, but pyproject.toml does not ask for {names or 'it'}"
 
 
 def test_the_lock_is_closed() -> None:
@@ -89,6 +96,13 @@ def test_the_lock_is_closed() -> None:
             # openvino-telemetry needs nothing, and set-up removes it: it has no metadata to ask
             waiting.extend(needs(name) if name != "openvino-telemetry" else ())
     assert set(pins()) == reached
+    assert not extras() & reached
+
+
+def test_set_up_leaves_optional_packages_alone() -> None:
+    script = (ROOT / "scripts" / "set_up.sh").read_text(encoding="utf-8")
+    (kept,) = re.findall(r"listed - \{(.*)\}", script)
+    assert extras() <= set(re.findall(r'"([^"]+)"', kept))
 
 
 def test_what_is_installed_is_what_is_pinned() -> None:

@@ -19,6 +19,7 @@ QT = {"PySide6", "shiboken6", "pyqtgraph"}
 ONLY_IN = {
     "mujoco": ("hardware/twin",),
     "pyrealsense2": ("hardware/cameras",),
+    "pypylon": ("hardware/cameras",),
     "dynamixel_sdk": ("hardware/servos",),
     "serial": ("hardware/servos", "hardware/inputs"),
     "PySide6": ("app",),
@@ -117,7 +118,7 @@ def test_no_qt_below_the_app(module: str) -> None:
 def test_core_needs_no_device(module: str) -> None:
     # sessions are videos, wherever their pictures come from
     codecs = () if module.startswith("core.session") else ("av",)
-    for package in ("mujoco", "pyrealsense2", "dynamixel_sdk", "serial", *codecs):
+    for package in ("mujoco", "pyrealsense2", "pypylon", "dynamixel_sdk", "serial", *codecs):
         assert package not in reached_from(module), f"{' -> '.join(reached_from(module)[package])} -> {package}"
 
 

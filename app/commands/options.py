@@ -15,7 +15,9 @@ ModelOption = Annotated[str | None, typer.Option(help="model name or folder")]
 SchedulerOption = Annotated[str | None, typer.Option(help="address of a Dask scheduler that takes the place of --workers")]
 RigOption = Annotated[
     str | None,
-    typer.Option("--rig", help="twin (needs no hardware), realsense, webcam, or a name of rig list; default: the configured one"),
+    typer.Option(
+        "--rig", help="twin (needs no hardware), realsense, webcam, basler, or a name of rig list; default: the configured one"
+    ),
 ]
 SourceOption = Annotated[
     Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a rig's camera")

@@ -88,7 +88,8 @@ def calibrate_rig(
     name: RigName,
     auto: Annotated[bool, typer.Option("--auto", help="yes, without help: the servos move by themselves")] = False,
     source: Annotated[
-        str | None, typer.Option("--from", help="twin, realsense, webcam or a rig; default: NAME where there is one, else twin")
+        str | None,
+        typer.Option("--from", help="twin, realsense, webcam, basler or a rig; default: NAME where there is one, else twin"),
     ] = None,
     steps: Annotated[str, typer.Option(help="of board,servos,zero,steering")] = "board,servos,zero,steering",
     pictures: Annotated[int, typer.Option(min=1, max=20, help="of the board")] = 5,

@@ -157,7 +157,7 @@ class CameraPage(WizardPage):
         wanted: dict[str, object] = {"width_px": self.sizes[0].value(), "height_px": self.sizes[1].value()}
         wanted |= {"frames_per_second": self.rate.value()}
         # By its own identifier: a configuration without one means any camera, and another one may be the first tomorrow.
-        wanted |= {"serial": camera.serial} if camera.kind == "realsense" else {}
+        wanted |= {"serial": camera.serial} if camera.serial is not None else {}
         wanted |= {"device": camera.device} if camera.kind == "webcam" else {}
         settings = CameraConfig.model_validate({**config.camera.model_dump(), **wanted})
         self.picture.show_text(tr("Opening the camera. The first time the network is loaded, too."))
@@ -179,7 +179,7 @@ def _is_configured(camera: FoundCamera, config: Config) -> bool:
     if camera.kind != config.rig.camera or config.rig.source is not None:
         return False
     settings = config.camera
-    if camera.kind == "realsense":
+    if camera.kind in {"realsense", "basler"}:
         return settings.serial in {None, camera.serial}
     return camera.kind == "twin" or settings.device in {None, camera.device}
 

@@ -150,5 +150,5 @@ def _is_same_camera(before: Config, now: Config) -> bool:
         sizes = [(config.twin.image_width_px, config.twin.image_height_px) for config in (before, now)]
         return sizes[0] == sizes[1]
     was, is_now = before.camera, now.camera
-    signs = (was.serial, is_now.serial) if now.rig.camera == "realsense" else (was.device, is_now.device)
+    signs = (was.device, is_now.device) if now.rig.camera == "webcam" else (was.serial, is_now.serial)
     return signs[0] in {None, signs[1]} and (was.width_px, was.height_px) == (is_now.width_px, is_now.height_px)

@@ -591,6 +591,7 @@ def rig_line(rig: RigFile) -> str:
     camera = {
         "twin": tr("bench twin"),
         "realsense": f"RealSense {rig.camera.serial or ''}",
+        "basler": f"Basler {rig.camera.serial or ''}",
         "webcam": tr("webcam {device}", device=rig.camera.device or ""),
     }
     servos = {"twin": tr("its own servos"), "servos": tr("servos on {port}", port=rig.servos.port), "none": tr("no servos")}

@@ -23,7 +23,7 @@ from core.devices import UserError
 class CameraConfig(ConfigSection):
     """A real camera. Where it has no such setting, what is asked for is left out, and ``doctor`` says so."""
 
-    serial: str | None = Field(None, min_length=1, description="RealSense: its serial number; empty: the only one there is")
+    serial: str | None = Field(None, min_length=1, description="RealSense, Basler: its serial number; empty: the only one there is")
     device: str | None = Field(
         None, min_length=1, description="webcam: its stable path in /dev/v4l/by-id, or its number; empty: the first one"
     )
@@ -384,7 +384,7 @@ class RigConfig(ConfigSection):
     """Which camera and robot are used."""
 
     name: str = Field("twin", min_length=1, description="as it stands in sessions and messages")
-    camera: Literal["twin", "realsense", "webcam", "video_file", "image_folder"] = Field(
+    camera: Literal["twin", "realsense", "webcam", "basler", "video_file", "image_folder"] = Field(
         "twin", description="where pictures come from"
     )
     robot: Literal["twin", "servos", "none"] = Field("twin", description="what moves; servos = real ones, see section Servos")

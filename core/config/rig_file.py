@@ -29,7 +29,7 @@ from core.files import write_atomic
 from core.messages import message
 
 FORMAT = 1
-RESERVED = ("twin", "realsense", "webcam")
+RESERVED = ("twin", "realsense", "webcam", "basler")
 """What ``--rig`` means without a rig file."""
 _NAME = re.compile(r"^[\w][\w .()+-]{0,59}$")
 _ENDING, _OLDER = ".toml", ".older.toml"
@@ -47,7 +47,7 @@ class RigFile(ConfigSection):
     format: int = Field(FORMAT, ge=1)
     name: str = Field(min_length=1, max_length=60)
     made_utc: datetime
-    kind: Literal["twin", "realsense", "webcam"]
+    kind: Literal["twin", "realsense", "webcam", "basler"]
     robot: Literal["twin", "servos", "none"]
     camera: CameraConfig = CameraConfig()
     twin: TwinConfig | None = None

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class FoundCamera:
-    """A camera that a rig can have. ``serial`` of a RealSense, ``device`` of a webcam."""
+    """A camera that a rig can have. ``serial`` of a RealSense or Basler camera, ``device`` of a webcam."""
 
     kind: str
     title: str
@@ -156,6 +157,54 @@ def _check_webcam(config: CameraConfig) -> Check:
     return Check("camera", True, note)
 
 
+def _basler_live(config: CameraConfig) -> Camera:
+    from hardware.cameras.basler import basler_camera
+
+    return basler_camera(config)
+
+
+_PYPYLON = "pypylon"
+"""The optional package of Basler's cameras."""
+_BASLER_UDEV = (
+    """echo 'SUBSYSTEM=="usb", ATTRS{idVendor}=="2676", MODE="0666"' | sudo tee /etc/udev/rules.d/69-basler-cameras.rules """
+    "&& sudo udevadm control --reload-rules && sudo udevadm trigger, then plug the camera in again"
+)
+
+
+def _find_basler() -> Sequence[FoundCamera]:
+    """Most computers have neither package nor camera: that is no problem there."""
+    if find_spec(_PYPYLON) is None and not sysfs.basler_on_usb():
+        return ()
+    from hardware.cameras.basler import find_cameras
+
+    return [FoundCamera("basler", f"{camera.name} {camera.serial}", serial=camera.serial) for camera in find_cameras()]
+
+
+def _check_basler(config: CameraConfig) -> Check:
+    from hardware.preflight.checks import Check
+
+    if find_spec(_PYPYLON) is None:
+        return Check("camera", False, message("Basler cameras need the package pypylon"), ".venv/bin/pip install pypylon")
+    from hardware.cameras.basler import find_cameras
+
+    cameras = find_cameras()
+    chosen = [camera for camera in cameras if config.serial in {None, camera.serial}]
+    serials = ", ".join(camera.serial for camera in cameras)
+    if len(chosen) == 1:
+        return Check("camera", True, f"{chosen[0].name} {chosen[0].serial}")
+    if chosen:
+        fix = f'set camera.serial = "{chosen[0].serial}"'
+        return Check("camera", False, message("{a} Basler cameras: {serials}", a=len(chosen), serials=serials), fix)
+    if cameras:
+        detail = message("no Basler camera {serial}; there are: {serials}", serial=config.serial, serials=serials)
+        return Check("camera", False, detail, "set camera.serial to one of these")
+    if plugged := sysfs.basler_on_usb():
+        detail = message("{camera} is plugged in, but cannot be opened", camera=plugged[0].product)
+        return Check("camera", False, detail, _BASLER_UDEV)
+    fix = message("plug it into a USB 3 port; on a network: its supply, its cable, and an address in this computer's network")
+    return Check("camera", False, message("no Basler camera"), fix)
+
+
 def _video_file(source: Path, _: RigConfig) -> Camera:
     from hardware.cameras.files import VideoFile
 
@@ -174,6 +223,7 @@ CAMERA_KINDS: dict[str, CameraKind] = {
         "RealSense", _realsense_live, _realsense_recording, _find_realsense, _check_realsense, _check_realsense_library
     ),
     "webcam": CameraKind("webcam", _webcam_live, None, _find_webcams, _check_webcam),
+    "basler": CameraKind("Basler", _basler_live, None, _find_basler, _check_basler),
     "video_file": CameraKind("video", recorded=_video_file),
     "image_folder": CameraKind("pictures", recorded=_image_folder),
 }

@@ -7,7 +7,8 @@ from pathlib import Path
 
 DEV, SYS = Path("/dev"), Path("/sys")
 USB3_MBIT_S = 5000
-_INTEL, _REALSENSE = "8086", "realsense"
+_INTEL, _REALSENSE, _BASLER = "8086", "realsense", "2676"
+"""Vendor identifiers on USB, and what a RealSense has in its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +43,19 @@ def _text(path: Path) -> str:
 
 def realsense_on_usb() -> list[UsbDevice]:
     """RealSense cameras that are plugged in, whether or not they may be opened."""
+    return _usb_devices(_INTEL, _REALSENSE)
+
+
+def basler_on_usb() -> list[UsbDevice]:
+    """Basler cameras that are plugged in, whether or not they may be opened; those on a network are not known here."""
+    return _usb_devices(_BASLER)
+
+
+def _usb_devices(vendor: str, part_of_name: str = "") -> list[UsbDevice]:
     found = []
     for folder in sorted((SYS / "bus" / "usb" / "devices").glob("*")):
         product = _text(folder / "product")
-        if _text(folder / "idVendor") == _INTEL and _REALSENSE in product.lower():
+        if _text(folder / "idVendor") == vendor and part_of_name in product.lower():
             speed = _text(folder / "speed")
             found.append(UsbDevice(product, _text(folder / "serial"), int(float(speed)) if speed.replace(".", "").isdigit() else 0))
     return found

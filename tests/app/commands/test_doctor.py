@@ -120,7 +120,7 @@ def test_without_a_name_the_configured_rig_is_meant(tmp_path: Path) -> None:
     assert rig_config("webcam", path, None)[0] == config
 
 
-@pytest.mark.parametrize("name", ["realsense", "webcam"])
+@pytest.mark.parametrize("name", ["realsense", "webcam", "basler"])
 def test_a_real_camera_drives_servos_only_when_their_port_is_known(name: str, tmp_path: Path) -> None:
     config, kind = rig_config(name, None, None)
     assert (config.rig.name, config.rig.camera, config.rig.robot, kind) == (name, name, "none", RigKind.LIVE)
@@ -141,6 +141,6 @@ def test_a_realsense_recording_is_played(tmp_path: Path) -> None:
 
 
 def test_an_unknown_rig_names_the_known_ones() -> None:
-    with pytest.raises(RigFileError, match="unknown rig 'moon'; known: twin, realsense, webcam"):
+    with pytest.raises(RigFileError, match="unknown rig 'moon'; known: twin, realsense, webcam, basler"):
         rig_config("moon", None, None)
     assert Config().rig.camera == "twin"

@@ -64,7 +64,7 @@ def test_a_rig_is_shown() -> None:
     assert "scale: 0.3200 mm/px in the middle, ±0.10 % (by board)" in text
     assert "right +1, left +2" in text
     assert json.loads(_run("show", "bench 1", "--json"))["calibration"]["scale"]["mm_per_px"] == 0.32
-    with pytest.raises(UserError, match="unknown rig 'x'; known: twin, realsense, webcam, bench 1"):
+    with pytest.raises(UserError, match="unknown rig 'x'; known: twin, realsense, webcam, basler, bench 1"):
         _run("show", "x")
 
 

@@ -408,7 +408,7 @@ def test_another_camera_does_not_inherit_the_calibration(make_wizard: MakeWizard
     assert wizard.scale_page.is_done
 
 
-@pytest.mark.parametrize(("kind", "sign"), [("realsense", "serial"), ("webcam", "device")])
+@pytest.mark.parametrize(("kind", "sign"), [("realsense", "serial"), ("basler", "serial"), ("webcam", "device")])
 def test_a_camera_that_was_not_named_keeps_its_calibration_when_it_is_found(
     make_wizard: MakeWizard, qtbot: QtBot, kind: str, sign: str
 ) -> None:

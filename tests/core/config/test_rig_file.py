@@ -344,7 +344,7 @@ def test_a_value_that_cannot_be_is_named(old: str, new: str, problem: str) -> No
 
 def test_a_missing_rig_names_those_that_there_are() -> None:
     write_rig(make_rig(load_config(), "bench 1", None))
-    with pytest.raises(RigFileError, match="unknown rig 'bench 2'; known: twin, realsense, webcam, bench 1"):
+    with pytest.raises(RigFileError, match="unknown rig 'bench 2'; known: twin, realsense, webcam, basler, bench 1"):
         find_rig("bench 2")
     with pytest.raises(RigFileError, match="no such rig file"):
         read_rig(rig_path("bench 2"))

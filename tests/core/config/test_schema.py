@@ -45,7 +45,7 @@ def test_every_setting_says_what_it_means_and_every_number_its_range() -> None:
         ("perception.cleaning.min_robot_area_px", FieldKind.WHOLE, "px²", "0 to 100000 px²", Effect.NOW),
         ("perception.gaps.rule", FieldKind.CHOICE, "", "components, every_pair", Effect.NOW),
         ("servos.joints.3.sign", FieldKind.CHOICE, "", "-1, 1", Effect.RIG),
-        ("rig.camera", FieldKind.CHOICE, "", "twin, realsense, webcam, video_file, image_folder", Effect.PROGRAM),
+        ("rig.camera", FieldKind.CHOICE, "", "twin, realsense, webcam, basler, video_file, image_folder", Effect.PROGRAM),
         ("window.theme", FieldKind.CHOICE, "", "dark, light, system", Effect.NOW),
         ("window.language", FieldKind.CHOICE, "", "auto, en, zh", Effect.PROGRAM),
         ("safety.pose_hold_s", FieldKind.NUMBER, "s", "0.05 to 0.15 s", Effect.RIG),
