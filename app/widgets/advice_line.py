@@ -17,8 +17,8 @@ _CHEVRONS = {Speed.STOP: 0, Speed.SLOWEST: 1, Speed.SLOW: 2, Speed.MODERATE: 3, 
 class AdviceLine(PaintedWidget):
     """An arrow turned by the steering angle, the speed as word and as one to four chevrons, the degrees and the reason.
 
-    Arrow and chevrons point up to advance and down to back off, as the keys do. Where the way decides and not the state, it says
-    so, as the badge does. Without advice it is blank and says why. Where the pose is unsure it says so.
+    Arrow and chevrons point up to advance, and down to back off, as the keys do; Stop is a square. Where the way decides, not the
+    state, it says so, as the badge does. Without advice it is blank and says why. Where the pose is unsure it says so.
     """
 
     def __init__(self) -> None:
@@ -65,14 +65,15 @@ class AdviceLine(PaintedWidget):
         accent = theme.STATE_COLOUR[self._state]
         draw_box(painter, QRectF(frame.left(), frame.top(), 6, frame.height()), 3, accent)
         is_back = advice.advance_mm_s < 0.0
-        _paint_arrow(painter, QPointF(frame.left() + 48, frame.center().y()), 24.0, advice.steer_deg, accent, is_back=is_back)
+        if advice.speed is not Speed.STOP:
+            _paint_arrow(painter, QPointF(frame.left() + 48, frame.center().y()), 24.0, advice.steer_deg, accent, is_back=is_back)
         _paint_chevrons(painter, QPointF(frame.left() + 92, frame.center().y()), _CHEVRONS[advice.speed], is_back=is_back)
         left = frame.left() + 168
         headline = QRectF(left, frame.top() + 6, frame.right() - left - 16, 34)
         draw_text(painter, headline, advice_headline(advice), theme.bold(theme.Size.TITLE), theme.TEXT, smallest_px=11)
         why = QRectF(left, frame.top() + 40, headline.width(), 22)
         colour = theme.FAULT if self._is_unsure else theme.TEXT_DIM
-        draw_text(painter, why, self._why(advice), theme.font(15), colour, elided=True)
+        draw_text(painter, why, self._why(advice), theme.font(15), colour, smallest_px=11, elided=True)
 
 
 def _paint_arrow(painter: QPainter, middle: QPointF, size: float, turn_deg: float, colour: str, *, is_back: bool) -> None:
