@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from core.config.safety import SafetyConfig
+from core.control.direction_monitor import HeadSeen
 from core.control.faults import AFTER_SOME, AT_ONCE, Cause, Fault
 from core.messages import message
 from core.types import Reason
@@ -35,6 +36,7 @@ class FrameReport:
     finite : False when any number of the result is not finite.
     delivered, lost : the camera's frames since the last report that arrived (also those skipped for a newer one), or never did.
     drift_px : how far the landmarks moved since the rig was set up; None: not watched.
+    head : where the head is and points, for ``direction_monitor``; None without a pose.
     """
 
     index: int
@@ -48,6 +50,7 @@ class FrameReport:
     delivered: int = 1
     lost: int = 0
     drift_px: float | None = None
+    head: HeadSeen | None = None
 
 
 @dataclass(frozen=True, slots=True)

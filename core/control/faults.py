@@ -127,6 +127,10 @@ class Cause(StrEnum):
         "Perception gave broken results", "start again with F5, then acknowledge")
     COMMANDS_REJECTED = ("commands rejected again and again", Area.PROGRAM, Reaction.DISARM,
         "The program's commands were rejected", "acknowledge; if it comes again, report it with the log")
+    WRONG_TURN = ("head turns against the command", Area.PROGRAM, Reaction.DISARM,
+        "The head turns the other way than it is steered", "check the tendons; Rig, Calibrate: Wiggle, Steering; acknowledge")
+    WRONG_FEED = ("robot moves against the feed", Area.PROGRAM, Reaction.DISARM,
+        "The robot moves the other way than it is fed", "check the feed's direction; Rig, Calibrate: Wiggle; acknowledge")
     HEAD_LOST_LONG = ("head lost for long", Area.PERCEPTION, Reaction.DISARM,
         "The robot's head is lost", "bring the robot back into view by hand, then acknowledge")
     POSE_LOST = ("pose lost", Area.PERCEPTION, Reaction.DISARM,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from core.config.models import PursuitConfig
 from core.control.camera_monitor import FrameReport, RouteState
+from core.control.direction_monitor import head_seen
 from core.control.look_ahead import look_ahead
 from core.types import Advice, Frame, Image, Point, Reason, Scene
 
@@ -142,6 +143,7 @@ class FrameReports:
             delivered=1 if before is None else max(1, frame.index - before.index),
             lost=0 if before is None else max(0, frame.lost - before.lost),
             drift_px=self._landmarks.drift_px(image, frame.captured_s, scene.scale) if format_ok and not is_blind else None,
+            head=head_seen(scene, self._config.pixels_per_mm) if sound else None,
         )
 
     def _route(self, scene: Scene, has_target: bool) -> RouteState:

@@ -1,4 +1,4 @@
-"""Health of all parts (``camera_monitor``, ``bus_monitor``, deadmen, threads, model, gate): reports in, active faults out. Pure.
+"""Health of all parts (camera, bus, direction, deadmen, threads, model, gate): reports in, active faults out. Pure.
 
 Each monitor is a frozen value; ``update`` returns the value after a report.
 """
@@ -12,6 +12,7 @@ from enum import StrEnum
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusMonitor, BusReport
 from core.control.camera_monitor import CameraMonitor, FrameArrived, FrameLate, FrameReport, RouteState
+from core.control.direction_monitor import DirectionMonitor, MotionSent
 from core.control.faults import Area, Cause, Fault
 from core.control.gate import RejectReason
 from core.messages import message
@@ -105,6 +106,7 @@ Report = (
     | ServoRequestBegun
     | ServosBusy
     | GateReport
+    | MotionSent
     | Fault
 )
 
@@ -169,6 +171,7 @@ class Health:
 
     frames: CameraMonitor = field(default_factory=CameraMonitor)
     bus: BusMonitor = field(default_factory=BusMonitor)
+    direction: DirectionMonitor = field(default_factory=DirectionMonitor)
     deadmen: Mapping[Hashable, Deadman] = field(default_factory=dict)
     window_s: float | None = None
     perception_s: float | None = None
@@ -187,7 +190,10 @@ class Health:
         """The state after a report. Only while `armed` does a new press of a deadman count, and the gate's answer."""
         match report:
             case FrameReport():
-                return replace(self, frames=self.frames.update(report, now_s, safety))
+                direction = self.direction.observe(report.head) if report.head is not None else self.direction
+                return replace(self, frames=self.frames.update(report, now_s, safety), direction=direction)
+            case MotionSent():
+                return replace(self, direction=self.direction.drive(report)) if armed else self
             case FrameArrived(captured_s):
                 return replace(self, frames=self.frames.arrived(captured_s, now_s))
             case FrameLate():
@@ -232,9 +238,9 @@ class Health:
         return replace(self, rejection=rejection, rejected_run=run)
 
     def disarmed(self) -> Health:
-        """The state after disarming: presses of deadmen and rejected commands from before do not count for the next time."""
+        """The state after disarming: presses of deadmen, rejected commands and motions from before do not count the next time."""
         deadmen = {source: replace(deadman, counts=False) for source, deadman in self.deadmen.items()}
-        return replace(self, deadmen=deadmen, rejection=None, rejected_run=0)
+        return replace(self, deadmen=deadmen, rejection=None, rejected_run=0, direction=DirectionMonitor())
 
     def deadman_held(self, now_s: float, safety: SafetyConfig) -> bool:
         """Whether a deadman that is enough by itself is held, by a press that began while armed."""
@@ -256,6 +262,7 @@ class Health:
     def faults(self, now_s: float, servos: ServosConfig, safety: SafetyConfig, *, driving: bool = False) -> list[Fault]:
         """All active faults; `driving`: also those that are faults only while the program drives."""
         faults = [*self.reported, *self.frames.faults(now_s, safety), *self.bus.faults(now_s, servos, safety)]
+        faults += self.direction.faults()
         for beat_s, cause in ((self.window_s, Cause.WINDOW_HUNG), (self.perception_s, Cause.HEARTBEAT_LOST)):
             if beat_s is None or now_s - beat_s > servos.heartbeat_timeout_s:
                 silence = "no sign of life yet" if beat_s is None else message("silent for {a:.0f} ms", a=1000 * (now_s - beat_s))

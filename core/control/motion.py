@@ -16,6 +16,9 @@ _LONGEST_STEP_S = 0.1
 """A longer pause between two commands counts as this."""
 _MOST_AHEAD = 0.25
 """Largest lead of the commanded bend over the one sent, of full bend."""
+_CAREFUL_DEG_S, _CAREFUL_MM_S = 10.0, 3.0
+"""Fastest turn and feed until the robot was seen to follow: in the time that it takes to notice a wrong direction and to stop, the
+head turns by less than 10 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,8 +158,11 @@ class AdviceController:
         self._advance_mm_s = 0.0
         self._last_s: float | None = None
 
-    def command(self, advice: Advice | None, now_s: float) -> Command:
-        """The command now; `now_s` is on any monotonic clock, the same for all calls."""
+    def command(self, advice: Advice | None, now_s: float, *, turns: bool = True, feeds: bool = True) -> Command:
+        """The command now; `now_s` is on any monotonic clock, the same for all calls.
+
+        `turns`, `feeds`: bend and feed are known to act in the right direction (``direction_monitor``); else they are slow.
+        """
         config = self._config
         elapsed_s = 0.0 if self._last_s is None else min(max(0.0, now_s - self._last_s), config.max_gap_s)
         self._last_s = now_s
@@ -166,13 +172,14 @@ class AdviceController:
         turn = advice.steer_deg / config.turn_deg
         integral = self._integral + turn * elapsed_s / config.integral_s
         wanted = integral + config.proportional * turn
-        reach = config.max_bend_rate_per_s * elapsed_s
+        rate_per_s = config.max_bend_rate_per_s
+        reach = (rate_per_s if turns else min(rate_per_s, _CAREFUL_DEG_S / config.turn_deg)) * elapsed_s
         bend = limited(self._bend + limited(wanted - self._bend, reach), 1.0)
         # anti-windup: the integral waits while rate or range limit the bend
         held_back = (wanted - bend) * turn > 0.0
         self._integral = self._integral if held_back else limited(integral, 1.0)
         self._bend = bend
-        self._advance_mm_s = self._feed(advice.advance_mm_s, elapsed_s)
+        self._advance_mm_s = self._feed(advice.advance_mm_s if feeds else limited(advice.advance_mm_s, _CAREFUL_MM_S), elapsed_s)
         return Command(bend=bend, pitch=self._pitch, advance_mm_s=self._advance_mm_s)
 
     def _feed(self, wanted_mm_s: float, elapsed_s: float) -> float:

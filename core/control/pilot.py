@@ -19,6 +19,7 @@ from core.config.models import Config
 from core.config.safety import SafetyConfig
 from core.control.alerts import AlertReporter, Note
 from core.control.camera_monitor import FrameArrived, FrameLate, RouteState
+from core.control.direction_monitor import MotionSent
 from core.control.drive_view import AdviceAdherence, CommandLatency, DriveNews, DriveView
 from core.control.faults import Cause, Fault
 from core.control.frame_reports import FrameReports, is_finite, is_sound
@@ -419,6 +420,8 @@ class Pilot:
             events.append(GateReport(RejectReason.NOT_ARMED))  # no command is expected now, so its absence is no fault
         elif sent is not None and self._permitted is Source.PROGRAM and sent.rejection is not RejectReason.NO_COMMAND:
             events.append(GateReport(sent.rejection))
+            turn_deg = sent.motion.bend * self._config.policy.drive.turn_deg
+            events.append(MotionSent(sent.time_s, turn_deg, sent.motion.advance_mm_s))
         elif self._state.mode is Mode.AUTONOMOUS and kept_back is not None:
             events.append(GateReport(kept_back.reason))
         if self._has_arrived(inputs.latest, now_s):
@@ -462,7 +465,8 @@ class Pilot:
                 retracts = self._hold_retraction(used_jog, sent)
                 robot.send(self._operator_command, source=Source.OPERATOR, retracts=retracts)
             elif permitted is Source.PROGRAM and latest is not None:
-                program_command = self._following.command(latest.advice, now_s)
+                known = self._state.health.direction
+                program_command = self._following.command(latest.advice, now_s, turns=known.turns, feeds=known.feeds)
                 robot.send(program_command, source=Source.PROGRAM, captured_s=latest.captured_s)
             else:
                 robot.hold()

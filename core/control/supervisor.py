@@ -23,6 +23,7 @@ from dataclasses import replace
 
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.camera_monitor import RouteState
+from core.control.direction_monitor import DirectionMonitor
 from core.control.faults import Area, Cause, Fault, Reaction, first_fault, worst
 from core.control.gate import Source
 from core.control.health import DeadmanReport, Health, Report
@@ -180,7 +181,7 @@ def _handle_requests(
             if reasons := against(state, now_s, safety):
                 refused.append(RequestRefused(act, reasons))
             else:
-                state = replace(state, mode=mode, resumed_s=None)
+                state = replace(state, mode=mode, resumed_s=None, health=replace(state.health, direction=DirectionMonitor()))
     if state.mode in DRIVING_MODES and not acts.isdisjoint({Act.INPUT, Act.TAKE_BACK}):
         state = replace(state, mode=Mode.ARMED)
     if state.mode in ARMED_MODES and Act.DISARM in acts:

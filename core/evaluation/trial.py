@@ -45,6 +45,7 @@ class TrialLog:
     refusals: Counter[str] = field(default_factory=Counter)
     interventions: int = 0
     back_offs: int = 0
+    direction_alarms: int = 0
 
     def count(self, pose: Pose | None, refusal: str, wall_contact_n: float) -> None:
         """Count a frame: the result of perception, and the contact force."""
@@ -89,6 +90,7 @@ def trial_row(log: TrialLog, *, seed: int, policy: str, phantom: str, outcome: s
         "refusals": dict(sorted(log.refusals.items())),
         "interventions": log.interventions,
         "back_offs": log.back_offs,
+        "direction_alarms": log.direction_alarms,
         "theta_error_median_deg": _median([m.theta_error_deg for m in measures]),
         "head_error_median_px": _median([m.head_error_px for m in measures]),
         "track": _track(measures),
@@ -136,6 +138,7 @@ def summarise(rows: Sequence[Mapping[str, Any]]) -> Row:
         "median_path_ratio": _median([row["path_ratio"] for row in reached]),
         "mean_interventions": _mean([float(row["interventions"]) for row in rows]),
         "answered_share": _mean([row["answered_share"] for row in rows]),
+        "direction_alarms": sum(row.get("direction_alarms", 0) for row in rows) if rows else None,
     }
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from core import geometry
 from core.config.models import Config, PolicyName
+from core.control.direction_monitor import DirectionMonitor, MotionSent, head_seen
 from core.control.motion import AdviceController
 from core.control.policies import Policy, make_policy
 from core.evaluation.accuracy import TrueMasks
@@ -122,6 +123,8 @@ class Trial:
         pipeline.reset()
         self._policy: Policy = make_policy(policy, config, own_seed)
         self._drive = AdviceController(config.policy.drive)
+        self._direction = DirectionMonitor()
+        self._wrong_way = False
         self._operator = _Operator(config.safety.pose_disarm_s)
         self._manual = RouteFollower(phantom, self.target.node)
         self._log = TrialLog()
@@ -162,6 +165,7 @@ class Trial:
         advice = self._policy(scene, status)
         if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
             advice = None  # autonomy has to hold
+        self._watch_direction(scene)
         self._delayed.append(self._command(advice, frame.captured_s))
         self._world.robot.send(self._delayed.popleft())
         time_s, contact_n = frame.captured_s - start_s, status.wall_contact_n or 0.0
@@ -189,12 +193,24 @@ class Trial:
             backing_off = advice is not None and advice.advance_mm_s < 0.0
             self._log.back_offs += backing_off and not self._backing_off
             self._backing_off = backing_off
-            return self._drive.command(advice, now_s)
+            command = self._drive.command(advice, now_s, turns=self._direction.turns, feeds=self._direction.feeds)
+            sent_s = now_s + DELAY_FRAMES / self._world.config.frames_per_second
+            turn_deg = command.bend * self._plan.config.policy.drive.turn_deg
+            self._direction = self._direction.drive(MotionSent(sent_s, turn_deg, command.advance_mm_s))
+            return command
         if helping:
             self._log.interventions += 1
         self._policy.reset()
         self._drive.take_over(manual.bend)
+        self._direction = DirectionMonitor()
         return manual
+
+    def _watch_direction(self, scene: Scene) -> None:
+        """Count when the robot seems to go the other way, which would end autonomy: it is wired right, so each is a false alarm."""
+        head = head_seen(scene, self._plan.config.policy.pursuit.pixels_per_mm)
+        self._direction = self._direction.observe(head) if head is not None else self._direction
+        before, self._wrong_way = self._wrong_way, bool(self._direction.faults())
+        self._log.direction_alarms += self._wrong_way and not before
 
     def _measure(self, scene: Scene, time_s: float, insertion_mm: float, wall_contact_n: float) -> None:
         truth = self._world.truth(self.target.click_px)

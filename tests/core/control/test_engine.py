@@ -108,7 +108,8 @@ class _LostCamera(_Camera):
 
 def test_a_lost_camera_leaves_the_operator_the_hand() -> None:
     bench = Bench()
-    engine = Engine(_LostCamera([]), lambda *_: None, lambda _: None, lambda: None, bench.pilot, bench.robot)  # type: ignore[arg-type,return-value]
+    camera = _LostCamera([])
+    engine = Engine(camera, lambda *_: None, lambda _: None, lambda: None, bench.pilot, bench.robot, turns_pilot=False)  # type: ignore[arg-type,return-value]
     assert engine.step(0.0) is None
     assert engine.problem == "camera unplugged: plug it in"
     assert Fault(Cause.CAMERA_LOST, engine.problem) in bench.pilot._inputs.take(bench.now_s).events

@@ -11,6 +11,7 @@ import pytest
 
 from core.control.bus_monitor import BusReport
 from core.control.camera_monitor import FrameArrived, FrameLate, FrameReport, RouteState
+from core.control.direction_monitor import HeadSeen, MotionSent
 from core.control.faults import AFTER_SOME, AT_ONCE, CAUSES, Area, Cause, Fault, Reaction
 from core.control.gate import RejectReason, Source
 from core.control.health import (
@@ -166,6 +167,20 @@ def _silent(part: Part) -> Inject:
     return inject
 
 
+def _wrong_way(turn_deg: float, feed_mm_s: float) -> Inject:
+    """The head turns, or goes, as far the other way as it is commanded, until autonomy ends."""
+
+    def inject(bench: Bench) -> None:
+        for k in range(60):
+            head = HeadSeen(0.0, -turn_deg * k, -turn_deg * k, (-feed_mm_s * k * TICK_S, 0.0))
+            bench.frame = lambda report, head=head: replace(report, head=replace(head, captured_s=report.captured_s))  # type: ignore[misc]
+            decision = bench.tick(MotionSent(bench.now_s, turn_deg * k, feed_mm_s))
+            if decision.latched is not None and bench.state.mode is not S:
+                return
+
+    return inject
+
+
 def _joint(value: object, place: int, rest: object) -> tuple[object, ...]:
     return tuple(value if n == place else rest for n in range(7))
 
@@ -201,6 +216,8 @@ INJECTIONS: dict[Cause, Inject] = {
     Cause.OUTSIDE_VESSEL: _frames(1, refusal=Reason.OUTSIDE_VESSEL),
     Cause.NOT_FINITE_REPEATED: _frames(3, finite=False),
     Cause.COMMANDS_REJECTED: _events(GateReport(RejectReason.NON_FINITE), ticks=3),
+    Cause.WRONG_TURN: _wrong_way(1.0, 0.0),
+    Cause.WRONG_FEED: _wrong_way(0.0, 5.0),
     Cause.HEAD_LOST_LONG: _frames(16, refusal=Reason.NO_ROBOT),
     Cause.POSE_LOST: _mute(FrameReport, 0.53125, frames_arrive=True),
     Cause.BUS_SILENT: _mute(BusReport, 0.1875),
@@ -283,7 +300,7 @@ def test_every_fault_in_every_mode(cause: Cause, before: Mode, benches: dict[Mod
     assert decision.mode is _after(before, cause)
     driving_only = cause in {Cause.DEADMAN, Cause.NO_TARGET}
     kept = cause.reaction is not Reaction.DISARM or before not in {R, U, H}
-    if cause is Cause.COMMAND_REJECTED or cause is Cause.COMMANDS_REJECTED:
+    if cause in {Cause.COMMAND_REJECTED, Cause.COMMANDS_REJECTED, Cause.WRONG_TURN, Cause.WRONG_FEED}:
         assert (cause in [fault.cause for fault in decision.active]) == (before in {R, U, H})
     elif kept and not (driving_only and before not in {U, H}):
         assert cause in [fault.cause for fault in decision.active]

@@ -1,0 +1,219 @@
+"""The direction monitor: what a robot that is wired right, wrong, held or badly seen gives; all numbers follow from the drive."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from core.control.direction_monitor import (
+    WRONG_FEED_MM,
+    WRONG_TURN_DEG,
+    DirectionMonitor,
+    HeadSeen,
+    MotionSent,
+    head_seen,
+)
+from core.control.faults import Cause
+from tests.core.driving_scenes import STRAIGHT, scene_at
+
+FRAME_S, TURN_S, LATE_S = 0.04, 0.02, 0.08
+"""Of the camera, of the pilot, and how late a motion follows its command."""
+
+
+@dataclass
+class Robot:
+    """Heading and place by what was commanded ``LATE_S`` ago: `turn` and `feed` of it, and `more` deg/s of turn of the picture."""
+
+    turn: float = 1.0
+    feed: float = 1.0
+    of_theta: float = 1.0
+    noise_deg: float = 0.0
+
+
+def _course(
+    robot: Robot,
+    bend_deg: Callable[[float], float],
+    feed_mm_s: Callable[[float], float] = lambda _: 0.0,
+    seconds: float = 3.0,
+    vessel_deg: Callable[[float], float] = lambda _: 0.0,
+) -> list[DirectionMonitor]:
+    """The monitor after each frame."""
+    rng, monitor, found = np.random.default_rng(3), DirectionMonitor(), []
+    steps = round(seconds / TURN_S)
+    way_mm = 0.0
+    for step in range(steps):
+        now_s = step * TURN_S
+        monitor = monitor.drive(MotionSent(now_s, bend_deg(now_s), feed_mm_s(now_s)))
+        way_mm += robot.feed * feed_mm_s(max(0.0, now_s - LATE_S)) * TURN_S
+        if step % 2 == 0:
+            heading = robot.turn * bend_deg(max(0.0, now_s - LATE_S)) + vessel_deg(now_s) + rng.normal(0.0, 1.0) * robot.noise_deg
+            along = math.radians(robot.turn * bend_deg(0.0))
+            place = way_mm * math.cos(along), way_mm * math.sin(along)
+            monitor = monitor.observe(HeadSeen(now_s, heading, robot.of_theta * (heading - vessel_deg(now_s)), place))
+            found.append(monitor)
+    return found
+
+
+def _ramp(deg_s: float) -> Callable[[float], float]:
+    return lambda now_s: deg_s * now_s
+
+
+def _first_s(course: list[DirectionMonitor], cause: Cause) -> float:
+    """Time of the first fault; infinite without one."""
+    return next((k * FRAME_S for k, one in enumerate(course) if any(f.cause is cause for f in one.faults())), math.inf)
+
+
+@pytest.mark.parametrize("deg_s", [15.0, -15.0, 60.0, -140.0])
+def test_a_head_that_follows_is_no_fault_and_soon_known_to_turn(deg_s: float) -> None:
+    course = _course(Robot(), _ramp(deg_s), seconds=1.0)
+    assert _first_s(course, Cause.WRONG_TURN) == math.inf
+    assert max(one.wrong_turn_deg for one in course) == 0.0
+    assert course[-1].turns
+    assert not course[0].turns
+
+
+@pytest.mark.parametrize(("deg_s", "within_deg"), [(15.0, 7.0), (-15.0, 7.0), (60.0, 16.0), (-140.0, 37.0)])
+def test_a_head_that_turns_the_other_way_is_noticed(deg_s: float, within_deg: float) -> None:
+    """At the slow start's 15 degrees a second within 7 degrees; later as fast as lag and frames allow."""
+    course = _course(Robot(turn=-1.0), _ramp(deg_s), seconds=1.0)
+    at_s = _first_s(course, Cause.WRONG_TURN)
+    assert abs(deg_s) * at_s <= within_deg
+    fault = course[round(at_s / FRAME_S)].faults()[0]
+    assert ("to the right" if deg_s > 0 else "to the left") in fault.detail
+    assert not course[round(at_s / FRAME_S)].turns
+
+
+def test_the_limit_is_four_degrees() -> None:
+    for most_deg, fault in ((4.4, True), (3.6, False)):
+        course = _course(Robot(turn=-1.0), lambda now_s, most=most_deg: min(10.0 * now_s, most), seconds=2.0)  # type: ignore[misc]
+        assert (max(one.wrong_turn_deg for one in course) >= WRONG_TURN_DEG) is fault
+
+
+@pytest.mark.parametrize("feed_mm_s", [3.0, 8.0, -3.0])
+def test_a_feed_that_goes_the_other_way_is_noticed(feed_mm_s: float) -> None:
+    course = _course(Robot(feed=-1.0), _ramp(0.0), lambda _: feed_mm_s)
+    at_s = _first_s(course, Cause.WRONG_FEED)
+    assert abs(feed_mm_s) * at_s <= WRONG_FEED_MM + 0.3 * abs(feed_mm_s)
+    assert f"{math.copysign(1.0, feed_mm_s):+.0f}"[0] in course[round(at_s / FRAME_S)].faults()[0].detail
+    right = _course(Robot(), _ramp(0.0), lambda _: feed_mm_s)
+    assert _first_s(right, Cause.WRONG_FEED) == math.inf
+    assert right[-1].feeds
+
+
+def test_a_head_that_is_held_is_no_wrong_way_and_does_not_stay_careful_for_ever() -> None:
+    course = _course(Robot(turn=0.0, feed=0.0), _ramp(20.0), lambda _: 5.0)
+    assert all(not one.faults() for one in course)
+    assert course[-1].turns
+    assert course[-1].feeds
+
+
+def test_a_vessel_that_turns_away_is_no_turn_of_the_head() -> None:
+    """Bent to the left at rest, while the vessel beside the head turns: theta goes right, the head does not."""
+    course = _course(Robot(turn=0.0), _ramp(-30.0), lambda _: 8.0, vessel_deg=lambda now_s: 0.0)
+    assert _first_s(course, Cause.WRONG_TURN) == math.inf
+    bent = [
+        DirectionMonitor().drive(MotionSent(0.0, 0.0, 8.0)),
+    ]
+    for k in range(1, 30):
+        now_s = k * FRAME_S
+        bent.append(
+            bent[-1].drive(MotionSent(now_s, -30.0 * now_s, 8.0)).observe(HeadSeen(now_s, 0.0, 30.0 * now_s, (8.0 * now_s, 0.0)))
+        )
+    assert all(not one.faults() for one in bent)
+
+
+def test_a_head_that_follows_a_bend_of_the_vessel_against_a_large_command_goes_the_wrong_way() -> None:
+    """Swapped, in a vessel that turns to the right: steered to the left, the head lies along the vessel and theta stays."""
+    monitor, found_s = DirectionMonitor(), math.inf
+    for k in range(60):
+        now_s = k * FRAME_S
+        monitor = monitor.drive(MotionSent(now_s, -10.0 * now_s, 5.0)).observe(HeadSeen(now_s, 6.0 * now_s, 0.0, (0.0, 0.0)))
+        found_s = min(found_s, now_s) if monitor.faults() else found_s
+    assert 1.0 < found_s < 1.4
+
+
+def test_a_wall_that_turns_the_head_with_the_vessel_is_no_turn_against_it() -> None:
+    monitor = DirectionMonitor().drive(MotionSent(0.0, 0.0, 8.0))
+    for k in range(1, 40):
+        now_s = k * FRAME_S
+        monitor = monitor.drive(MotionSent(now_s, -20.0 * now_s, 8.0))
+        monitor = monitor.observe(
+            HeadSeen(now_s, 40.0 * now_s, -5.0 * now_s, (0.0, 0.0))
+        )  # guided right, while it turns to the left
+        assert not any(fault.cause is Cause.WRONG_TURN for fault in monitor.faults())
+
+
+def test_a_bent_head_that_is_fed_turns_on_while_it_is_already_straightened() -> None:
+    """Bent by 70 degrees and fed by 8 mm/s it turns by some 25 degrees a second in free lumen, against the straightening."""
+    monitor = DirectionMonitor()
+    for k in range(60):
+        now_s = k * FRAME_S
+        monitor = monitor.drive(MotionSent(now_s, 70.0 - 15.0 * now_s, 8.0))
+        monitor = monitor.observe(HeadSeen(now_s, 25.0 * now_s, 25.0 * now_s, (0.0, 0.0)))
+        assert not any(fault.cause is Cause.WRONG_TURN for fault in monitor.faults())
+
+
+@pytest.mark.parametrize("noise_deg", [1.0, 3.0, 6.0])
+def test_noise_of_the_pose_is_no_turn(noise_deg: float) -> None:
+    for deg_s in (0.0, 8.0, -20.0):
+        course = _course(Robot(noise_deg=noise_deg), lambda now_s, rate=deg_s: rate * math.sin(2.0 * now_s), seconds=20.0)  # type: ignore[misc]
+        assert _first_s(course, Cause.WRONG_TURN) == math.inf
+
+
+def test_a_wrong_turn_is_noticed_through_noise() -> None:
+    assert _first_s(_course(Robot(turn=-1.0, noise_deg=2.0), _ramp(30.0), seconds=2.0), Cause.WRONG_TURN) <= 0.8
+
+
+def test_a_single_wrong_pose_is_no_motion() -> None:
+    monitor = DirectionMonitor()
+    for k in range(60):
+        now_s = k * FRAME_S
+        wrong = 180.0 if k in {20, 40, 41} else 0.0
+        monitor = monitor.drive(MotionSent(now_s, -20.0 * now_s, -3.0)).observe(HeadSeen(now_s, wrong, wrong, (wrong, 0.0)))
+        assert not monitor.faults(), now_s
+
+
+def test_a_head_that_springs_free_goes_by_what_was_fed_before() -> None:
+    """Held for a second while it was fed and bent, it springs on after the command was turned round."""
+    monitor, fed_mm, turn_deg = DirectionMonitor(), 0.0, 0.0
+    for k in range(50):
+        now_s = k * FRAME_S
+        speed, rate = (5.0, 20.0) if now_s < 1.0 else (-5.0, -20.0)
+        fed_mm, turn_deg = fed_mm + speed * FRAME_S, turn_deg + rate * FRAME_S
+        at_deg, at_mm = (turn_deg, fed_mm) if now_s >= 1.2 else (0.0, 0.0)
+        head = HeadSeen(now_s, at_deg, at_deg, (at_mm, 0.0))
+        monitor = monitor.drive(MotionSent(now_s, turn_deg, speed)).observe(head)
+        assert not monitor.faults(), now_s
+
+
+def test_a_pause_of_commands_or_poses_begins_again() -> None:
+    monitor = _course(Robot(turn=-1.0), _ramp(15.0), seconds=0.4)[-1]
+    assert 0.0 < monitor.wrong_turn_deg < WRONG_TURN_DEG
+    resumed = monitor.drive(MotionSent(2.0, 6.0, 0.0))
+    assert resumed.seen == ()
+    assert resumed.observe(HeadSeen(2.04, -90.0, -90.0, (0.0, 0.0))).wrong_turn_deg == 0.0
+    late = monitor.observe(HeadSeen(0.9, -40.0, -40.0, (0.0, 0.0)))
+    assert (late.wrong_turn_deg, len(late.seen)) == (0.0, 1)
+
+
+def test_poses_without_commands_and_commands_without_poses_say_nothing() -> None:
+    alone = DirectionMonitor()
+    for k in range(40):
+        alone = alone.observe(HeadSeen(k * FRAME_S, 9.0 * k, 9.0 * k, (0.0, 0.0)))
+    assert alone == DirectionMonitor()
+    blind = DirectionMonitor()
+    for k in range(400):
+        blind = blind.drive(MotionSent(k * TURN_S, 1.0 * k, 8.0))
+    assert not blind.faults()
+    assert len(blind.sent) < 250, "old commands are dropped"
+
+
+def test_the_head_of_a_scene() -> None:
+    found = head_seen(scene_at(STRAIGHT, (200.0, 100.0), None, heading_deg=12.0), 4.0)
+    assert found is not None
+    assert (found.heading_deg, found.theta_deg) == (pytest.approx(12.0, abs=0.1), pytest.approx(12.0, abs=0.1))
+    assert found.place_mm == (50.0, 25.0)
