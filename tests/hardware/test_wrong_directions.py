@@ -34,7 +34,8 @@ Wiring = Callable[[Sequence[float]], Sequence[float]]
 
 @dataclass
 class Course:
-    """What happened after the hand-over: the largest turn of the tip against the bend, the way, and the end of autonomy."""
+    """What happened after the hand-over: the largest turn of the tip against the bend as it is meant, the way back, and the end of
+    autonomy."""
 
     wrong_deg: float
     wrong_mm: float
@@ -48,7 +49,9 @@ def _heading_deg(bench: FaultBench) -> float:
     return float(np.degrees(np.arctan2(*(points[-1] - points[-4])[::-1])))
 
 
-def _handed_over(bench: FaultBench, wiring: Wiring, seconds: float, target: Point = TARGET, roll_deg: float = 0.0) -> Course:
+def _handed_over(
+    bench: FaultBench, wiring: Wiring, seconds: float, target: Point = TARGET, *, roll_deg: float = 0.0, side: int = 1
+) -> Course:
     robot = bench.robot
     assert isinstance(robot, LockStepServos)
     joints = JointsToTwin(bench.config.servos, wiring(robot.positions_mm()), roll_deg)
@@ -63,7 +66,7 @@ def _handed_over(bench: FaultBench, wiring: Wiring, seconds: float, target: Poin
     for turn in range(round(seconds / PERIOD_S)):
         view = bench.turn()
         modes += [view.mode] if view.mode is not modes[-1] else []
-        commanded = _bend(robot, bench) - start_bend
+        commanded = side * (_bend(robot, bench) - start_bend)
         turned_deg = (_heading_deg(bench) - start_deg + 180.0) % 360.0 - 180.0
         wrong_deg = max(wrong_deg, -math.copysign(1.0, commanded) * turned_deg if abs(commanded) > 0.01 else 0.0)
         wrong_mm = max(wrong_mm, start_mm - bench.world.physics.status().insertion_mm)
@@ -140,7 +143,7 @@ def test_a_robot_that_is_turned_over_in_its_holder_ends_it_within_ten_degrees(tm
 
 def test_a_camera_that_sees_the_bench_from_below_ends_it_within_ten_degrees(tmp_path: Path) -> None:
     with _bench(tmp_path, lambda picture: picture[:, ::-1]) as bench:
-        found = _handed_over(bench, list, 8.0, (639.0 - TARGET[0], TARGET[1]))
+        found = _handed_over(bench, list, 8.0, (639.0 - TARGET[0], TARGET[1]), side=-1)
     assert found.cause is Cause.WRONG_TURN
     assert found.wrong_deg <= MOST_DEG
 

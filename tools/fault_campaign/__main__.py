@@ -1,4 +1,4 @@
-"""``python -m tools.fault_campaign``: brings all 45 faults about and compares reaction, alert and record with what is listed."""
+"""``python -m tools.fault_campaign``: brings all faults about and compares reaction, alert and record with what is listed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _TRIES = 3  # over real lines, where a machine that pauses at the wrong moment s
 
 _HEAD = """# Faults
 
-What the program does in each of 45 faults. `python -m tools.fault_campaign --out docs/faults.md` brings them about and writes this
+What the program does in each fault. `python -m tools.fault_campaign --out docs/faults.md` brings them about and writes this
 page (`--only N`: one fault; `--quick`: those that need no line, process or window; `--json`: also the alerts and the session's
 events).
 
@@ -172,7 +172,7 @@ def main(
     out: Annotated[Path | None, typer.Option(help="also write the table as a page, as docs/faults.md")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="those that need no line, process or window, in lock-step")] = False,
 ) -> None:
-    """Fault campaign: bring all 45 faults about and look for reaction, alert and record."""
+    """Fault campaign: bring all faults about and look for reaction, alert and record."""
     sys.exit(run_faults(only or [], out, quick=quick, as_json=json))
 
 

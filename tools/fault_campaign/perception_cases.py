@@ -1,4 +1,4 @@
-"""Faults 1 to 20 and 43: camera, late perception, results of perception, and the model."""
+"""Faults 1 to 20, 43 and 46: camera, late perception, results of perception, the model, and a robot that goes the other way."""
 
 from __future__ import annotations
 
@@ -27,9 +27,11 @@ from core.perception.pose import classify
 from core.perception.segmentation import Segmenter
 from core.types import Frame, Image, Point, Reason, Refusal, Scene
 from hardware.preflight.model_checks import judge as judge_model
+from hardware.twin.process import JointsToTwin
 from hardware.twin.world import TwinWorld
 from tools.fault_campaign.bench import ExpectedReaction, FaultBench, Masks, Probability, bench_fault, is_active, judge, open_bench
 from tools.fault_campaign.registry import Kit, Observation, check, fault, run_parts
+from tools.lockstep import LockStepServos
 
 _HELD = (Mode.HOLD,)
 _TO_ADVISORY = (Mode.HOLD, Mode.ADVISORY)
@@ -435,3 +437,25 @@ def wrong_model(kit: Kit) -> Observation:
     problems = check((not verdict.ok and "swapped" in verdict.detail, f"the self-test says: {verdict.detail}"))
     seen = _arm_unfit(kit, ModelReport(verdict.ok, verdict.detail), None, *problems)
     return replace(seen, reaction=f"refuses to arm: {verdict.detail}")
+
+
+@fault(46)
+def other_way(kit: Kit) -> Observation:
+    def wired(change: Callable[[Sequence[float]], Sequence[float]], cause: Cause) -> Callable[[Kit], Observation]:
+        def run(kit: Kit) -> Observation:
+            with open_bench(kit, live=False) as bench:
+                bench.hand_over().mark()
+                robot = bench.robot
+                assert isinstance(robot, LockStepServos)
+                joints = JointsToTwin(bench.config.servos, change(robot.positions_mm()))
+                bench.world.drive = lambda duration_s: joints.command(change(robot.positions_mm()), duration_s)
+                bench.until(lambda view: view.latched is not None)
+                return judge(bench, ExpectedReaction(_AT_ONCE, (cause,), latched=cause, may_hold=True))
+
+        return run
+
+    return run_parts(
+        kit,
+        ("right and left swapped", wired(lambda at: (at[1], at[0], *at[2:]), Cause.WRONG_TURN)),
+        ("feed reversed", wired(lambda at: (*at[:4], -at[4], *at[5:]), Cause.WRONG_FEED)),
+    )

@@ -1,4 +1,4 @@
-"""The register of the 45 faults: what is injected, what must follow, and the function that injects and judges."""
+"""The register of the faults: what is injected, what must follow, and the function that injects and judges."""
 
 from __future__ import annotations
 
@@ -157,6 +157,9 @@ FAULTS = {
         "the torque is to go off at STOP; it is pressed while one servo obeys but does not answer, which it does 0.6 s later",
         "STOP; told at once that the torque is not proven to be off, tried again, and told when all servos have said so",
         quick=False),
+    46: FaultText("robot goes the other way",
+        "right and left are swapped while the program drives; on another bench the feed is reversed (in lock-step)",
+        "DISARM within some degrees, or a second, of the wrong motion", quick=False),
 }
 # fmt: on
 COUNT = len(FAULTS)

@@ -165,3 +165,16 @@ REST, WITHIN, BEYOND = Retraction.REST, Retraction.WITHIN, Retraction.BEYOND
 )
 def test_only_a_pull_that_begins_at_the_end_goes_beyond_it(state: Retraction, pulls: bool, at_low: bool, then: Retraction) -> None:
     assert next_retraction(state, pulls=pulls, at_low=at_low) is then
+
+
+def test_until_the_robot_was_seen_to_follow_bend_and_feed_are_slow() -> None:
+    drive = DriveConfig(turn_deg=50.0)
+    fast = Advice(Speed.FAST, -8.0, 40.0, "")
+    for turns, feeds, bend, feed in ((False, False, 0.02, -3.0), (True, False, 0.15, -3.0), (False, True, 0.02, -8.0)):
+        controller = AdviceController(drive)
+        for step in range(40):
+            now_s = 0.1 * step
+            command = controller.command(fast, now_s, turns=turns, feeds=feeds)
+            if step == 1:
+                assert command.bend == pytest.approx(bend), "10 degrees a second"
+        assert command.advance_mm_s == feed
