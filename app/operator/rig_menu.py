@@ -89,6 +89,7 @@ class RigMenuController(QObject):
         self._menu.aboutToShow.connect(self.update_entries)
         self._cameras.aboutToShow.connect(self._update_cameras)
         self._rig.phase_changed.connect(self._on_phase)
+        window.panels.servos.search_asked.connect(self.calibrate)
         self._rig.add_borrower(self.stop)
         self.update_entries()
 

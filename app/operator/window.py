@@ -195,7 +195,12 @@ class OperatorWindow(WindowFrame):
     @Slot(object)
     def ask_step(self, step: OperatorStep) -> None:
         """A step that the operator asks for, by key, button or menu."""
-        if self.rig.may_ask(step):
+        if not self.rig.may_ask(step):
+            return
+        view = self.controls.view
+        if step is OperatorStep.SERVOS_ON and self.panels.servos.lacks_zeros and view is not None and view.latched is None:
+            self.panels.servos.open_zeros()
+        else:
             self.controls.ask_step(step)
 
     # ---- the rig

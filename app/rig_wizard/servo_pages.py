@@ -328,7 +328,7 @@ class SteeringPage(WizardPage):
 
     name = mark("Steering")
     hint = mark(
-        "The joints are zeroed where they stand. Then each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has "
+        "From where the page before has left the wires each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has "
         "shown its way. The robot must have room on both sides."
     )
 

@@ -65,7 +65,9 @@ class SummaryPage(WizardPage):
         notes = dict.fromkeys(tr_text(line) for line in self.draft.notes)
         lines = [f"{rig.name}: {rig_line(rig)}", "", *calibration_lines(rig), "", *notes]
         if rig.robot != "none":
-            lines.append(tr("Zero is lost whenever the servos are switched off: zero them again then, with slack wires."))
+            lines.append(
+                tr("The zeros are offered whenever the servos are switched on; say then how far robot and catheter are in.")
+            )
         self.text.setPlainText("\n".join(lines))
 
 

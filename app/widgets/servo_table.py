@@ -47,8 +47,8 @@ from app.widgets.painting import (
     set_colours,
     text_width,
 )
+from app.widgets.zero_dialog import ZeroDialog, joint_zeros
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
-from core.control.kept_zero import ZeroRequest
 from core.types import RobotStatus
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, wire_force_mn
 
@@ -191,7 +191,7 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
         _signed(f"{state.temperature_c:.0f}", heat, tr("warning from {warm:g} °C, limit {hot:g} °C", warm=warm, hot=hot)),
         _signed(f"{state.voltage_v:.1f}", volts, tr("warning from {sags:g} V, limit {low:g} V", sags=sags, low=low)),
         Cell(tr("on")) if state.torque else _signed(tr("off"), Tone.BAD if armed else Tone.FAINT),
-        Cell(tr("yes")) if zeroed else _signed(tr("no"), Tone.WARN, tr("zero the joint, with slack wires, before arming")),
+        Cell(tr("yes")) if zeroed else _signed(tr("no"), Tone.WARN, tr("its zero must be confirmed or set before arming: Zero...")),
         error,
     )
 
@@ -527,6 +527,7 @@ class ServoTable(QWidget):
     ----------
     reboot_asked : servo id.
     zero_asked : a ZeroRequest.
+    search_asked : the wizard's search for slack.
     torque_off_asked : all servos.
 
     Parameters
@@ -537,6 +538,7 @@ class ServoTable(QWidget):
 
     reboot_asked = Signal(int)
     zero_asked = Signal(object)
+    search_asked = Signal()
     torque_off_asked = Signal()
 
     def __init__(self, safety: SafetyConfig | None = None, clock: Callable[[], float] = time.monotonic) -> None:
@@ -547,6 +549,9 @@ class ServoTable(QWidget):
         self._servos = ServosConfig()
         self._kind: object = None
         self._armed = self._reachable = False
+        self._status: BusStatus | None = None
+        self.zeros: ZeroDialog | None = None
+        """While it is open."""
         self.table = ServoView(servo_rows(None, self._servos, self._safety))
         self.table.customContextMenuRequested.connect(self._open_context_menu)
         self._balance = TendonBalance()
@@ -555,7 +560,7 @@ class ServoTable(QWidget):
         self.question = QuestionStrip()  # where a request is confirmed
         self.question.closed.connect(self._on_answered)
         self._restart_button = text_button(tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), self._open_restart_menu)
-        self._zero_button = text_button(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self._open_zero_menu)
+        self._zero_button = text_button(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self.open_zeros)
         self._off_button = text_button(tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off)
         self._asked_by: QWidget = self._zero_button
         buttons = line(self._restart_button, self._zero_button, self._off_button, spacing=6)
@@ -597,16 +602,16 @@ class ServoTable(QWidget):
             restart = menu.addAction(
                 tr("Restart servo {id} ({joint})", id=joint.id, joint=_plain(joint.name)), partial(self._ask_restart, joint)
             )
-            zero = menu.addAction(tr("Zero {joint}", joint=_plain(joint.name)), partial(self._ask_zero, joint.name))
             restart.setEnabled(free)
-            zero.setEnabled(free)
             menu.addSeparator()
-        menu.addAction(tr("Zero all joints"), partial(self._ask_zero, None)).setEnabled(free)
+        menu.addAction(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self.open_zeros).setEnabled(free)
         menu.addAction(tr("Switch all torque off"), self._ask_torque_off).setEnabled(self._reachable)
         return menu
 
     def _show(self, status: BusStatus | None, silence_s: float | None) -> None:
-        believed = status if silence_s is None else None
+        believed = self._status = status if silence_s is None else None
+        if self.zeros is not None:
+            self.zeros.show_joints(joint_zeros(believed))
         self.table.show_rows(servo_rows(believed, self._servos, self._safety))
         self._balance.show_pairs(pair_balances(believed, self._servos))
         said = bus_line(status, silence_s)
@@ -622,12 +627,14 @@ class ServoTable(QWidget):
 
     def _show_offered(self) -> None:
         free = self._reachable and not self._armed
+        if self.zeros is not None and not free:
+            self.zeros.close()
         why = "" if free else tr("press STOP or Torque off first") if self._armed else tr("the servo bus is not open")
         self._restart_button.setEnabled(free)
         self._zero_button.setEnabled(free)
         self._off_button.setEnabled(self._reachable)
         self._restart_button.setToolTip(why or tr("Restart one servo, which clears its error; its joint must be zeroed again"))
-        self._zero_button.setToolTip(why or tr("The present positions become 0 mm; the wires must be slack"))
+        self._zero_button.setToolTip(why or tr("Say where the joints are: kept zeros, slack wires, and how far the feeds are in"))
         self._off_button.setToolTip(
             tr("Let all motors go, which releases the wires' tension; not while armed") if self._reachable else why
         )
@@ -643,12 +650,32 @@ class ServoTable(QWidget):
             menu.addAction(f"{joint.id}  {_plain(joint.name)}", partial(self._ask_restart, joint))
         _popup_above(menu, self._restart_button)
 
-    def _open_zero_menu(self) -> None:
-        menu = self._make_menu()
-        menu.addAction(tr("All joints"), partial(self._ask_zero, None))
-        for joint in self._servos.joints:
-            menu.addAction(_plain(joint.name), partial(self._ask_zero, joint.name))
-        _popup_above(menu, self._zero_button)
+    @property
+    def lacks_zeros(self) -> bool:
+        """Whether all servos answer, and a joint is not zeroed: before that they cannot be switched on."""
+        status = self._status
+        is_known = status is not None and bool(status.servos) and all(isinstance(one, ServoState) for one in status.servos)
+        return is_known and status is not None and not status.armed and not all(status.zeroed)
+
+    @Slot()
+    def open_zeros(self) -> None:
+        """The dialog in which the operator says where the joints are."""
+        if self.zeros is not None:
+            self.zeros.raise_()
+            return
+        self.zeros = dialog = ZeroDialog(self._servos, self)
+        dialog.show_joints(joint_zeros(self._status))
+        dialog.zero_asked.connect(self.zero_asked)
+        dialog.search_asked.connect(self.search_asked)
+        dialog.torque_off_asked.connect(self.torque_off_asked)
+        dialog.finished.connect(self._on_zeros_closed)
+        dialog.show()
+
+    @Slot()
+    def _on_zeros_closed(self) -> None:
+        if self.zeros is not None:
+            self.zeros.deleteLater()
+            self.zeros = None
 
     def _make_menu(self) -> QMenu:
         menu = QMenu(self)
@@ -658,14 +685,6 @@ class ServoTable(QWidget):
     def _ask_restart(self, joint: JointConfig) -> None:
         question = tr("Restart servo {id} ({joint})? It must be zeroed again.", id=joint.id, joint=_plain(joint.name))
         self._ask(self._restart_button, question, tr("Restart"), partial(self.reboot_asked.emit, joint.id))
-
-    def _ask_zero(self, name: JointName | None) -> None:
-        what = tr("All joints become 0 mm here")
-        if name is not None:
-            what = tr("{joint} becomes 0 mm here", joint=_plain(name).capitalize())
-        question = tr("Are the wires slack? {what}.", what=what)
-        request = ZeroRequest(positions_mm=dict.fromkeys(JOINT_NAMES if name is None else (name,), 0.0))
-        self._ask(self._zero_button, question, tr("Zero"), partial(self.zero_asked.emit, request))
 
     def _ask_torque_off(self) -> None:
         self._ask(self._off_button, tr("All motors let go and the wires hang loose."), tr("Torque off"), self.torque_off_asked.emit)

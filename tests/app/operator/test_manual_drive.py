@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
@@ -18,20 +19,22 @@ from app.operator.engine_thread import EnginePhase
 from app.operator.manual_drive import PERIOD_MS, REPEAT_MS, DeadmanKey, JogKeys, OperatorDevices
 from app.operator.window import OperatorWindow
 from app.settings.fields import NumberEdit
+from app.ui.texts import OperatorStep
 from app.widgets.jog_panel import KEYS, Motion
 from core.config.models import Config
-from core.config.safety import SafetyConfig
+from core.config.safety import JOINT_NAMES, SafetyConfig
 from core.control.alerts import ALERTS, Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import Source
-from core.control.kept_zero import ZeroRequest
+from core.control.kept_zero import ZeroOffer, ZeroRequest
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST, Jog
 from core.devices import DeviceError, EndOfStream
 from hardware.inputs.gamepad import GamepadState
 from hardware.rig import RigKind
-from tests.app.bus_status import bus
+from hardware.servos.bus_ipc import BusPhase
+from tests.app.bus_status import bus, servo
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, FakePilot, until
 from tests.hardware.soft_pedal import SoftPedal
@@ -276,6 +279,31 @@ def test_servo_requests_of_the_table_reach_the_servos(running: OperatorWindow, e
     running.panels.servos.zero_asked.emit(ZeroRequest(positions_mm={"left": 0.0}, kept=("advance",)))
     running.panels.servos.torque_off_asked.emit()
     assert engine.pilot.asked == ["reboot 3", "zero ['left'], kept ['advance']", "torque off"]
+
+
+def test_servos_without_zeros_are_not_switched_on_but_asked_for_them(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    """F3: kept zeros are offered, and what is confirmed reaches the servos; then F3 switches them on."""
+    engine.pilot.view = replace(engine.pilot.view, servos_on=False)
+    states = tuple(servo(place, position_mm=None, goal_mm=None) for place in range(7))
+    offers = tuple(ZeroOffer(name, 0.3, 0.0, 0, 0.0) for name in JOINT_NAMES)
+    lost = partial(bus, *states, phase=BusPhase.DISARMED, zeroed=(False,) * 7, offers=offers)
+    engine.bus_status = lambda: lost(time_s=time.monotonic())  # type: ignore[method-assign]
+    table = running.panels.servos
+    until(qtbot, lambda: table.lacks_zeros)
+    running.ask_step(OperatorStep.SERVOS_ON)
+    assert engine.pilot.asked == []
+    assert table.zeros is not None
+    assert table.zeros.isVisible()
+    table.zeros.set_button.click()
+    feeds = ["advance", "delivery_1", "delivery_2"]
+    assert engine.pilot.asked == [f"zero {feeds}, kept ['right', 'left', 'up', 'down']"]
+    engine.bus_status = lambda: bus(phase=BusPhase.DISARMED, time_s=time.monotonic())  # type: ignore[method-assign]
+    until(qtbot, lambda: not table.lacks_zeros)
+    running.ask_step(OperatorStep.SERVOS_ON)
+    assert engine.pilot.asked[-1] == "switch on"
+    assert table.zeros is None
 
 
 NONE = Qt.KeyboardModifier.NoModifier

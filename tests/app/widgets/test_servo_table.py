@@ -14,7 +14,7 @@ from app.ui import theme
 from app.widgets.painting import number
 from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_words, known_joints, pair_balances, servo_rows
 from core.config.safety import SafetyConfig
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.control.kept_zero import ZeroRequest
 from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
 from hardware.servos.registers import HardwareError, MissingServo
 from tests.app.bus_status import DASH, MINUS, SERVOS, bus, servo
@@ -248,17 +248,47 @@ def test_zeroing_is_asked_back_and_then_told(table: ServoTable, qtbot: QtBot) ->
     table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
     asked: list[object] = []
     table.zero_asked.connect(asked.append)
-    button(table, "Zero").click()
-    choose(open_menu(table), "All joints")
-    assert table.question.text == "Are the wires slack? All joints become 0 mm here."
+    for opened in (lambda: button(table, "Zero").click(), lambda: choose(table.menu_for(SERVOS.joints[5]), "Zero…")):
+        opened()
+        dialog = table.zeros
+        assert dialog is not None
+        assert not dialog.isModal(), "STOP stays within reach"
+        box, number = dialog.feed("delivery_1")
+        box.setChecked(True)
+        number.setValue(12.5)
+        assert asked == []
+        dialog.leave_button.click()
+        assert table.zeros is None
     assert asked == []
-    next(b for b in table.question.findChildren(QPushButton) if b.text() == "Zero").click()
-    assert asked == [ALL_AT_ZERO]
-    assert table.question.text == ""
-    for answer in ("Cancel", "Zero"):
-        choose(table.menu_for(SERVOS.joints[5]), "Zero delivery 1")
-        button(table.question, answer).click()
-    assert asked == [ALL_AT_ZERO, ZeroRequest(positions_mm={"delivery_1": 0.0})]
+    table.open_zeros()
+    assert table.zeros is not None
+    table.zeros.feed("delivery_1")[1].setValue(12.5)
+    table.zeros.feed("delivery_1")[0].setChecked(True)
+    table.zeros.set_button.click()
+    assert asked == [ZeroRequest(positions_mm={"delivery_1": 12.5})]
+
+
+@pytest.mark.parametrize(
+    ("changes", "lacks"),
+    [
+        ({"phase": BusPhase.DISARMED}, False),
+        ({"phase": BusPhase.DISARMED, "zeroed": (False,) + (True,) * 6}, True),
+        ({"zeroed": (False,) + (True,) * 6}, False),
+        ({"phase": BusPhase.DISARMED, "zeroed": (False,) * 7, "servos": ()}, False),
+    ],
+)
+def test_a_joint_that_is_not_zeroed_is_noticed_when_all_servos_answer(
+    table: ServoTable, changes: dict[str, object], lacks: bool
+) -> None:
+    table.show_status(bus(**changes), SERVOS)
+    assert table.lacks_zeros is lacks
+
+
+def test_arming_closes_the_dialog_of_the_zeros(table: ServoTable) -> None:
+    table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
+    table.open_zeros()
+    table.show_status(bus(), SERVOS)
+    assert table.zeros is None
 
 
 def test_restart_and_torque_off_are_asked_back(table: ServoTable, qtbot: QtBot) -> None:
@@ -279,8 +309,7 @@ def test_while_armed_only_the_torque_can_be_let_go(table: ServoTable) -> None:
     enabled = {action.text(): action.isEnabled() for action in table.menu_for(SERVOS.joints[0]).actions() if action.text()}
     assert enabled == {
         "Restart servo 1 (right)": False,
-        "Zero right": False,
-        "Zero all joints": False,
+        "Zero…": False,
         "Switch all torque off": True,
     }
     assert not button(table, "Zero").isEnabled()
@@ -291,7 +320,7 @@ def test_while_armed_only_the_torque_can_be_let_go(table: ServoTable) -> None:
 
 def test_arming_takes_an_open_question_back(table: ServoTable) -> None:
     table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
-    choose(table.menu_for(None), "Zero all joints")
+    button(table, "Torque off").click()
     assert table.question.text
     table.show_status(bus(), SERVOS)
     assert table.question.text == ""

@@ -1,0 +1,315 @@
+"""The dialog in which the operator says where the joints are: kept zeros to confirm, slack wires, and how far the feeds are in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSize, Qt, Signal, Slot
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDoubleSpinBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QWidget
+
+from app.ui import theme
+from app.ui.i18n import mark, tr, tr_text
+from app.widgets.basics import StillWheel, column, takes_enter
+from core.config.safety import JOINT_NAMES, TENDONS, JointConfig, JointName, ServosConfig
+from core.control.kept_zero import ZeroOffer, ZeroRequest
+from hardware.servos.registers import ServoState
+
+if TYPE_CHECKING:
+    from hardware.servos.bus_ipc import BusStatus
+
+_SIZE = QSize(760, 420)
+_MOVED_MM = 0.3
+"""A joint that was moved by more since its zero was kept is said to be."""
+_STEP_MM = 0.1
+"""Of a feed's number; one step below the envelope stands for no number."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointZero:
+    """What is known of a joint's zero.
+
+    ``position_mm``: None where it is not zeroed; ``holds``: None where its servo does not tell.
+    """
+
+    name: JointName
+    position_mm: float | None = None
+    offer: ZeroOffer | None = None
+    holds: bool | None = None
+
+    @property
+    def is_tendon(self) -> bool:
+        return self.name in TENDONS
+
+    @property
+    def note(self) -> str:
+        """In one line."""
+        if self.position_mm is not None:
+            return tr("at {at:.2f} mm", at=self.position_mm) if self.is_tendon else tr("at {at:.1f} mm", at=self.position_mm)
+        if self.holds is None:
+            return tr("its servo does not answer")
+        if self.offer is None:
+            return tr("no kept zero that fits") if self.is_tendon else tr("not known: measure how far it is in")
+        at, when = self.offer.position_mm, _when(self.offer.kept_s)
+        if self.is_tendon:
+            text = tr("{at:+.2f} mm from its kept zero ({when})", at=at, when=when)
+        else:
+            text = tr("last seen at {at:.1f} mm ({when})", at=at - self.offer.moved_mm, when=when)
+        moved = tr(", moved by {moved:+.1f} mm since", moved=self.offer.moved_mm) if abs(self.offer.moved_mm) > _MOVED_MM else ""
+        return text + moved
+
+
+def joint_zeros(status: BusStatus | None) -> tuple[JointZero, ...]:
+    """Of the seven joints, by a status of the bus."""
+    if status is None or not status.servos:
+        return tuple(JointZero(name) for name in JOINT_NAMES)
+    offers = {offer.name: offer for offer in status.offers}
+    return tuple(
+        JointZero(name, reading.position_mm if zeroed else None, offers.get(name), reading.torque)
+        if isinstance(reading, ServoState)
+        else JointZero(name)
+        for name, reading, zeroed in zip(JOINT_NAMES, status.servos, status.zeroed, strict=True)
+    )
+
+
+class Choice(Enum):
+    """What a tendon's zero rests on."""
+
+    LEAVE = mark("leave as it is")
+    KEPT = mark("the kept zero holds")
+    SLACK = mark("the wire is slack here")
+    AGAIN = mark("the wire was hung in again, and is slack here")
+
+
+def choices(known: JointZero) -> tuple[Choice, ...]:
+    """What can be chosen for a tendon now; the first is proposed. A wire is slack only where its servo does not hold."""
+    first = (Choice.KEPT, Choice.LEAVE) if known.offer is not None else (Choice.LEAVE,)
+    if known.holds is not False:
+        return first
+    return (*first, Choice.SLACK if known.position_mm is None and known.offer is None else Choice.AGAIN)
+
+
+def _when(kept_s: float) -> str:
+    """The time of a kept zero: of today without the date. A zero of an earlier version has no time."""
+    if kept_s <= 0.0:
+        return tr("rig file")
+    at = datetime.fromtimestamp(kept_s)
+    return f"{at:%H:%M}" if at.date() == datetime.now().date() else f"{at:%Y-%m-%d %H:%M}"
+
+
+class _TendonRow(QComboBox):
+    """The choices of one tendon."""
+
+    def __init__(self, name: JointName) -> None:
+        super().__init__()
+        self.setAccessibleName(tr("Zero of {joint}", joint=tr_text(name)))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._offered: tuple[Choice, ...] = ()
+
+    @property
+    def choice(self) -> Choice:
+        found: Choice = self.currentData()
+        return found
+
+    def show_joint(self, known: JointZero) -> None:
+        """Offer what is possible now; what was chosen stays, where it is."""
+        offered = choices(known)
+        if offered == self._offered:
+            return
+        chosen = self.choice if self._offered and self._offered[0] is offered[0] else offered[0]
+        self._offered = offered
+        self.clear()
+        for choice in offered:
+            self.addItem(tr(choice.value), choice)
+        self.setCurrentIndex(offered.index(chosen if chosen in offered else Choice.LEAVE))
+        self.setToolTip(tr("its servo holds: the torque must be off for a wire to be slack") if known.holds else "")
+
+
+class _FeedRow(QWidget):
+    """How far a feed is in: a number that is set when its box is ticked."""
+
+    changed = Signal()
+
+    def __init__(self, joint: JointConfig) -> None:
+        super().__init__()
+        self._low_mm = joint.low_mm
+        self.box = QCheckBox(tr("it is at"))
+        self.number = QDoubleSpinBox(decimals=1, singleStep=_STEP_MM, suffix=" mm")
+        self.number.setRange(joint.low_mm - _STEP_MM, joint.high_mm)
+        self.number.setSpecialValueText(tr("? mm"))
+        self.number.setAccessibleName(tr("Position of {joint}", joint=tr_text(joint.name).replace("_", " ")))
+        self.number.setValue(self.number.minimum())
+        self.box.setAccessibleName(tr("Set the position of {joint}", joint=tr_text(joint.name).replace("_", " ")))
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.box)
+        layout.addWidget(self.number, 1)
+        self._known: tuple[bool, ...] | None = None
+        self.box.toggled.connect(self._on_changed)
+        self.number.valueChanged.connect(self._on_edited)
+
+    @property
+    def position_mm(self) -> float | None:
+        """The number to set; None: it stays as it is, or no number was given."""
+        is_given = self.box.isChecked() and self.number.value() >= self._low_mm - _STEP_MM / 2
+        return max(self._low_mm, round(self.number.value(), 1)) if is_given else None
+
+    def show_joint(self, known: JointZero) -> None:
+        """Fill in what is offered, or where it is; what the operator has typed stays."""
+        key = known.position_mm is None, known.offer is not None, known.holds is not None
+        if key == self._known:
+            return
+        self._known = key
+        at_mm = known.offer.position_mm if known.offer is not None else known.position_mm
+        self.number.setValue(self.number.minimum() if at_mm is None else at_mm)
+        self.box.setChecked(known.position_mm is None and known.holds is not None)
+
+    @Slot()
+    def _on_edited(self) -> None:
+        if self.number.hasFocus():
+            self.box.setChecked(True)
+        self._on_changed()
+
+    @Slot()
+    def _on_changed(self) -> None:
+        self.changed.emit()
+
+
+class ZeroDialog(QDialog):
+    """One row a joint: what is known of its zero, and what is to be its zero. Nothing is set before the operator says so.
+
+    It does not block the window: STOP stays within reach. It shows the state of the servos as long as it is open.
+
+    Attributes
+    ----------
+    zero_asked : a ZeroRequest.
+    search_asked : the wizard's search for slack, which is the way where a tendon has no kept zero.
+    torque_off_asked : all servos.
+    """
+
+    zero_asked = Signal(object)
+    search_asked = Signal()
+    torque_off_asked = Signal()
+
+    def __init__(self, servos: ServosConfig, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(tr("Where the joints are"))
+        self.setModal(False)
+        theme.set_sheet(self, theme.FORM_SHEET)
+        self.resize(_SIZE)
+        self._tendons = {name: _TendonRow(name) for name in TENDONS}
+        self._feeds = {joint.name: _FeedRow(joint) for joint in servos.joints if joint.name not in TENDONS}
+        self._notes: dict[JointName, QLabel] = {}
+        rows = QGridLayout()
+        rows.setHorizontalSpacing(14)
+        rows.setVerticalSpacing(6)
+        rows.setColumnStretch(1, 1)
+        for place, name in enumerate(JOINT_NAMES):
+            title, note = QLabel(tr_text(name).replace("_", " ")), QLabel(wordWrap=True)
+            title.setFont(theme.semi_bold(theme.Size.BODY))
+            self._notes[name] = note
+            for column_number, part in enumerate((title, note, self._tendons.get(name) or self._feeds[name])):
+                rows.addWidget(part, place, column_number)
+        self._hint = QLabel(wordWrap=True)
+        theme.set_sheet(self._hint, "color: @TEXT_DIM;")
+        self.search_button = QPushButton(tr("&Search for slack..."))
+        self.search_button.setToolTip(tr("The rig wizard pulls each wire until the head follows (page Zero and pretension)"))
+        self.off_button = QPushButton(tr("&Torque off"))
+        self.off_button.setToolTip(tr("Let all motors go; the wires spring back"))
+        self.set_button = QPushButton(tr("S&et"))
+        self.leave_button = QPushButton(tr("Cancel"))
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.search_button)
+        buttons.addWidget(self.off_button)
+        buttons.addStretch(1)
+        for button in (self.search_button, self.off_button, self.set_button, self.leave_button):
+            button.setAutoDefault(False)
+        buttons.addWidget(self.set_button)
+        buttons.addWidget(self.leave_button)
+        self.setLayout(column(self._hint, rows, buttons, spacing=12, margins=(18, 14, 18, 14)))
+        StillWheel(self)
+        for box in self._tendons.values():
+            box.currentIndexChanged.connect(self._update_buttons)
+        for feed in self._feeds.values():
+            feed.changed.connect(self._update_buttons)
+        self.search_button.clicked.connect(self._on_search)
+        self.off_button.clicked.connect(self.torque_off_asked)
+        self.set_button.clicked.connect(self._on_set)
+        self.leave_button.clicked.connect(self.close)
+        self._joints: tuple[JointZero, ...] = ()
+        self.show_joints(joint_zeros(None))
+
+    @property
+    def request(self) -> ZeroRequest:
+        """What is chosen."""
+        by_choice = {name: row.choice for name, row in self._tendons.items()}
+        slack = [name for name, choice in by_choice.items() if choice in {Choice.SLACK, Choice.AGAIN}]
+        feeds = {name: at_mm for name, row in self._feeds.items() if (at_mm := row.position_mm) is not None}
+        return ZeroRequest(
+            positions_mm={**dict.fromkeys(slack, 0.0), **feeds},
+            kept=tuple(name for name, choice in by_choice.items() if choice is Choice.KEPT),
+            forgotten=tuple(name for name, choice in by_choice.items() if choice is Choice.AGAIN),
+        )
+
+    @property
+    def notes(self) -> list[str]:
+        """What is said of each joint."""
+        return [self._notes[name].text() for name in JOINT_NAMES]
+
+    def tendon(self, name: JointName) -> QComboBox:
+        return self._tendons[name]
+
+    def feed(self, name: JointName) -> tuple[QCheckBox, QDoubleSpinBox]:
+        return self._feeds[name].box, self._feeds[name].number
+
+    def show_joints(self, joints: Sequence[JointZero]) -> None:
+        """The newest state of the servos; what was chosen stays, as far as it is still possible."""
+        if tuple(joints) == self._joints:
+            return
+        self._joints = tuple(joints)
+        for known in self._joints:
+            self._notes[known.name].setText(known.note)
+            (self._tendons.get(known.name) or self._feeds[known.name]).show_joint(known)
+        needs_search = any(one.is_tendon and one.position_mm is None and one.offer is None for one in self._joints)
+        self._hint.setText(
+            tr(
+                "A tendon has no kept zero: search for slack, which pulls each wire until the head follows. By hand: torque off, "
+                "see that the wire is slack, and say so."
+            )
+            if needs_search
+            else tr(
+                "A kept zero holds as long as the wire was not hung in again. Say how far robot and catheter are in: measure it."
+            )
+        )
+        self.search_button.setObjectName("main_button" if needs_search else "")
+        self.set_button.setObjectName("" if needs_search else "main_button")
+        for button in (self.search_button, self.set_button):
+            button.style().unpolish(button)
+            button.style().polish(button)
+        self.off_button.setEnabled(any(one.holds for one in self._joints))
+        self._update_buttons()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not takes_enter(self, event):
+            super().keyPressEvent(event)
+
+    @Slot()
+    def _update_buttons(self) -> None:
+        if self._joints:
+            request = self.request
+            self.set_button.setEnabled(bool(request.positions_mm or request.kept))
+
+    @Slot()
+    def _on_search(self) -> None:
+        self.close()
+        self.search_asked.emit()
+
+    @Slot()
+    def _on_set(self) -> None:
+        request = self.request
+        self.close()
+        self.zero_asked.emit(request)
