@@ -270,7 +270,7 @@ def lockstep(config: ServosConfig, draw: random.Random) -> Iterator[LockstepLine
 
 def run_procedure(name: str, draw: random.Random, stop_after_s: float | None) -> tuple[LockstepLine, LockstepEnd, float]:
     """The procedure with STOP so long after its beginning (None: without); returns line, application and beginning."""
-    config = ServosConfig(port="lockstep")
+    config = ServosConfig(port="lockstep", unattended_s=0.0)  # the application ends with its procedure
     holds, requests = PROCEDURES[name]
     with lockstep(config, draw) as line:
         bus = ServoBus(config)
