@@ -12,6 +12,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 from app.annotator.sources import default_store
+from app.operator.awake import AwakeInhibitor, must_stay_awake
 from app.operator.engine_thread import EnginePhase
 from app.operator.models import ModelMenu
 from app.operator.preflight import PreflightModel
@@ -76,6 +77,7 @@ class WindowServices(QObject):
             sessions_folder(window.rig.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
         )
         self.preflight = PreflightModel(lambda: window.rig.config, lambda: window.controls.view, self)
+        self.awake = AwakeInhibitor(self)
         self.checks = PreflightList(self.preflight, window, window.panels.mode_bar.stop)
         self.models = ModelMenu(
             window, offers, self._model, self._against_another_model, self._cost_of_another_model, self.teach, self.train
@@ -111,6 +113,7 @@ class WindowServices(QObject):
         window.rig.add_guard(self.preflight.may_ask)
         window.rig.add_config_source(self._without_other_bench)
         self.preflight.asked.connect(self._on_not_armed)
+        self.awake.failed.connect(window.say)
         self.checks.arm_asked.connect(partial(window.ask_step, OperatorStep.ARM))
         self.models.chosen.connect(self._use_model)
 
@@ -142,6 +145,7 @@ class WindowServices(QObject):
         for part in (self.recovery, self.preflight, self.after):
             part.close()
         self.checks.close()
+        self.awake.close()
         self._familiarity.stop()
         self._check_state.stop()
         if self.training is not None:
@@ -183,7 +187,8 @@ class WindowServices(QObject):
             self.preflight.begin_soon()
 
     def _show_checks(self) -> None:
-        """The bar and the list of checks say the same."""
+        """The bar and the list of checks say the same; the computer stays awake while real servos follow."""
+        self.awake.hold(must_stay_awake(self._window.rig.kind, self._window.controls.view))
         self._window.panels.mode_bar.show_checks(self.preflight.preflight.step)
 
     def _on_not_armed(self, line: str) -> None:

@@ -18,7 +18,7 @@ from core.config.servo_models import model_name
 from core.devices import UserError
 from hardware.calibration.rig_draft import RigDraft
 from hardware.rig import with_port
-from hardware.servos.discovery import find_ports
+from hardware.servos.discovery import FASTER_BUS, find_ports, slow_bus
 
 _JOINT_TEXT: dict[JointName, str] = {
     "right": mark("tendon right"),
@@ -92,7 +92,10 @@ class PortPage(WizardPage):
         for row, servo in enumerate(servos):
             set_cell(self.servos, row, 0, str(servo.id))
             set_cell(self.servos, row, 1, model_name(servo.model))
-        set_note(self.result, "" if found is None else tr("{count} servos at {baud} baud.", count=len(servos), baud=found.baud))
+        text = "" if found is None else tr("{count} servos at {baud} baud.", count=len(servos), baud=found.baud)
+        if draft is not None and found is not None and (slow := slow_bus(found.baud, draft.config.servos.bus_hz)):
+            text += " " + tr("Slow: {what}; {fix}.", what=tr_text(slow), fix=tr(FASTER_BUS))
+        set_note(self.result, text)
 
     def _search(self) -> None:
         draft, bench = self.draft, self.model.bench

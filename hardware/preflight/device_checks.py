@@ -10,7 +10,9 @@ import fcntl
 import grp
 import os
 import select
+import shutil
 import stat
+import subprocess
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -248,6 +250,68 @@ def check_servos(config: ServosConfig) -> Check:
                 name, False, detail, message("let {joint} cool below {a:g} °C", joint=joint.name, a=config.hottest_c(joint))
             )
     return Check(name, True, detail)
+
+
+def check_bus_speed(config: ServosConfig) -> Check:
+    """Whether the configured speed leaves time for the cycles. Servos come from the factory at 57600 baud, which is too slow."""
+    name = "bus speed"
+    if config.port is None:
+        return Check(name, True, NOT_CONFIGURED)
+    from hardware.servos.discovery import FASTER_BUS, slow_bus
+
+    if slow := slow_bus(config.baud, config.bus_hz):
+        return Check(name, False, slow, FASTER_BUS)
+    return Check(name, True, message("{baud} baud", baud=config.baud))
+
+
+def check_adapter_power(port: str | None) -> Check:
+    """Whether the system may put the servos' USB adapter to sleep when it is idle, which TLP and powertop switch on."""
+    name = "adapter power"
+    if port is None:
+        return Check(name, True, NOT_CONFIGURED)
+    device = (sysfs.SYS / "class" / "tty" / Path(port).resolve().name / "device").resolve()
+    usb = next((folder for folder in (device, *device.parents) if (folder / "idVendor").is_file()), None)
+    control = usb / "power" / "control" if usb is not None else None
+    if control is None or not control.is_file():
+        return Check(name, True, f"{port} is no USB adapter")
+    try:
+        setting = control.read_text(encoding="ascii").strip()
+    except (OSError, ValueError) as error:
+        return Check(name, False, f"{control} cannot be read ({one_line(error)})", "unplug the USB adapter and plug it in again")
+    if setting == "auto":
+        fix = f"echo on | sudo tee {control}; for good: exclude it from autosuspend in TLP or powertop"
+        return Check(name, False, f"USB autosuspend may put it to sleep ({control})", fix)
+    return Check(name, True, f"no USB autosuspend ({control})")
+
+
+_BUS_CALL_S = 3.0
+"""A message bus that does not answer within this time is none."""
+_SCREEN_SAVER = "org.freedesktop.ScreenSaver"
+_HAS_OWNER = ("call", "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus", "NameHasOwner", "s", _SCREEN_SAVER)
+
+
+def check_screen_lock(robot: str) -> Check:
+    """Whether screen lock and sleep can be inhibited while real servos follow; gamepad and pedal do not count as input."""
+    name = "screen lock"
+    if robot != "servos":
+        return Check(name, True, NOT_CONFIGURED)
+    fix = "switch screen lock and sleep off in the desktop's settings"
+    if shutil.which("systemd-inhibit") is None:
+        return Check(name, False, "sleep cannot be inhibited: systemd-inhibit is not there", fix)
+    try:
+        asked = subprocess.run(
+            ["busctl", "--user", *_HAS_OWNER],
+            capture_output=True,
+            text=True,
+            timeout=_BUS_CALL_S,
+            stdin=subprocess.DEVNULL,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return Check(name, False, f"whether the lock can be inhibited is not known ({one_line(error)})", fix)
+    if asked.returncode != 0 or "true" not in asked.stdout:
+        return Check(name, False, f"the lock cannot be inhibited: no {_SCREEN_SAVER} on this desktop", fix)
+    return Check(name, True, "inhibited while the servos follow")
 
 
 def check_latency(port: str | None) -> Check:

@@ -45,6 +45,9 @@ CHECKS: dict[str, tuple[Callable[[Config], Check], Level | None]] = {
     "servos": (lambda config: device_checks.check_servos(config.servos), None),
     # after the driver has had the port open
     "adapter latency": (lambda config: device_checks.check_latency(config.servos.port), Level.BAD),
+    "bus speed": (lambda config: device_checks.check_bus_speed(config.servos), Level.WARNING),
+    "adapter power": (lambda config: device_checks.check_adapter_power(config.servos.port), Level.WARNING),
+    "screen lock": (lambda config: device_checks.check_screen_lock(config.rig.robot), Level.WARNING),
     "foot pedal": (lambda config: device_checks.check_pedal(config.pedal), None),
     "gamepad": (lambda config: device_checks.check_gamepad(config.gamepad), Level.WARNING),
     "recordings": (lambda config: checks.check_disk(config.record), Level.WARNING),  # a full disk stops a recording, not the robot

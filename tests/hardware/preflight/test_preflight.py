@@ -514,6 +514,72 @@ def test_the_latency_of_an_ftdi_adapter(sys_: Path, dev: Path, text: str, ok: bo
         _bad(check, "^16 ms", f"echo 1 . sudo tee {timer}")
 
 
+@pytest.mark.parametrize(
+    ("baud", "bus_hz", "slow"),
+    [
+        (57_600, 50.0, "57600 baud: about 24 cycles a second instead of 50"),
+        (115_200, 50.0, "about 49 cycles"),
+        (1_000_000, 50.0, ""),
+    ],
+)
+def test_the_factorys_bus_speed_is_said_to_be_too_slow_and_how_to_change_it(baud: int, bus_hz: float, slow: str) -> None:
+    """It works, with 25 cycles a second instead of 50, and neither ``doctor`` nor the wizard said so."""
+    config = ServosConfig(port="/dev/none", baud=baud, bus_hz=bus_hz)
+    check = device_checks.check_bus_speed(config)
+    if slow:
+        _bad(check, slow, r"Baud Rate \(8\) of all seven to 1 Mbps, then servos.baud = 1000000")
+    else:
+        _good(check, "1000000 baud")
+    _good(device_checks.check_bus_speed(ServosConfig()), "not configured")
+
+
+@pytest.mark.parametrize(("setting", "ok"), [("on", True), ("auto", False)])
+def test_usb_autosuspend_of_the_adapter(sys_: Path, dev: Path, setting: str, ok: bool) -> None:
+    port = dev / "ttyUSB0"
+    port.touch()
+    (dev / "usb-U2D2").symlink_to(port)
+    _good(device_checks.check_adapter_power(str(port)), "is no USB adapter")
+    usb = sys_ / "devices" / "pci0" / "usb1" / "1-2"
+    tty = usb / "1-2:1.0" / "ttyUSB0"
+    (tty / "tty" / "ttyUSB0").mkdir(parents=True)
+    (usb / "power").mkdir()
+    (usb / "idVendor").write_text("0403\n")
+    control = usb / "power" / "control"
+    control.write_text(f"{setting}\n")
+    node = sys_ / "class" / "tty" / "ttyUSB0"
+    node.mkdir(parents=True)
+    (node / "device").symlink_to(tty)
+    check = device_checks.check_adapter_power(str(dev / "usb-U2D2"))
+    if ok:
+        _good(check, "no USB autosuspend")
+    else:
+        _bad(check, "USB autosuspend may put it to sleep", f"echo on . sudo tee {control}")
+    _good(device_checks.check_adapter_power(None), "not configured")
+
+
+def _programs(folder: Path, monkeypatch: pytest.MonkeyPatch, **scripts: str) -> None:
+    """The only programs that there are."""
+    for name, script in scripts.items():
+        path = folder / name.replace("_", "-")
+        path.write_text(f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder))
+
+
+def test_whether_screen_lock_and_sleep_can_be_inhibited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _good(device_checks.check_screen_lock("twin"), "not configured")
+    _programs(tmp_path, monkeypatch)
+    _bad(device_checks.check_screen_lock("servos"), "systemd-inhibit is not there", "desktop's settings")
+    _programs(tmp_path, monkeypatch, systemd_inhibit="exit 0")
+    _bad(device_checks.check_screen_lock("servos"), "is not known", "desktop's settings")
+    _programs(tmp_path, monkeypatch, busctl="echo 'b false'")
+    _bad(device_checks.check_screen_lock("servos"), "no org.freedesktop.ScreenSaver", "desktop's settings")
+    _programs(tmp_path, monkeypatch, busctl="exit 1")
+    _bad(device_checks.check_screen_lock("servos"), "no org.freedesktop.ScreenSaver", "desktop's settings")
+    _programs(tmp_path, monkeypatch, busctl="echo 'b true'")
+    _good(device_checks.check_screen_lock("servos"), "inhibited while the servos follow")
+
+
 @pytest.fixture
 def bus() -> Iterator[SoftServoBus]:
     servos_ = SoftServoBus(ServosConfig(), wire_time=True)
@@ -616,11 +682,15 @@ def test_all_checks_are_made_one_after_the_other_and_named_as_in_the_table(tmp_p
         ("recordings", "0.1 GB free", Level.WARNING),
         ("cores and memory", "1 core", Level.WARNING),
         ("gamepad", "no permission", Level.WARNING),
+        ("bus speed", "57600 baud", Level.WARNING),
+        ("adapter power", "USB autosuspend", Level.WARNING),
+        ("screen lock", "cannot be inhibited", Level.WARNING),
     ],
 )
 def test_only_what_driving_needs_stands_against_it(name: str, detail: str, level: Level) -> None:
     assert level_of(Check(name, False, detail, "mend it")) is level
     assert level_of(Check(name, True, "as it should be")) is Level.GOOD
+    assert level_of(Check(name, True, "not configured")) is Level.UNUSED
 
 
 def test_a_damaged_model_and_a_lost_camera_are_found_without_opening_any_device() -> None:
