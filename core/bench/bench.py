@@ -414,7 +414,7 @@ def _drawn_vessel(vessel: Mask | None, shape: tuple[int, int]) -> Mask | None:
 
 
 def bench_stamp(folder: Path) -> int | None:
-    """When the bench in `folder` was written, in nanoseconds; None where there is none."""
+    """When the bench in `folder` was written, in nanoseconds; None where it is missing."""
     try:
         return (folder / INFO).stat().st_mtime_ns
     except OSError:

@@ -40,7 +40,7 @@ class SentGoals:
 def by_hand(servos: ServosConfig, at_mm: Sequence[float], last: SentGoals | None, *, retracts: bool) -> ServosConfig:
     """The servos with the envelope that holds while the operator drives.
 
-    A feed may be below the low end of its envelope, where a wrong zero or a retraction has left it: slowly, and not farther down.
+    A feed may be below the low end of its envelope, where a wrong zero or a retraction has left it: slowly, and not further down.
     While the operator holds a retraction (`retracts`) it has no low end, so that a robot whose insertion is not known can be pulled
     out.
 

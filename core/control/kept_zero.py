@@ -20,7 +20,7 @@ from core.config.section import ConfigSection
 from core.messages import message
 
 _MOST_MOVED_TICKS = TICKS_PER_TURN // 4
-"""A joint that was moved farther while nothing watched it may be in another turn: no offer."""
+"""A joint that was moved further while nothing watched it may be in another turn: no offer."""
 _ROUNDING_TICKS = 2
 """Play and noise of a joint that stands at the end of its envelope."""
 

@@ -130,7 +130,7 @@ class BaslerSensor:
             raise
 
     def read(self, timeout_s: float) -> SensorFrame | None:
-        """The newest picture. One that arrived incomplete is none; the next one's number shows that it is lost."""
+        """The newest picture. One that arrived incomplete is left out; the next one's number shows that it is lost."""
         try:
             result = self._camera.RetrieveResult(int(1000 * timeout_s), self._pylon.TimeoutHandling_Return)
             arrived_s = time.monotonic()

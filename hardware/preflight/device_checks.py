@@ -285,7 +285,7 @@ def check_adapter_power(port: str | None) -> Check:
 
 
 _BUS_CALL_S = 3.0
-"""A message bus that does not answer within this time is none."""
+"""A message bus that does not answer within this time counts as missing."""
 _SCREEN_SAVER = "org.freedesktop.ScreenSaver"
 _HAS_OWNER = ("call", "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus", "NameHasOwner", "s", _SCREEN_SAVER)
 

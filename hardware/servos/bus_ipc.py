@@ -416,7 +416,7 @@ class PortSuccession:
         ready, _, _ = select.select([self._socket], [], [], max(0.0, timeout_s))
         try:
             heir, _ = self._socket.accept() if ready else (None, None)
-        except OSError:  # the name was not to be had
+        except OSError:  # the name is taken
             heir = None
         if heir is None:
             time.sleep(max(0.0, until_s - time.monotonic()))

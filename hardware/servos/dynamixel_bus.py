@@ -119,7 +119,7 @@ def _make_answer(line: ServoLine, joint: JointConfig) -> None:
 def _unprotected(table: bytes, model: ServoModel) -> str:
     """What keeps a servo of this EEPROM from protecting itself, or from being stopped, and how to mend it; "" for nothing.
 
-    These registers are left to the operator: whoever changed them had a reason that may still hold.
+    These registers are left to the operator: they were changed for a reason that may still hold.
     """
     firmware, second_id, limit_c = table[_FIRMWARE], table[_SECONDARY_ID], table[_TEMPERATURE_LIMIT]
     if firmware < model.watchdog_firmware:

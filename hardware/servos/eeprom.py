@@ -75,7 +75,7 @@ def keep_eeprom(folder: Path, port: str, table: bytes) -> None:
 
 
 def read_backup(folder: Path, port: str, servo_id: int, model: int) -> EepromBackup | None:
-    """The backup of a servo; None when there is none. Raises UserError for a file that is none."""
+    """The backup of a servo; None where it is missing. Raises UserError for a file that is no backup."""
     path = _path(folder, port, servo_id, model)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
