@@ -6,6 +6,7 @@ the age of a reading and of a command. A goal beyond them is unsafe, whatever it
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterable
@@ -14,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from core.config.safety import TENDONS, JointConfig, JointName, ServosConfig
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.device import SoftServo
-from hardware.twin.servos.protocol import BROADCAST, EXTENDED_POSITION, Instruction, InstructionPacket, group_items
+from hardware.twin.servos.protocol import BROADCAST, CURRENT_POSITION, Instruction, InstructionPacket, group_items
 
 _TORQUE, _GOAL = 64, 116
 _OLD_S = 0.2
@@ -23,6 +24,8 @@ _ROUNDING_MM, _STILL_MM, _JUMP_MM = 0.03, 0.3, 0.5
 _AT_END_MM, _SLOW_LAG_MM = 0.1, 0.3
 """A feed so near to the low end of its envelope may be pulled out by hand; its goals are so far ahead at most."""
 _AFTER_STOP_S = 0.5
+_FORCE_SHARE, _CURRENT_UNIT_MA = 1.1, 2.69
+"""A servo may give a tenth more than its joint's force; unit of Goal Current(102) of the twin's XM430."""
 _MOST_TEXTS = 50
 
 
@@ -97,8 +100,10 @@ class WireMonitor:
         last, self._last[servo.id] = self._last.get(servo.id), (now_s, at_ticks)
         if not servo.table["torque"]:
             return  # it causes no motion; the register is checked when the torque is switched on
-        if servo.table["operating_mode"] != EXTENDED_POSITION:
+        if servo.table["operating_mode"] != CURRENT_POSITION:
             self._add_unsafe(f"{joint.name}: a goal in mode {servo.table['operating_mode']}")
+        if (force_n := _most_force_n(servo, joint)) > _FORCE_SHARE * joint.max_force_n:
+            self._add_unsafe(f"{joint.name}: a goal that may pull with {force_n:.1f} N (at most {joint.max_force_n:g} N)")
         most_mm = joint.max_step_mm + joint.max_speed_mm_s * _OLD_S
         if away_mm > most_mm + _ROUNDING_MM:
             self._add_unsafe(f"{joint.name}: goal {away_mm:.2f} mm from the horn (at most {most_mm:.2f} mm)")
@@ -123,6 +128,11 @@ class WireMonitor:
         self._report.unsafe += 1
         if len(self._report.texts) < _MOST_TEXTS:
             self._report.texts.append(text)
+
+
+def _most_force_n(servo: SoftServo, joint: JointConfig) -> float:
+    """What the servo may pull its joint with."""
+    return abs(servo.table["goal_current"]) * _CURRENT_UNIT_MA * servo.motor.mnm_per_ma / (joint.mm_per_turn / (2.0 * math.pi))
 
 
 def _ticks_to(servo: SoftServo, register: int) -> float:

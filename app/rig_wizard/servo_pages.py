@@ -262,9 +262,9 @@ class ZeroPage(WizardPage):
 
     name = mark("Zero and pretension")
     hint = mark(
-        "Each wire is loosened by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, 4 mm and 300 mA at most; "
-        "there it is left, taut and without tension: zero. A wire that the camera cannot judge is set by eye: choose it, and "
-        "tighten or loosen it."
+        "Each wire is loosened by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, by 4 mm and with its "
+        "greatest force at most; there it is left, taut and without tension: zero. A wire that the camera cannot judge is set "
+        "by eye: choose it, and tighten or loosen it."
     )
 
     def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:

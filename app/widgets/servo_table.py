@@ -49,6 +49,7 @@ from app.widgets.painting import (
 )
 from app.widgets.zero_dialog import ZeroDialog, joint_zeros
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.servo_models import PWM_FULL
 from core.types import RobotStatus
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, wire_force_mn
 
@@ -178,11 +179,16 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
     warm, sags = hot - safety.temperature_warn_margin_c, low + safety.voltage_warn_margin_v
     heat = Tone.BAD if state.temperature_c >= hot else Tone.WARN if state.temperature_c >= warm else Tone.PLAIN
     volts = Tone.BAD if state.voltage_v <= low else Tone.WARN if state.voltage_v <= sags else Tone.PLAIN
-    error, current = _error(state), Cell(NONE)
-    if state.current_ma is not None:
-        strain = Tone.BAD if abs(state.current_ma) > servos.max_current_ma else Tone.PLAIN
-        limit = tr("limit {most:g} mA for half a second", most=servos.max_current_ma)
-        current = _signed(number(state.current_ma, 0), strain, limit)
+    error, limit = _error(state), servos.force_limit(joint)
+    if state.current_ma is None or limit.current_ma is None or limit.strain_ma is None:
+        duty = 100.0 * limit.units / PWM_FULL
+        current = Cell(
+            NONE, tip=tr("the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)", force=limit.force_n, duty=duty)
+        )
+    else:
+        strain = Tone.BAD if abs(state.current_ma) > limit.strain_ma else Tone.PLAIN
+        tip = tr("the servo gives {force:.0f} N at most ({most:.0f} mA)", force=limit.force_n, most=limit.current_ma)
+        current = _signed(number(state.current_ma, 0), strain, tip)
     return (
         Cell(_name(joint), max(Tone.PLAIN, heat, volts, error.tone)),
         _position(joint, state),

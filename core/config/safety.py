@@ -14,7 +14,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from core.config.section import ConfigSection
-from core.config.servo_models import SERVO_MODELS, ServoModel, unsupported
+from core.config.servo_models import SERVO_MODELS, ForceLimit, ServoModel, force_limit, unsupported
 
 _REPEATED_S = 0.05
 """1.5 times the repeat period of a held key (33 ms), twice that of a held deadman (25 ms)."""
@@ -83,6 +83,10 @@ TICKS_PER_TURN = 4096
 JointName = Literal["right", "left", "up", "down", "advance", "delivery_1", "delivery_2"]
 JOINT_NAMES: tuple[JointName, ...] = ("right", "left", "up", "down", "advance", "delivery_1", "delivery_2")
 TENDONS = JOINT_NAMES[:4]
+_TENDON_FORCE_N = 20.0
+"""Below what a steel or nitinol wire of 0.15 mm bears (25 to 35 N, by its cross-section); five times what bends the twin's head."""
+_FEED_FORCE_N = 30.0
+"""Of the feed and of each servo of the catheter's delivery: what their own friction leaves of it reaches the catheter."""
 
 
 class JointConfig(ConfigSection):
@@ -92,6 +96,13 @@ class JointConfig(ConfigSection):
     id: int = Field(ge=0, le=252, description="on the bus")
     model: int | None = Field(None, ge=0, le=65535, description="model number of its servo; empty: servos.model")
     sign: Literal[-1, 1] = Field(1, description="direction of the servo that increases the joint's millimetres")
+    max_force_n: float = Field(
+        _TENDON_FORCE_N,
+        gt=0.0,
+        le=150.0,
+        description="the servo itself gives no more, its gear's friction included; tendons 20 (a wire of 0.15 mm bears 25 to 35), "
+        "feed and delivery 30; raise it where a joint does not follow though nothing is jammed",
+    )
     mm_per_turn: float = Field(40.0, gt=0.0, le=500.0, description="way of the joint at one turn of the servo's horn")
     low_mm: float = Field(ge=-2000.0, le=2000.0, description="end of the envelope: nothing is sent beyond it")
     high_mm: float = Field(ge=-2000.0, le=2000.0, description="its other end")
@@ -99,6 +110,14 @@ class JointConfig(ConfigSection):
     max_speed_mm_s: float = Field(gt=0.0, le=200.0, description="the joint is never sent faster")
     max_acceleration_mm_s2: float = Field(gt=0.0, le=10_000.0, description="nor sped up or slowed down harder")
     max_step_mm: float = Field(gt=0.0, le=50.0, description="farthest goal from the measured position")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_force(cls, data: Any) -> Any:
+        """The default depends on what the joint moves; older files have none."""
+        if isinstance(data, dict) and "max_force_n" not in data:
+            return {**data, "max_force_n": _TENDON_FORCE_N if data.get("name") in TENDONS else _FEED_FORCE_N}
+        return data
 
     @model_validator(mode="after")
     def _check_envelope(self) -> Self:
@@ -122,15 +141,17 @@ def _feed(name: JointName, number: int) -> JointConfig:
     return JointConfig(name=name, id=number, max_acceleration_mm_s2=200.0, **limits)
 
 
-_MOST = {"heartbeat_timeout_s": 0.5, "watchdog_s": 0.5, "max_current_ma": 1500.0, "tracking_error_mm": 3.0}
-"""Ceilings with real servos. The safety rules demand a hold within 100 ms and an end after 500 ms of silence. An XM430 stalls at
-2300 mA. A joint that is 3 mm from its goal has left it by more than any step that may be ordered."""
+_MOST = {"heartbeat_timeout_s": 0.5, "watchdog_s": 0.5, "tracking_error_mm": 3.0}
+"""Ceilings with real servos. The safety rules demand a hold within 100 ms and an end after 500 ms of silence. A joint that is 3 mm
+from its goal has left it by more than any step that may be ordered."""
 _MIN_BUS_HZ = 20.0
 """Floor with real servos: two cycles pass within the 100 ms of the rules."""
 _LEAST_UNATTENDED_S = 10.0
 """Floor of ``unattended_s`` with real servos: the program can be started again before the wires are relaxed."""
 _MOST_TENDON_STEP_MM, _MOST_FEED_STEP_MM = 1.0, 2.0
 """Ceilings of ``max_step_mm`` with real servos: so far a joint goes when the program dies."""
+_MOST_TENDON_FORCE_N, _MOST_FEED_FORCE_N = 60.0, 100.0
+"""Ceilings of ``max_force_n`` with real servos: beyond, it protects neither wire nor catheter."""
 
 
 AtClose = Literal["ask", "hold", "relax", "torque off"]
@@ -158,12 +179,7 @@ class ServosConfig(ConfigSection):
     min_voltage_v: float | None = Field(
         None, ge=3.5, le=24.0, description="a lower supply ends the driving; empty: 7/8 of what each servo's model recommends"
     )
-    max_current_ma: float = Field(
-        600.0,
-        ge=50.0,
-        le=5000.0,
-        description="a servo that draws more for half a second is stopped; small ones (XL330, XC330) stall at 1500 to 1800",
-    )
+    max_current_ma: float | None = Field(None, exclude=True, description="of older files; each joint has its max_force_n instead")
     tracking_error_mm: float = Field(1.5, gt=0.0, le=50.0, description="distance of goal and measured position that counts as jam")
     unattended_s: float = Field(
         300.0,
@@ -202,6 +218,10 @@ class ServosConfig(ConfigSection):
         """The model of a joint's servo."""
         return SERVO_MODELS[self.model if joint.model is None else joint.model]
 
+    def force_limit(self, joint: JointConfig) -> ForceLimit:
+        """How the joint's servo limits its force."""
+        return force_limit(self.model_of(joint), joint.mm_per_turn, joint.max_force_n)
+
     def lowest_v(self, joint: JointConfig) -> float:
         """A lower supply of the joint's servo ends the driving."""
         return self.model_of(joint).lowest_v if self.min_voltage_v is None else self.min_voltage_v
@@ -217,9 +237,14 @@ class ServosConfig(ConfigSection):
             if getattr(self, name) > limit:
                 return f"{name} must be {limit:g} at most with real servos"
         for joint in self.joints:
-            limit = _MOST_TENDON_STEP_MM if joint.name in TENDONS else _MOST_FEED_STEP_MM
-            if joint.max_step_mm > limit:
-                return f"joint {joint.name}: max_step_mm must be {limit:g} at most with real servos"
+            is_tendon = joint.name in TENDONS
+            ceilings = {
+                "max_step_mm": _MOST_TENDON_STEP_MM if is_tendon else _MOST_FEED_STEP_MM,
+                "max_force_n": _MOST_TENDON_FORCE_N if is_tendon else _MOST_FEED_FORCE_N,
+            }
+            for name, limit in ceilings.items():
+                if getattr(joint, name) > limit:
+                    return f"joint {joint.name}: {name} must be {limit:g} at most with real servos"
         if self.unattended_s < _LEAST_UNATTENDED_S:
             return f"unattended_s must be {_LEAST_UNATTENDED_S:g} at least with real servos"
         return "" if self.bus_hz >= _MIN_BUS_HZ else f"bus_hz must be {_MIN_BUS_HZ:g} at least with real servos"

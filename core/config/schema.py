@@ -222,6 +222,8 @@ def _section(model: type[BaseModel], key: str, title: str | None = None) -> Sect
     settings: list[Setting] = []
     sections: list[Section] = []
     for name, info in model.model_fields.items():
+        if info.exclude:  # of older files, read and not used
+            continue
         path = f"{key}.{name}" if key else name
         kind = info.annotation
         if isinstance(kind, type) and issubclass(kind, BaseModel):

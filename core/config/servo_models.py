@@ -20,6 +20,9 @@ _FRICTION_SHARE = 0.05
 _SHUTDOWN_MARGIN_C = 5.0
 """The program ends the driving so far below the temperature at which the servo switches itself off."""
 
+_STRAIN_SHARE = 0.9
+"""Of the current to which a servo limits itself: from there on it is strained."""
+
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
@@ -117,6 +120,11 @@ class ForceLimit:
     force_n: float
     current_ma: float | None
     speed_mm_s: float
+
+    @property
+    def strain_ma(self) -> float | None:
+        """A servo that draws more gives all that it may; None for models that report no current."""
+        return None if self.current_ma is None else _STRAIN_SHARE * self.current_ma
 
 
 GOAL_PWM, GOAL_CURRENT = 100, 102

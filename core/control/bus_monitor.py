@@ -28,6 +28,7 @@ class BusReport:
     tracking_mm : goal minus measured position.
     currents_ma : None for a servo that reports none.
     rebooted : a servo has restarted, so that its zero is lost.
+    limit_lost : the servo has another force limit than it was given: another master, or a fault of the line.
     torque_taken : the torque is off while the bus is armed, though the servo neither restarted nor reports an error: another master
         on the line has switched it off. The zero is kept.
     armed, ended : whether the bus process follows commands, and why it does not any more.
@@ -45,6 +46,7 @@ class BusReport:
     currents_ma: Sequence[float | None] = ()
     rebooted: bool = False
     torque_taken: Sequence[bool] = ()
+    limit_lost: Sequence[bool] = ()
     watchdog_tripped: bool = False
     armed: bool = True
     ended: Fault | None = None
@@ -75,9 +77,12 @@ def _strain(samples: Sequence[CurrentSample], servos: ServosConfig) -> str:
     NaN counts as too much; a missing reading counts as none, and proves nothing.
     """
     pause_s = _longest_pause_s(servos) + _ROUNDING_S
-    for place, name in enumerate(JOINT_NAMES):
+    for place, joint in enumerate(servos.joints):
+        limit = servos.force_limit(joint)
+        if (most_ma := limit.strain_ma) is None:
+            continue
         found = [(s.time_s, ma) for s in samples if place < len(s.currents_ma) and (ma := s.currents_ma[place]) is not None]
-        above = [(time_s, ma) for time_s, ma in found if not ma <= servos.max_current_ma]
+        above = [(time_s, ma) for time_s, ma in found if not ma <= most_ma]
         starts = [time_s for time_s, _ in above if above[-1][0] - time_s >= STRAIN_S - _ROUNDING_S]
         if not starts:
             continue
@@ -89,11 +94,12 @@ def _strain(samples: Sequence[CurrentSample], servos: ServosConfig) -> str:
         if 2 * len(over) >= len(since):
             lasted_ms = 1000.0 * (above[-1][0] - starts[-1])
             return message(
-                "{joint} up to {a:.0f} mA for {b:.0f} ms (at most {c:.0f} mA)",
-                joint=name,
+                "{joint} up to {a:.0f} mA for {b:.0f} ms (its {c:g} N are {d:.0f} mA)",
+                joint=joint.name,
                 a=max(over),
                 b=lasted_ms,
-                c=servos.max_current_ma,
+                c=joint.max_force_n,
+                d=limit.current_ma or 0.0,
             )
     return ""
 
@@ -212,6 +218,7 @@ class BusMonitor:
             (Cause.STRAINED, self.strained),
             (Cause.TORQUE_ON, newest.torque_problem),
             (Cause.REBOOTED, self.rebooted),
+            (Cause.SERVOS_WRONG, _listed(newest.limit_lost, bool, " has lost its force limit")),
             (Cause.TORQUE_TAKEN, _listed(newest.torque_taken, bool, "")),
             (Cause.WATCHDOG, newest.watchdog_tripped),
             (Cause.HOT, hot),

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
 from core.control.kept_zero import ALL_AT_ZERO, ZeroBasis
 from core.messages import message
 from core.types import Command
@@ -24,8 +24,6 @@ from hardware.servos.dynamixel_port import NoAnswer, ServoError
 from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
 
-MAX_CURRENT_MA = 300.0
-"""Of an XM430 about 80 N at a drum of 40 mm a turn: less than a jam, more than friction."""
 _UNDER_TEST: JointName = "advance"
 _PLACE = JOINT_NAMES.index(_UNDER_TEST)
 _PERIOD_S = 0.02
@@ -110,7 +108,6 @@ class ProbeLimits:
     low_mm: float = -3.0
     high_mm: float = 3.0
     speed_mm_s: float = 4.0
-    max_current_ma: float = MAX_CURRENT_MA
 
 
 def probe_config(
@@ -126,8 +123,9 @@ def probe_config(
 
     Notes
     -----
-    A known servo turns its own joint's millimetres per turn. An unknown one may drive any of the seven: with the largest of theirs
-    its wire or screw never moves further, nor faster, than it is asked to.
+    A known servo turns its own joint's millimetres per turn, with its own joint's force. An unknown one may drive any of the seven:
+    with the largest of their ways its wire or screw never moves further, nor faster, than it is asked to, and with the smallest of
+    their torques it never pulls harder than it may.
 
     Raises ProbeFailed when there are not seven, or `servo_id` is not among them.
     """
@@ -137,8 +135,9 @@ def probe_config(
         raise ProbeFailed(f"servo {servo_id} cannot be moved: seven servos are needed, there are {', '.join(map(str, every))}")
     every.remove(servo_id)
     every.insert(_PLACE, servo_id)
-    known = {} if found is not None else {joint.id: joint.mm_per_turn for joint in servos.joints}
     largest = max(joint.mm_per_turn for joint in servos.joints)
+    weakest_n = min(joint.max_force_n * joint.mm_per_turn for joint in servos.joints) / largest
+    known = {} if found is not None else {joint.id: (joint.mm_per_turn, joint.max_force_n) for joint in servos.joints}
     bounds = {
         "low_mm": limits.low_mm - _MARGIN_MM,
         "high_mm": limits.high_mm + _MARGIN_MM,
@@ -153,7 +152,8 @@ def probe_config(
                 "id": one,
                 "model": models[one],
                 "sign": sign if one == servo_id else 1,
-                "mm_per_turn": known.get(one, largest),
+                "mm_per_turn": known.get(one, (largest, weakest_n))[0],
+                "max_force_n": known.get(one, (largest, weakest_n))[1],
                 **bounds,
             }
         )
@@ -227,8 +227,11 @@ def check_armed(status: BusStatus, title: str) -> None:
 class ServoProbe:
     """A servo that can be moved; ``opened`` makes one. One thread uses it; STOP may come from anywhere."""
 
-    def __init__(self, robot: ServoRobot, servo_id: int, limits: ProbeLimits, stop: StopSwitch) -> None:
+    def __init__(
+        self, robot: ServoRobot, servo_id: int, limits: ProbeLimits, stop: StopSwitch, strain_ma: float | None = None
+    ) -> None:
         self._robot, self.servo_id, self._limits, self._stop = robot, servo_id, limits, stop
+        self._strain_ma = strain_ma
         self._strained = 0
         self._strain_seen_s = 0.0
         self._last: ServoState | None = None
@@ -243,7 +246,7 @@ class ServoProbe:
         robot = ServoRobot(config, safety, name=f"servo {servo_id}", backups=backups)
         try:
             with armed(robot, stop, ZeroBasis.HERE):
-                yield cls(robot, servo_id, limits, stop)
+                yield cls(robot, servo_id, limits, stop, config.force_limit(config.joints[_PLACE]).strain_ma)
         except ServoError as error:
             raise type(error)(_by_id(str(error), config)) from None
 
@@ -320,14 +323,15 @@ class ServoProbe:
         if state.time_s == self._strain_seen_s:
             return  # the same reading once more
         self._strain_seen_s = state.time_s
-        is_over = state.current_ma is not None and abs(state.current_ma) > self._limits.max_current_ma
+        most_ma = self._strain_ma
+        is_over = state.current_ma is not None and most_ma is not None and abs(state.current_ma) > most_ma
         self._strained = self._strained + 1 if is_over else 0
         if self._strained >= _STRAINED_CYCLES:
             self._robot.hold()
             self._robot.torque_off()
             drawn_ma = abs(state.current_ma or 0.0)
             raise Strained(
-                f"servo {self.servo_id} drew {drawn_ma:.0f} mA (at most {self._limits.max_current_ma:.0f} mA) and was let go: "
+                f"servo {self.servo_id} drew {drawn_ma:.0f} mA, all that its force limit allows, and was let go: "
                 "something holds its wire"
             )
 
@@ -335,10 +339,9 @@ class ServoProbe:
 class SteeredRobot:
     """The robot with all its servos, zeroed where they stood: bends and holds it, and stops when a servo strains."""
 
-    def __init__(
-        self, robot: ServoRobot, joints: tuple[JointConfig, ...], stop: StopSwitch, max_current_ma: float = MAX_CURRENT_MA
-    ) -> None:
-        self._robot, self._joints, self._stop, self._max_current_ma = robot, joints, stop, max_current_ma
+    def __init__(self, robot: ServoRobot, servos: ServosConfig, stop: StopSwitch) -> None:
+        self._robot, self._joints, self._stop = robot, servos.joints, stop
+        self._most_ma = {joint.name: servos.force_limit(joint).strain_ma for joint in servos.joints}
         self._strained = 0
         self._cycle = -1
         self._command = Command()
@@ -355,7 +358,7 @@ class SteeredRobot:
         config = patient(servos)
         robot = ServoRobot(config, safety, name="robot", backups=backups)
         with armed(robot, stop, ZeroBasis.SEARCHED):
-            yield cls(robot, config.joints, stop)
+            yield cls(robot, config, stop)
 
     def bend_to(self, command: Command) -> None:
         """Bend at the gate's own pace, and wait until it has stopped."""
@@ -396,7 +399,8 @@ class SteeredRobot:
         raise ServoError("not all servos tell where they are: check cables and supply")
 
     def _watch_current(self, states: list[ServoState]) -> None:
-        strained = [state for state in states if state.current_ma is not None and abs(state.current_ma) > self._max_current_ma]
+        pairs = [(state, self._most_ma[state.name]) for state in states]
+        strained = [s for s, most_ma in pairs if s.current_ma is not None and most_ma is not None and abs(s.current_ma) > most_ma]
         self._strained = self._strained + 1 if strained else 0
         if self._strained >= _STRAINED_CYCLES:
             self._robot.hold()

@@ -314,6 +314,26 @@ def check_screen_lock(robot: str) -> Check:
     return Check(name, True, "inhibited while the servos follow")
 
 
+def check_forces(config: ServosConfig) -> Check:
+    """What each servo limits its own force to, and whether the joint still reaches its speed with it."""
+    name = "forces"
+    if config.port is None:
+        return Check(name, True, NOT_CONFIGURED)
+    told, slow = [], []
+    for joint in config.joints:
+        limit, model = config.force_limit(joint), config.model_of(joint)
+        how = "duty" if limit.current_ma is None else f"{limit.current_ma:.0f} mA"
+        told.append(f"{joint.name} {limit.force_n:.0f} N ({how})")
+        if limit.speed_mm_s < joint.max_speed_mm_s:
+            slow.append(f"{joint.name} {limit.speed_mm_s:.1f} of {joint.max_speed_mm_s:g} mm/s")
+        if model.is_small:
+            told[-1] += f" by {model.name}, whose motor goes on when its own bus watchdog trips"
+    if slow:
+        fix = "raise the joint's max_force_n, or lower its max_speed_mm_s; or use a model that reports its current"
+        return Check(name, False, f"with its force limit reaches at most: {', '.join(slow)}", fix)
+    return Check(name, True, f"at most {', '.join(told)}")
+
+
 def check_latency(port: str | None) -> Check:
     """How long an FTDI adapter keeps bytes back. The driver sets it when it opens the port, so it is looked at after that."""
     name = "adapter latency"

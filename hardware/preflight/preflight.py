@@ -43,6 +43,7 @@ CHECKS: dict[str, tuple[Callable[[Config], Check], Level | None]] = {
     "picture": (device_checks.check_picture, None),
     "servo port": (lambda config: device_checks.check_servo_port(config.servos.port, wanted=config.rig.robot == "servos"), None),
     "servos": (lambda config: device_checks.check_servos(config.servos), None),
+    "forces": (lambda config: device_checks.check_forces(config.servos), None),
     # after the driver has had the port open
     "adapter latency": (lambda config: device_checks.check_latency(config.servos.port), Level.BAD),
     "bus speed": (lambda config: device_checks.check_bus_speed(config.servos), Level.WARNING),

@@ -169,8 +169,8 @@ class UnattendedWatch:
             if not isinstance(reading, ServoState):
                 strained.append(count)
                 continue
-            ma = abs(reading.current_ma) if reading.current_ma is not None else 0.0
-            strained.append(0 if ma <= servos.max_current_ma else count + 1)
+            ma, most_ma = reading.current_ma, servos.force_limit(joint).strain_ma
+            strained.append(0 if ma is None or most_ma is None or abs(ma) <= most_ma else count + 1)
             if reading.torque and not problem:
                 problem = _against_holding(joint, reading, strained[-1], servos)
         return UnattendedWatch(now_s, tuple(strained), problem)
@@ -206,6 +206,7 @@ def report_of(readings: Sequence[ServoReading], *, armed: bool, errors: int, reb
         currents_ma=tuple(reading.current_ma if isinstance(reading, ServoState) else None for reading in readings),
         rebooted=rebooted or any(reading.restarted for reading in missing),
         # a servo that has switched itself off has an error; one that has restarted has lost its status block
+        limit_lost=tuple(armed and isinstance(r, ServoState) and not r.is_limited for r in readings),
         torque_taken=tuple(armed and isinstance(r, ServoState) and not r.torque and not r.error for r in readings),
         watchdog_tripped=any(state.watchdog_tripped for state in states),
     )

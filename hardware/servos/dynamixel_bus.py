@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.config.safety import TENDONS, JointConfig, JointName, ServosConfig
-from core.config.servo_models import ServoModel, model_name
+from core.config.servo_models import GOAL_CURRENT, GOAL_PWM, ServoModel, model_name
 from core.control.kept_zero import KeptJoint, ZeroBasis, zero_offer
 from core.messages import message
 from hardware.servos import registers
@@ -54,11 +54,15 @@ _NO_SECONDARY_ID = 253
 _BY = "with DYNAMIXEL Wizard 2"
 _SHUTDOWN_NEEDED = HardwareError.OVERLOAD | HardwareError.OVERHEATING
 """What a servo must switch itself off for; its Shutdown(63) comes as 52, which adds the electrical shock."""
-_EXTENDED_POSITION = 4
+_EXTENDED_POSITION, _CURRENT_POSITION = 4, 5
+_LIMIT_OF = {GOAL_PWM: 36, GOAL_CURRENT: 38}
+"""PWM Limit(36) and Current Limit(38): the servo takes no Goal PWM(100) or Goal Current(102) above."""
 _COUNTING = frozenset({_DRIVE_MODE, _MODE, _HOMING_OFFSET})
 """Registers that decide what a position means."""
 _SPEEDS = (57600, 1_000_000, 115_200, 2_000_000, 3_000_000, 4_000_000)
 _REBOOT_S = 1.5
+_SLACK_SHARE = 0.5
+"""Of what its force limit allows: a tendon whose servo draws more is pulled."""
 _ROUNDING_MM = 1e-9
 _TORQUE_OFF_PACKETS = 3
 """A packet to several servos has no answer, and may get lost."""
@@ -211,6 +215,7 @@ class ServoBus:
         self._zeros: dict[int, int] = {}
         self._put_off: set[int] = set()
         self._marks: dict[int, int] = {}
+        self._limits: dict[int, int] = {}
         self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
         self._silences = dict(self._misses)
         self._turns = dict.fromkeys((address for address, _, _ in self._blocks), 0)
@@ -337,23 +342,24 @@ class ServoBus:
                     joint=_title(joint),
                 )
             )
-        model = self.config.model_of(joint)
+        model, limit_ma = self.config.model_of(joint), self.config.force_limit(joint).current_ma
+        friction_ma = min(model.friction_ma, _SLACK_SHARE * (limit_ma or model.friction_ma))
         drawn_ma = model.current_ma(registers.signed(self._line.read(joint.id, _CURRENT, 2)))
-        if drawn_ma is not None and abs(drawn_ma) > model.friction_ma:
+        if drawn_ma is not None and abs(drawn_ma) > friction_ma:
             raise NotReady(
                 message(
                     "{joint} pulls with {a:.0f} mA (friction takes {b:.0f} mA at most): slacken its wire, then zero it",
                     joint=_title(joint),
                     a=abs(drawn_ma),
-                    b=model.friction_ma,
+                    b=friction_ma,
                 )
             )
 
     def arm(self) -> None:
         """Torque on, each servo holding where it stands. A servo that holds already goes on holding.
 
-        The order: watchdog off; EEPROM where it differs, for which this one servo lets go and holds again; profile; position read,
-        goal = position; torque on where it is off; watchdog on.
+        The order: watchdog off; EEPROM where it differs, for which this one servo lets go and holds again; force limit; profile;
+        position read, goal = position; torque on where it is off; watchdog on.
 
         Raises
         ------
@@ -371,6 +377,7 @@ class ServoBus:
                 if self._map_block(joint):  # the only sign that it has restarted: it counts from another turn now
                     self._zeros.pop(joint.id, None)
                 self._set_up_held(joint)
+                self._limit_force(joint)
                 self._set_profile(joint)
             self._check_zeroed()
             self._send_position_as_goal(self._joints)
@@ -400,6 +407,7 @@ class ServoBus:
         held = self._holds(joint)
         self._configure(joint)
         if held:
+            self._limit_force(joint)
             self._send_position_as_goal([joint])
             self._line.write(joint.id, TORQUE, b"\1")
 
@@ -532,6 +540,7 @@ class ServoBus:
             raise WrongServo(f"there is no servo with id {servo_id} in the configuration")
         self._armed = False
         self._zeros.pop(servo_id, None)
+        self._limits.pop(servo_id, None)
         self._line.reboot(servo_id)
         until = time.monotonic() + _REBOOT_S
         self._line.pause(0.1)  # it answers for a moment before it goes down
@@ -575,7 +584,8 @@ class ServoBus:
         wanted = {
             _RETURN_DELAY: b"\0",
             _DRIVE_MODE: b"\0",  # not reversed, and the profile in velocities
-            _MODE: bytes([_EXTENDED_POSITION]),
+            # the force of a servo in extended position mode is limited by its duty only
+            _MODE: bytes([_CURRENT_POSITION if self.config.model_of(joint).has_current_mode else _EXTENDED_POSITION]),
             _HOMING_OFFSET: bytes(4),  # with one, a tripped watchdog can move the motor
             _VELOCITY_LIMIT: registers.profile_velocity(joint).to_bytes(4, "little"),
             _STARTUP: b"\0",  # no torque at power-up, and no RAM brought back, which would hide a restart; firmware 44 has 0 there
@@ -622,6 +632,23 @@ class ServoBus:
         self._marks[joint.id] = self._line.read(joint.id, data, 1)[0]
         return True
 
+    def _limit_force(self, joint: JointConfig) -> None:
+        """Let the servo itself give no more than the joint's force, or less where its own EEPROM allows less; read back.
+
+        Raises WriteRefused: then no torque may come on.
+        """
+        limit = self.config.force_limit(joint)
+        most = int.from_bytes(self._line.read(joint.id, _LIMIT_OF[limit.register], 2), "little")
+        units = min(limit.units, most)
+        data = units.to_bytes(2, "little")
+        self._line.write(joint.id, limit.register, data)
+        if units < 1 or self._line.read(joint.id, limit.register, 2) != data:
+            raise WriteRefused(
+                f"{_title(joint)} did not take its force limit (register {limit.register} = {limit.units}): "
+                f"set its register {_LIMIT_OF[limit.register]} to what it came with, or reboot it"
+            )
+        self._limits[joint.id] = units
+
     def _set_profile(self, joint: JointConfig) -> None:
         """Greatest acceleration and speed on the way to a goal, read back. Raises WriteRefused."""
         values = (registers.profile_acceleration(joint), registers.profile_velocity(joint))
@@ -647,10 +674,12 @@ class ServoBus:
 
     def _reading(self, joint: JointConfig, block: bytes, time_s: float) -> ServoReading:
         self._misses[joint.id] = self._silences[joint.id] = 0
-        state = state_of(joint, self.config.model_of(joint), self._zeros.get(joint.id), block, time_s, self._marks.get(joint.id, 0))
+        model, zero, mark = self.config.model_of(joint), self._zeros.get(joint.id), self._marks.get(joint.id, 0)
+        state = state_of(joint, model, zero, block, time_s, mark, self._limits.get(joint.id))
         if state is None:
             self._armed = False
             self._zeros.pop(joint.id, None)
+            self._limits.pop(joint.id, None)
             with contextlib.suppress(NoAnswer, WriteRefused):
                 self._map_block(joint)
             return MissingServo(joint.name, joint.id, time_s, 0, "restarted: zero and arm again", restarted=True)

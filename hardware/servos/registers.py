@@ -1,8 +1,8 @@
 """Registers of a DYNAMIXEL X servo in millimetres, degrees Celsius and seconds, and the status block that one read gives. Pure.
 
-The block is seventeen bytes, gathered through the servo's indirect addresses. Why indirect: the registers of interest lie
+The block is twenty bytes, gathered through the servo's indirect addresses. Why indirect: the registers of interest lie
 between 64 and 146. Read as they lie, seven servos take 6.6 ms at 1 Mbps and 115 ms at the factory's 57600; gathered they take 2
-and 33 ms. Why not more: the smallest servos (330 size) have 20 indirect addresses. Their block is one byte shorter.
+and 33 ms. Why not more: the smallest servos (330 size) have 20 indirect addresses. Their block is two bytes shorter.
 
 The addresses are forgotten in a reboot, and the block then reads as zeros. So the block begins with a mark that the driver has
 written, goes on with a register that it keeps at 2, and holds the supply voltage: zeros cannot pass for a servo at position 0.
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 
 from core.config.safety import TICKS_PER_TURN, JointConfig, JointName
-from core.config.servo_models import ServoModel, drum_radius_mm
+from core.config.servo_models import GOAL_CURRENT, GOAL_PWM, ServoModel, drum_radius_mm
 
 MAX_TICKS = 256 * TICKS_PER_TURN - 1
 """Extended position mode counts so far from zero in both directions."""
@@ -87,8 +87,6 @@ _PARTS = {
     "temperature": (146, 1),
     "voltage": (144, 2),
 }
-_SMALL_PARTS = _PARTS | {"voltage": (144, 1)}
-"""Of the 330 size: a supply of 14 V or less fits in one byte."""
 TAG_BYTES = 2
 """Padding: requests in turn ask for 0, 1 or 2 bytes more, so that a late answer to an earlier one is known by its length."""
 _MARK_BYTES = 1
@@ -123,7 +121,8 @@ class ServoState:
     """What one servo reported. ``time_s`` is monotonic, at the arrival of the answer.
 
     ``position_mm`` and ``goal_mm``: None until the joint has been zeroed; ``ticks`` always tells the position register.
-    ``goal_ticks`` is the goal that the servo has really taken: a group write has no answer that would tell.
+    ``goal_ticks`` is the goal that the servo has really taken: a group write has no answer that would tell. ``is_limited``: its
+    force limit is still the one that it was given.
     """
 
     name: JointName
@@ -140,6 +139,7 @@ class ServoState:
     error: HardwareError
     torque: bool
     watchdog_tripped: bool
+    is_limited: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +161,11 @@ ServoReading = ServoState | MissingServo
 
 
 def _parts(model: ServoModel) -> dict[str, tuple[int, int]]:
-    return _SMALL_PARTS if model.is_small else _PARTS
+    """The parts of a model's block. In the 330 size a supply of 14 V or less fits in one byte, and one is left for the limit."""
+    limit = GOAL_CURRENT if model.has_current_mode else GOAL_PWM
+    if model.is_small:
+        return _PARTS | {"voltage": (144, 1), "limit": (limit, 1)}
+    return _PARTS | {"limit": (limit, 2)}
 
 
 def block_bytes(model: ServoModel) -> int:
@@ -192,11 +196,17 @@ def split_block(model: ServoModel, block: bytes) -> dict[str, bytes]:
 
 
 def state_of(
-    joint: JointConfig, model: ServoModel, zero_ticks: int | None, block: bytes, time_s: float, mark: int
+    joint: JointConfig,
+    model: ServoModel,
+    zero_ticks: int | None,
+    block: bytes,
+    time_s: float,
+    mark: int,
+    limit_units: int | None = None,
 ) -> ServoState | None:
     """A servo's state from its block; None when it has lost its indirect addresses or its `mark`: it has restarted.
 
-    Raises ValueError for a short block.
+    `limit_units` is the force limit that was given to it, None for none. Raises ValueError for a short block.
     """
     parts = split_block(model, block)
     voltage = int.from_bytes(parts["voltage"], "little")
@@ -218,4 +228,5 @@ def state_of(
         error=HardwareError(parts["hardware_error"][0]),
         torque=parts["torque"][0] == 1,
         watchdog_tripped=parts["watchdog"][0] == WATCHDOG_TRIPPED,
+        is_limited=limit_units is None or parts["limit"] == limit_units.to_bytes(2, "little")[: len(parts["limit"])],
     )

@@ -11,7 +11,7 @@ from core.config.safety import SafetyConfig, ServosConfig
 from core.types import Command
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.device import SoftServo
-from hardware.twin.servos.protocol import EXTENDED_POSITION, Instruction, InstructionPacket
+from hardware.twin.servos.protocol import CURRENT_POSITION, Instruction, InstructionPacket
 from tools.wire_monitor import MonitoredBus, WireMonitor
 
 SERVOS = ServosConfig()
@@ -26,7 +26,8 @@ def goal(ticks: int, servo_id: int = ADVANCE) -> InstructionPacket:
 
 def servo_at(ticks: int) -> SoftServo:
     servo = SoftServo(ADVANCE, SERVOS.model, ticks)
-    servo.table["operating_mode"] = EXTENDED_POSITION
+    servo.table["operating_mode"] = CURRENT_POSITION
+    servo.table["goal_current"] = 39  # 30 N at 40 mm a turn
     servo.table["torque"] = 1
     return servo
 
@@ -69,6 +70,15 @@ def test_a_goal_is_inside_the_envelope_unless_the_joint_itself_is_not(watch: Wir
     assert watch.report.texts == ["advance: goal -5.20 mm (-5 to 400 mm)"]
     watch.check_packet(goal(mm(-6.0)), {ADVANCE: servo_at(mm(-6.0))}, 10.04)  # held where it is
     assert watch.report.unsafe == 1
+
+
+def test_a_servo_that_may_pull_harder_than_its_joint_is_unsafe(watch: WireMonitor, servo: SoftServo) -> None:
+    servo.table["goal_current"] = 1193
+    watch.check_packet(goal(mm(0.1)), {ADVANCE: servo}, 10.0)
+    assert watch.report.texts == ["advance: a goal that may pull with 898.6 N (at most 30 N)"]
+    servo.table["operating_mode"], servo.table["goal_current"] = 4, 39
+    watch.check_packet(goal(mm(0.1)), {ADVANCE: servo}, 10.02)
+    assert watch.report.texts[1:] == ["advance: a goal in mode 4"]
 
 
 def test_a_leap_between_goals_is_unsafe(watch: WireMonitor, servo: SoftServo) -> None:

@@ -80,8 +80,9 @@ LOOSE = {"position_mm": None, "goal_mm": None}
         (0, {"voltage_v": 11.1}, Column.VOLTAGE, "11.1", Tone.PLAIN),
         (0, {"voltage_v": 11.0}, Column.VOLTAGE, "!11.0", Tone.WARN),
         (0, {"voltage_v": 10.5}, Column.VOLTAGE, "!!10.5", Tone.BAD),
-        (0, {"current_ma": 600.0}, Column.CURRENT, "600", Tone.PLAIN),
-        (0, {"current_ma": -612.0}, Column.CURRENT, f"!!{MINUS}612", Tone.BAD),
+        (0, {"current_ma": 62.0}, Column.CURRENT, "62", Tone.PLAIN),
+        (0, {"current_ma": -64.0}, Column.CURRENT, f"!!{MINUS}64", Tone.BAD),  # nine tenths of what its force limit allows
+        (4, {"current_ma": 94.0}, Column.CURRENT, "94", Tone.PLAIN),  # the feed may give more
         (0, {"current_ma": None}, Column.CURRENT, DASH, Tone.PLAIN),  # models that report a load
         (0, {"watchdog_tripped": True}, Column.ERROR, "bus watchdog", Tone.BAD),
         (0, {"torque": False}, Column.TORQUE, "!!off", Tone.BAD),  # armed, and yet it does not hold

@@ -1,5 +1,6 @@
 """The layers of the configuration, and how wrong files are reported."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +77,9 @@ def test_the_twins_servos_may_be_more_patient(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"max_current_ma": 5000.0}, "max_current_ma must be 1500 at most with real servos"),
+        ({"forces": {"up": 61.0}}, "joint up: max_force_n must be 60 at most with real servos"),
+        ({"forces": {"delivery_2": 101.0}}, "joint delivery_2: max_force_n must be 100 at most with real servos"),
+        ({"forces": {"up": 60.0, "advance": 100.0}}, ""),
         ({"tracking_error_mm": 50.0}, "tracking_error_mm must be 3 at most with real servos"),
         ({"joints": {"right": 50.0}}, "joint right: max_step_mm must be 1 at most with real servos"),
         ({"joints": {"advance": 2.1}}, "joint advance: max_step_mm must be 2 at most with real servos"),
@@ -84,9 +87,29 @@ def test_the_twins_servos_may_be_more_patient(tmp_path: Path) -> None:
     ],
 )
 def test_what_a_joint_may_do_has_a_ceiling_with_real_servos(changes: dict[str, Any], words: str) -> None:
-    steps = changes.get("joints", {})
-    joints = [joint.model_copy(update={"max_step_mm": steps.get(joint.name, joint.max_step_mm)}) for joint in ServosConfig().joints]
+    changes = dict(changes)
+    steps, forces = changes.pop("joints", {}), changes.pop("forces", {})
+    joints = [
+        joint.model_copy(
+            update={
+                "max_step_mm": steps.get(joint.name, joint.max_step_mm),
+                "max_force_n": forces.get(joint.name, joint.max_force_n),
+            }
+        )
+        for joint in ServosConfig().joints
+    ]
     assert ServosConfig.model_validate({**changes, "joints": joints}).too_loose == words
+
+
+def test_a_joint_of_an_older_file_gets_the_force_of_its_kind(tmp_path: Path) -> None:
+    joints = [{k: v for k, v in joint.items() if k != "max_force_n"} for joint in _joints_with("up", id=30)]
+    text = "[servos]\nmax_current_ma = 600.0\n" + "".join(
+        "[[servos.joints]]\n" + "".join(f"{k} = {json.dumps(v)}\n" for k, v in joint.items() if v is not None) for joint in joints
+    )
+    servos = load_config(_write(tmp_path, text)).servos
+    assert [joint.max_force_n for joint in servos.joints] == [20.0] * 4 + [30.0] * 3
+    assert servos.joints[2].id == 30
+    assert "max_current_ma" not in servos.model_dump()
 
 
 def test_missing_file_and_unknown_preset_are_named(tmp_path: Path) -> None:

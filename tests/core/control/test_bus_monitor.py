@@ -188,7 +188,7 @@ def test_one_that_is_silent_three_times_in_a_row_is_named_alone() -> None:
 
 
 def test_a_report_without_currents_forgets_no_strain() -> None:
-    strained = BusReport(currents_ma=(40.0, 40.0, 40.0, 40.0, -601.0, 40.0, 40.0))
+    strained = BusReport(currents_ma=(40.0, 40.0, 40.0, 40.0, -95.0, 40.0, 40.0))
     watch, now_s = _watched([*[strained] * 60, *[BusReport()] * 6])
     assert [fault.cause for fault in _faults(watch, now_s)] == [Cause.STRAINED]
 
@@ -207,6 +207,8 @@ def test_reports_of_servos_that_follow_nobody_are_counted_in_a_row() -> None:
     assert _watched([off, off])[0].checked().disarmed_run == 0
 
 
+MOST_MA = SERVOS.force_limit(SERVOS.joints[2]).strain_ma or math.nan
+"""A tendon's servo that draws more is strained; the tests' currents are in 600ths of it."""
 BUS_S = 0.02
 Current = Callable[[int], float | None]
 
@@ -214,16 +216,21 @@ Current = Callable[[int], float | None]
 def seconds_until_strained(
     current_ma: Current, servos: ServosConfig = SERVOS, cycle_s: float = BUS_S, most_s: float = 3.0
 ) -> float | None:
-    """When the fault comes, from the first reading on; `current_ma` of the third joint by cycle. None: not within `most_s`."""
+    """When the fault comes, from the first reading on; `current_ma` of the third joint by cycle. None: not within `most_s`.
+
+    600 stands for ``MOST_MA``.
+    """
     watch = BusMonitor()
     for n in range(round(most_s / cycle_s)):
         now_s = 64.0 + n * cycle_s
-        report = replace(GOOD_BUS, currents_ma=(40.0, 40.0, current_ma(n), None, 40.0, 40.0, 40.0))
+        drawn = current_ma(n)
+        drawn_ma = None if drawn is None else drawn / 600.0 * MOST_MA
+        report = replace(GOOD_BUS, currents_ma=(40.0, 40.0, drawn_ma, None, 40.0, 40.0, 40.0))
         watch = watch.update(report, now_s, servos, SAFETY)
         faults = [fault for fault in watch.faults(now_s, servos, SAFETY) if fault.cause is Cause.STRAINED]
         if faults:
             assert faults[0].detail.startswith("up up to ")
-            assert faults[0].detail.endswith("(at most 600 mA)")
+            assert faults[0].detail.endswith("(its 20 N are 70 mA)")
             return now_s - 64.0
     return None
 

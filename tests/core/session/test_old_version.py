@@ -71,7 +71,10 @@ def test_annotations_are_read_measured_and_written(version: str, tmp_path: Path)
 def test_a_rig_and_settings_are_read() -> None:
     rig = json.loads((OLD / "expected/rig_bench.json").read_text())
     del rig["path"]
-    assert _has_all(read_rig(OLD / "rig_bench.toml").model_dump(mode="json"), rig)
+    assert rig["servos"].pop("max_current_ma") == 600.0  # each joint has a force now
+    now = read_rig(OLD / "rig_bench.toml")
+    assert _has_all(now.model_dump(mode="json"), rig)
+    assert [joint.max_force_n for joint in now.servos.joints] == [20.0] * 4 + [30.0] * 3
     settings = read_settings(OLD / "settings.toml", may_move=False)
     assert settings.problems == ()
     assert (settings.config.rig.name, settings.config.camera.gain, settings.config.policy.name) == ("webcam", 16.0, "table")

@@ -448,6 +448,7 @@ def test_without_a_port_nothing_is_wrong() -> None:
     for check in (
         device_checks.check_servo_port(None),
         device_checks.check_servos(ServosConfig()),
+        device_checks.check_forces(ServosConfig()),
         device_checks.check_latency(None),
     ):
         _good(check, "not configured")
@@ -614,6 +615,18 @@ def test_a_weak_supply_and_an_overloaded_servo_are_found(bus: SoftServoBus) -> N
     _bad(device_checks.check_servos(ServosConfig(port=bus.port)), "75 .C at most", "cool below 70 .C")
     bus.modify_servo(2, lambda servo: servo.alert(32))
     _bad(device_checks.check_servos(ServosConfig(port=bus.port)), "hardware error, .*left: overload", "restart that servo")
+
+
+def test_forces_are_told_with_what_limits_them() -> None:
+    plain = ServosConfig(port="/dev/servos")
+    _good(device_checks.check_forces(plain), r"at most right 20 N \(70 mA\), .*advance 29 N \(105 mA\)")
+    small = ServosConfig(port="/dev/servos", model=1240)
+    _good(
+        device_checks.check_forces(small),
+        r"right \d+ N \(\d+ mA\) by XC330-M288, whose motor goes on when its own bus watchdog trips",
+    )
+    loads = ServosConfig(port="/dev/servos", model=1060)
+    _bad(device_checks.check_forces(loads), r"right 3\.2 of 10 mm/s, .*delivery_2 4\.8 of 20 mm/s", "raise the joint's max_force_n")
 
 
 # --- controls --------------------------------------------------------------------------------------------------------------------

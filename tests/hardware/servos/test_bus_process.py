@@ -139,7 +139,7 @@ def test_it_is_a_robot_that_moves_only_when_armed(servos: SoftServoBus, robot: S
         robot.arm()
     robot.zero()
     robot.arm()
-    status = _drive(robot, until=lambda status: servos.positions_mm()[4] > 1.0)
+    status = _drive(robot, until=lambda status: servos.positions_mm()[4] > 2.5)  # the wires come to their pretension slowly
     assert status.armed
     assert status.sent.order.command == FORWARD
     assert robot.send(FORWARD).advance_mm_s == pytest.approx(5.0, abs=2.5)

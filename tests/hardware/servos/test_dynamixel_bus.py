@@ -189,20 +189,22 @@ XM430, XL330 = SERVO_MODELS[1020], SERVO_MODELS[1200]
 
 
 def test_a_status_block_by_hand() -> None:
-    block = bytes.fromhex("A7 02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 2D 7800")
+    block = bytes.fromhex("A7 02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 2D 7800 1A00")
     state = registers.state_of(TENDON, XM430, -131_073, block, 5.0, 0xA7)
     assert state is not None
     assert (state.torque, state.error, state.watchdog_tripped) == (True, HardwareError.OVERLOAD, True)
     assert (state.goal_ticks, state.ticks, state.position_mm) == (-1024, -131_073, 0.0)
     assert (state.current_ma, state.voltage_v, state.temperature_c) == (pytest.approx(-246 * 2.69), 12.0, 45.0)
+    limited = [registers.state_of(TENDON, XM430, 0, block, 5.0, 0xA7, units) for units in (26, 27, 26 + 256)]
+    assert [one.is_limited for one in limited if one is not None] == [True, False, False]
     assert state.velocity_mm_s == pytest.approx(-65 * 0.229 / 60 * 40)
-    small = registers.state_of(TENDON, XL330, -131_073, block[:-2] + b"\x32", 5.0, 0xA7)
+    small = registers.state_of(TENDON, XL330, -131_073, block[:-4] + b"\x32\x1a", 5.0, 0xA7)
     assert small is not None
     assert (small.current_ma, small.voltage_v, small.temperature_c) == (-246.0, 5.0, 45.0)
 
 
 def test_a_supply_of_25_6_v_is_no_lost_block() -> None:
-    block = bytes.fromhex("A7 02 01 00 00 000000 0000 0000 000000 2D 0001")
+    block = bytes.fromhex("A7 02 01 00 00 000000 0000 0000 000000 2D 0001 1A00")
     assert registers.state_of(TENDON, SERVO_MODELS[1040], 0, block, 0.0, 0xA8) is None, "another mark: it has restarted"
     state = registers.state_of(TENDON, SERVO_MODELS[1040], 0, block, 0.0, 0xA7)
     assert state is not None
@@ -531,7 +533,7 @@ def test_a_mode_that_was_altered_is_mended_but_must_be_zeroed(twin: SoftServoBus
     with pytest.raises(NotReady, match="not zeroed: left"):
         armed.arm()
     assert not armed.is_armed
-    assert twin.servo(2).table["operating_mode"] == 4
+    assert twin.servo(2).table["operating_mode"] == 5
     armed.set_zero()
     armed.arm()
 
@@ -593,7 +595,15 @@ def test_the_arming_order(twin: SoftServoBus, closed: ServoBus) -> None:
     closed.arm()
     goal = (1003).to_bytes(4, "little")
     profile = (83).to_bytes(4, "little") + (65).to_bytes(4, "little")
-    assert _writes(twin, 3) == [(98, b"\0"), (108, profile), (132, b""), (116, goal), (64, b"\1"), (98, bytes([100]))]
+    assert _writes(twin, 3) == [
+        (98, b"\0"),
+        (102, b"\x1a\0"),
+        (108, profile),
+        (132, b""),
+        (116, goal),
+        (64, b"\1"),
+        (98, bytes([100])),
+    ]
     order = [(packet.id, packet.parameters[0]) for packet in twin.log if packet.instruction == Instruction.WRITE]
     assert order.index((1, 64)) > order.index((7, 98)), "all watchdogs off before the first torque is touched"
     assert closed.is_armed
@@ -1032,21 +1042,136 @@ def test_24_heat_and_voltage_are_told(twin: SoftServoBus, armed: ServoBus) -> No
     assert states[4].error == HardwareError(0)
 
 
-def test_25_a_jam_shows_as_distance_current_and_then_overload(twin: SoftServoBus, clock: Clock) -> None:
-    bus = ServoBus(CONFIG, twin.port)
+def test_25_a_jam_shows_as_distance_and_never_as_more_force_than_the_joint_may_give(
+    twin: SoftServoBus, armed: ServoBus, clock: Clock
+) -> None:
+    """The servo limits itself: neither half a second of overcurrent nor its own overload is waited for."""
+    twin.modify_servo(1, lambda servo: servo.freeze(True))
+    armed.write([2.0] + [0.0] * 6)
+    time.sleep(0.3)
+    state = _states(armed)[0]
+    assert (state.position_mm, state.goal_mm) == (0.0, pytest.approx(2.0, abs=0.005))
+    assert state.current_ma == pytest.approx(69.94)
+    clock.ahead_s += 60.0
+    state = _states(armed)[0]
+    assert (state.error, state.torque) == (HardwareError(0), True)
+
+
+def _force_n(twin: SoftServoBus, joint: JointConfig) -> float:
+    """Force at the joint's drum."""
+    return abs(twin.servo(joint.id).torque_mnm) / (joint.mm_per_turn / (2.0 * math.pi))
+
+
+@pytest.mark.parametrize(
+    ("model", "force_n", "mm_per_turn"),
+    [(1020, 5.0, 40.0), (1020, 20.0, 40.0), (1020, 20.0, 62.8), (1020, 40.0, 20.0), (1130, 30.0, 40.0), (1050, 20.0, 40.0),
+     (1200, 20.0, 40.0), (1190, 10.0, 20.0), (1240, 40.0, 40.0), (1220, 20.0, 40.0), (1060, 20.0, 40.0), (1080, 40.0, 40.0),
+     (1160, 30.0, 20.0)],
+)  # fmt: skip
+def test_a_blocked_horn_gives_no_more_than_the_joints_force(clock: Clock, model: int, force_n: float, mm_per_turn: float) -> None:
+    changed = {"max_force_n": force_n, "mm_per_turn": mm_per_turn, "model": model}
+    config = CONFIG.model_copy(update={"joints": tuple(joint.model_copy(update=changed) for joint in CONFIG.joints)})
+    twin = SoftServoBus(config, clock=clock, positions=[1000] * 7)
+    twin.start()
+    bus = ServoBus(config, twin.port)
+    try:
+        bus.open()
+        bus.set_zero()
+        bus.arm()
+        for joint in config.joints:
+            twin.modify_servo(joint.id, lambda servo: servo.freeze(True))
+        for goal_mm in (0.6, -0.6, 2.5, -2.0):
+            bus.write([goal_mm] * 7)
+            for _ in range(10):
+                _states(bus)
+                assert all(_force_n(twin, joint) <= force_n for joint in config.joints)
+                clock.ahead_s += 0.05
+        assert all(_force_n(twin, joint) > 0.5 * force_n for joint in config.joints), "they do pull"
+    finally:
+        bus.close()
+        twin.stop()
+
+
+# --- force is limited in the servo -----------------------------------------------------------------------------------------------
+
+
+def _limits(twin: SoftServoBus) -> list[int]:
+    return [twin.servo(joint.id).table["goal_current"] for joint in CONFIG.joints]
+
+
+def test_the_force_limit_is_in_the_servos_before_their_torque_comes_on(twin: SoftServoBus, bus: ServoBus) -> None:
+    bus.set_zero()
+    twin.log.clear()
+    bus.arm()
+    assert _limits(twin) == [26] * 4 + [39] * 3
+    assert all(twin.servo(joint.id).table["operating_mode"] == 5 for joint in CONFIG.joints)
+    for joint in CONFIG.joints:
+        order = [packet.parameters[0] for packet in twin.log if packet.id == joint.id and packet.instruction == Instruction.WRITE]
+        assert order.index(102) < order.index(64)
+
+
+def test_a_servo_that_is_itself_limited_to_less_keeps_that(twin: SoftServoBus, bus: ServoBus) -> None:
+    bus.set_zero()
+    twin.modify_servo(2, lambda servo: servo.table.__setitem__("current_limit", 10))
+    bus.arm()
+    assert _limits(twin) == [26, 10, 26, 26, 39, 39, 39]
+    assert all(state.is_limited for state in _states(bus))
+
+
+def test_a_servo_that_takes_no_force_limit_is_not_switched_on(
+    twin: SoftServoBus, bus: ServoBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus.set_zero()
+    write = ServoLine.write
+    monkeypatch.setattr(ServoLine, "write", lambda line, i, at, data: None if (i, at) == (4, 102) else write(line, i, at, data))
+    with pytest.raises(WriteRefused, match=r"servo down \(id 4\) did not take its force limit"):
+        bus.arm()
+    assert _torques(twin) == [0] * 7
+
+
+def test_a_force_limit_that_another_master_takes_away_is_seen(twin: SoftServoBus, armed: ServoBus) -> None:
+    assert all(state.is_limited for state in _states(armed))
+    twin.modify_servo(6, lambda servo: servo.answer(3, 102, data=(1193).to_bytes(2, "little")))
+    assert [state.is_limited for state in _states(armed)] == [True] * 5 + [False, True]
+
+
+def test_after_a_change_of_the_mode_the_limit_is_there_before_it_holds_again(twin: SoftServoBus, armed: ServoBus) -> None:
+    """A servo that holds lets go for a register of its EEPROM, and holds again at once."""
+    armed.disarm()
+    twin.modify_servo(3, lambda servo: servo.table.__setitem__("return_delay", 100))
+    twin.modify_servo(3, lambda servo: servo.table.__setitem__("goal_current", 1193))
+    twin.log.clear()
+    armed.arm()
+    order = [(packet.id, packet.parameters[0], packet.parameters[2:]) for packet in twin.log if packet.instruction == 3]
+    held_again = [at for at, (servo_id, register, data) in enumerate(order) if (servo_id, register, data) == (3, 64, b"\1")]
+    assert order.index((3, 102, b"\x1a\0")) < held_again[0]
+    assert _limits(twin)[2] == 26
+
+
+@pytest.fixture
+def load_bus(clock: Clock) -> Iterator[tuple[SoftServoBus, ServoBus]]:
+    """Tendons with a model that reports no current: its duty is limited."""
+    joints = tuple(j.model_copy(update={"model": 1080, "max_force_n": 40.0}) if j.id <= 4 else j for j in CONFIG.joints)
+    config = ServosConfig.model_validate({**CONFIG.model_dump(), "joints": joints})
+    twin = SoftServoBus(config, clock=clock, positions=[1000] * 7)
+    twin.start()
+    bus = ServoBus(config, twin.port)
     bus.open()
     bus.set_zero()
     bus.arm()
-    twin.modify_servo(1, lambda servo: servo.freeze(True))
-    bus.write([2.0] + [0.0] * 6)
-    time.sleep(0.3)
-    state = _states(bus)[0]
-    assert (state.position_mm, state.goal_mm) == (0.0, pytest.approx(2.0, abs=0.005))
-    assert state.current_ma > 1500.0
-    clock.ahead_s += 1.1
-    state = _states(bus)[0]
-    assert (state.error, state.torque) == (HardwareError.OVERLOAD, False)
+    yield twin, bus
     bus.close()
+    twin.stop()
+
+
+def test_a_model_without_current_is_limited_by_its_duty(load_bus: tuple[SoftServoBus, ServoBus]) -> None:
+    twin, bus = load_bus
+    # 40 N on a drum of 40 mm a turn: 0.2546 Nm of 1.9 Nm at 12 V, at 14.8 V 10.9 %: 96 of 885
+    assert [twin.servo(joint.id).table["goal_pwm"] for joint in CONFIG.joints] == [96] * 4 + [885] * 3
+    assert [twin.servo(joint.id).table["operating_mode"] for joint in CONFIG.joints] == [4] * 4 + [5] * 3
+    assert [state.current_ma is None for state in _states(bus)] == [True] * 4 + [False] * 3
+    twin.modify_servo(2, lambda servo: servo.answer(3, 100, data=(885).to_bytes(2, "little")))
+    assert [state.is_limited for state in _states(bus)] == [True, False, True, True, True, True, True]
 
 
 def _has_backup(servo: SoftServo, startup: int) -> None:
@@ -1062,7 +1187,7 @@ def test_27_startup_configuration_is_set_to_0(
     """While the torque is off; a servo that holds is left alone until it is switched on."""
     for servo_id in (3, 5):
         twin.modify_servo(servo_id, lambda servo: _has_backup(servo, startup))
-    twin.modify_servo(5, lambda servo: servo.table.__setitem__("operating_mode", 4))
+    twin.modify_servo(5, lambda servo: servo.table.__setitem__("operating_mode", 5))
     twin.modify_servo(5, lambda servo: servo.table.__setitem__("torque", 1))
     closed.open()
     assert [twin.servo(servo_id).table["startup"] for servo_id in (3, 5)] == [0, startup]
@@ -1271,13 +1396,22 @@ def test_small_and_strong_servos_work_together(mixed: tuple[SoftServoBus, ServoB
 
 def test_currents_of_several_models_are_told_in_their_units(mixed: tuple[SoftServoBus, ServoBus]) -> None:
     twin, bus = mixed
-    twin.modify_servo(1, lambda servo: servo.grind(1000.0))  # in the winding: 1008 mA, of 1470 mA at stall
-    twin.modify_servo(5, lambda servo: servo.grind(100.0))
-    small, strong = (_until(bus, index, lambda r: isinstance(r, ServoState) and (r.current_ma or 0.0) > 90.0) for index in (0, 4))
+    twin.modify_servo(1, lambda servo: servo.grind(200.0))  # in the winding: 208 mA, of 1470 mA at stall
+    twin.modify_servo(5, lambda servo: servo.grind(50.0))
+    small, strong = (_until(bus, index, lambda r: isinstance(r, ServoState) and (r.current_ma or 0.0) > 25.0) for index in (0, 4))
     assert isinstance(small, ServoState)
     assert isinstance(strong, ServoState)
-    assert small.current_ma == pytest.approx(1008.0**2 / 1470.0, abs=1.0), "of the supply"
-    assert strong.current_ma == pytest.approx(108.0, abs=3.0)
+    assert small.current_ma == pytest.approx(208.0**2 / 1470.0, abs=1.0), "of the supply"
+    assert strong.current_ma == pytest.approx(58.0, abs=3.0)
+
+
+def test_a_small_servo_that_restarts_is_seen_also_where_it_restores_its_block(mixed: tuple[SoftServoBus, ServoBus]) -> None:
+    twin, bus = mixed
+    twin.modify_servo(2, lambda servo: _has_backup(servo, 2))
+    twin.modify_servo(2, lambda servo: servo.restart(0.0))
+    reading = _until(bus, 1, lambda r: isinstance(r, MissingServo) and r.restarted)
+    assert isinstance(reading, MissingServo)
+    assert bus.zero_ticks[1] is None
 
 
 @pytest.mark.parametrize("servo_id", [2, 6])
