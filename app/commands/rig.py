@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.commands.accept import accept_rig, acceptance_lines, config_of
 from app.commands.options import ConfigOption, JsonOption
 from app.ui.texts import calibrated_parts, calibration_lines, rig_line
 from core.calibration.camera import BoardError, BoardSpec
+from core.config.acceptance import read_acceptance
 from core.config.models import Config
 from core.config.rig_file import (
     RESERVED,
@@ -43,6 +45,7 @@ ColumnsOption = Annotated[int, typer.Option(min=4, max=40, help="squares across"
 RowsOption = Annotated[int, typer.Option(min=4, max=40, help="squares down")]
 
 rig = typer.Typer(help="Rigs: camera, servos and calibration of a bench, in one file.", no_args_is_help=True)
+rig.command("accept")(accept_rig)
 
 
 @rig.command("list")
@@ -80,6 +83,8 @@ def _print_rig(path: Path, found: RigFile, notes: list[str] | None = None, *, as
         sys.stdout.write(json.dumps({**result, **found.model_dump(mode="json")}) + "\n")
     else:
         lines = [f"{found.name} ({path})", rig_line(found), *calibration_lines(found), *(notes or [])]
+        if found.robot == "servos":
+            lines += acceptance_lines(read_acceptance(path), config_of(path, found))
         sys.stdout.write("\n".join(lines) + "\n")
 
 

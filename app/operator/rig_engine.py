@@ -32,7 +32,9 @@ class RigEngine(Engine):
 
     def __init__(self, rig: Rig, perceive: Perceive, config: Config, model: ModelReport, left_over: LeftOver | None = None) -> None:
         policy = make_policy(config.policy.name, config)
-        readiness = read_readiness(config) if rig.kind is RigKind.LIVE else READY
+        status = rig.robot.bus_status() if isinstance(rig.robot, ServoRobot) else None
+        firmware = status.firmware if status is not None else ()
+        readiness = read_readiness(config, firmware) if rig.kind is RigKind.LIVE else READY
         pilot = Pilot(rig.robot, policy, config, model, left_over=left_over, readiness=readiness) if rig.robot is not None else None
         super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
         self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None

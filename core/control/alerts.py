@@ -112,6 +112,11 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
         "set perception.quality.enabled, and max_novelty to 1.25 at most",
     ),
     Hindrance.POLICY_BLIND: ("The policy does not look at the picture", "set policy.name to pursuit or table"),
+    Hindrance.NOT_ACCEPTED: ("The rig was not accepted", "close it, then main.py rig accept NAME; by hand you can drive"),
+    Hindrance.ACCEPTANCE_OUTDATED: (
+        "The rig was changed since it was accepted",
+        "main.py rig show NAME says what; close it, then main.py rig accept NAME",
+    ),
     RejectReason.NON_FINITE: ("Command is not a number", "nothing to do; report it if it comes again"),
     RejectReason.WRONG_COUNT: ("Command has the wrong number of joints", "report it with the log"),
     RejectReason.FROM_THE_FUTURE: ("Command is from the future", "start the program again"),

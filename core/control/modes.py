@@ -59,6 +59,8 @@ class Hindrance(StrEnum):
     MODEL_UNTAUGHT = "model not taught on this bench"
     CHECKS_OFF = "checks of perception switched off"
     POLICY_BLIND = "policy does not look at the picture"
+    NOT_ACCEPTED = "rig not accepted"
+    ACCEPTANCE_OUTDATED = "rig changed since it was accepted"
 
 
 OF_THE_RIG = frozenset(
@@ -71,6 +73,8 @@ OF_THE_RIG = frozenset(
         Hindrance.MODEL_UNTAUGHT,
         Hindrance.CHECKS_OFF,
         Hindrance.POLICY_BLIND,
+        Hindrance.NOT_ACCEPTED,
+        Hindrance.ACCEPTANCE_OUTDATED,
     }
 )
 """What a LIVE rig lacks (``readiness``): nothing that happens while it is open changes it."""

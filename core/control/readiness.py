@@ -1,12 +1,15 @@
-"""What a LIVE rig needs before the program may drive it: learnt directions, a model of this bench, a policy that looks. Pure.
+"""What a LIVE rig needs before the program may drive it: learnt directions, a model of this bench, a policy, an acceptance. Pure.
 
 A rig without it stays advisory: pictures, advice and driving by hand. On a simulated rig nothing hinders.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
+from core.config.acceptance import Acceptance, AcceptanceError, is_outdated, read_acceptance
 from core.config.models import Config, PolicyName, QualityConfig
 from core.config.rig_file import RigFile, rig_in_use
 from core.config.safety import wiring_of
@@ -33,7 +36,9 @@ READY = Readiness()
 """Of a simulated rig."""
 
 
-def readiness_of(config: Config, rig: RigFile | None, model: ModelInfo | None) -> Readiness:
+def readiness_of(
+    config: Config, rig: RigFile | None, model: ModelInfo | None, accepted: Acceptance | None, firmware: Sequence[int] = ()
+) -> Readiness:
     """Of a LIVE rig.
 
     Parameters
@@ -41,6 +46,8 @@ def readiness_of(config: Config, rig: RigFile | None, model: ModelInfo | None) -
     config : as it drives.
     rig : its rig file; None: it has none, so nothing of it was learnt.
     model : the manifest of the model that perceives; None: it cannot be read, which another check reports.
+    accepted : the acceptance of the rig; None: there is none, or it cannot be read.
+    firmware : of the seven servos; empty: they were not asked.
     """
     found: list[Hindrance] = []
     known = rig.calibration if rig is not None else None
@@ -64,6 +71,11 @@ def readiness_of(config: Config, rig: RigFile | None, model: ModelInfo | None) -
         found.append(Hindrance.CHECKS_OFF)
     if config.policy.name in BLIND_POLICIES:
         found.append(Hindrance.POLICY_BLIND)
+    changed = accepted is not None and is_outdated(accepted, config, firmware)
+    if accepted is None or (accepted.missing and not changed):
+        found.append(Hindrance.NOT_ACCEPTED)
+    elif changed:
+        found.append(Hindrance.ACCEPTANCE_OUTDATED)
     return Readiness(tuple(found), keyboard_deadman=rig is not None and rig.keyboard_deadman)
 
 
@@ -72,11 +84,15 @@ def _is_taught(config: Config, rig: RigFile, model: ModelInfo) -> bool:
     return rig.bench is not None and rig.model == config.perception.segmentation.model and "taught" in model.training
 
 
-def read_readiness(config: Config) -> Readiness:
-    """The same with rig file and manifest read from disk. Raises RigFileError."""
+def read_readiness(config: Config, firmware: Sequence[int] = ()) -> Readiness:
+    """The same with rig file, acceptance and manifest read from disk. Raises RigFileError."""
     found = rig_in_use(config)
     try:
         model = read_model_info(model_folder(config.perception.segmentation.model), verify=())
     except ModelError:
         model = None
-    return readiness_of(config, found[1] if found is not None else None, model)
+    accepted = None
+    if found is not None:
+        with suppress(AcceptanceError):  # ``doctor`` and ``rig show`` say what is wrong with it
+            accepted = read_acceptance(found[0])
+    return readiness_of(config, found[1] if found is not None else None, model, accepted, firmware)

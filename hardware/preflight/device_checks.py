@@ -5,11 +5,13 @@ They only look: no torque, no goal, no setting is ever written.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import grp
 import os
 import select
+import shlex
 import shutil
 import stat
 import subprocess
@@ -17,8 +19,9 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from core.config.acceptance import AcceptanceError, problems_of, read_acceptance
 from core.config.models import Config, GamepadConfig, PedalConfig
-from core.config.rig_file import RigFileError, as_calibrated
+from core.config.rig_file import RigFileError, as_calibrated, rig_in_use
 from core.config.safety import ServosConfig
 from core.control.alerts import ALERTS
 from core.control.readiness import read_readiness
@@ -133,6 +136,39 @@ def check_readiness(config: Config) -> Check:
         deadman = "" if found.keyboard_deadman else "; with pedal or gamepad as deadman"
         return Check(name, True, f"directions, steering, model and policy are as needed{deadman}")
     return Check(name, False, "; ".join(lack.text for lack in lacks), "; ".join(lack.what_to_do for lack in lacks))
+
+
+def check_acceptance(config: Config) -> Check:
+    """Whether a rig with real servos was accepted, and nothing has changed since."""
+    name = "acceptance"
+    if kind_of(config.rig) is not RigKind.LIVE or config.rig.robot == "none":
+        return Check(name, True, "only asked of a rig with a real robot")
+    again = f"main.py rig accept {shlex.quote(config.rig.name)}"
+    try:
+        found = rig_in_use(config)
+        accepted = read_acceptance(found[0]) if found is not None else None
+    except (AcceptanceError, RigFileError) as error:
+        return Check(name, False, one_line(error), f"{again} --anew")
+    firmware: tuple[int, ...] = ()
+    with contextlib.suppress(ImportError, DeviceError):  # what hinders it is told by other checks
+        firmware = _firmware(config.servos)
+    if problems := problems_of(accepted, config, firmware):
+        return Check(name, False, "; ".join(problems), again)
+    assert accepted is not None
+    return Check(name, True, f"by {accepted.operator}, {accepted.finished_utc or accepted.begun_utc:%Y-%m-%d}")
+
+
+def _firmware(servos: ServosConfig) -> tuple[int, ...]:
+    """Versions of the servos' firmware, by joint. Raises DeviceError."""
+    from hardware.servos.dynamixel_bus import identify
+    from hardware.servos.dynamixel_port import ServoLine
+
+    line = ServoLine(servos.port or "", servos.baud)
+    line.open()
+    try:
+        return tuple(found.firmware for found in identify(line, servos))
+    finally:
+        line.close()
 
 
 def list_cameras() -> Check:

@@ -38,6 +38,7 @@ CHECKS: dict[str, tuple[Callable[[Config], Check], Level | None]] = {
     "model": (lambda config: model_checks.check_model(config.perception.segmentation.model), Level.BAD),
     "self-test": (lambda config: model_checks.check_self_test(config.perception), Level.BAD),
     "driving by program": (device_checks.check_readiness, None),
+    "acceptance": (device_checks.check_acceptance, None),
     "cameras found": (lambda config: device_checks.list_cameras(), None),
     "camera": (device_checks.check_camera, Level.BAD),
     "picture": (device_checks.check_picture, None),

@@ -147,6 +147,7 @@ class BusStatus:
     rejection, clamps, at_end : what the gate said in this cycle.
     rejections, clamp_count : the same counted.
     zeroed : by joint.
+    firmware : versions of the servos' firmware, by joint; empty while the port is closed.
     releasing : whether tendons are being let go slowly.
     offers : where joints that are not zeroed stand by their kept zeros, for the operator to confirm.
     torque_offs : how often the torque was switched off and read back; ``torque_problem`` why a requested one is not confirmed yet.
@@ -174,6 +175,7 @@ class BusStatus:
     offers: tuple[ZeroOffer, ...] = ()
     torque_offs: int = 0
     torque_problem: str = ""
+    firmware: tuple[int, ...] = ()
 
     @property
     def armed(self) -> bool:

@@ -663,6 +663,7 @@ class BusLoop:
                 times=self._timer.summary,
                 zeroed=zeroed,
                 offers=tuple(offer for offer in offers if offer.name not in known),
+                firmware=tuple(servo.firmware for servo in self._bus.identities),
             )
         )
 

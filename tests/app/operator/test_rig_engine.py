@@ -139,6 +139,7 @@ def test_a_live_rig_that_nothing_was_learnt_of_is_advisory_only_and_a_twin_is_no
         Hindrance.STEERING_UNKNOWN,
         Hindrance.MODEL_UNTAUGHT,
         Hindrance.POLICY_BLIND,
+        Hindrance.NOT_ACCEPTED,
     }
     assert set(view.against_arming) & OF_THE_RIG == (lacks if kind is RigKind.LIVE else set())
     assert view.keyboard_deadman is (kind is RigKind.SIM)

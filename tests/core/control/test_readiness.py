@@ -8,12 +8,14 @@ from typing import Any
 
 import pytest
 
+from core.config.acceptance import Acceptance, write_acceptance
 from core.config.models import Config, load_config
 from core.config.rig_file import RigFile, as_calibrated, make_rig, read_rig, with_rig, write_rig
 from core.config.safety import TENDONS, wiring_of
 from core.control.modes import OF_THE_RIG, Hindrance
 from core.control.readiness import Readiness, read_readiness, readiness_of
 from core.perception.model_file import ModelInfo, model_folder, read_model_info
+from tests.core.config.test_acceptance import accepted_rig
 
 LIVE = load_config(
     overrides={
@@ -30,6 +32,7 @@ STEERING = {
     "tendons": [{"name": name, "moved_px": 8.0, "px_per_mm": 20.0} for name in TENDONS],
 }
 SHIPPED = read_model_info(model_folder("default"), verify=())
+ACCEPTED = accepted_rig(LIVE)
 TAUGHT = SHIPPED.model_copy(update={"name": "mine", "training": {"taught": {"bench": "lab", "frames": 18}}})
 
 
@@ -45,11 +48,11 @@ def _config(rig: RigFile, overrides: dict[str, Any] | None = None) -> Config:
 
 def _lacks(rig: RigFile | None, model: ModelInfo | None = TAUGHT, overrides: dict[str, Any] | None = None) -> set[Hindrance]:
     config = _config(rig if rig is not None else _rig(), overrides)
-    return set(readiness_of(config, rig, model).hindrances)
+    return set(readiness_of(config, rig, model, ACCEPTED).hindrances)
 
 
 def test_a_rig_that_was_calibrated_and_taught_is_ready() -> None:
-    assert readiness_of(_config(_rig()), _rig(), TAUGHT) == Readiness((), keyboard_deadman=False)
+    assert readiness_of(_config(_rig()), _rig(), TAUGHT, ACCEPTED, [45] * 7) == Readiness((), keyboard_deadman=False)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +90,7 @@ def test_another_model_than_the_rigs_is_not_the_taught_one() -> None:
     config = _config(_rig())
     segmentation = config.perception.segmentation.model_copy(update={"model": "before"})
     config = config.model_copy(update={"perception": config.perception.model_copy(update={"segmentation": segmentation})})
-    assert set(readiness_of(config, _rig(), TAUGHT).hindrances) == {Hindrance.MODEL_UNTAUGHT}
+    assert set(readiness_of(config, _rig(), TAUGHT, ACCEPTED).hindrances) == {Hindrance.MODEL_UNTAUGHT}
 
 
 def test_a_reference_of_pictures_of_another_size_says_nothing() -> None:
@@ -107,7 +110,23 @@ def test_perceptions_own_checks_must_be_on(quality: dict[str, Any]) -> None:
 
 def test_without_a_rig_file_nothing_was_learnt() -> None:
     assert _lacks(None) == {Hindrance.DIRECTIONS_UNKNOWN, Hindrance.STEERING_UNKNOWN, Hindrance.MODEL_UNTAUGHT}
-    assert not readiness_of(LIVE, None, TAUGHT).keyboard_deadman
+    assert not readiness_of(LIVE, None, TAUGHT, ACCEPTED).keyboard_deadman
+
+
+@pytest.mark.parametrize(
+    ("accepted", "firmware", "lack"),
+    [
+        (None, (), Hindrance.NOT_ACCEPTED),
+        (accepted_rig(LIVE, estop=None), (), Hindrance.NOT_ACCEPTED),
+        (ACCEPTED, (45, 45, 45, 45, 45, 45, 46), Hindrance.ACCEPTANCE_OUTDATED),
+        (accepted_rig(LIVE, basis=ACCEPTED.basis.model_copy(update={"major": "77"})), (), Hindrance.ACCEPTANCE_OUTDATED),
+    ],
+)
+def test_a_rig_that_was_not_accepted_as_it_is_stays_advisory(
+    accepted: Acceptance | None, firmware: tuple[int, ...], lack: Hindrance
+) -> None:
+    assert readiness_of(_config(_rig()), _rig(), TAUGHT, accepted, firmware).hindrances == (lack,)
+    assert lack in OF_THE_RIG
 
 
 def test_every_lack_is_one_of_the_rig() -> None:
@@ -123,6 +142,9 @@ def test_the_keyboard_is_a_deadman_where_the_rig_file_says_so(tmp_path: Path) ->
     assert not read_readiness(config).keyboard_deadman
     path.write_text(path.read_text().replace("keyboard_deadman = false", "keyboard_deadman = true"))
     assert read_readiness(config).keyboard_deadman
+    assert set(read_readiness(config).hindrances) == {Hindrance.MODEL_UNTAUGHT, Hindrance.NOT_ACCEPTED}
+    write_acceptance(path, accepted_rig(config))
     assert set(read_readiness(config).hindrances) == {Hindrance.MODEL_UNTAUGHT}
+    assert set(read_readiness(config, (46,) * 7).hindrances) == {Hindrance.MODEL_UNTAUGHT, Hindrance.ACCEPTANCE_OUTDATED}
     again = make_rig(config, "lab", read_rig(path).calibration)
     assert again.keyboard_deadman, "a rig that is calibrated again keeps it"

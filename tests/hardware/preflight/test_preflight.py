@@ -415,6 +415,9 @@ def test_what_a_real_rig_lacks_for_driving_by_program_is_told_with_what_to_do(ow
     assert device_checks.check_readiness(looked_at).ok
     gone = Config.model_validate(real | {"rig": {"camera": "webcam", "robot": "servos", "file": "/nowhere/lab.toml"}})
     assert "no such rig file" in device_checks.check_readiness(gone).detail
+    assert "was not accepted" in found.detail
+    assert device_checks.check_acceptance(twin).ok
+    _bad(device_checks.check_acceptance(Config.model_validate(real)), "no acceptance is recorded", "main.py rig accept")
 
 
 def test_a_real_camera_is_tried() -> None:

@@ -133,6 +133,7 @@ def _settle_mm(servos: SoftServoBus, most_s: float = 2.0) -> float:
 def test_it_is_a_robot_that_moves_only_when_armed(servos: SoftServoBus, robot: ServoRobot) -> None:
     as_protocol: Robot = robot
     assert as_protocol.send(FORWARD) == Command()
+    assert robot.bus_status().firmware == (servos.servo(1).table["firmware"],) * 7
     _drive(robot, 0.2)
     assert servos.positions_mm()[4] == 0.0
     with pytest.raises(NotReady, match="not zeroed"):

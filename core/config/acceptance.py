@@ -1,0 +1,286 @@
+"""The acceptance of a rig with real servos: what was checked, when and by whom, and whether it still holds. Pure but for its file.
+
+It lies beside the rig file as NAME.acceptance.json. It holds for the servos, directions, ways, force limits, STOP behaviour and
+major version of the program that it was made with (``Basis``): when one of them changes, the rig is advisory until it is accepted
+again.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tomllib
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from core.config.models import Config
+from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig, wiring_of
+from core.config.section import ConfigSection, first_problem
+from core.devices import UserError
+from core.files import write_atomic
+
+FORMAT = 1
+FORCE_ALLOWANCE = 1.1
+"""A force that is read may be so many times the configured one."""
+STOP_TRIES = 3
+"""Stops that are timed of each kind."""
+MOST_STOP_MS = 500.0
+"""A longer way to stand-still is no stop: the rules end every motion after 500 ms."""
+ESTOP_STEP = "E-stop"
+_ENDING, _OLDER = ".acceptance.json", ".acceptance.older.json"
+_MAX_BYTES = 200_000
+_SOURCE = Path(__file__).resolve().parents[2]
+
+
+class AcceptanceError(UserError):
+    """An acceptance cannot be read or saved, or a step of it failed; one line says what to do."""
+
+
+class StopBehaviour(ConfigSection):
+    """What decides how the rig stops."""
+
+    torque_off_on_stop: bool
+    watchdog_s: float
+    heartbeat_timeout_s: float
+    command_max_age_s: float
+    deadman_timeout_s: float
+
+
+class Basis(ConfigSection):
+    """What an acceptance holds for; tuples are per joint, in the order of JOINT_NAMES."""
+
+    wiring: tuple[tuple[int, int], ...] = Field(description="id and sign")
+    models: tuple[int, ...]
+    mm_per_turn: tuple[float, ...]
+    max_force_n: tuple[float, ...]
+    stop: StopBehaviour
+    major: str = Field(description="major version of the program")
+
+
+class AcceptedServo(ConfigSection):
+    """A servo as it answered. X series servos have no serial number: model, firmware and id are their identity."""
+
+    name: JointName
+    id: int
+    model: int
+    firmware: int
+
+
+class ForceReading(ConfigSection):
+    """The force of an axis that the operator read from a scale, and what the servo's own current says (None: it reports none)."""
+
+    name: JointName
+    limit_n: float = Field(gt=0.0)
+    read_n: float = Field(gt=0.0)
+    by_current_n: float | None = None
+
+    @model_validator(mode="after")
+    def _check_force(self) -> Self:
+        if problem := force_problem(self.name, self.read_n, self.limit_n):
+            raise ValueError(problem)
+        return self
+
+
+class StopTimes(ConfigSection):
+    """Milliseconds from the event to stand-still, as the servo's own positions show it; resolution: a cycle of the bus."""
+
+    kind: Literal["STOP", "deadman"]
+    joint: JointName
+    speed_mm_s: float
+    times_ms: tuple[float, ...] = Field(min_length=STOP_TRIES)
+    way_mm: float = Field(description="longest way after the event")
+
+    @model_validator(mode="after")
+    def _check_times(self) -> Self:
+        if max(self.times_ms) > MOST_STOP_MS:
+            raise ValueError(f"{self.kind}: {max(self.times_ms):.0f} ms to stand-still, at most {MOST_STOP_MS:.0f} ms")
+        return self
+
+
+class EstopRecord(ConfigSection):
+    """The E-stop was pressed and released."""
+
+    cause: str = Field(description="the program's cause for disarming")
+    silent_ms: float = Field(description="from the last whole answer of the servos to disarmed")
+    refused: str = Field(description="why arming was refused while it was pressed")
+    refused_after: str = Field(description="and when power was back, before the joints were zeroed")
+
+
+class Acceptance(ConfigSection):
+    """An acceptance, complete or not yet (``missing``)."""
+
+    format: int = Field(FORMAT, ge=1)
+    rig: str
+    operator: str = Field(min_length=1, max_length=100)
+    begun_utc: datetime
+    finished_utc: datetime | None = None
+    version: str
+    commit: str | None = None
+    basis: Basis
+    adapter: str = Field("", description="path of the servo port, which holds the adapter's serial number")
+    camera: str = Field("", description="serial number or stable path")
+    servos: tuple[AcceptedServo, ...] = ()
+    supply_v: tuple[float, float] | None = Field(None, description="lowest and highest that the servos told")
+    directions: tuple[JointName, ...] = Field((), description="confirmed by eye")
+    forces: tuple[ForceReading, ...] = ()
+    stops: tuple[StopTimes, ...] = ()
+    estop: EstopRecord | None = None
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The steps that are not done, in their order."""
+        read = {reading.name for reading in self.forces}
+        found = [] if len(self.servos) == len(JOINT_NAMES) and self.supply_v is not None else ["servos"]
+        found += [f"direction of {name}" for name in JOINT_NAMES if name not in self.directions]
+        found += [f"force of {name}" for name in JOINT_NAMES if name not in read]
+        found += [f"{kind} times" for kind in ("STOP", "deadman") if kind not in {one.kind for one in self.stops}]
+        return (*found, *([] if self.estop is not None else [ESTOP_STEP]))
+
+
+def force_problem(name: str, read_n: float, limit_n: float) -> str:
+    """Why a force that was read is refused; "" when it is not."""
+    most_n = FORCE_ALLOWANCE * limit_n
+    if read_n <= most_n:
+        return ""
+    return (
+        f"{name} pulled {read_n:g} N, at most {most_n:g} N ({limit_n:g} N and 10 %): correct mm_per_turn, or lower its "
+        "max_force_n, then try again"
+    )
+
+
+def basis_of(servos: ServosConfig, safety: SafetyConfig, version: str) -> Basis:
+    """What an acceptance of this configuration would hold for."""
+    return Basis(
+        wiring=wiring_of(servos),
+        models=tuple(servos.model_of(joint).number for joint in servos.joints),
+        mm_per_turn=tuple(joint.mm_per_turn for joint in servos.joints),
+        max_force_n=tuple(joint.max_force_n for joint in servos.joints),
+        stop=StopBehaviour(
+            torque_off_on_stop=servos.torque_off_on_stop,
+            watchdog_s=servos.watchdog_s,
+            heartbeat_timeout_s=servos.heartbeat_timeout_s,
+            command_max_age_s=safety.command_max_age_s,
+            deadman_timeout_s=safety.deadman_timeout_s,
+        ),
+        major=version.partition(".")[0],
+    )
+
+
+def changes_since(accepted: Acceptance, now: Basis, firmware: Sequence[int] = ()) -> tuple[str, ...]:
+    """What an acceptance no longer holds for, each in a few words.
+
+    Parameters
+    ----------
+    firmware : of the seven servos, in the order of the joints; empty: they were not asked.
+    """
+    then, found = accepted.basis, []
+    columns: tuple[tuple[str, Sequence[Any], Sequence[Any]], ...] = (
+        ("id", [one[0] for one in then.wiring], [one[0] for one in now.wiring]),
+        ("sign", [one[1] for one in then.wiring], [one[1] for one in now.wiring]),
+        ("model", then.models, now.models),
+        ("mm_per_turn", then.mm_per_turn, now.mm_per_turn),
+        ("max_force_n", then.max_force_n, now.max_force_n),
+        ("firmware", [servo.firmware for servo in accepted.servos], firmware),
+    )
+    for what, before, after in columns:
+        for name, old, new in zip(JOINT_NAMES, before, after, strict=False):
+            if old != new:
+                found.append(f"{what} of {name} was {old:g} and is {new:g}")
+    for key, old in then.stop:
+        if (new := getattr(now.stop, key)) != old:
+            found.append(f"{key} was {old} and is {new}")
+    if then.major != now.major:
+        found.append(f"version of the program was {accepted.version}")
+    return tuple(found)
+
+
+def is_outdated(accepted: Acceptance, config: Config, firmware: Sequence[int] = ()) -> bool:
+    """Whether something has changed since."""
+    return bool(changes_since(accepted, basis_of(config.servos, config.safety, program_version()), firmware))
+
+
+def problems_of(accepted: Acceptance | None, config: Config, firmware: Sequence[int] = ()) -> tuple[str, ...]:
+    """Why a rig of this configuration is not accepted; empty when it is."""
+    if accepted is None:
+        return ("no acceptance is recorded",)
+    if changed := changes_since(accepted, basis_of(config.servos, config.safety, program_version()), firmware):
+        return changed
+    return tuple(f"not done: {step}" for step in accepted.missing)
+
+
+def program_version() -> str:
+    """Version of this program, which runs from its source; "0" where that does not say."""
+    try:
+        return str(tomllib.loads((_SOURCE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"])
+    except (OSError, ValueError, KeyError):
+        return "0"
+
+
+def program_commit() -> str | None:
+    """Commit of the source that runs, with "+" when files differ from it; None where that is not known."""
+    try:
+        told = subprocess.run(
+            ["git", "-C", str(_SOURCE), "describe", "--always", "--dirty=+", "--abbrev=12"],
+            capture_output=True,
+            text=True,
+            timeout=5.0,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return told.stdout.strip() or None
+
+
+def acceptance_path(rig_file: Path) -> Path:
+    """Where the acceptance of a rig file lies."""
+    return rig_file.with_name(rig_file.stem + _ENDING)
+
+
+def read_acceptance(rig_file: Path) -> Acceptance | None:
+    """The acceptance of a rig file; None without one. Raises AcceptanceError; the file is never changed."""
+    path = acceptance_path(rig_file)
+    again = "accept the rig again (main.py rig accept NAME --anew)"
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise AcceptanceError(f"{path}: cannot be read ({error.strerror})") from None
+    if len(data) > _MAX_BYTES:
+        raise AcceptanceError(f"{path}: too large for an acceptance: {again}")
+    try:
+        found = Acceptance.model_validate_json(data)
+    except ValidationError as error:
+        raise AcceptanceError(f"{path}: {first_problem(error)}; the file is kept: {again}") from None
+    if found.format > FORMAT:
+        raise AcceptanceError(f"{path}: format {found.format} is of a newer version: update the program, or {again}")
+    return found
+
+
+def write_acceptance(rig_file: Path, accepted: Acceptance, *, keeps_older: bool = False) -> Path:
+    """Save it atomically; with `keeps_older` the one before stays as NAME.acceptance.older.json. Raises AcceptanceError."""
+    path = acceptance_path(rig_file)
+    older = rig_file.with_name(rig_file.stem + _OLDER) if keeps_older else None
+    try:
+        write_atomic(path, (accepted.model_dump_json(indent=1) + "\n").encode(), durable=True, older=older)
+    except OSError as error:
+        raise AcceptanceError(f"{path}: cannot be saved ({error.strerror})") from None
+    return path
+
+
+def new_acceptance(rig: str, operator: str, config: Config, camera: str) -> Acceptance:
+    """An acceptance that begins."""
+    version = program_version()
+    return Acceptance(
+        rig=rig,
+        operator=operator,
+        begun_utc=datetime.now(UTC).replace(microsecond=0),
+        version=version,
+        commit=program_commit(),
+        basis=basis_of(config.servos, config.safety, version),
+        adapter=config.servos.port or "",
+        camera=camera,
+    )
