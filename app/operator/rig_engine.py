@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from core.bench.bench import BenchError
 from core.config.models import Config, PerceptionConfig
-from core.config.rig_file import as_calibrated
+from core.config.rig_file import as_calibrated, calibration_of
 from core.control.engine import Engine, Perceive
+from core.control.frame_reports import view_picture
 from core.control.health import ModelReport
 from core.control.pilot import LeftOver, Pilot
 from core.control.policies import make_policy
@@ -18,7 +19,7 @@ from core.perception.inference import cores
 from core.perception.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
 from core.system import lower_priority, release_memory
-from core.types import Frame, Point, Scene
+from core.types import Frame, Image, Point, Scene
 from hardware.rig import Rig, RigKind, open_rig
 from hardware.servos.bus_ipc import BusStatus
 from hardware.servos.servo_robot import ServoRobot
@@ -34,8 +35,11 @@ class RigEngine(Engine):
         policy = make_policy(config.policy.name, config)
         status = rig.robot.bus_status() if isinstance(rig.robot, ServoRobot) else None
         firmware = status.firmware if status is not None else ()
-        readiness = read_readiness(config, firmware) if rig.kind is RigKind.LIVE else READY
-        pilot = Pilot(rig.robot, policy, config, model, left_over=left_over, readiness=readiness) if rig.robot is not None else None
+        pilot = None
+        if rig.robot is not None:
+            is_live = rig.kind is RigKind.LIVE
+            readiness, view = (read_readiness(config, firmware), _calibrated_view(config)) if is_live else (READY, None)
+            pilot = Pilot(rig.robot, policy, config, model, left_over=left_over, readiness=readiness, view=view)
         super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
         self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None
         self._network: Pipeline | None = None
@@ -60,6 +64,12 @@ class RigEngine(Engine):
     def bus_status(self) -> BusStatus | None:
         """None where there is no servo bus, and before its first status."""
         return self._servos.bus_status() if self._servos is not None else None
+
+
+def _calibrated_view(config: Config) -> Image | None:
+    """The picture of the rig's calibration, with which a moved camera is noticed; a rig with a bench is registered against that."""
+    known = calibration_of(config) if config.perception.bench is None else None
+    return view_picture(known.view) if known is not None and known.view is not None else None
 
 
 class EngineMaker:

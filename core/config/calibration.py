@@ -120,3 +120,6 @@ class CalibrationConfig(ConfigSection):
     steering: SteeringConfig | None = None
     zero: ZeroConfig | None = None
     port: PortConfig | None = None
+    view: str | None = Field(
+        None, max_length=100_000, description="small picture of the bench at its calibration (JPEG, base64): shows a moved camera"
+    )

@@ -114,7 +114,7 @@ class Cause(StrEnum):
     WRONG_FORMAT = ("wrong picture format", Area.CAMERA, Reaction.DISARM,
         "The camera's picture has the wrong format", "set the camera's size and colour format, then acknowledge")
     CAMERA_MOVED = ("camera moved", Area.CAMERA, Reaction.DISARM,
-        "The camera was moved", "put it back, or start again with F5 (make a bench again), then acknowledge")
+        "The camera was moved", "put it back, or calibrate the rig and make its bench again (without: F5); acknowledge")
     FRAMES_LOST_LONG = ("too many frames lost for long", Area.CAMERA, Reaction.DISARM,
         "Too many camera frames lost", "check the USB port and cable, then acknowledge")
     MODEL_UNFIT = ("model unfit", Area.PERCEPTION, Reaction.DISARM,

@@ -1,13 +1,17 @@
 """Frame and scene -> the report that the supervisor gets, with the drift of a camera that was moved since the rig was opened.
 
-Landmarks are corners of the first picture with structure. They are tracked by optical flow, there and back, so that a covered one
-does not count. Robot, hand or reflection change some of them; a moved, turned or zoomed camera moves most, so the drift is their
-median displacement. Grey levels are taken relative to their surroundings: a lamp that is dimmed is no move.
+Landmarks are corners of the first picture with structure, and of a picture of the rig's calibration if its file has one: so a
+camera is noticed that was moved while the program was closed. They are tracked by optical flow, there and back, so that a covered
+one does not count. Robot, hand or reflection change some of them; a moved, turned or zoomed camera moves most, so the drift is
+their median displacement. Grey levels are taken relative to their surroundings: a lamp that is dimmed is no move.
 """
 
 from __future__ import annotations
 
+import base64
 import math
+from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,6 +33,8 @@ _APART_PX, _CORNER = 10, 0.08
 """Least distance between landmarks, and least quality against the best one."""
 _WINDOW_PX, _PYRAMID = 21, 4
 """Of the optical flow."""
+_TOGETHER_PX = 2.0
+"""Landmarks that are off by less from one shift, turn and zoom move together."""
 _BACK_PX = 1.0
 """Tracked there and back, a landmark must end where it began."""
 _SMOOTH_PX, _AROUND_PX = 1.2, 12.0
@@ -42,13 +48,29 @@ _Grey = NDArray[np.uint8]
 _Corners = NDArray[np.float32]
 
 
-class Landmarks:
-    """Compares pictures with the first one that has structure, two or three times a second."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """A small grey picture and its corners."""
 
-    def __init__(self) -> None:
+    grey: _Grey
+    corners: _Corners
+
+    def displacement_px(self, now: _Grey) -> float | None:
+        """Median displacement of the landmarks that are found, in px of these pictures; None when too few are."""
+        return _displacement_px(self.grey, now, self.corners) if self.grey.shape == now.shape else None
+
+
+class Landmarks:
+    """Compares pictures with the first one that has structure, two or three times a second.
+
+    `kept`: a picture of the same place that goes before it; where another scene is seen, as after a change of the phantom, the
+    first one counts.
+    """
+
+    def __init__(self, kept: Image | None = None) -> None:
+        self._kept = _view_of(_structure(kept)) if kept is not None else None
         self._size: tuple[int, int] | None = None
-        self._first: _Grey | None = None
-        self._corners: _Corners = np.zeros((0, 1, 2), np.float32)
+        self._first: _View | None = None
         self._compared_s = -math.inf
         self._drift_px: float | None = None
         self._gone = 0
@@ -67,18 +89,48 @@ class Landmarks:
             return self._drift_px
         self._compared_s = captured_s
         grey = _structure(image)
+        small_px = self._kept.displacement_px(grey) if self._kept is not None else None
+        if small_px is None and self._first is not None:
+            small_px = self._first.displacement_px(grey)
         if self._first is None:
-            found = _corners_of(grey)
-            if len(found) >= _LEAST:
-                self._first, self._corners = grey, found
-            return None
-        small_px = _displacement_px(self._first, grey, self._corners)
-        self._gone = self._gone + 1 if small_px is None and 2 * len(_corners_of(grey)) >= len(self._corners) else 0
+            self._first = _view_of(grey)
+            if small_px is None:
+                return None
+        is_gone = small_px is None and self._first is not None and 2 * len(_corners_of(grey)) >= len(self._first.corners)
+        self._gone = self._gone + 1 if is_gone else 0
         if small_px is not None:
             self._drift_px = small_px * (size[0] / grey.shape[1]) * scale
         else:
             self._drift_px = math.inf if self._gone >= _GONE_LOOKS else None
         return self._drift_px
+
+
+def _view_of(grey: _Grey) -> _View | None:
+    """A picture with its corners; None when it has too few."""
+    corners = _corners_of(grey)
+    return _View(grey, corners) if len(corners) >= _LEAST else None
+
+
+_QUALITY = 90
+"""Of the JPEG that is kept."""
+
+
+def kept_view(image: Image) -> str:
+    """A picture (h, w, 3) as a rig file keeps it: small, grey, JPEG, base64; some 15 kB."""
+    height, width = image.shape[:2]
+    small = cv2.resize(image, (_WIDTH_PX, max(1, round(height * _WIDTH_PX / width))), interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".jpg", cv2.cvtColor(small, cv2.COLOR_RGB2GRAY), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    return base64.b64encode(data.tobytes()).decode("ascii")
+
+
+def view_picture(kept: str) -> Image | None:
+    """The picture of ``kept_view`` (h, w, 3); None for a damaged one."""
+    try:
+        data = base64.b64decode(kept, validate=True)
+    except ValueError:
+        return None
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) if data else None
+    return np.asarray(picture, np.uint8) if picture is not None and picture.shape[1] == _WIDTH_PX else None
 
 
 def _corners_of(grey: _Grey) -> _Corners:
@@ -97,15 +149,33 @@ def _structure(image: Image) -> _Grey:
 
 
 def _displacement_px(first: _Grey, now: _Grey, corners: _Corners) -> float | None:
-    """Median displacement of the landmarks that are found, in px of these pictures; None when too few are."""
-    window = (_WINDOW_PX, _WINDOW_PX)
-    there, found, _ = cv2.calcOpticalFlowPyrLK(first, now, corners, np.empty_like(corners), winSize=window, maxLevel=_PYRAMID)
-    back, returned, _ = cv2.calcOpticalFlowPyrLK(now, first, there, np.empty_like(corners), winSize=window, maxLevel=_PYRAMID)
+    """Median displacement of the landmarks that are found, in px of these pictures; None when too few are.
+
+    Where optical flow does not reach, it begins at the shift of the whole picture (phase correlation).
+    """
+    found_px = _followed_px(first, now, corners, np.zeros(2, np.float32))
+    if found_px is None:
+        window = cv2.createHanningWindow((first.shape[1], first.shape[0]), cv2.CV_32F)
+        shift, _ = cv2.phaseCorrelate(first.astype(np.float32), now.astype(np.float32), window)
+        found_px = _followed_px(first, now, corners, np.array(shift, np.float32))
+    return found_px
+
+
+def _followed_px(first: _Grey, now: _Grey, corners: _Corners, shift: NDArray[np.float32]) -> float | None:
+    """The same with optical flow that begins at a shift (2,); the landmarks must move together, as one picture does."""
+    begin = corners + shift
+    options: Any = {"winSize": (_WINDOW_PX, _WINDOW_PX), "maxLevel": _PYRAMID, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
+    there, found, _ = cv2.calcOpticalFlowPyrLK(first, now, corners, begin.copy(), **options)
+    back, returned, _ = cv2.calcOpticalFlowPyrLK(now, first, there, there - shift, **options)
     astray_px = np.linalg.norm((back - corners)[:, 0], axis=1)
     good = (found[:, 0] == 1) & (returned[:, 0] == 1) & (astray_px <= _BACK_PX)
-    if np.count_nonzero(good) < max(_LEAST, len(corners) // 3):
+    least = max(_LEAST, len(corners) // 3)
+    if np.count_nonzero(good) < least:
         return None
-    return float(np.median(np.linalg.norm((there - corners)[good, 0], axis=1)))
+    _, together = cv2.estimateAffinePartial2D(corners[good], there[good], ransacReprojThreshold=_TOGETHER_PX)
+    if together is None or np.count_nonzero(together) < least:
+        return None
+    return float(np.median(np.linalg.norm((there - corners)[good, 0][together[:, 0] > 0], axis=1)))
 
 
 _SAMPLE = 16
@@ -114,13 +184,13 @@ _NOTHING_SEEN = frozenset({Reason.BLACK, Reason.WHITE, Reason.UNREADABLE})
 
 
 class FrameReports:
-    """Makes reports; it keeps the frame before for comparison."""
+    """Makes reports; it keeps the frame before for comparison. `view`: a picture of the rig's calibration."""
 
-    def __init__(self, config: PursuitConfig) -> None:
+    def __init__(self, config: PursuitConfig, view: Image | None = None) -> None:
         self._config = config
         self._before: Frame | None = None
         self._shape: tuple[int, ...] | None = None
-        self._landmarks = Landmarks()
+        self._landmarks = Landmarks(view)
         self._direction = _Direction(config.behind_s)
 
     def report(self, frame: Frame, scene: Scene, advice: Advice | None, *, has_target: bool, sound: bool = True) -> FrameReport:

@@ -36,7 +36,7 @@ from core.control.supervisor import hindrances, supervise
 from core.devices import DeviceError
 from core.messages import message
 from core.system import SLEPT_S, slept_s
-from core.types import Advice, Command, Frame, RobotStatus, Scene
+from core.types import Advice, Command, Frame, Image, RobotStatus, Scene
 
 _log = logging.getLogger(__name__)
 
@@ -128,6 +128,7 @@ class Pilot:
     clock : monotonic, the one of the frames.
     left_over : what is not acknowledged yet of the rig before this one: starting again acknowledges nothing.
     readiness : what stands against the program's driving of this rig.
+    view : a picture of the rig's calibration, with which the camera's are compared.
     """
 
     def __init__(
@@ -139,6 +140,7 @@ class Pilot:
         clock: Callable[[], float] = time.monotonic,
         left_over: LeftOver | None = None,
         readiness: Readiness = READY,
+        view: Image | None = None,
     ) -> None:
         self._readiness = readiness
         self._robot, self._policy, self._config, self._clock = robot, policy, config, clock
@@ -147,7 +149,7 @@ class Pilot:
         self._release = TorqueRelease(is_enabled=config.servos.torque_off_on_stop)
         self._simulated = config.rig.camera == "twin"
         self._alerts = AlertReporter(simulated=self._simulated)
-        self._reports = FrameReports(config.policy.pursuit)
+        self._reports = FrameReports(config.policy.pursuit, view)
         self._state = SupervisorState(against_program=readiness.hindrances)
         if left_over is not None:
             mode = Mode.STOPPED if left_over.stopped else Mode.ADVISORY

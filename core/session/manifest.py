@@ -139,7 +139,7 @@ def about_rig(config: Config, kind: Kind, rig: str) -> About:
     known = None
     with contextlib.suppress(RigFileError):  # reported when the rig is opened
         known = calibration_of(config)
-    calibration = known.model_dump(mode="json") if known is not None else None
+    calibration = known.model_dump(mode="json", exclude={"view"}) if known is not None else None
     return About(kind, rig, config.model_dump(mode="json"), model, calibration, _about_bench(config.perception.bench))
 
 

@@ -30,6 +30,7 @@ from core.config.models import Config
 from core.config.rig_file import RigFile, make_rig
 from core.config.safety import JOINT_NAMES, JointName, ServosConfig, wiring_of
 from core.config.servo_models import model_name, unsupported
+from core.control.frame_reports import kept_view
 from core.devices import DeviceError
 from core.messages import message
 from core.types import Image, Point
@@ -77,6 +78,8 @@ class RigDraft:
         self.findings: dict[int, ServoFinding] = {}
         self.assignments: tuple[Assignment, ...] = ()
         self.port = known.port if known is not None else None
+        self._view = known.view if known is not None else None
+        self._viewed_scale = self.scale
         self._assumed_earlier = known.assumed if known is not None else None
         self._wiring = known.wiring if known is not None else None
         self.zeros: servo_identification.Zeros | None = None
@@ -380,7 +383,9 @@ class RigDraft:
     # ---- the end
 
     def calibration(self) -> CalibrationConfig:
-        """All that was found."""
+        """All that was found, with a picture of now if the scale is new, or there was none."""
+        if self._view is None or self.scale != self._viewed_scale:
+            self._view, self._viewed_scale = self._view_now(), self.scale
         return CalibrationConfig(
             made_utc=datetime.now(UTC).replace(microsecond=0),
             assumed=self.assumed or None,
@@ -390,7 +395,19 @@ class RigDraft:
             steering=self.steering,
             zero=self.zero,
             port=self.port,
+            view=self._view,
         )
+
+    def _view_now(self) -> str | None:
+        """What the camera shows, for noticing later that it was moved; None without a picture, or with the board in it."""
+        frame = self.bench.feed.newest
+        if frame is None:
+            return None
+        try:
+            find_board(frame.image, self.spec)
+        except BoardError:
+            return kept_view(frame.image)
+        return None
 
     def rig_file(self, name: str) -> RigFile:
         """The rig under this name, not saved yet; raises RigFileError."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import cast
 
 import cv2
@@ -145,6 +146,7 @@ class _Bench:
 
     def __init__(self) -> None:
         self.closed, self.kind = False, RigKind.SIM
+        self.feed = SimpleNamespace(newest=None)
 
     def set_lens(self, lens: object) -> None: ...
     def warm_up(self) -> None: ...

@@ -18,6 +18,7 @@ from core.config.models import Config, PerceptionConfig, PolicyName, PoseConfig
 from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.control.engine import Perceive
 from core.control.faults import Cause, Fault
+from core.control.frame_reports import kept_view
 from core.control.health import ModelReport
 from core.control.modes import OF_THE_RIG, Act, Hindrance, Mode
 from core.control.policies import Policy, make_policy
@@ -27,6 +28,7 @@ from core.types import Frame, Point, Reason, Refusal, Scene
 from hardware.rig import Rig, RigKind
 from hardware.twin.process import PrestartedProcesses
 from tests.core.control.test_engine import _Camera
+from tests.core.control.test_frame_reports import BOARD, moved
 from tests.core.perception.test_pipeline import DrawnNetwork, _draw_tapered, frame
 from tests.core.pilot_bench import Robot
 
@@ -119,6 +121,21 @@ class _Grey(_Camera):
     def read(self, timeout_s: float) -> Frame | None:
         given = super().read(timeout_s)
         return frame(given.captured_s) if given is not None else None
+
+
+def test_a_live_rigs_camera_is_compared_with_its_calibration_unless_it_has_a_bench(tmp_path: Path) -> None:
+    known = CalibrationConfig(made_utc=datetime(2025, 3, 4, tzinfo=UTC), view=kept_view(BOARD))
+    path = write_rig(make_rig(Config(), "lab", known), tmp_path / "lab.toml")
+    config = with_rig(Config(), read_rig(path), path)
+    with_bench = config.model_copy(update={"perception": config.perception.model_copy(update={"bench": "lab"})})
+    for kind, used, drift_px in ((RigKind.LIVE, config, 40.0), (RigKind.LIVE, with_bench, None), (RigKind.SIM, config, None)):
+        engine = RigEngine(
+            Rig("lab", kind, _Grey([0]), Robot()), Pipeline(DrawnNetwork(), PerceptionConfig()), used, ModelReport(True)
+        )
+        assert engine.pilot is not None
+        found = engine.pilot._reports._landmarks.drift_px(moved(BOARD, 40.0), 0.0, 1.0)
+        engine.close()
+        assert found == (None if drift_px is None else pytest.approx(drift_px, abs=0.6))
 
 
 @pytest.mark.parametrize("kind", [RigKind.SIM, RigKind.LIVE])

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.control.frame_reports import Landmarks
+from core.control.frame_reports import Landmarks, kept_view, view_picture
 from core.types import Image
 
 SIZE = (640, 480)
@@ -79,6 +79,33 @@ def test_an_empty_picture_is_no_beginning_and_another_size_a_new_one() -> None:
     assert landmarks.drift_px(BOARD, 1.0, 1.0) is None
     assert landmarks.drift_px(moved(BOARD, 10.0), 2.0, 1.0) == pytest.approx(10.0, abs=0.5)
     assert landmarks.drift_px(np.ascontiguousarray(BOARD[::2, ::2]), 3.0, 1.0) is None
+
+
+@pytest.mark.parametrize(("dx", "dy"), [(0.0, 0.0), (6.0, -8.0), (60.0, 40.0), (-150.0, 90.0)])
+def test_a_camera_that_was_moved_while_the_program_was_closed_is_noticed_at_its_first_picture(dx: float, dy: float) -> None:
+    kept = view_picture(kept_view(BOARD))
+    found = Landmarks(kept).drift_px(moved((BOARD * 0.7).astype(np.uint8), dx, dy), 0.0, 1.0)
+    assert found == pytest.approx(math.hypot(dx, dy), abs=0.6)
+
+
+def test_another_scene_than_the_kept_one_is_compared_with_its_own_first_picture() -> None:
+    other = np.ascontiguousarray(BOARD[::-1, ::-1])
+    landmarks = Landmarks(view_picture(kept_view(BOARD)))
+    assert landmarks.drift_px(other, 0.0, 1.0) is None
+    assert landmarks.drift_px(other, 1.0, 1.0) == pytest.approx(0.0, abs=0.3)
+    assert landmarks.drift_px(moved(other, 12.0), 2.0, 1.0) == pytest.approx(12.0, abs=0.5)
+    assert landmarks.drift_px(BOARD, 3.0, 1.0) == pytest.approx(0.0, abs=0.6), "the phantom is back"
+
+
+def test_a_kept_picture_of_another_shape_or_damaged_says_nothing() -> None:
+    wide = np.ascontiguousarray(np.hstack([BOARD, BOARD[:, :200]]))
+    landmarks = Landmarks(view_picture(kept_view(wide)))
+    assert landmarks.drift_px(BOARD, 0.0, 1.0) is None
+    assert landmarks.drift_px(moved(BOARD, 10.0), 1.0, 1.0) == pytest.approx(10.0, abs=0.5)
+    kept = kept_view(BOARD)
+    assert len(kept) < 60_000
+    for damaged in ("", "no base64!", kept[:40], "AAAA"):
+        assert view_picture(damaged) is None
 
 
 def test_it_looks_now_and_then_only_and_at_no_time_that_is_none() -> None:

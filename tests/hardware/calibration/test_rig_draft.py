@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -11,11 +12,11 @@ import pytest
 
 from core.calibration.camera import BoardError, BoardSpec
 from core.calibration.servos import Assignment, HeadNotSeen, ServoFinding, SteeringNotSeen
-from core.config.calibration import CalibrationConfig, ZeroConfig
+from core.config.calibration import CalibrationConfig, ScaleConfig, ZeroConfig
 from core.config.models import Config
 from core.config.safety import wiring_of
 from core.devices import DeviceError
-from core.types import Image
+from core.types import Frame, Image
 from hardware.calibration import servo_identification
 from hardware.calibration.rig_draft import RigDraft
 from hardware.calibration.servo_identification import Zeros
@@ -33,6 +34,7 @@ class Bench:
     def __init__(self) -> None:
         self.stop = StopSwitch()
         self.pictures: Iterator[Image] = iter(())
+        self.feed = SimpleNamespace(newest=None)
 
     def set_lens(self, _lens: object) -> None: ...
 
@@ -162,6 +164,23 @@ def test_without_a_search_the_steering_is_learnt_from_a_kept_zero_or_not_at_all(
     with pytest.raises(SteeringNotSeen):
         draft.learn_steering()
     assert kept[-1] is None, "a search has just left them there"
+
+
+def test_a_picture_of_the_bench_is_kept_with_its_scale(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
+    feed = cast("Bench", draft.bench).feed
+    assert draft.calibration().view is None
+    rng = np.random.default_rng(0)
+    feed.newest = Frame(0, 0.0, rng.integers(0, 255, (480, 640, 3), np.uint8))
+    first = draft.calibration().view
+    assert first is not None
+    feed.newest = Frame(1, 1.0, rng.integers(0, 255, (480, 640, 3), np.uint8))
+    again = RigDraft(draft.bench, draft.config, draft.calibration())
+    assert again.calibration().view == first, "what the scale was measured with"
+    again.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
+    assert again.calibration().view not in {None, first}
+    monkeypatch.setattr("hardware.calibration.rig_draft.find_board", lambda *_: None)
+    again.scale = again.scale.model_copy(update={"mm_per_px": 0.4})
+    assert again.calibration().view is None, "the board will not stay there"
 
 
 def test_the_wiring_that_was_found_is_kept(draft: RigDraft) -> None:
