@@ -66,7 +66,7 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Note.NEW_TARGET: ("Another destination: you drive again", "hand over again to go there"),
     Note.TORQUE_OFF: ("The torque is off: all servos have said so", "the wires hang loose; switch the servos on to drive"),
     Note.AT_END: ("A joint is at the end of its travel", "drive the other way"),
-    Note.AT_LOW_END: ("A feed is at the end of its way back", "to pull it out farther, slowly: let go, then hold retract again"),
+    Note.AT_LOW_END: ("A feed is at the end of its way back", "to pull it out further, slowly: let go, then hold retract again"),
     Note.BEYOND_END: (
         "Pulling out beyond the end: slow, while held",
         "watch the robot; when it is out, say where it is (page Servos, Zero)",

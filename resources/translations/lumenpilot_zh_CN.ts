@@ -748,6 +748,75 @@ destination, target: 目标点, 目标            route: 路线                 
         <translation>标注者 {rater}</translation>
     </message>
     <message>
+        <location filename="../../app/operator/awake.py"/>
+        <source>The screen may lock, or the computer sleep, while you drive: switch that off in the desktop's settings</source>
+        <translation>驱动时屏幕可能锁定或计算机休眠：请在桌面设置中关闭</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>Relax slowly</source>
+        <translation>缓慢放松</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>Hold</source>
+        <translation>保持</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>Torque off now</source>
+        <translation>立即断开扭矩</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>The servos hold</source>
+        <translation>舵机仍在保持</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>The servos hold the wires.</source>
+        <translation>舵机仍拉着拉线。</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>Relax slowly: the wires are let out at 1 mm/s, then the torque goes off.
+Hold: they stay as they are; heat, supply and current are watched, and after {minutes:.0f} min they are relaxed.
+Torque off now: the wires spring back at once.</source>
+        <translation>缓慢放松：以 1 mm/s 放出拉线，然后断开扭矩。
+保持：维持原状；监视温度、电源和电流，{minutes:.0f} 分钟后放松。
+立即断开扭矩：拉线会立刻回弹。</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>Do not close</source>
+        <translation>不关闭</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>The wires are relaxed, then the window closes; STOP ends it</source>
+        <translation>先放松拉线，然后关闭窗口；STOP 可中止</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>The torque goes off, then the window closes</source>
+        <translation>断开扭矩，然后关闭窗口</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>Always so for this rig</source>
+        <translation>此装置总是如此</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>Stopped: the window stays open, and the wires are as they were then</source>
+        <translation>已停止：窗口保持打开，拉线维持当时的状态</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
+        <source>The torque is not proven to be off: cut the servos' power</source>
+        <translation>无法证实扭矩已断开：请切断舵机电源</translation>
+    </message>
+    <message>
         <location filename="../../app/operator/manual_drive.py"/>
         <source>the robot is armed: disarm it first</source>
         <translation>机器人处于待命：请先解除待命</translation>
@@ -776,11 +845,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/operator/manual_drive.py"/>
         <source>restart servo {servo_id}</source>
         <translation>重启舵机 {servo_id}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/manual_drive.py"/>
-        <source>all servos</source>
-        <translation>所有舵机</translation>
     </message>
     <message>
         <location filename="../../app/operator/manual_drive.py"/>
@@ -1039,6 +1103,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/operator/preflight.py"/>
+        <source>The checks are good, but not yet ready to arm: {why}</source>
+        <translation>检查通过，但尚不能就绪：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
         <source>Ready: {good} of {count} checks good</source>
         <translation>就绪：{count} 项检查中 {good} 项正常</translation>
     </message>
@@ -1054,6 +1123,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/operator/preflight.py"/>
+        <source>rig</source>
+        <translation>装置</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
         <source>Not ready: 1 of {whole} checks stands against driving</source>
         <translation>未就绪：{whole} 项检查中有 1 项不允许驾驶</translation>
     </message>
@@ -1061,6 +1135,31 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/operator/preflight.py"/>
         <source>, {warned} to note</source>
         <translation>，{warned} 项须注意</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
+        <source>Checking before driving</source>
+        <translation>正在进行驱动前检查</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
+        <source>this takes some seconds; then press {key} to arm</source>
+        <translation>需要几秒钟；然后按 {key} 就绪</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
+        <source>What to do: {fix}</source>
+        <translation>处理方法：{fix}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
+        <source>You steer</source>
+        <translation>由您操纵</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
+        <source>the checks before driving come first: {key}, some seconds, {key} again</source>
+        <translation>先进行驱动前检查：按 {key}，等几秒，再按 {key}</translation>
     </message>
     <message>
         <location filename="../../app/operator/preflight.py"/>
@@ -1096,6 +1195,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/operator/preflight_list.py"/>
         <source>good</source>
         <translation>正常</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight_list.py"/>
+        <source>not used</source>
+        <translation>未使用</translation>
     </message>
     <message>
         <location filename="../../app/operator/preflight_list.py"/>
@@ -3057,8 +3161,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Each wire is loosened by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, 4 mm and 300 mA at most; there it is left, taut and without tension: zero. A wire that the camera cannot judge is set by eye: choose it, and tighten or loosen it.</source>
-        <translation>每根驱动丝先放松 1.25 mm，再以 0.25 mm 的步长拉紧，直到头端跟随，最多 4 mm 和 300 mA；停在绷直而无张力处：零位。相机无法判断的驱动丝用目测设定：选中它，拉紧或放松。</translation>
+        <source>Each wire is loosened by 1.25 mm and then pulled in steps of 0.25 mm until the head follows, by 4 mm and with its greatest force at most; there it is left, taut and without tension: zero. A wire that the camera cannot judge is set by eye: choose it, and tighten or loosen it.</source>
+        <translation>每根拉线先放松 1.25 mm，再以 0.25 mm 的步长拉紧，直到头端跟随，最多 4 mm，且不超过其最大力；停在绷紧但无张力处：即零点。相机无法判断的拉线按目视设置：选中它，再拉紧或放松。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -3067,8 +3171,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>The joints are zeroed where they stand. Then each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has shown its way. The robot must have room on both sides.</source>
-        <translation>各关节在当前位置归零。然后依次拉动每根驱动丝，先 0.3 mm，最多 1.2 mm，直到看出头端的方向。机器人两侧必须留有空间。</translation>
+        <source>From where the page before has left the wires each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has shown its way. The robot must have room on both sides.</source>
+        <translation>从上一页所留的位置起，每根拉线拉动，先 0.3 mm，最多 1.2 mm，直到头端显示其方向。机器人两侧须有空间。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -3099,6 +3203,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>no servos: look only</source>
         <translation>没有舵机：只观察</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>{count} servos at {baud} baud.</source>
+        <translation>{baud} 波特，{count} 个舵机。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -3272,8 +3381,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>{count} servos at {baud} baud.</source>
-        <translation>{baud} 波特，{count} 个舵机。</translation>
+        <source>Slow: {what}; {fix}.</source>
+        <translation>慢：{what}；{fix}。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -3372,8 +3481,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/wizard.py"/>
-        <source>Zero is lost whenever the servos are switched off: zero them again then, with slack wires.</source>
-        <translation>舵机断电后零位总会丢失：届时请在驱动丝松弛时重新归零。</translation>
+        <source>The zeros are offered whenever the servos are switched on; say then how far robot and catheter are in.</source>
+        <translation>每次开启舵机时都会提供零点；届时请说明机器人和导管插入多深。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/wizard.py"/>
@@ -4700,6 +4809,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
+        <source>The way ahead may ask for something else: then badge and advice say so, and the advice counts.</source>
+        <translation>前方路线可能要求不同的动作：此时徽标和建议会说明，以建议为准。</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
         <source>pictures and advice only</source>
         <translation>只有图像和建议</translation>
     </message>
@@ -4930,11 +5044,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>You steer</source>
-        <translation>由您操纵</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>press {key} to arm; then you can hand over to the program</source>
         <translation>按 {key} 进入待命；之后可移交给程序</translation>
     </message>
@@ -4962,6 +5071,36 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>Interrupted</source>
         <translation>已中断</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>the pedal</source>
+        <translation>脚踏</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>fast, no steering</source>
+        <translation>快速，不转向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>slow, no steering</source>
+        <translation>慢速，不转向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>slowest, steer</source>
+        <translation>最慢，转向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>moderate, steer</source>
+        <translation>中速，转向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>the way decides, not state {state} ({rule})</source>
+        <translation>以路线为准，而非状态 {state}（{rule}）</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -5515,6 +5654,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
+        <source>greatest force, limited in the servo, friction included: {forces} N</source>
+        <translation>最大力，在舵机内限制，含摩擦：{forces} N</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
         <source>The program drives</source>
         <translation>程序正在驾驶</translation>
     </message>
@@ -5597,6 +5741,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>calibrated: {parts}</source>
         <translation>已标定：{parts}</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>turn of the head: {turn:.0f}° per mm of pull</source>
+        <translation>头端转角：每毫米拉线 {turn:.0f}°</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6614,8 +6763,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>limit {most:g} mA for half a second</source>
-        <translation>上限 {most:g} mA，持续半秒</translation>
+        <source>the servo gives {force:.0f} N at most ({most:.0f} mA)</source>
+        <translation>舵机最多给出 {force:.0f} N（{most:.0f} mA）</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -6651,11 +6800,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/servo_table.py"/>
         <source>Restart servo {id} ({joint})? It must be zeroed again.</source>
         <translation>重启舵机 {id}（{joint}）？之后须重新归零。</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
-        <source>Are the wires slack? {what}.</source>
-        <translation>驱动丝松弛吗？{what}。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -6744,18 +6888,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>All joints</source>
-        <translation>所有关节</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
         <source>Restart</source>
         <translation>重启</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
-        <source>All joints become 0 mm here</source>
-        <translation>所有关节以此处为 0 mm</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -6769,8 +6903,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>zero the joint, with slack wires, before arming</source>
-        <translation>进入待命前，请在驱动丝松弛时给关节归零</translation>
+        <source>the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)</source>
+        <translation>舵机最多给出 {force:.0f} N（占空比 {duty:.0f} %）</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/servo_table.py"/>
+        <source>its zero must be confirmed or set before arming: Zero...</source>
+        <translation>就绪前须确认或设置其零点：设零…</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -6781,11 +6920,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/servo_table.py"/>
         <source>Restart servo {id} ({joint})</source>
         <translation>重启舵机 {id}（{joint}）</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
-        <source>Zero {joint}</source>
-        <translation>归零：{joint}</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -6804,8 +6938,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>The present positions become 0 mm; the wires must be slack</source>
-        <translation>当前位置成为 0 mm；驱动丝必须松弛</translation>
+        <source>Say where the joints are: kept zeros, slack wires, and how far the feeds are in</source>
+        <translation>说明各关节的位置：保留的零点、松弛的拉线，以及进给插入多深</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -6814,18 +6948,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>{joint} becomes 0 mm here</source>
-        <translation>{joint}以此处为 0 mm</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
         <source>error {number}</source>
         <translation>错误 {number}</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
-        <source>Zero all joints</source>
-        <translation>所有关节归零</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -7028,6 +7152,141 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>最近 30 秒 θ、d_head 和 d_tail 的趋势</translation>
     </message>
     <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>leave as it is</source>
+        <translation>保持不变</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>the kept zero holds</source>
+        <translation>保留的零点有效</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>the wire is slack here</source>
+        <translation>此处拉线松弛</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>the wire was hung in again, and is slack here</source>
+        <translation>拉线已重新挂上，且此处松弛</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>rig file</source>
+        <translation>装置文件</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>its servo does not answer</source>
+        <translation>其舵机不应答</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>{at:+.2f} mm from its kept zero ({when})</source>
+        <translation>距保留的零点 {at:+.2f} mm（{when}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>last seen at {at:.1f} mm ({when})</source>
+        <translation>上次见于 {at:.1f} mm（{when}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>, moved by {moved:+.1f} mm since</source>
+        <translation>，此后移动了 {moved:+.1f} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>Zero of {joint}</source>
+        <translation>{joint} 的零点</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>it is at</source>
+        <translation>现位于</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>? mm</source>
+        <translation>? mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>Position of {joint}</source>
+        <translation>{joint} 的位置</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>Set the position of {joint}</source>
+        <translation>设置 {joint} 的位置</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>Where the joints are</source>
+        <translation>各关节的位置</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>&amp;Search for slack...</source>
+        <translation>寻找松弛点(&amp;S)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>The rig wizard pulls each wire until the head follows (page Zero and pretension)</source>
+        <translation>装置向导拉动每根拉线，直到头端跟随（“零点与预紧”页）</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>&amp;Torque off</source>
+        <translation>断开扭矩(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>Let all motors go; the wires spring back</source>
+        <translation>放开所有电机；拉线会回弹</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>S&amp;et</source>
+        <translation>设置(&amp;E)</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>at {at:.2f} mm</source>
+        <translation>位于 {at:.2f} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>at {at:.1f} mm</source>
+        <translation>位于 {at:.1f} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>no kept zero that fits</source>
+        <translation>没有合适的保留零点</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>not known: measure how far it is in</source>
+        <translation>未知：请测量其插入深度</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>its servo holds: the torque must be off for a wire to be slack</source>
+        <translation>其舵机在保持：只有断开扭矩，拉线才会松弛</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>A tendon has no kept zero: search for slack, which pulls each wire until the head follows. By hand: torque off, see that the wire is slack, and say so.</source>
+        <translation>有拉线没有保留的零点：寻找松弛点，即拉动每根拉线直到头端跟随。手动：断开扭矩，查看拉线是否松弛，并如此说明。</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>A kept zero holds as long as the wire was not hung in again. Say how far robot and catheter are in: measure it.</source>
+        <translation>只要拉线没有重新挂过，保留的零点就有效。请说明机器人和导管插入多深：测量它。</translation>
+    </message>
+    <message>
         <location filename="../../core/annotation/model.py"/>
         <source>robot line &lt; {a} px</source>
         <translation>机器人线 &lt; {a} px</translation>
@@ -7051,6 +7310,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../core/bench/bench.py"/>
         <source>the vessel mask covers {share} of the picture: white must be the vessel</source>
         <translation>血管掩膜覆盖图像的 {share}：白色必须是血管</translation>
+    </message>
+    <message>
+        <location filename="../../core/bench/bench.py"/>
+        <source>{path}: was made for a working size of {a} px, and {b} px are set; make the bench again</source>
+        <translation>{path}：按工作尺寸 {a} px 建立，而设置为 {b} px；请重新建立台架</translation>
     </message>
     <message>
         <location filename="../../core/bench/bench.py"/>
@@ -7244,8 +7508,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/control/bus_monitor.py"/>
-        <source>{joint} up to {a} mA for {b} ms (at most {c} mA)</source>
-        <translation>{joint}电流达 {a} mA，持续 {b} ms（最多 {c} mA）</translation>
+        <source>{joint} up to {a} mA for {b} ms (its {c} N are {d} mA)</source>
+        <translation>{joint} 在 {b} ms 内达到 {a} mA（其 {c} N 为 {d} mA）</translation>
     </message>
     <message>
         <location filename="../../core/control/bus_monitor.py"/>
@@ -7256,6 +7520,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../core/control/bus_monitor.py"/>
         <source>{a} in {b} s (at most {c})</source>
         <translation>{b} s 内 {a} 个（最多 {c}）</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/bus_monitor.py"/>
+        <source>{a} V at most</source>
+        <translation>最多 {a} V</translation>
     </message>
     <message>
         <location filename="../../core/control/bus_monitor.py"/>
@@ -7293,6 +7562,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>{a} 帧</translation>
     </message>
     <message>
+        <location filename="../../core/control/direction_monitor.py"/>
+        <source>{a}° against a bend of {b}° to the {side}</source>
+        <translation>{a}°，而弯曲为向{side} {b}°</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/direction_monitor.py"/>
+        <source>{a} mm against a feed of {b} mm</source>
+        <translation>{a} mm，而进给为 {b} mm</translation>
+    </message>
+    <message>
         <location filename="../../core/control/engine.py"/>
         <source>the camera's picture is {kind} {shape}, not 8-bit RGB: set its colour format</source>
         <translation>相机图像为 {kind} {shape}，不是 8 位 RGB：请设置其颜色格式</translation>
@@ -7321,6 +7600,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../core/control/gate.py"/>
         <source>{joint} by {a} mm (at most {b} mm)</source>
         <translation>{joint}相差 {a} mm（最多 {b} mm）</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/kept_zero.py"/>
+        <source>{joint} cannot be at {a} mm: give {b} to {c} mm</source>
+        <translation>{joint} 不可能位于 {a} mm：请给出 {b} 到 {c} mm</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/kept_zero.py"/>
+        <source>{joint}: a tendon is zeroed where its wire is slack, at 0 mm</source>
+        <translation>{joint}：拉线在其松弛处设零，即 0 mm</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/kept_zero.py"/>
+        <source>{joint} stands {a} mm from its kept zero: use that, or forget it if the wire was hung in again</source>
+        <translation>{joint} 距其保留的零点 {a} mm：使用该零点，若拉线重新挂过则放弃它</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/kept_zero.py"/>
+        <source>{joint} has no kept zero that fits: give its position, or search for it (menu Rig, Calibrate)</source>
+        <translation>{joint} 没有合适的保留零点：请给出其位置，或寻找它（“装置”菜单，标定）</translation>
     </message>
     <message>
         <location filename="../../core/control/pilot.py"/>
@@ -7416,11 +7715,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../core/perception/centerline.py"/>
         <source>the target is {a} px beside the vessel</source>
         <translation>目标偏离血管 {a} px</translation>
-    </message>
-    <message>
-        <location filename="../../core/perception/pipeline.py"/>
-        <source>{path}: was made for a working size of {a} px, and {b} px are set; make the bench again</source>
-        <translation>{path}：按工作尺寸 {a} px 建立，而设置为 {b} px；请重新建立台架</translation>
     </message>
     <message>
         <location filename="../../core/perception/quality.py"/>
@@ -7534,8 +7828,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/calibration/rig_draft.py"/>
-        <source>steering: roll {a}°, way and heading {b}° from a right angle</source>
-        <translation>转向：滚转 {a}°，位移与朝向偏离直角 {b}°</translation>
+        <source>steering: roll {a}°, way and heading {b}° from a right angle, the head turns by {c}° per mm</source>
+        <translation>转向：滚转 {a}°，方向与航向偏离直角 {b}°，每毫米拉线头端转 {c}°</translation>
     </message>
     <message>
         <location filename="../../hardware/calibration/rig_draft.py"/>
@@ -7574,6 +7868,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/calibration/servo_identification.py"/>
+        <source>tendon {name} does not stand at its kept zero: find the zeros first</source>
+        <translation>拉线 {name} 不在其保留的零点：请先寻找零点</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/calibration/servo_identification.py"/>
         <source>servo {a} {function} ({seen}), direction {sign}</source>
         <translation>舵机 {a}{function}（{seen}），方向 {sign}</translation>
     </message>
@@ -7581,6 +7880,66 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/calibration/servo_probe.py"/>
         <source>too much current: {names}; the servos were let go: something holds the wires</source>
         <translation>电流过大：{names}；舵机已放开：有东西卡住驱动丝</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>no Basler camera: check its cable and supply; main.py doctor --rig basler says more</source>
+        <translation>没有 Basler 相机：检查其线缆和电源；main.py doctor --rig basler 给出更多信息</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>Basler cameras need the package pypylon: pip install pypylon</source>
+        <translation>Basler 相机需要软件包 pypylon：pip install pypylon</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>pypylon cannot be loaded ({why}): pip install --force-reinstall pypylon</source>
+        <translation>无法载入 pypylon（{why}）：pip install --force-reinstall pypylon</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>pylon cannot look for cameras: {why}</source>
+        <translation>pylon 无法查找相机：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>{camera} {serial} is not there any more: check its cable and supply</source>
+        <translation>{camera} {serial} 已不在：检查其线缆和电源</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>{a} Basler cameras ({serials}): set camera.serial to one of them</source>
+        <translation>{a} 台 Basler 相机（{serials}）：将 camera.serial 设为其中之一</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>no Basler camera {serial}; there are: {serials}: set camera.serial to one of them</source>
+        <translation>没有 Basler 相机 {serial}；现有：{serials}：将 camera.serial 设为其中之一</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>{camera} gives {rate} pictures/s at {size}: set camera.frames_per_second or camera.exposure_ms lower</source>
+        <translation>{camera} 在 {size} 时为每秒 {rate} 帧：调低 camera.frames_per_second 或 camera.exposure_ms</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>{camera} has no {size}: set camera.width_px to {widths}, and camera.height_px to {heights}</source>
+        <translation>{camera} 没有 {size}：将 camera.width_px 设为 {widths}，camera.height_px 设为 {heights}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>{camera} cannot be started ({why}): close other programs that use it</source>
+        <translation>{camera}无法启动（{why}）：关闭使用它的其他程序</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>{camera} is lost ({why}): check its cable</source>
+        <translation>{camera}断开（{why}）：检查其线缆</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>{camera} is lost: check its cable</source>
+        <translation>{camera}断开：检查其线缆</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/files.py"/>
@@ -7603,14 +7962,24 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>{camera} {serial} 已不在（现有：{serials}）：请插上，或换另一台重新启动</translation>
     </message>
     <message>
-        <location filename="../../hardware/cameras/realsense.py"/>
-        <source>{camera} cannot be started ({why}): close other programs that use it</source>
-        <translation>{camera}无法启动（{why}）：关闭使用它的其他程序</translation>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>plug it into a USB 3 port; on a network: its supply, its cable, and an address in this computer's network</source>
+        <translation>插入 USB 3 端口；网络相机：检查电源、线缆，以及本机网段内的地址</translation>
     </message>
     <message>
-        <location filename="../../hardware/cameras/realsense.py"/>
-        <source>{camera} is lost ({why}): check its cable</source>
-        <translation>{camera}断开（{why}）：检查其线缆</translation>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>no Basler camera {serial}; there are: {serials}</source>
+        <translation>没有 Basler 相机 {serial}；现有：{serials}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>{camera} is plugged in, but cannot be opened</source>
+        <translation>{camera} 已插入，但无法打开</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>no Basler camera</source>
+        <translation>没有 Basler 相机</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/registry.py"/>
@@ -7623,9 +7992,14 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>没有 {node} 的权限</translation>
     </message>
     <message>
-        <location filename="../../hardware/cameras/webcam.py"/>
-        <source>{camera} is lost: check its cable</source>
-        <translation>{camera}断开：检查其线缆</translation>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>Basler cameras need the package pypylon</source>
+        <translation>Basler 相机需要软件包 pypylon</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>{a} Basler cameras: {serials}</source>
+        <translation>{a} 台 Basler 相机：{serials}</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/webcam.py"/>
@@ -7749,13 +8123,23 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/preflight/device_checks.py"/>
-        <source>{a} answer, model {b}, firmware {rest}</source>
-        <translation>{a} 个应答，型号 {b}，固件 {rest}</translation>
+        <source>{a} answer, {models}, firmware {rest}</source>
+        <translation>{a} 个应答，{models}，固件 {rest}</translation>
     </message>
     <message>
         <location filename="../../hardware/preflight/device_checks.py"/>
         <source>it should give {a}: more light, camera.exposure_ms below {b}, or a USB 3 port without a hub</source>
         <translation>应达到 {a}：增加光照，camera.exposure_ms 低于 {b}，或不经集线器的 USB 3 端口</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/preflight/device_checks.py"/>
+        <source>{port} is in use by another program</source>
+        <translation>{port} 正被另一个程序使用</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/preflight/device_checks.py"/>
+        <source>{baud} baud</source>
+        <translation>{baud} 波特</translation>
     </message>
     <message>
         <location filename="../../hardware/preflight/device_checks.py"/>
@@ -7779,13 +8163,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/preflight/device_checks.py"/>
-        <source>the supply must give {a} V or more at every servo</source>
-        <translation>每个舵机处的供电须不低于 {a} V</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/preflight/device_checks.py"/>
-        <source>let it cool below {a} °C</source>
-        <translation>让其冷却到 {a} °C 以下</translation>
+        <source>the supply must give {a} V or more at servo {joint}</source>
+        <translation>舵机 {joint} 处的电源必须不低于 {a} V</translation>
     </message>
     <message>
         <location filename="../../hardware/preflight/device_checks.py"/>
@@ -7794,8 +8173,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/preflight/device_checks.py"/>
-        <source>{port} is in use by another program</source>
-        <translation>{port} 正被另一个程序使用</translation>
+        <source>let {joint} cool below {a} °C</source>
+        <translation>让 {joint} 冷却到 {a} °C 以下</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/preflight/device_checks.py"/>
+        <source>{port}: the E-stop is pressed, or its wire is broken</source>
+        <translation>{port}：急停已按下，或其导线断开</translation>
     </message>
     <message>
         <location filename="../../hardware/preflight/device_checks.py"/>
@@ -7823,6 +8207,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>未待命：{why}；请检查其供电和电缆</translation>
     </message>
     <message>
+        <location filename="../../hardware/servos/bus_process.py"/>
+        <source>not zeroed: {why}; check its supply and cable</source>
+        <translation>未设零：{why}；检查其电源和线缆</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/servos/discovery.py"/>
+        <source>{baud} baud: about {a} cycles a second instead of {b}</source>
+        <translation>{baud} 波特：每秒约 {a} 个周期，而非 {b}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/servos/dynamixel_bus.py"/>
+        <source>{joint} holds its wire: let the wizard search where it is taut (menu Rig, Calibrate), or switch the torque off and see that it is slack</source>
+        <translation>{joint} 仍拉着拉线：让向导寻找绷紧点（“装置”菜单，标定），或断开扭矩并查看其是否松弛</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/servos/dynamixel_bus.py"/>
+        <source>{joint} pulls with {a} mA (friction takes {b} mA at most): slacken its wire, then zero it</source>
+        <translation>{joint} 以 {a} mA 拉动（摩擦最多 {b} mA）：放松其拉线，然后设零</translation>
+    </message>
+    <message>
         <location filename="../../hardware/servos/dynamixel_bus.py"/>
         <source>torque of {names} is not proven to be off: cut the servos' power</source>
         <translation>未能证实{names}的力矩已关闭：请切断舵机电源</translation>
@@ -7831,6 +8235,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/servos/dynamixel_port.py"/>
         <source>{port} cannot be used as servo port ({why}): set servos.port to the USB adapter</source>
         <translation>{port} 不能用作舵机端口（{why}）：把 servos.port 设为 USB 适配器</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/servos/dynamixel_port.py"/>
+        <source>servo port {port} is in use by another program: close that program first</source>
+        <translation>舵机端口 {port} 正被另一个程序使用：先关闭那个程序</translation>
     </message>
     <message>
         <location filename="../../hardware/servos/dynamixel_port.py"/>
@@ -7844,13 +8253,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/servos/dynamixel_port.py"/>
-        <source>servo port {port} is in use by another program: close that program first</source>
-        <translation>舵机端口 {port} 正被另一个程序使用：先关闭那个程序</translation>
+        <source>servo port {port} has no device behind it: unplug the USB adapter and plug it in again</source>
+        <translation>舵机端口 {port} 后面没有设备：拔下 USB 适配器再重新插入</translation>
     </message>
     <message>
         <location filename="../../hardware/servos/dynamixel_port.py"/>
-        <source>servo port {port} has no device behind it: unplug the USB adapter and plug it in again</source>
-        <translation>舵机端口 {port} 后面没有设备：拔下 USB 适配器再重新插入</translation>
+        <source>servo port {port} is in use by another program, {who}: close that program first</source>
+        <translation>舵机端口 {port} 正被另一程序使用，{who}：请先关闭该程序</translation>
     </message>
     <message>
         <location filename="../../hardware/servos/dynamixel_port.py"/>
@@ -7866,6 +8275,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/servos/dynamixel_port.py"/>
         <source>servo port {port} is lost ({why}): check the USB cable, then connect again</source>
         <translation>舵机端口 {port} 断开（{why}）：检查 USB 线，然后重新连接</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/servos/eeprom.py"/>
+        <source>{path}: the servo's EEPROM cannot be saved ({why}), so it is not changed: make room, or the folder writable</source>
+        <translation>{path}：无法保存舵机的 EEPROM（{why}），因此不作更改：请腾出空间，或使该文件夹可写</translation>
     </message>
     <message>
         <location filename="../../hardware/servos/tracking.py"/>
@@ -8529,6 +8943,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>release the E-stop; check the wire of its second contact</source>
+        <translation>松开急停；检查其第二触点的导线</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>check its USB cable</source>
         <translation>检查其 USB 线</translation>
     </message>
@@ -8579,8 +8998,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>switch the servos' 12 V on, check the cables, servos.baud and the joints' ids</source>
-        <translation>接通舵机的 12 V 电源，检查线缆、servos.baud 和各关节的 id</translation>
+        <source>switch the servos' supply on, check cables, servos.baud and the joints' ids</source>
+        <translation>接通舵机电源，检查线缆、servos.baud 和关节的 id</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9164,6 +9583,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>e-stop pressed</source>
+        <translation>急停已按下</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>servo port lost</source>
         <translation>舵机端口断开</translation>
     </message>
@@ -9204,6 +9628,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>servo power lost</source>
+        <translation>舵机断电</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>servo silent</source>
         <translation>舵机无应答</translation>
     </message>
@@ -9216,6 +9645,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>servo restarted</source>
         <translation>舵机重启</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>torque switched off by another program</source>
+        <translation>扭矩被另一程序断开</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9291,6 +9725,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>commands rejected again and again</source>
         <translation>指令反复被拒绝</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>head turns against the command</source>
+        <translation>头端转向与命令相反</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>robot moves against the feed</source>
+        <translation>机器人移动与进给相反</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9484,8 +9928,63 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>deadman on the keyboard only</source>
+        <translation>只有键盘作为使能键</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>controls in use</source>
         <translation>操纵键正在使用</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>directions of the servos not learned</source>
+        <translation>未学习舵机方向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>up and down assumed</source>
+        <translation>上下为假定</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>steering not learned</source>
+        <translation>未学习转向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>right and left act the wrong way</source>
+        <translation>左右动作相反</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>model not calibrated</source>
+        <translation>模型未校准</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>model not taught on this bench</source>
+        <translation>模型未在此台架上学习</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>checks of perception switched off</source>
+        <translation>感知检查已关闭</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>policy does not look at the picture</source>
+        <translation>策略不看图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>rig not accepted</source>
+        <translation>装置未验收</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>rig changed since it was accepted</source>
+        <translation>装置在验收后有更改</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9634,6 +10133,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>E-stop pressed</source>
+        <translation>急停已按下</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>release the E-stop, acknowledge, then zero the servos and arm again</source>
+        <translation>松开急停，确认，然后为舵机设零并重新就绪</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>Servo port lost</source>
         <translation>舵机端口断开</translation>
     </message>
@@ -9669,8 +10178,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>free the wire or what it moves, let it cool, then acknowledge</source>
-        <translation>松开驱动丝或被带动的部件，待其冷却，然后确认</translation>
+        <source>the wires were let out: free what blocks, let it cool, then acknowledge</source>
+        <translation>拉线已放松：排除阻碍，待其冷却，然后确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9714,6 +10223,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>No servo power: E-stop pressed, or supply off</source>
+        <translation>舵机无电源：急停已按下或电源关闭</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>release the E-stop or switch the supply on; acknowledge, zero</source>
+        <translation>松开急停或接通电源；确认，设零</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>A servo does not answer</source>
         <translation>有舵机没有应答</translation>
     </message>
@@ -9744,6 +10263,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>Another program switched the torque off</source>
+        <translation>另一程序断开了扭矩</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>end that program (doctor names it), check the wires, then acknowledge</source>
+        <translation>结束该程序（doctor 会指出），检查拉线，然后确认</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>The servos' watchdog tripped</source>
         <translation>舵机看门狗触发</translation>
     </message>
@@ -9759,8 +10288,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>let it cool, lower the pretension, then acknowledge</source>
-        <translation>让其冷却，降低预紧，然后确认</translation>
+        <source>the wires were let out: let it cool, lower the pretension, then acknowledge</source>
+        <translation>拉线已放松：待其冷却，减小预紧，然后确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9829,8 +10358,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>put it back, or start again with F5, then acknowledge</source>
-        <translation>放回原位，或按 F5 重新启动，然后确认</translation>
+        <source>put it back, or start again with F5 (make a bench again), then acknowledge</source>
+        <translation>放回原位，或按 F5 重新启动（重新建立台架），然后确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -9881,6 +10410,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>acknowledge; if it comes again, report it with the log</source>
         <translation>确认；若再次出现，请连同日志报告</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The head turns the other way than it is steered</source>
+        <translation>头端转向与操控方向相反</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>check the tendons; Rig, Calibrate: Wiggle, Steering; acknowledge</source>
+        <translation>检查拉线；“装置”，标定：摆动、转向；确认</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The robot moves the other way than it is fed</source>
+        <translation>机器人移动方向与进给相反</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>check the feed's direction; Rig, Calibrate: Wiggle; acknowledge</source>
+        <translation>检查进给方向；“装置”，标定：摆动；确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10159,6 +10708,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>A feed is at the end of its way back</source>
+        <translation>进给已到退回的尽头</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>to pull it out further, slowly: let go, then hold retract again</source>
+        <translation>要继续缓慢拉出：松开，再按住后退</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Pulling out beyond the end: slow, while held</source>
+        <translation>正在拉出到尽头之外：缓慢，按住期间</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>watch the robot; when it is out, say where it is (page Servos, Zero)</source>
+        <translation>看着机器人；拉出后，说明其位置（“舵机”页，零点）</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>acknowledge the stop first</source>
         <translation>请先确认停止</translation>
     </message>
@@ -10184,23 +10753,23 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>The camera is not well for long enough</source>
-        <translation>相机正常的时间还不够长</translation>
+        <source>Waiting for steady pictures (1 s)</source>
+        <translation>等待稳定的图像（1 秒）</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>wait a second</source>
-        <translation>等一秒</translation>
+        <source>the camera must be well for a second</source>
+        <translation>相机须连续正常一秒</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Perception is not well for long enough</source>
-        <translation>感知正常的时间还不够长</translation>
+        <source>Waiting for a steady pose (1 s)</source>
+        <translation>等待稳定的位姿（1 秒）</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>wait until the pose is steady for a second</source>
-        <translation>等位姿稳定一秒</translation>
+        <source>keep the robot in view: it must be seen well for a second</source>
+        <translation>保持机器人在视野内：须清晰可见一秒</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10274,6 +10843,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>The keyboard alone is no deadman here</source>
+        <translation>此处不能只用键盘作为使能键</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>hold the pedal, or set keyboard_deadman = true in the rig's file, then F5</source>
+        <translation>按住脚踏，或在装置文件中设 keyboard_deadman = true，然后按 F5</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>The controls are in use</source>
         <translation>操纵键正在使用</translation>
     </message>
@@ -10281,6 +10860,106 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>let go of the controls, then hand over</source>
         <translation>松开操纵键，然后移交</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The servos' directions are not learned</source>
+        <translation>尚未学习舵机方向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>menu Rig, Calibrate: page Wiggle and direction; by hand you can drive</source>
+        <translation>“装置”菜单，标定：“摆动与方向”页；可手动驱动</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Up and down are assumed</source>
+        <translation>上下为假定</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>menu Rig, Calibrate: look, and confirm or swap them on the page Wiggle and direction</source>
+        <translation>“装置”菜单，标定：在“摆动与方向”页查看并确认或交换</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The steering is not learned</source>
+        <translation>尚未学习转向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>menu Rig, Calibrate: page Steering; by hand you can drive</source>
+        <translation>“装置”菜单，标定：“转向”页；可手动驱动</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Right and left act the wrong way</source>
+        <translation>左右动作相反</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>menu Rig, Calibrate: wiggle again, or turn the robot in its holder; then Steering</source>
+        <translation>“装置”菜单，标定：重新摆动，或在支架中转动机器人；然后“转向”</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The model's confidence is not calibrated</source>
+        <translation>模型的置信度未校准</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>menu Model, Teach this bench; or main.py teach, or calibrate</source>
+        <translation>“模型”菜单，学习此台架；或 main.py teach 或 calibrate</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The model was not taught on this bench</source>
+        <translation>模型未在此台架上学习</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>menu Model, Teach this bench; or main.py teach</source>
+        <translation>“模型”菜单，学习此台架；或 main.py teach</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Checks of perception are switched off</source>
+        <translation>感知检查已关闭</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>set perception.quality.enabled, and max_novelty to 1.25 at most</source>
+        <translation>设置 perception.quality.enabled，且 max_novelty 不超过 1.25</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The policy does not look at the picture</source>
+        <translation>策略不看图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>set policy.name to pursuit or table</source>
+        <translation>将 policy.name 设为 pursuit 或 table</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The rig was not accepted</source>
+        <translation>装置未验收</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>close it, then main.py rig accept NAME; by hand you can drive</source>
+        <translation>关闭它，然后运行 main.py rig accept NAME；可手动驱动</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The rig was changed since it was accepted</source>
+        <translation>装置在验收后有更改</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>main.py rig show NAME says what; close it, then main.py rig accept NAME</source>
+        <translation>main.py rig show NAME 说明更改；关闭它，然后 main.py rig accept NAME</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10504,8 +11183,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>RealSense: its serial number; empty: the only one there is</source>
-        <translation>RealSense：其序列号；留空：唯一的那一台</translation>
+        <source>RealSense, Basler: its serial number; empty: the only one there is</source>
+        <translation>RealSense、Basler：其序列号；空：唯一的那台</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11869,13 +12548,18 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>model number that every servo must report (1020: XM430-W350)</source>
-        <translation>每个舵机必须报告的型号（1020：XM430-W350）</translation>
+        <source>model number of the servos (1020: XM430-W350); a joint may have another</source>
+        <translation>舵机型号（1020：XM430-W350）；各关节可另设</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
         <source>pull of every tendon at zero bend</source>
         <translation>弯曲为零时每根驱动丝的牵拉</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>speed at which wires are pulled to it after the servos were switched on</source>
+        <translation>舵机开启后把拉线拉到预紧的速度</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11924,8 +12608,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>a hotter servo ends the driving</source>
-        <translation>舵机更热则结束驾驶</translation>
+        <source>a hotter servo ends the driving; 5 °C below its own limit at most</source>
+        <translation>舵机更热则结束驱动；最多比其自身限值低 5 °C</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11934,18 +12618,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>a lower supply ends the driving</source>
-        <translation>供电更低则结束驾驶</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>Max current</source>
-        <translation>最大电流</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>a servo that draws more for half a second is stopped; small ones (XL330, XC330) stall at 1500 to 1800</source>
-        <translation>舵机电流超过此值达半秒即停止；小型舵机（XL330、XC330）的堵转电流为 1500 至 1800</translation>
+        <source>a lower supply ends the driving; empty: 7/8 of what each servo's model recommends</source>
+        <translation>电源更低则结束驱动；空：各舵机型号推荐值的 7/8</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11956,6 +12630,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>distance of goal and measured position that counts as jam</source>
         <translation>目标与测得位置相差这么多视为卡住</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Unattended</source>
+        <translation>无人值守</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>servos that hold without the program are watched for so long, then relaxed and switched off; 0: they hold on</source>
+        <translation>没有程序而仍保持的舵机被监视的时间，之后放松并断开；0：一直保持</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>At close</source>
+        <translation>关闭时</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>servos that hold when the program is closed; without a window or terminal to ask in they hold</source>
+        <translation>程序关闭时仍保持的舵机；没有窗口或终端可询问时保持</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11984,6 +12678,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>model number of its servo; empty: servos.model</source>
+        <translation>该舵机的型号；空：servos.model</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>Sign</source>
         <translation>方向</translation>
     </message>
@@ -11991,6 +12690,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>direction of the servo that increases the joint's millimetres</source>
         <translation>使关节毫米数增大的舵机转向</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Max force</source>
+        <translation>最大力</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the servo itself gives no more, its gear's friction included; tendons 20 (a wire of 0.15 mm bears 25 to 35), feed and delivery 30; raise it where a joint does not follow though nothing is jammed</source>
+        <translation>舵机本身最多给出此力，含齿轮摩擦；拉线 20（0.15 mm 的线可承受 25 到 35），进给和输送 30；关节不跟随而又没有卡住时，调高它</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
