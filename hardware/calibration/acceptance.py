@@ -145,8 +145,11 @@ class AcceptanceProbe(ServoProbe):
         self._robot.hold()
         return last_s
 
-    def stand_still(self, since_s: float) -> tuple[float, float]:
-        """Milliseconds from `since_s` until the servo stood, and its way meanwhile. Raises ProbeFailed when it does not stop."""
+    def stand_still(self, since_s: float, from_mm: float) -> tuple[float, float]:
+        """Milliseconds from `since_s` until the servo stood, and its way from `from_mm`, where it was then.
+
+        Raises ProbeFailed when it does not stop.
+        """
         samples: list[tuple[float, float]] = []
         while time.monotonic() < since_s + _WATCH_S:
             state = _state_of(self._robot.bus_status(), self.servo_id)
@@ -159,8 +162,7 @@ class AcceptanceProbe(ServoProbe):
         still = [time_s for time_s, _ in samples if time_s >= since_s and (not moving or time_s > moving[-1])]
         if not still or end_s - still[0] < _STILL_S:
             raise ProbeFailed(f"servo {self.servo_id} does not stand still within {_WATCH_S:g} s: press the E-stop")
-        before = [at_mm for time_s, at_mm in samples if time_s <= since_s] or [samples[0][1]]
-        return 1000.0 * (still[0] - since_s), abs(end_mm - before[-1])
+        return 1000.0 * (still[0] - since_s), abs(end_mm - from_mm)
 
     def acknowledge(self) -> None:
         """After a STOP that was timed: arm again for the next one."""
@@ -250,11 +252,12 @@ class AcceptanceBench:
             for attempt in range(STOP_TRIES):
                 way = speed_mm_s if attempt % 2 == 0 else -speed_mm_s
                 probe.run(way, _RUN_UP_S)
+                from_mm = probe.position_mm
                 if kind == "STOP":
                     began_s = probe.press_stop()
                 else:
                     began_s = probe.lose_deadman(way, self._config.safety.deadman_timeout_s)
-                time_ms, at_mm = probe.stand_still(began_s)
+                time_ms, at_mm = probe.stand_still(began_s, from_mm)
                 times_ms.append(round(time_ms, 1))
                 way_mm = max(way_mm, at_mm)
                 report(f"  {time_ms:.0f} ms, {at_mm:.2f} mm")
