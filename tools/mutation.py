@@ -35,6 +35,8 @@ TESTS = {  # module -> the tests that should find its mutants
     "health": ("test_supervisor.py", "test_health.py"),
     "camera_monitor": ("test_camera_monitor.py", "test_supervisor.py"),
     "bus_monitor": ("test_bus_monitor.py", "test_supervisor.py", "test_health.py"),
+    "direction_monitor": ("test_direction_monitor.py",),
+    "readiness": ("test_readiness.py",),
 }
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
 JOBS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from core.control.direction_monitor import (
     WRONG_FEED_MM,
@@ -217,3 +219,41 @@ def test_the_head_of_a_scene() -> None:
     assert found is not None
     assert (found.heading_deg, found.theta_deg) == (pytest.approx(12.0, abs=0.1), pytest.approx(12.0, abs=0.1))
     assert found.place_mm == (50.0, 25.0)
+
+
+_rates = st.lists(st.floats(-140.0, 140.0), min_size=2, max_size=6)
+
+
+@given(rates=_rates, share=st.floats(0.0, 1.0), feed=st.floats(-8.0, 8.0), late_s=st.floats(0.02, 0.14))
+@settings(max_examples=60, deadline=None)
+def test_a_robot_that_is_wired_right_never_seems_to_go_the_other_way(
+    rates: list[float], share: float, feed: float, late_s: float
+) -> None:
+    """Whatever is commanded, however much of it the vessel lets through, and however late, within the lags that are known."""
+    monitor, turn_deg, fed_mm = DirectionMonitor(), [0.0], [0.0]
+    late = round(late_s / TURN_S)
+    for step in range(25 * len(rates)):
+        now_s = step * TURN_S
+        turn_deg.append(max(-94.0, min(94.0, turn_deg[-1] + rates[step // 25] * TURN_S)))
+        fed_mm.append(fed_mm[-1] + feed * TURN_S)
+        monitor = monitor.drive(MotionSent(now_s, turn_deg[-1], feed))
+        if step % 2:
+            then_deg, then_mm = (known[max(0, len(known) - 1 - late)] for known in (turn_deg, fed_mm))
+            monitor = monitor.observe(HeadSeen(now_s, share * then_deg, share * then_deg, (share * then_mm, 0.0)))
+            assert not monitor.faults(), now_s
+
+
+@given(rate=st.floats(12.0, 140.0), share=st.floats(0.6, 1.0), sign=st.sampled_from([-1.0, 1.0]), late_s=st.floats(0.02, 0.14))
+@settings(max_examples=40, deadline=None)
+def test_a_robot_that_is_wired_the_other_way_is_always_noticed(rate: float, share: float, sign: float, late_s: float) -> None:
+    monitor, most_deg = DirectionMonitor(), 0.0
+    for step in range(round(1.5 / TURN_S)):
+        now_s = step * TURN_S
+        monitor = monitor.drive(MotionSent(now_s, sign * rate * now_s, 0.0))
+        if step % 2:
+            most_deg = share * rate * max(0.0, now_s - late_s)
+            monitor = monitor.observe(HeadSeen(now_s, -sign * most_deg, -sign * most_deg, (0.0, 0.0)))
+            if monitor.faults():
+                break
+    assert monitor.faults()
+    assert most_deg <= WRONG_TURN_DEG + 2.0 + rate * 0.25
