@@ -50,10 +50,12 @@ def readiness_of(
     firmware : of the seven servos; empty: they were not asked.
     """
     found: list[Hindrance] = []
+    changed = accepted is not None and is_outdated(accepted, config, firmware)
+    is_accepted = accepted is not None and not accepted.missing and not changed
     known = rig.calibration if rig is not None else None
     if known is None or known.wiring is None or known.wiring != wiring_of(config.servos):
         found.append(Hindrance.DIRECTIONS_UNKNOWN)
-    elif known.assumed:
+    elif known.assumed and not is_accepted:  # the acceptance has each direction confirmed by eye
         found.append(Hindrance.DIRECTIONS_ASSUMED)
     steering = known.steering if known is not None else None
     if steering is None or steering.turn_deg_per_mm is None:
@@ -71,11 +73,8 @@ def readiness_of(
         found.append(Hindrance.CHECKS_OFF)
     if config.policy.name in BLIND_POLICIES:
         found.append(Hindrance.POLICY_BLIND)
-    changed = accepted is not None and is_outdated(accepted, config, firmware)
-    if accepted is None or (accepted.missing and not changed):
-        found.append(Hindrance.NOT_ACCEPTED)
-    elif changed:
-        found.append(Hindrance.ACCEPTANCE_OUTDATED)
+    if not is_accepted:
+        found.append(Hindrance.ACCEPTANCE_OUTDATED if changed else Hindrance.NOT_ACCEPTED)
     return Readiness(tuple(found), keyboard_deadman=rig is not None and rig.keyboard_deadman)
 
 

@@ -61,7 +61,6 @@ def test_a_rig_that_was_calibrated_and_taught_is_ready() -> None:
         ({"wiring": None}, Hindrance.DIRECTIONS_UNKNOWN),
         ({"wiring": ((2, 1), (1, 1), *wiring_of(LIVE.servos)[2:])}, Hindrance.DIRECTIONS_UNKNOWN),
         ({"wiring": (*wiring_of(LIVE.servos)[:4], (5, -1), *wiring_of(LIVE.servos)[5:])}, Hindrance.DIRECTIONS_UNKNOWN),
-        ({"assumed": ("up", "down")}, Hindrance.DIRECTIONS_ASSUMED),
         ({"steering": None}, Hindrance.STEERING_UNKNOWN),
         ({"steering": {**STEERING, "turn_deg_per_mm": None}}, Hindrance.STEERING_UNKNOWN),  # a file of an earlier version
         ({"steering": {**STEERING, "roll_deg": 180.0}}, Hindrance.STEERING_WRONG),  # right and left swapped, or seen from below
@@ -70,6 +69,13 @@ def test_a_rig_that_was_calibrated_and_taught_is_ready() -> None:
 )
 def test_what_was_not_learnt_of_the_servos_is_named(calibration: dict[str, Any], lack: Hindrance) -> None:
     assert _lacks(_rig(**calibration)) == {lack}
+
+
+def test_what_was_assumed_of_the_directions_is_confirmed_by_the_acceptance_or_in_the_wizard() -> None:
+    rig = _rig(assumed=("up", "down"))
+    assert _lacks(rig) == set()
+    found = set(readiness_of(_config(rig), rig, TAUGHT, None).hindrances)
+    assert found == {Hindrance.DIRECTIONS_ASSUMED, Hindrance.NOT_ACCEPTED}
 
 
 @pytest.mark.parametrize(
