@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from core.config.models import RESOURCES
 from core.config.schema import Effect, schema
-from core.control.alerts import ALERTS
+from core.control.alerts import ALERTS, alert_of
 from core.control.faults import Cause
 from core.control.gate import RejectReason
 from core.control.joints import Limit
@@ -94,7 +94,14 @@ FIXED = (
     "no pedal is configured: set pedal.port to its path in /dev/serial/by-id", "the bench twin has not told anything yet",
     "the bench twin did not start: free memory, then start the rig again (F5)", "put in a point", "move a point",
     "take out a point", "nudge a point", "add a point", "can tell", "can't tell", "note", "take the algorithm's lines",
-    "nothing to save: no frames in memory yet", "the last seconds are still being saved",
+    "nothing to save: no frames in memory yet", "the last seconds are still being saved", "relaxing the wires",
+    "the tension is being let off: wait a moment, then try again", "stopped meanwhile: the wires are as they were then",
+    "the wires were not let go in time: cut the servos' power", "the servo port is not open: switch the torque off",
+    "the application ended meanwhile: nothing was switched on",
+    "the twin's servos did not answer in time: close other programs, then try again; F5 starts the twin again", "bus speed",
+    "adapter power", "screen lock", "inhibited while the servos follow",
+    "switch screen lock and sleep off in the desktop's settings", "sleep cannot be inhibited: systemd-inhibit is not there",
+    "with DYNAMIXEL Wizard 2.0 set Baud Rate (8) of all seven to 1 Mbps, then servos.baud = 1000000",
 )  # fmt: skip
 
 # Texts that core and hardware compose without ``message``. A value called by one letter is a number, any other may be a known text.
@@ -135,8 +142,8 @@ def texts_of_tables() -> Iterator[str]:
     """Texts that stand in tables of the core: reasons, every alert, every setting with its section and when it acts."""
     for words in (Reason, Cause, Hindrance, RejectReason, Limit, Effect):
         yield from words
-    for spec in ALERTS.values():
-        yield from (spec.text, spec.what_to_do)
+    for key, spec in ALERTS.items():
+        yield from (spec.text, spec.what_to_do, alert_of(key, simulated=True).what_to_do)
     for section in schema().walk():
         yield from (section.title, section.description)
         for setting in section.settings:
