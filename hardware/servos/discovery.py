@@ -11,6 +11,7 @@ from serial.tools import list_ports
 from core.config.safety import JOINT_NAMES
 from core.messages import message
 from hardware.cameras import sysfs
+from hardware.servos.bus_ipc import ask_for_port
 from hardware.servos.dynamixel_port import NoAnswer, ServoLine
 
 BAUDS = (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000)
@@ -78,6 +79,7 @@ def find_servos(
     Raises PortError: the port is missing, not permitted, in use, or no serial port; NoAnswer: no servo answers at any speed.
     """
     answered: dict[int, tuple[FoundServo, ...]] = {}
+    ask_for_port(port)  # a bus process of this program may watch servos that hold
     for baud in bauds:
         check_stop()
         say(f"asking at {baud} baud")

@@ -17,6 +17,7 @@ from core.config.safety import JointConfig, ServosConfig
 from core.config.servo_models import model_name
 from core.devices import UserError
 from core.messages import message
+from hardware.servos.bus_ipc import ask_for_port
 from hardware.servos.dynamixel_port import ServoError, ServoLine, WrongServo
 
 EEPROM_BYTES = 64
@@ -101,6 +102,7 @@ def restore_eeprom(servos: ServosConfig, folder: Path, say: Callable[[str], obje
     kept = {joint.id: read_backup(folder, servos.port, joint.id, servos.model_of(joint).number) for joint in servos.joints}
     if not any(kept.values()):
         raise UserError(f"there is no backup of these servos in {folder}: the program has not changed any")
+    ask_for_port(servos.port)  # a bus process of this program may watch servos that hold
     line = ServoLine(servos.port, servos.baud)
     line.open()
     try:

@@ -26,6 +26,7 @@ from core.devices import DeviceError, Robot
 from core.types import Command, RobotStatus
 from hardware.processes import PARENT_CHECK_S
 from hardware.servos.bus_ipc import BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, start_bus
+from hardware.servos.discovery import find_servos
 from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
 from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
@@ -897,6 +898,20 @@ def test_a_closed_robot_that_holds_is_watched_and_the_next_one_takes_over(servos
         following.torque_off()
         following.close()
     assert psutil.Process().children() == [], "with the torque off there is nothing to watch"
+
+
+def test_a_search_for_servos_takes_a_watched_port_over(servos: SoftServoBus) -> None:
+    """Between two pages of the wizard a bus process of its own would hold the port."""
+    robot = _robot(servos, unattended_s=600.0, **WATCHED)
+    robot.connect()
+    robot.zero()
+    robot.arm()
+    robot.close()
+    assert len(find_servos(servos.port).servos) == 7
+    assert _torques(servos) == [1] * 7
+    following = _robot(servos)
+    following.connect()
+    following.close()
 
 
 def test_a_watched_port_is_not_given_away_while_an_application_drives(servos: SoftServoBus, armed: ServoRobot) -> None:
