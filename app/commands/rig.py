@@ -16,6 +16,7 @@ from app.commands.options import ConfigOption, JsonOption
 from app.ui.texts import calibrated_parts, calibration_lines, rig_line
 from core.calibration.camera import BoardError, BoardSpec
 from core.config.acceptance import read_acceptance
+from core.config.calibration import DrumsConfig
 from core.config.models import Config
 from core.config.rig_file import (
     RESERVED,
@@ -30,12 +31,14 @@ from core.config.rig_file import (
     write_rig,
 )
 from core.devices import UserError
-from hardware.rig import RigKind, rig_config
+from hardware.rig import RigKind, kind_of, rig_config
 
 if TYPE_CHECKING:
     from hardware.calibration.rig_draft import RigDraft
 
 STEPS = ("board", "servos", "zero", "steering")
+_MOVING = frozenset({"servos", "zero", "steering"})
+"""Steps that turn servos."""
 _BOARD_TRIES = 4
 """Pictures of the board that may fail."""
 
@@ -97,6 +100,13 @@ def calibrate_rig(
         typer.Option("--from", help="twin, realsense, webcam, basler or a rig; default: NAME where there is one, else twin"),
     ] = None,
     steps: Annotated[str, typer.Option(help="of board,servos,zero,steering")] = "board,servos,zero,steering",
+    drums: Annotated[
+        str | None,
+        typer.Option(
+            help="diameters in mm, measured: of the tendons' drums, the feed's wheel, the delivery's; of a screw: its lead over pi",
+            metavar="TENDONS,FEED,DELIVERY",
+        ),
+    ] = None,
     pictures: Annotated[int, typer.Option(min=1, max=20, help="of the board")] = 5,
     square_mm: SquareOption = 18.0,
     columns: ColumnsOption = 10,
@@ -107,18 +117,25 @@ def calibrate_rig(
     """Calibrate a rig without a window and save it; with help it goes in the window, menu Rig."""
     from app.operator.rig_engine import quick_sight
     from hardware.calibration.bench import open_bench
-    from hardware.calibration.rig_draft import RigDraft
+    from hardware.calibration.rig_draft import DRUMS_FIRST, RigDraft
 
     if not auto:
         raise UserError("say --auto when nobody is in the servos' way; with pictures and buttons: main.py gui, menu Rig, Calibrate")
     chosen = tuple(step.strip() for step in steps.split(",") if step.strip())
     config, earlier = _config_to_calibrate(name, source, chosen, config_path)
+    measured = _drums(drums)
+    calibration = earlier.calibration if earlier is not None else None
+    if measured is None and (calibration is None or calibration.drums is None):
+        if kind_of(config.rig) is RigKind.LIVE and set(chosen) & _MOVING:
+            raise UserError(DRUMS_FIRST)
     check_can_save(name)
     bench = open_bench(config, quick_sight(config))
     done: list[str] = []
     ended: UserError | KeyboardInterrupt | None = None
     try:
-        draft = RigDraft(bench, config, earlier.calibration if earlier is not None else None, _report)
+        draft = RigDraft(bench, config, calibration, _report)
+        if measured is not None:
+            draft.set_drums(measured)
         draft.spec = BoardSpec(columns, rows, square_mm)
         bench.warm_up()
         for step in calibration_steps(draft, chosen, pictures):
@@ -157,7 +174,7 @@ def calibration_steps(draft: RigDraft, steps: tuple[str, ...], pictures: int) ->
                     raise
         draft.solve_boards()
         yield "board"
-    if set(steps) & {"servos", "zero", "steering"}:
+    if set(steps) & _MOVING:
         if "board" in steps and draft.bench.kind is not RigKind.SIM:  # the twin's board lies in the pictures of it only
             draft.wait_for_no_board()
         draft.search_servos()
@@ -220,6 +237,17 @@ def _config_to_calibrate(
         return rig_config(source, config_path, None)[0], None
     path, found = find_rig(source)
     return with_rig(rig_config(None, config_path, None)[0], found, path), found
+
+
+def _drums(text: str | None) -> DrumsConfig | None:
+    """The drums of ``--drums``. Raises UserError."""
+    if text is None:
+        return None
+    try:
+        tendons_mm, advance_mm, delivery_mm = map(float, text.split(","))
+        return DrumsConfig(tendons_mm=tendons_mm, advance_mm=advance_mm, delivery_mm=delivery_mm)
+    except ValueError:  # pydantic's, too
+        raise UserError(f"--drums {text}: three diameters in mm of 0.3 to 150: tendons, feed, delivery") from None
 
 
 def _report(line: str) -> None:

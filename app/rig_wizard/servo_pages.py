@@ -13,11 +13,12 @@ from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, b
 from app.ui.i18n import mark, tr, tr_text
 from app.widgets.painting import NONE
 from core.calibration.servos import Assignment
+from core.config.calibration import DrumsConfig
 from core.config.safety import JOINT_NAMES, TENDONS, JointName
 from core.config.servo_models import model_name
 from core.devices import UserError
 from hardware.calibration.rig_draft import RigDraft
-from hardware.rig import with_port
+from hardware.rig import RigKind, with_port
 from hardware.servos.discovery import FASTER_BUS, find_ports, slow_bus
 
 _JOINT_TEXT: dict[JointName, str] = {
@@ -111,6 +112,84 @@ class PortPage(WizardPage):
             self.model.changed.emit()
             return
         self.model.run(tr("searching the servos"), draft.search_servos)
+
+
+class DrumsPage(WizardPage):
+    """How far one turn of a servo moves its joint, by the diameter of what it turns: asked before anything moves."""
+
+    name = mark("Drums")
+    hint = mark(
+        "Measure with a caliper what the servos turn: the drums of the wires, with the wire on them, and the wheels of feed and "
+        "delivery. Ways, speeds and the greatest force of each joint follow from it. Of a lead screw enter its way per turn."
+    )
+
+    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
+        super().__init__(model, picture)
+        self.diameters: list[QDoubleSpinBox] = []
+        self.ways: list[QDoubleSpinBox] = []
+        for title in (mark("Tendons"), mark("Robot forward"), mark("Catheter")):
+            diameter, way = self._field(1.0), self._field(math.pi)
+            diameter.setAccessibleName(tr("Diameter, {what}", what=tr(title)))
+            way.setAccessibleName(tr("Way per turn, {what}", what=tr(title)))
+            diameter.valueChanged.connect(lambda mm, way=way: self._set_other(way, math.pi * mm))
+            way.valueChanged.connect(lambda mm, diameter=diameter: self._set_other(diameter, mm / math.pi))
+            self.diameters.append(diameter)
+            self.ways.append(way)
+            self.add_row(
+                QLabel(tr(title)), QLabel("\N{DIAMETER SIGN}"), diameter, QLabel(tr("way per turn")), way, stretched=diameter
+            )
+        self.result = note("")
+        self.column.addWidget(self.result)
+        self.column.addStretch(1)
+
+    def _field(self, per_mm: float) -> QDoubleSpinBox:
+        field = QDoubleSpinBox()
+        field.setDecimals(2)
+        field.setRange(0.0, per_mm * 150.0)
+        field.setSingleStep(0.1)
+        field.setSuffix(" mm")
+        field.setSpecialValueText(tr("not measured"))
+        field.setKeyboardTracking(False)
+        return field
+
+    @property
+    def is_done(self) -> bool:
+        draft, bench = self.draft, self.model.bench
+        return draft is not None and (draft.drums is not None or (bench is not None and bench.kind is RigKind.SIM))
+
+    def enter(self) -> None:
+        """Show what is known."""
+        draft = self.draft
+        if draft is not None and self.is_done:
+            joints = (draft.config.servos.joints[place] for place in (0, 4, 5))
+            for joint, diameter, way in zip(joints, self.diameters, self.ways, strict=True):
+                self._show(diameter, joint.mm_per_turn / math.pi)
+                self._show(way, joint.mm_per_turn)
+        self.refresh()
+
+    def refresh(self) -> None:
+        draft = self.draft
+        enable(draft is not None and not self.model.is_busy, *self.diameters, *self.ways)
+        if not self.is_done or draft is None:
+            set_note(self.result, tr("Before all three are known no servo is moved."))
+            return
+        limits = [draft.config.servos.force_limit(draft.config.servos.joints[place]) for place in (0, 4, 5)]
+        forces = " / ".join(f"{limit.force_n:.0f}" for limit in limits)
+        set_note(self.result, tr("Greatest force, limited in the servos: {forces} N.", forces=forces))
+
+    @staticmethod
+    def _show(field: QDoubleSpinBox, mm: float) -> None:
+        with QSignalBlocker(field):
+            field.setValue(mm)
+
+    def _set_other(self, other: QDoubleSpinBox, mm: float) -> None:
+        self._show(other, mm)
+        draft = self.draft
+        tendons_mm, advance_mm, delivery_mm = (way.value() / math.pi for way in self.ways)
+        if draft is None or min(tendons_mm, advance_mm, delivery_mm) <= 0.3:
+            return
+        draft.set_drums(DrumsConfig(tendons_mm=tendons_mm, advance_mm=advance_mm, delivery_mm=delivery_mm))
+        self.model.changed.emit()
 
 
 class IdentifyPage(WizardPage):

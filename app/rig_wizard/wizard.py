@@ -23,7 +23,7 @@ from app.operator.stop_keys import StopKeys
 from app.rig_wizard.camera_pages import CameraPage, ScalePage
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.pages_base import WizardPage, WizardPicture, button, note, set_main_button
-from app.rig_wizard.servo_pages import IdentifyPage, PortPage, SteeringPage, ZeroPage
+from app.rig_wizard.servo_pages import DrumsPage, IdentifyPage, PortPage, SteeringPage, ZeroPage
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import calibration_lines, rig_line
@@ -110,6 +110,7 @@ class RigWizard(QDialog):
         self.camera_page.ask = self._ask
         self.scale_page = ScalePage(model, self.picture)
         self.port_page = PortPage(model, self.picture)
+        self.drums_page = DrumsPage(model, self.picture)
         self.identify_page = IdentifyPage(model, self.picture)
         self.zero_page = ZeroPage(model, self.picture)
         self.steering_page = SteeringPage(model, self.picture)
@@ -118,6 +119,7 @@ class RigWizard(QDialog):
             self.camera_page,
             self.scale_page,
             self.port_page,
+            self.drums_page,
             self.identify_page,
             self.zero_page,
             self.steering_page,

@@ -554,7 +554,7 @@ def feed_disagreement(
         return ""
     return message(
         "the feed goes by about {a:.0f} mm at one turn of the servo's horn, as the camera saw it, and is "
-        "configured with {b:g} mm: measure it, and set servos.joints, advance, mm_per_turn",
+        "configured with {b:g} mm: measure the diameter of its wheel (page Drums)",
         a=seen,
         b=configured,
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from core.config.safety import JOINT_NAMES, TENDONS, JointName
+from core.config.safety import JOINT_NAMES, TENDONS, JointName, ServosConfig
 from core.config.section import ConfigSection
 
 SizePx = Annotated[tuple[int, int], Field(description="width and height of the pictures")]
@@ -95,6 +96,30 @@ class ZeroConfig(ConfigSection):
     found_utc: datetime | None = Field(None, description="when the wires were searched; None: by an earlier version")
 
 
+class DrumsConfig(ConfigSection):
+    """Diameters of what the servos turn, as measured: the drums of the wires, the wheels of feed and delivery.
+
+    A lead screw counts as the drum of the same way per turn: its lead over pi.
+    """
+
+    tendons_mm: float = Field(gt=0.3, le=150.0, description="of all four, with the wire on them")
+    advance_mm: float = Field(gt=0.3, le=150.0)
+    delivery_mm: float = Field(gt=0.3, le=150.0, description="of both")
+
+    def of(self, name: JointName) -> float:
+        """Diameter of a joint's drum, mm."""
+        return self.tendons_mm if name in TENDONS else self.advance_mm if name == "advance" else self.delivery_mm
+
+    def applied(self, servos: ServosConfig) -> ServosConfig:
+        """The servos with the way per turn that these drums give."""
+        joints = tuple(joint.model_copy(update={"mm_per_turn": round(math.pi * self.of(joint.name), 4)}) for joint in servos.joints)
+        return servos.model_copy(update={"joints": joints})
+
+    def fit(self, servos: ServosConfig) -> bool:
+        """Whether the servos' ways per turn are still those of these drums."""
+        return self.applied(servos).joints == servos.joints
+
+
 class PortConfig(ConfigSection):
     """Where the robot is inserted, as shares of the undistorted picture's width and height."""
 
@@ -115,6 +140,7 @@ class CalibrationConfig(ConfigSection):
         max_length=len(JOINT_NAMES),
         description="id and sign of each joint, found or confirmed: others in servos.joints are not known to be right",
     )
+    drums: DrumsConfig | None = Field(None, description="None: nobody has measured them, and the ways per turn are assumed")
     lens: LensConfig | None = None
     scale: ScaleConfig | None = None
     steering: SteeringConfig | None = None

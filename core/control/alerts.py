@@ -89,6 +89,10 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
         "hold the pedal, or set keyboard_deadman = true in the rig's file, then F5",
     ),
     Hindrance.OPERATOR_DRIVING: ("The controls are in use", "let go of the controls, then hand over"),
+    Hindrance.DRUMS_UNKNOWN: (
+        "The servos' drums are not measured",
+        "menu Rig, Calibrate: page Drums; until then ways and forces are assumed",
+    ),
     Hindrance.DIRECTIONS_UNKNOWN: (
         "The servos' directions are not learned",
         "menu Rig, Calibrate: page Wiggle and direction; by hand you can drive",

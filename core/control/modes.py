@@ -51,6 +51,7 @@ class Hindrance(StrEnum):
     DEADMAN_ON_KEYBOARD = "deadman on the keyboard only"
     OPERATOR_DRIVING = "controls in use"
     # of a LIVE rig (``readiness``)
+    DRUMS_UNKNOWN = "drums not measured"
     DIRECTIONS_UNKNOWN = "directions of the servos not learned"
     DIRECTIONS_ASSUMED = "up and down assumed"
     STEERING_UNKNOWN = "steering not learned"
@@ -65,6 +66,7 @@ class Hindrance(StrEnum):
 
 OF_THE_RIG = frozenset(
     {
+        Hindrance.DRUMS_UNKNOWN,
         Hindrance.DIRECTIONS_UNKNOWN,
         Hindrance.DIRECTIONS_ASSUMED,
         Hindrance.STEERING_UNKNOWN,

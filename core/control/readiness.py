@@ -1,4 +1,4 @@
-"""What a LIVE rig needs before the program may drive it: learnt directions, a model of this bench, a policy, an acceptance. Pure.
+"""What a LIVE rig needs before the program drives it: drums, directions, a model of this bench, a policy, an acceptance. Pure.
 
 A rig without it stays advisory: pictures, advice and driving by hand. On a simulated rig nothing hinders.
 """
@@ -53,6 +53,8 @@ def readiness_of(
     changed = accepted is not None and is_outdated(accepted, config, firmware)
     is_accepted = accepted is not None and not accepted.missing and not changed
     known = rig.calibration if rig is not None else None
+    if known is None or known.drums is None or not known.drums.fit(config.servos):
+        found.append(Hindrance.DRUMS_UNKNOWN)
     if known is None or known.wiring is None or known.wiring != wiring_of(config.servos):
         found.append(Hindrance.DIRECTIONS_UNKNOWN)
     elif known.assumed and not is_accepted:  # the acceptance has each direction confirmed by eye

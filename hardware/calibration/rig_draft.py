@@ -25,7 +25,7 @@ from core.calibration.camera import (
     undistort,
 )
 from core.calibration.servos import Assignment, HeadNotSeen, NotIdentified, ServoFinding, SteeringNotSeen, assign, feed_disagreement
-from core.config.calibration import CalibrationConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
+from core.config.calibration import CalibrationConfig, DrumsConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
 from core.config.models import Config
 from core.config.rig_file import RigFile, make_rig
 from core.config.safety import JOINT_NAMES, JointName, ServosConfig, wiring_of
@@ -37,6 +37,7 @@ from core.types import Image, Point
 from hardware.calibration import servo_identification
 from hardware.calibration.bench import CalibrationBench
 from hardware.calibration.servo_probe import ProcedureStopped
+from hardware.rig import RigKind
 from hardware.servos.discovery import BAUDS, FoundServos, find_servos
 from hardware.servos.dynamixel_port import ServoError
 
@@ -46,6 +47,11 @@ _NOTICEABLE_PX = 1.0
 _BOARD_MISSES = 6
 """Pictures in a row without the board, three seconds: a hand laid on it must not start the servos."""
 _BOARD_LOOK_S, _BOARD_GONE_WITHIN_S = 0.5, 180.0
+
+DRUMS_FIRST = (
+    "say the diameters of the drums before anything moves, they decide how far and how hard a servo pulls: page Drums of the rig "
+    "wizard, or rig calibrate --drums TENDONS,FEED,DELIVERY in mm"
+)
 
 Say = Callable[[str], object]
 
@@ -82,6 +88,7 @@ class RigDraft:
         self._viewed_scale = self.scale
         self._assumed_earlier = known.assumed if known is not None else None
         self._wiring = known.wiring if known is not None else None
+        self.drums: DrumsConfig | None = known.drums if known is not None else None
         self.zeros: servo_identification.Zeros | None = None
         self.notes: list[str] = []
         self._is_displaced = False
@@ -102,7 +109,7 @@ class RigDraft:
         return self._findings() != self._begun_with
 
     def _findings(self) -> tuple[object, ...]:
-        known = (self.lens, self.scale, self.steering, self.zero, self.zeros, self.port)
+        known = (self.drums, self.lens, self.scale, self.steering, self.zero, self.zeros, self.port)
         return (self.config, *known, self.assignments, len(self.views), len(self.findings))
 
     # ---- lens and scale
@@ -215,6 +222,20 @@ class RigDraft:
         self._set_servos(_with_found(servos, found))
         return found
 
+    def set_drums(self, drums: DrumsConfig) -> None:
+        """The operator has measured the drums. What was found with other ones is unknown again: its millimetres were others."""
+        before = self.config.servos
+        self.drums = drums
+        self._set_servos(drums.applied(before))
+        if self.config.servos != before:
+            self._forget_wires("zero and steering were found with other drums: find them anew")
+
+    def _forget_wires(self, why: str) -> None:
+        had = (self.zero, self.zeros, self.steering)
+        self.zero = self.zeros = self.steering = self.head_px = None
+        if any(one is not None for one in had):
+            self.say(why)
+
     def wiggle(self, servo_id: int) -> None:
         """Turn one servo both ways, for the operator to watch."""
         with self._moving():
@@ -276,10 +297,7 @@ class RigDraft:
         self._set_servos(servos if self.found is None else _with_found(servos, self.found))
         self._wiring = wiring_of(self.config.servos)
         if self._wiring != before:  # what was found by moving the servos was found with others in their places
-            had = (self.zero, self.zeros, self.steering)
-            self.zero = self.zeros = self.steering = self.head_px = None
-            if any(one is not None for one in had):
-                self.say("zero and steering were found with the servos in other places: find them anew")
+            self._forget_wires("zero and steering were found with the servos in other places: find them anew")
 
     def find_zeros(self) -> servo_identification.Zeros:
         """Leave every tendon where it just becomes taut."""
@@ -322,7 +340,12 @@ class RigDraft:
 
     @contextmanager
     def _moving(self) -> Iterator[None]:
-        """A step that turns servos, and turns them back. After one that was stopped half way the wires' places are unknown."""
+        """A step that turns servos, and turns them back. After one that was stopped half way the wires' places are unknown.
+
+        Raises DeviceError on a LIVE rig whose drums nobody has measured.
+        """
+        if self.bench.kind is RigKind.LIVE and self.drums is None:
+            raise DeviceError(DRUMS_FIRST)
         try:
             yield
         except BaseException as error:
@@ -390,6 +413,7 @@ class RigDraft:
             made_utc=datetime.now(UTC).replace(microsecond=0),
             assumed=self.assumed or None,
             wiring=self._wiring,
+            drums=self.drums,
             lens=self.lens,
             scale=self.scale,
             steering=self.steering,

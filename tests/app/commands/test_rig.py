@@ -69,6 +69,22 @@ def test_a_rig_is_shown() -> None:
         _run("show", "x")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ((), r"^say the diameters of the drums before anything moves, .*--drums TENDONS,FEED,DELIVERY"),
+        (("--drums", "12.7,20"), "^--drums 12.7,20: three diameters in mm"),
+        (("--drums", "12.7,20,0.1"), "^--drums 12.7,20,0.1: three diameters in mm"),
+        (("--drums", "12.7,20,x"), "^--drums 12.7,20,x: three diameters in mm"),
+    ],
+)
+def test_a_live_rig_is_not_moved_before_its_drums_are_known(arguments: tuple[str, ...], problem: str) -> None:
+    config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": "/dev/servos"}})
+    write_rig(make_rig(config, "bench 1", None))
+    with pytest.raises(UserError, match=problem):
+        _run("calibrate", "bench 1", "--auto", "--steps", "servos", *arguments)
+
+
 @pytest.mark.real_time
 def test_servos_are_restored_as_they_were_before_the_program_changed_them() -> None:
     twin = SoftServoBus(ServosConfig())

@@ -152,6 +152,7 @@ def test_a_live_rig_that_nothing_was_learnt_of_is_advisory_only_and_a_twin_is_no
     view = pilot.view
     engine.close()
     lacks = {
+        Hindrance.DRUMS_UNKNOWN,
         Hindrance.DIRECTIONS_UNKNOWN,
         Hindrance.STEERING_UNKNOWN,
         Hindrance.MODEL_UNTAUGHT,

@@ -249,6 +249,40 @@ def _with_servos(wizard: RigWizard) -> None:
     wizard.model.changed.emit()
 
 
+LIVE = {"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": "/dev/servos"}}
+
+
+def test_the_twins_drums_are_known(opened: RigWizard) -> None:
+    _to(opened, opened.drums_page)
+    page = opened.drums_page
+    assert page.is_done
+    assert [field.value() for field in page.ways] == [40.0] * 3
+    assert [field.value() for field in page.diameters] == [12.73] * 3
+    assert "20 / 29 / 29 N" in page.result.text()
+
+
+def test_drums_of_a_real_rig_are_asked_by_diameter_or_way(make_wizard: MakeWizard, qtbot: QtBot) -> None:
+    wizard = make_wizard("bench 1", load_config(overrides=LIVE))
+    wizard.model.open_camera(load_config(overrides=LIVE))
+    _idle(wizard, qtbot)
+    page, draft = wizard.drums_page, wizard.model.draft
+    assert draft is not None
+    _to(wizard, page)
+    assert not page.is_done
+    assert [field.text() for field in page.diameters] == ["not measured"] * 3
+    page.diameters[0].setValue(8.0)
+    page.ways[1].setValue(5.0)  # a lead screw
+    assert page.ways[0].value() == pytest.approx(25.13)
+    assert not page.is_done
+    assert "no servo is moved" in page.result.text()
+    page.diameters[2].setValue(30.0)
+    assert page.is_done
+    assert draft.drums is not None
+    ways = [joint.mm_per_turn for joint in draft.config.servos.joints]
+    assert ways == pytest.approx([25.13] * 4 + [5.0] + [94.25] * 2, abs=0.01)
+    assert " N." in page.result.text()
+
+
 def test_servos_are_told_apart_by_hand(opened: RigWizard, qtbot: QtBot) -> None:
     _to(opened, opened.identify_page)
     _with_servos(opened)

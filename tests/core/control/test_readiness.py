@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from core.config.acceptance import Acceptance, write_acceptance
+from core.config.calibration import DrumsConfig
 from core.config.models import Config, load_config
 from core.config.rig_file import RigFile, as_calibrated, make_rig, read_rig, with_rig, write_rig
 from core.config.safety import TENDONS, wiring_of
@@ -24,6 +25,8 @@ LIVE = load_config(
         "servos": {"port": "/dev/serial/by-id/u2d2"},
     }
 )
+DRUMS = {"tendons_mm": 12.0, "advance_mm": 20.0, "delivery_mm": 15.0}
+LIVE = LIVE.model_copy(update={"servos": DrumsConfig.model_validate(DRUMS).applied(LIVE.servos)})
 STEERING = {
     "heading_deg": 0.0,
     "roll_deg": 3.0,
@@ -37,7 +40,8 @@ TAUGHT = SHIPPED.model_copy(update={"name": "mine", "training": {"taught": {"ben
 
 
 def _rig(changes: dict[str, Any] | None = None, **calibration: Any) -> RigFile:
-    known = {"made_utc": datetime(2026, 1, 1, tzinfo=UTC), "wiring": wiring_of(LIVE.servos), "steering": STEERING} | calibration
+    known = {"made_utc": datetime(2026, 1, 1, tzinfo=UTC), "wiring": wiring_of(LIVE.servos)}
+    known |= {"drums": DRUMS, "steering": STEERING} | calibration
     rig = make_rig(LIVE, "lab", None).model_dump() | {"calibration": known, "bench": "/benches/lab", "model": "mine"}
     return RigFile.model_validate(rig | (changes or {}))
 
@@ -58,6 +62,8 @@ def test_a_rig_that_was_calibrated_and_taught_is_ready() -> None:
 @pytest.mark.parametrize(
     ("calibration", "lack"),
     [
+        ({"drums": None}, Hindrance.DRUMS_UNKNOWN),
+        ({"drums": {**DRUMS, "advance_mm": 12.0}}, Hindrance.DRUMS_UNKNOWN),  # mm_per_turn was changed by hand since
         ({"wiring": None}, Hindrance.DIRECTIONS_UNKNOWN),
         ({"wiring": ((2, 1), (1, 1), *wiring_of(LIVE.servos)[2:])}, Hindrance.DIRECTIONS_UNKNOWN),
         ({"wiring": (*wiring_of(LIVE.servos)[:4], (5, -1), *wiring_of(LIVE.servos)[5:])}, Hindrance.DIRECTIONS_UNKNOWN),
@@ -115,7 +121,8 @@ def test_perceptions_own_checks_must_be_on(quality: dict[str, Any]) -> None:
 
 
 def test_without_a_rig_file_nothing_was_learnt() -> None:
-    assert _lacks(None) == {Hindrance.DIRECTIONS_UNKNOWN, Hindrance.STEERING_UNKNOWN, Hindrance.MODEL_UNTAUGHT}
+    unknown = {Hindrance.DRUMS_UNKNOWN, Hindrance.DIRECTIONS_UNKNOWN, Hindrance.STEERING_UNKNOWN}
+    assert _lacks(None) == unknown | {Hindrance.MODEL_UNTAUGHT}
     assert not readiness_of(LIVE, None, TAUGHT, ACCEPTED).keyboard_deadman
 
 
@@ -136,7 +143,7 @@ def test_a_rig_that_was_not_accepted_as_it_is_stays_advisory(
 
 
 def test_every_lack_is_one_of_the_rig() -> None:
-    rig = _rig({"model": None}, wiring=None, steering=None)
+    rig = _rig({"model": None}, drums=None, wiring=None, steering=None)
     overrides = {"policy": {"name": "push"}, "perception": {"quality": {"enabled": False}}}
     assert _lacks(rig, SHIPPED, overrides) <= OF_THE_RIG
 

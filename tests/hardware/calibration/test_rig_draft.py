@@ -12,15 +12,16 @@ import pytest
 
 from core.calibration.camera import BoardError, BoardSpec
 from core.calibration.servos import Assignment, HeadNotSeen, ServoFinding, SteeringNotSeen
-from core.config.calibration import CalibrationConfig, ScaleConfig, ZeroConfig
+from core.config.calibration import CalibrationConfig, DrumsConfig, ScaleConfig, ZeroConfig
 from core.config.models import Config
-from core.config.safety import wiring_of
+from core.config.safety import ServosConfig, wiring_of
 from core.devices import DeviceError
 from core.types import Frame, Image
 from hardware.calibration import servo_identification
 from hardware.calibration.rig_draft import RigDraft
 from hardware.calibration.servo_identification import Zeros
 from hardware.calibration.servo_probe import ProcedureStopped, StopSwitch, Strained
+from hardware.rig import RigKind
 from hardware.servos.discovery import FoundServo, FoundServos
 from hardware.servos.dynamixel_port import NoAnswer
 
@@ -31,7 +32,8 @@ TICKS = (2048, 2049, 2050, 2051, 0, 1, 2)
 class Bench:
     """No camera and no servos: the wizard's steps are told what happens."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: RigKind = RigKind.SIM) -> None:
+        self.kind = kind
         self.stop = StopSwitch()
         self.pictures: Iterator[Image] = iter(())
         self.feed = SimpleNamespace(newest=None)
@@ -220,6 +222,46 @@ def test_what_was_seen_of_a_servo_that_is_gone_is_forgotten(draft: RigDraft, mon
     draft.search_servos()
     assert sorted(draft.findings) == [1, 2, 3, 4, 5, 6]
     assert draft.assignments == ()
+
+
+DRUMS = DrumsConfig(tendons_mm=12.0, advance_mm=20.0, delivery_mm=15.0)
+
+
+@pytest.mark.parametrize(
+    "step",
+    [RigDraft.find_zeros, lambda draft: draft.wiggle(3), lambda draft: draft.identify_one(3),
+     lambda draft: draft.nudge("up", 0.1)],
+    ids=["zeros", "wiggle", "identify", "nudge"],
+)  # fmt: skip
+def test_nothing_moves_on_a_live_rig_before_its_drums_are_known(
+    monkeypatch: pytest.MonkeyPatch, step: Callable[[RigDraft], object]
+) -> None:
+    for name in ("find_zeros", "learn_steering", "wiggle", "identify_servo", "nudge"):
+        ends(monkeypatch, name, AssertionError("it moved"))
+    draft = RigDraft(Bench(RigKind.LIVE), Config())  # type: ignore[arg-type]
+    draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 8)))
+    with pytest.raises(DeviceError, match=r"^say the diameters of the drums before anything moves"):
+        step(draft)
+    draft.set_drums(DRUMS)
+    with pytest.raises(AssertionError, match="it moved"):
+        step(draft)
+
+
+def test_drums_become_ways_per_turn_and_what_was_found_with_others_is_forgotten(draft: RigDraft) -> None:
+    assert draft.zero is not None
+    draft.set_drums(DRUMS)
+    assert [joint.mm_per_turn for joint in draft.config.servos.joints] == pytest.approx(
+        [37.6991] * 4 + [62.8319] + [47.1239] * 2, abs=1e-4
+    )
+    assert (draft.zero, draft.zeros, draft.steering) == (None, None, None)
+    known = draft.calibration()
+    assert known.drums == DRUMS
+    assert DRUMS.fit(draft.config.servos)
+    assert not DRUMS.fit(ServosConfig())
+    draft.find_zeros()
+    draft.set_drums(DRUMS)
+    assert draft.zero is not None, "the same drums again forget nothing"
+    assert RigDraft(Bench(), draft.config, known).drums == DRUMS  # type: ignore[arg-type]
 
 
 def _search(draft: RigDraft, monkeypatch: pytest.MonkeyPatch, **models: int) -> None:
