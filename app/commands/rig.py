@@ -48,7 +48,6 @@ ColumnsOption = Annotated[int, typer.Option(min=4, max=40, help="squares across"
 RowsOption = Annotated[int, typer.Option(min=4, max=40, help="squares down")]
 
 rig = typer.Typer(help="Rigs: camera, servos and calibration of a bench, in one file.", no_args_is_help=True)
-rig.command("accept")(accept_rig)
 
 
 @rig.command("list")
@@ -191,6 +190,9 @@ def calibration_steps(draft: RigDraft, steps: tuple[str, ...], pictures: int) ->
         was_kept = draft.zero is not None
         draft.learn_steering()  # stores where the tendons were left, too
         yield from ["steering"] if was_kept or "zero" not in steps else ["zero", "steering"]
+
+
+rig.command("accept")(accept_rig)
 
 
 @rig.command("restore-servos")

@@ -197,7 +197,7 @@ class BusLoop:
         self._settle = 0
         self._ramp: ReleaseRamp | None = None
         self._is_off_after_ramp = False
-        self._ended = self._quiet = self._lost = False
+        self._ended = self._quiet = self._lost = self._is_hurried = False
         self._watch = UnattendedWatch()
         self._is_let_go = False
         self._succession: PortSuccession | None = None
@@ -243,6 +243,8 @@ class BusLoop:
         """A STOP that was not read yet, and a torque-off that is not confirmed: after this process they are lost."""
         if self._server.read_stop():
             self._handle_stop()
+        if self._is_off_after_ramp:
+            self._end_ramp()
         if self._release.is_requested and not self._bus.is_open:
             self._reopen(time.monotonic())
         if self._release.is_requested:
@@ -258,7 +260,10 @@ class BusLoop:
         while not self._ended:
             left_s = due_s - time.monotonic()
             if self._succession is not None:
-                self._ended = self._succession.wait(left_s)
+                is_asked = self._succession.wait(left_s)
+                if self._ended and not is_asked and not self._is_let_go:  # a signal: no process would watch from now on
+                    self._ended, self._is_hurried = False, True
+                self._ended = self._ended or is_asked
                 return
             in_pipe, requests = self._server.wait(left_s)
             stop = in_pipe and self._server.read_stop()
@@ -301,7 +306,7 @@ class BusLoop:
         """One cycle of a bus whose application is silent or gone."""
         now_s = time.monotonic()
         if not self._is_let_go and self._servos.unattended_s > 0.0 and self._bus.is_open:
-            attention = self._watch.next(silent_s, now_s, self._servos)
+            attention = Attention.RELAX if self._is_hurried else self._watch.next(silent_s, now_s, self._servos)
             if attention is not Attention.REST:
                 self._guard_port(self._look)
                 if self._bus.is_open and self._is_slack():
@@ -419,8 +424,13 @@ class BusLoop:
             self._settle = _SETTLE_CYCLES
             self._bus.hold()
             self._end_ramp()
-        else:
+            return
+        try:
             self._bus.slacken(goals_mm, self._readings)
+        except PortLost:
+            raise
+        except (ServoError, ValueError) as error:  # again in the next cycle; the ramp's time ends it
+            _log.warning("a tendon was not let go further: %s", error)
 
     def _end_ramp(self) -> None:
         self._ramp = None
@@ -478,8 +488,9 @@ class BusLoop:
 
     def _lose_port(self) -> None:
         self._guard.end_motion(self._guard.lose_port())
-        self._ramp = None
-        if self._release.is_requested or self._servos.torque_off_on_stop:
+        is_owed = self._is_off_after_ramp or self._servos.torque_off_on_stop
+        self._ramp, self._is_off_after_ramp = None, False
+        if self._release.is_requested or is_owed:
             self._release.request()
         self._readings = ()
         self._lost, self._open_problem = True, ""

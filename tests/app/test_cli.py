@@ -22,7 +22,7 @@ COMMANDS = (
     "gui", "perceive", "synth", "train", "teach", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
     "play", "doctor", "session", "rig",
 )  # fmt: skip
-INNER = {"session": ("info", "recover", "export"), "rig": ("list", "show", "calibrate", "board")}
+INNER = {"session": ("info", "recover", "export"), "rig": ("list", "show", "calibrate", "accept", "restore-servos", "board")}
 SLOW = ("PySide6", "numpy", "torch", "openvino", "cv2", "scipy", "mujoco", "pydantic", "rich")
 
 

@@ -236,7 +236,7 @@ def test_servos_go_by_the_name_that_is_printed_on_them(wizard: RigWizard, qtbot:
     until(qtbot, lambda: not wizard.model.is_busy)
     wizard.model.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, (FoundServo(1, 1020), FoundServo(2, 4711)))
     wizard.port_page.refresh()
-    assert [wizard.port_page.servos.item(row, 1).text() for row in range(2)] == ["XM430-W350  (1020)", "4711"]
+    assert [wizard.port_page.servos.item(row, 1).text() for row in range(2)] == ["XM430-W350 (1020)", "model 4711"]
 
 
 # ---- training

@@ -22,7 +22,7 @@ from hardware.servos.servo_robot import ServoRobot
 class PaperBus:
     """Writes down what it is told."""
 
-    is_open, is_armed, zero_ticks = True, False, (0,) * 7
+    is_open, is_armed, zero_ticks, identities = True, False, (0,) * 7, ()
 
     def __init__(self) -> None:
         self.counts = LineCounts()
@@ -285,6 +285,28 @@ def test_stop_ends_it_and_the_wires_stay_as_they_are(paper: Paper) -> None:
     assert paper.bus.told[-1] == "hold"
     assert "torque off" not in paper.bus.told
     assert paper.stopped
+
+
+def test_a_servo_that_does_not_answer_ends_neither_the_ramp_nor_the_process(paper: Paper, monkeypatch: pytest.MonkeyPatch) -> None:
+    def silent(*_: object) -> None:
+        raise NoAnswer("servo right (id 1): no answer")
+
+    paper.reads(tendon_mm=2.0)
+    paper.hear(request="relax")
+    with monkeypatch.context() as patch:
+        patch.setattr(paper.bus, "slacken", silent)
+        _follow(paper, 20)
+    assert paper.loop._ramp is not None
+    _follow(paper, 30)
+    assert paper.bus.told[-1] == "slacken to 1.00"
+
+
+def test_a_port_that_is_lost_while_wires_are_relaxed_owes_the_torque_off(paper: Paper) -> None:
+    paper.reads(tendon_mm=2.0)
+    paper.hear(request="relax")
+    _follow(paper, 20)
+    paper.loop._lose_port()
+    assert paper.loop._release.is_requested
 
 
 def test_where_the_pull_is_not_known_the_torque_goes_off_at_once(paper: Paper) -> None:

@@ -223,7 +223,7 @@ def test_a_simulated_robot_names_no_cable(servos: SoftServoBus, simulated: bool)
     robot.connect()
     try:
         servos.faults.mute(3)
-        with pytest.raises(NoAnswer) as told:
+        with pytest.raises(NotReady) as told:
             robot.zero()
         assert ("cable" in str(told.value)) is not simulated
         assert ("the twin's servos did not answer in time" in str(told.value)) is simulated
