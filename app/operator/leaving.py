@@ -41,6 +41,7 @@ class LeavingQuestion(QObject):
     def __init__(self, window: QWidget, rig: RigSession, say: Callable[[str, bool], None]) -> None:
         super().__init__(window)
         self._window, self._rig, self._say = window, rig, say
+        self._was_asked_to_end = False
         self._is_decided = False
         self._before: BusStatus | None = None
         self._begun_s = 0.0
@@ -61,8 +62,9 @@ class LeavingQuestion(QObject):
         at_close = self._rig.config.servos.at_close
         if at_close != "ask":
             return self._leave(at_close)
-        if is_asked_to_end() and not may_be_asked():
+        if is_asked_to_end() and (self._was_asked_to_end or not may_be_asked()):
             return True
+        self._was_asked_to_end = is_asked_to_end()
         self._ask()
         return False
 
@@ -92,6 +94,8 @@ class LeavingQuestion(QObject):
 
     @Slot()
     def _on_finished(self) -> None:
+        if not is_asked_to_end():  # a second request to end closes the question, too, perhaps before it is asked here
+            self._was_asked_to_end = False
         if self.box is not None:
             self.box.deleteLater()
             self.box = None
@@ -112,11 +116,12 @@ class LeavingQuestion(QObject):
         if how == "hold" or pilot is None:
             return True
         self._before, self._begun_s = self._rig.engine.bus_status(), time.monotonic()
+        if not (pilot.relax() if how == "relax" else pilot.torque_off()):  # while it drives, and while it does something else
+            self._say(tr("The window stays open: disarm first (Shift+F6), or wait until the servos are ready"), True)
+            return False
         if how == "relax":
-            pilot.relax()
             self._say(tr("The wires are relaxed, then the window closes; STOP ends it"), False)
         else:
-            pilot.torque_off()
             self._say(tr("The torque goes off, then the window closes"), False)
         self._look.start()
         return False

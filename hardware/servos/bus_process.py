@@ -197,7 +197,7 @@ class BusLoop:
         self._settle = 0
         self._ramp: ReleaseRamp | None = None
         self._is_off_after_ramp = False
-        self._ended = self._quiet = self._lost = self._is_hurried = False
+        self._ended = self._quiet = self._lost = self._is_signalled = self._is_hurried = False
         self._watch = UnattendedWatch()
         self._is_let_go = False
         self._succession: PortSuccession | None = None
@@ -218,8 +218,8 @@ class BusLoop:
         }
 
     def end(self) -> None:
-        """Let ``run`` return soon; for a signal handler."""
-        self._ended = True
+        """Let ``run`` return soon, after what is watched was relaxed; for a signal handler."""
+        self._ended = self._is_signalled = True
 
     def run(self) -> None:
         """Cycle until the end. Afterwards the servos hold, a requested torque-off is done, and the port is free."""
@@ -261,9 +261,10 @@ class BusLoop:
             left_s = due_s - time.monotonic()
             if self._succession is not None:
                 is_asked = self._succession.wait(left_s)
-                if self._ended and not is_asked and not self._is_let_go:  # a signal: no process would watch from now on
-                    self._ended, self._is_hurried = False, True
-                self._ended = self._ended or is_asked
+                if self._is_signalled and not is_asked and not self._is_let_go:  # no process would watch from now on
+                    self._ended, self._is_signalled, self._is_hurried = False, False, True
+                else:
+                    self._ended = self._is_signalled or is_asked
                 return
             in_pipe, requests = self._server.wait(left_s)
             stop = in_pipe and self._server.read_stop()

@@ -793,6 +793,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/leaving.py"/>
+        <source>The window stays open: disarm first (Shift+F6), or wait until the servos are ready</source>
+        <translation>窗口保持打开：请先解除就绪（Shift+F6），或等到舵机空闲</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/leaving.py"/>
         <source>The wires are relaxed, then the window closes; STOP ends it</source>
         <translation>先放松拉线，然后关闭窗口；STOP 可中止</translation>
     </message>
@@ -9213,6 +9218,76 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>relaxing the wires</source>
+        <translation>正在放松拉线</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the tension is being let off: wait a moment, then try again</source>
+        <translation>正在卸除张力：请稍候，然后重试</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>stopped meanwhile: the wires are as they were then</source>
+        <translation>期间已停止：拉线维持当时的状态</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the wires were not let go in time: cut the servos' power</source>
+        <translation>拉线未能及时放松：请切断舵机电源</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the servo port is not open: switch the torque off</source>
+        <translation>舵机端口未打开：请断开扭矩</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the application ended meanwhile: nothing was switched on</source>
+        <translation>期间程序已结束：未开启任何舵机</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the twin's servos did not answer in time: close other programs, then try again; F5 starts the twin again</source>
+        <translation>数字孪生的舵机未及时应答：请关闭其他程序，然后重试；F5 重新启动数字孪生</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>bus speed</source>
+        <translation>总线速度</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>adapter power</source>
+        <translation>适配器供电</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>screen lock</source>
+        <translation>屏幕锁定</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>inhibited while the servos follow</source>
+        <translation>舵机跟随期间已禁止</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>switch screen lock and sleep off in the desktop's settings</source>
+        <translation>请在桌面设置中关闭屏幕锁定和休眠</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>sleep cannot be inhibited: systemd-inhibit is not there</source>
+        <translation>无法禁止休眠：没有 systemd-inhibit</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>with DYNAMIXEL Wizard 2.0 set Baud Rate (8) of all seven to 1 Mbps, then servos.baud = 1000000</source>
+        <translation>用 DYNAMIXEL Wizard 2.0 将全部七个的 Baud Rate (8) 设为 1 Mbps，然后 servos.baud = 1000000</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>{path}: cut short: {a} of {b} pictures</source>
         <translation>{path}：视频不完整：{b} 帧中只有 {a} 帧</translation>
     </message>
@@ -10133,6 +10208,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>acknowledge, switch the servos on, arm again</source>
+        <translation>确认，开启舵机，重新就绪</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>E-stop pressed</source>
         <translation>急停已按下</translation>
     </message>
@@ -10150,6 +10230,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>plug the servo cable in, check the servos, then acknowledge</source>
         <translation>插好舵机线缆，检查舵机，然后确认</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the twin has failed: F5 starts it again, then acknowledge</source>
+        <translation>数字孪生出错：F5 重新启动，然后确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10358,8 +10443,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>put it back, or start again with F5 (make a bench again), then acknowledge</source>
-        <translation>放回原位，或按 F5 重新启动（重新建立台架），然后确认</translation>
+        <source>put it back, or calibrate the rig and make its bench again (without: F5); acknowledge</source>
+        <translation>放回原位，或重新标定装置并重新建立其台架（没有装置：F5）；确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10370,6 +10455,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>check the USB port and cable, then acknowledge</source>
         <translation>检查 USB 端口和线缆，然后确认</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the twin is behind: close other programs; if it stays, F5 starts it again; then acknowledge</source>
+        <translation>数字孪生落后：请关闭其他程序；若仍如此，F5 重新启动；然后确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10460,6 +10550,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>wait a moment; if it stays, check the cable</source>
         <translation>稍等；若不恢复，检查线缆</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the twin is behind: close other programs; if it stays, F5 starts it again</source>
+        <translation>数字孪生落后：请关闭其他程序；若仍如此，F5 重新启动</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>

@@ -123,6 +123,17 @@ def test_it_closes_when_the_torque_is_off(
     until(qtbot, lambda: not live.isVisible())
 
 
+@pytest.mark.parametrize(("title", "name"), [("Relax slowly", "relax"), ("Torque off now", "torque_off")])
+def test_a_pilot_that_refuses_is_told_and_the_window_stays(
+    live: OperatorWindow, engine: HoldingEngine, monkeypatch: pytest.MonkeyPatch, title: str, name: str
+) -> None:
+    monkeypatch.setattr(engine.pilot, name, lambda: False)
+    live.close()
+    _answer(live, title)
+    assert "disarm first" in live.panels.toast.text()
+    assert live.isVisible()
+
+
 def test_stop_keeps_it_open(live: OperatorWindow, engine: HoldingEngine, qtbot: QtBot) -> None:
     live.close()
     _answer(live, "Relax slowly")
