@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QHeaderView, QLabel
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel
 
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, button, enable, note, set_cell, set_note, table
@@ -127,6 +127,7 @@ class DrumsPage(WizardPage):
         super().__init__(model, picture)
         self.diameters: list[QDoubleSpinBox] = []
         self.ways: list[QDoubleSpinBox] = []
+        grid = QGridLayout()
         for title in (mark("Tendons"), mark("Robot forward"), mark("Catheter")):
             diameter, way = self._field(1.0), self._field(math.pi)
             diameter.setAccessibleName(tr("Diameter, {what}", what=tr(title)))
@@ -135,16 +136,17 @@ class DrumsPage(WizardPage):
             way.valueChanged.connect(lambda mm, diameter=diameter: self._set_other(diameter, mm / math.pi))
             self.diameters.append(diameter)
             self.ways.append(way)
-            self.add_row(
-                QLabel(tr(title)), QLabel("\N{DIAMETER SIGN}"), diameter, QLabel(tr("way per turn")), way, stretched=diameter
-            )
+            cells = (QLabel(tr(title)), QLabel("\N{DIAMETER SIGN}"), diameter, QLabel(tr("way per turn")), way)
+            for place, cell in enumerate(cells):
+                grid.addWidget(cell, len(self.ways), place)
+        self.column.addLayout(grid)
         self.result = note("")
         self.column.addWidget(self.result)
         self.column.addStretch(1)
 
     def _field(self, per_mm: float) -> QDoubleSpinBox:
         field = QDoubleSpinBox()
-        field.setDecimals(2)
+        field.setDecimals(3)
         field.setRange(0.0, per_mm * 150.0)
         field.setSingleStep(0.1)
         field.setSuffix(" mm")
@@ -185,7 +187,7 @@ class DrumsPage(WizardPage):
     def _set_other(self, other: QDoubleSpinBox, mm: float) -> None:
         self._show(other, mm)
         draft = self.draft
-        tendons_mm, advance_mm, delivery_mm = (way.value() / math.pi for way in self.ways)
+        tendons_mm, advance_mm, delivery_mm = (round(way.value() / math.pi, 3) for way in self.ways)
         if draft is None or min(tendons_mm, advance_mm, delivery_mm) <= 0.3:
             return
         draft.set_drums(DrumsConfig(tendons_mm=tendons_mm, advance_mm=advance_mm, delivery_mm=delivery_mm))

@@ -22,7 +22,7 @@ from app.ui.texts import calibration_lines
 from app.ui.window_base import close_all, is_asked_to_end
 from core.calibration.camera import BoardView
 from core.calibration.servos import Assignment
-from core.config.calibration import CalibrationConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
+from core.config.calibration import CalibrationConfig, DrumsConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
 from core.config.models import Config, load_config
 from core.config.rig_file import find_rig, list_rigs
 from core.config.safety import JOINT_NAMES, TENDONS
@@ -257,7 +257,7 @@ def test_the_twins_drums_are_known(opened: RigWizard) -> None:
     page = opened.drums_page
     assert page.is_done
     assert [field.value() for field in page.ways] == [40.0] * 3
-    assert [field.value() for field in page.diameters] == [12.73] * 3
+    assert [field.value() for field in page.diameters] == [12.732] * 3
     assert "20 / 29 / 29 N" in page.result.text()
 
 
@@ -272,12 +272,12 @@ def test_drums_of_a_real_rig_are_asked_by_diameter_or_way(make_wizard: MakeWizar
     assert [field.text() for field in page.diameters] == ["not measured"] * 3
     page.diameters[0].setValue(8.0)
     page.ways[1].setValue(5.0)  # a lead screw
-    assert page.ways[0].value() == pytest.approx(25.13)
+    assert page.ways[0].value() == 25.133
     assert not page.is_done
     assert "no servo is moved" in page.result.text()
     page.diameters[2].setValue(30.0)
     assert page.is_done
-    assert draft.drums is not None
+    assert draft.drums == DrumsConfig(tendons_mm=8.0, advance_mm=1.592, delivery_mm=30.0)
     ways = [joint.mm_per_turn for joint in draft.config.servos.joints]
     assert ways == pytest.approx([25.13] * 4 + [5.0] + [94.25] * 2, abs=0.01)
     assert " N." in page.result.text()
