@@ -208,7 +208,7 @@ class AcceptanceBench:
     def identify(self) -> tuple[tuple[AcceptedServo, ...], tuple[float, float]]:
         """Who answers, and the lowest and highest supply. Nothing is written. Raises ServoError."""
         servos = self._config.servos
-        ask_for_port(servos.port or "")  # a bus process of this program may watch servos that hold
+        ask_for_port(servos.port or "", relaxed=True)  # a bus process of this program may watch servos that hold: it relaxes them
         line = ServoLine(servos.port or "", servos.baud)
         line.open()
         try:

@@ -53,6 +53,10 @@ END_S = 5.0
 _END_CHECK_S = 0.02
 _SUCCESSION_S = 2.0
 """A bus process that only watches gives its port to a new one within this time."""
+_RELAXED_S = 15.0
+"""And to a program that does not watch, after it has relaxed the wires."""
+_WATCHED, _RELAXED, _WORD_S = b"W", b"R", 0.2
+"""What is asked for, and how long that may take to arrive."""
 
 
 class BusPhase(StrEnum):
@@ -404,6 +408,8 @@ class PortSuccession:
     """How a bus process that only watches gives its port to the next one: a socket that is named after the port."""
 
     def __init__(self, port: str) -> None:
+        self.must_relax = False
+        """Whether who asks does not watch: the wires are relaxed and the torque is off before the port is given away."""
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._heir: socket.socket | None = None
         with contextlib.suppress(
@@ -415,6 +421,9 @@ class PortSuccession:
     def wait(self, timeout_s: float) -> bool:
         """Whether another process of the same user asks for the port; waits for one so long."""
         until_s = time.monotonic() + timeout_s
+        if self._heir is not None:  # the wires are being relaxed for it
+            time.sleep(max(0.0, timeout_s))
+            return False
         ready, _, _ = select.select([self._socket], [], [], max(0.0, timeout_s))
         try:
             heir, _ = self._socket.accept() if ready else (None, None)
@@ -427,6 +436,9 @@ class PortSuccession:
         if user != os.getuid():
             heir.close()
             return False
+        heir.settimeout(_WORD_S)
+        with contextlib.suppress(OSError):
+            self.must_relax = heir.recv(1) == _RELAXED
         self._heir = heir
         return True
 
@@ -441,12 +453,16 @@ def _succession(port: str) -> str:
     return f"\0lumenpilot servos {os.path.realpath(port)}"
 
 
-def ask_for_port(port: str) -> bool:
-    """Ask a bus process that only watches for its port, and wait until it is free; False when there is no such process."""
+def ask_for_port(port: str, *, relaxed: bool = False) -> bool:
+    """Ask a bus process that only watches for its port, and wait until it is free; False when there is no such process.
+
+    `relaxed`: for a program that will not watch the servos itself; their wires are let out and the torque is off before.
+    """
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
-        asking.settimeout(_SUCCESSION_S)
+        asking.settimeout(_RELAXED_S if relaxed else _SUCCESSION_S)
         try:
             asking.connect(_succession(port))
+            asking.sendall(_RELAXED if relaxed else _WATCHED)
             return asking.recv(1) == b""
         except OSError:
             return False

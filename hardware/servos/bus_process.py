@@ -261,6 +261,8 @@ class BusLoop:
             left_s = due_s - time.monotonic()
             if self._succession is not None:
                 is_asked = self._succession.wait(left_s)
+                if is_asked and self._succession.must_relax and not self._is_let_go:
+                    self._is_hurried, is_asked = True, False
                 if self._is_signalled and not is_asked and not self._is_let_go:  # no process would watch from now on
                     self._ended, self._is_signalled, self._is_hurried = False, False, True
                 else:
@@ -508,9 +510,24 @@ class BusLoop:
                 self._open_problem = str(error)
                 self._release.release_unopened()
 
+    def _open_after_watch(self) -> None:
+        """Open the port that a process gives away which only watches. Where that fails, no process would watch: torque off."""
+        if self._servos.port is None or not ask_for_port(self._servos.port):
+            self._bus.open()  # says who has it
+            return
+        try:
+            self._bus.open()
+        except ServoError:
+            self._release.request()
+            self._release.release_unopened()
+            raise
+
     def _open(self) -> None:
         if not self._bus.is_open:
-            _with_port(self._servos.port, self._bus.open)
+            try:
+                self._bus.open()
+            except PortTaken:
+                self._open_after_watch()
             self._keeper.load()
             self._give_up_s = math.inf
             self._corrupt = self._bus.counts.corrupt

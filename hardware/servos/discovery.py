@@ -79,7 +79,7 @@ def find_servos(
     Raises PortError: the port is missing, not permitted, in use, or no serial port; NoAnswer: no servo answers at any speed.
     """
     answered: dict[int, tuple[FoundServo, ...]] = {}
-    ask_for_port(port)  # a bus process of this program may watch servos that hold
+    ask_for_port(port, relaxed=True)  # a bus process of this program may watch servos that hold: it relaxes them
     for baud in bauds:
         check_stop()
         say(f"asking at {baud} baud")

@@ -102,7 +102,7 @@ def restore_eeprom(servos: ServosConfig, folder: Path, say: Callable[[str], obje
     kept = {joint.id: read_backup(folder, servos.port, joint.id, servos.model_of(joint).number) for joint in servos.joints}
     if not any(kept.values()):
         raise UserError(f"there is no backup of these servos in {folder}: the program has not changed any")
-    ask_for_port(servos.port)  # a bus process of this program may watch servos that hold
+    ask_for_port(servos.port, relaxed=True)  # a bus process of this program may watch servos that hold: it relaxes them
     line = ServoLine(servos.port, servos.baud)
     line.open()
     try:

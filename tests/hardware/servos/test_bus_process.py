@@ -900,18 +900,50 @@ def test_a_closed_robot_that_holds_is_watched_and_the_next_one_takes_over(servos
     assert psutil.Process().children() == [], "with the torque off there is nothing to watch"
 
 
-def test_a_search_for_servos_takes_a_watched_port_over(servos: SoftServoBus) -> None:
-    """Between two pages of the wizard a bus process of its own would hold the port."""
+@contextlib.contextmanager
+def _watched(servos: SoftServoBus) -> Iterator[int]:
+    """A bus process that watches servos of which one pulls, after its application has closed; its id."""
     robot = _robot(servos, unattended_s=600.0, **WATCHED)
     robot.connect()
     robot.zero()
     robot.arm()
+    _bend(robot)
+    watcher = robot._client.pid
     robot.close()
-    assert len(find_servos(servos.port).servos) == 7
-    assert _torques(servos) == [1] * 7
+    assert watcher is not None
+    assert _lives(watcher)
+    yield watcher
+
+
+def test_a_search_for_servos_has_a_watched_port_after_the_wires_are_relaxed(servos: SoftServoBus) -> None:
+    """A search does not watch: servos that hold would be left pulling."""
+    with _watched(servos) as watcher:
+        assert len(find_servos(servos.port).servos) == 7
+        assert not _lives(watcher)
+        assert _torques(servos) == [0] * 7
+        assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
     following = _robot(servos)
     following.connect()
     following.close()
+
+
+def test_a_program_that_cannot_open_a_watched_port_switches_the_torque_off(servos: SoftServoBus) -> None:
+    with _watched(servos) as watcher:
+        servos.faults.mute(3)
+        with pytest.raises(NoAnswer, match="id 3"):
+            _robot(servos, unattended_s=600.0, **WATCHED).connect()
+        assert not _lives(watcher)
+        _wait_for(lambda: _torques(servos) == [0] * 7)
+        assert _torques(servos) == [0] * 7
+    servos.faults.clear()
+
+
+def test_a_signal_relaxes_what_is_watched(servos: SoftServoBus) -> None:
+    with _watched(servos) as watcher:
+        os.kill(watcher, signal.SIGTERM)
+        _wait_for(lambda: not _lives(watcher))
+        assert _torques(servos) == [0] * 7
+        assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
 
 
 def test_a_watched_port_is_not_given_away_while_an_application_drives(servos: SoftServoBus, armed: ServoRobot) -> None:
