@@ -3151,6 +3151,16 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Drums</source>
+        <translation>绕线轮</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Measure with a caliper what the servos turn: the drums of the wires, with the wire on them, and the wheels of feed and delivery. Ways, speeds and the greatest force of each joint follow from it. Of a lead screw enter its way per turn.</source>
+        <translation>用卡尺测量舵机所转之物：拉线的绕线轮（带线测量），以及进给和输送的轮子。各关节的行程、速度和最大力由此得出。丝杠请输入其每转行程。</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Wiggle and direction</source>
         <translation>摆动与方向</translation>
     </message>
@@ -3218,6 +3228,26 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>searching the servos</source>
         <translation>正在搜索舵机</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Tendons</source>
+        <translation>拉线</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Robot forward</source>
+        <translation>机器人前进</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Catheter</source>
+        <translation>导管</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Greatest force, limited in the servos: {forces} N.</source>
+        <translation>最大力，在舵机内限制：{forces} N。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -3396,6 +3426,21 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Diameter, {what}</source>
+        <translation>直径，{what}</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Way per turn, {what}</source>
+        <translation>每转行程，{what}</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Before all three are known no servo is moved.</source>
+        <translation>三者均已知之前，舵机不会移动。</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Joint</source>
         <translation>关节</translation>
     </message>
@@ -3443,6 +3488,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Way and heading disagree by {angle:.0f}°: does the head lie against a wall?</source>
         <translation>位移与朝向相差 {angle:.0f}°：头端是否贴靠管壁？</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>way per turn</source>
+        <translation>每转行程</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -5654,11 +5704,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>way at one turn of the horn, as it is set and not measured: {ways} mm</source>
-        <translation>舵机输出盘每转一圈的行程（按设置，未测量）：{ways} mm</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>greatest force, limited in the servo, friction included: {forces} N</source>
         <translation>最大力，在舵机内限制，含摩擦：{forces} N</translation>
     </message>
@@ -5716,6 +5761,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>lens: k1 {k1:+.4f}, k2 {k2:+.4f}, {left:.2f} px left over</source>
         <translation>镜头：k1 {k1:+.4f}，k2 {k2:+.4f}，残差 {left:.2f} px</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>way at one turn of the horn, by the diameters measured: {ways} mm</source>
+        <translation>舵盘每转的行程，按所测直径：{ways} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>way at one turn of the horn, as it is set and not measured: {ways} mm</source>
+        <translation>舵机输出盘每转一圈的行程（按设置，未测量）：{ways} mm</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -7423,8 +7478,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/calibration/servos.py"/>
-        <source>the feed goes by about {a} mm at one turn of the servo's horn, as the camera saw it, and is configured with {b} mm: measure it, and set servos.joints, advance, mm_per_turn</source>
-        <translation>相机观察到舵盘每转一圈进给约 {a} mm，而配置为 {b} mm：请实测后设置 servos.joints 中 advance 的 mm_per_turn</translation>
+        <source>the feed goes by about {a} mm at one turn of the servo's horn, as the camera saw it, and is configured with {b} mm: measure the diameter of its wheel (page Drums)</source>
+        <translation>相机所见舵盘每转进给约 {a} mm，而设置为 {b} mm：请测量其轮子的直径（“绕线轮”页）</translation>
     </message>
     <message>
         <location filename="../../core/calibration/servos.py"/>
@@ -10013,6 +10068,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>drums not measured</source>
+        <translation>未测量绕线轮</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>directions of the servos not learned</source>
         <translation>未学习舵机方向</translation>
     </message>
@@ -10955,6 +11015,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>let go of the controls, then hand over</source>
         <translation>松开操纵键，然后移交</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The servos' drums are not measured</source>
+        <translation>舵机的绕线轮尚未测量</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>menu Rig, Calibrate: page Drums; until then ways and forces are assumed</source>
+        <translation>“装置”菜单，标定：“绕线轮”页；在此之前行程和力为假定值</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
