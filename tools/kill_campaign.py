@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.config.safety import ServosConfig
+from hardware.servos.dynamixel_bus import TORQUE
 from hardware.twin.servos.bus import SoftServoBus
 from tools.fault_campaign.children import read_line, start_child
 
@@ -78,6 +79,7 @@ class PositionLog(threading.Thread):
 def application(servos: SoftServoBus) -> Iterator[tuple[int, int]]:
     """A driving application: the ids of its process and of its bus process; both are gone afterwards."""
     bus_pid = None
+    servos.write_by_other(TORQUE, b"\0")  # those of the strike before hold, and servos that hold are not zeroed
     try:
         with start_child("drive", servos.port) as process:
             bus_pid = int(str(read_line(process)["bus_pid"]))
