@@ -37,6 +37,7 @@ TESTS = {  # module -> the tests that should find its mutants
     "bus_monitor": ("test_bus_monitor.py", "test_supervisor.py", "test_health.py"),
     "direction_monitor": ("test_direction_monitor.py",),
     "readiness": ("test_readiness.py",),
+    "kept_zero": ("test_kept_zero.py",),
 }
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
 JOBS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -65,6 +66,8 @@ EXPLAINED = {
     ("joints", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
     ("joints", "found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))",
         "Gt -> GtE"): TIE,
+    ("kept_zero", "turns = (away + TICKS_PER_TURN // 2) // TICKS_PER_TURN", "2 -> 3"):
+        "what was moved by more than a quarter of a turn is not offered, and nearer both round alike",
     ("health", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
 }
 # fmt: on

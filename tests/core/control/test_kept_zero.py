@@ -40,6 +40,8 @@ def kept(joint: JointConfig, ticks: int, position_mm: float) -> KeptJoint:
         (RIGHT, 9000, 0.0, 9000 - 2 * 4096, 0.0, 808),  # restarted: counts from another turn
         (RIGHT, -100, 0.0, 3996, 0.0, 3996),  # registers below 0 come back within one turn, too
         (RIGHT, 4090, 0.0, 4, 10 / 102.4, -6),  # restarted behind the encoder's seam
+        (RIGHT, 4096, 0.0, 0, 0.0, 0),
+        (RIGHT, -1, 0.0, 4095, 0.0, 4095),
         (ADVANCE, 5106, 40.0, 5106, 40.0, 1010),
         (ADVANCE, 5106, 40.0, 1010, 40.0, 1010 - 4096),  # restarted, and one turn in
         (ADVANCE, 5106, 40.0, 1112, 40.0 + 102 / 102.4, 1112 - 4198),
@@ -62,10 +64,19 @@ def test_where_a_joint_stands_by_its_kept_zero(
         (ADVANCE, 1000, 40.0, 1000 + 1100, "moved by more than a quarter of a turn: perhaps in another one"),
         (ADVANCE, 5106, 40.0, 5106 + 4096, "another program fed it by a turn: a restarted servo counts below 4096"),
         (ADVANCE, 5106, 2.0, 5106 - 800, "it would be at -5.8 mm"),
+        (RIGHT, 8192, 0.0, 4096, "turned back by a turn, but not restarted: it would count from 0 to 4095"),
     ],
 )
 def test_in_doubt_nothing_is_offered(joint: JointConfig, was: int, at_mm: float, now: int, why: str) -> None:
     assert zero_offer(joint, MODEL, kept(joint, was, at_mm), now) is None, why
+
+
+@pytest.mark.parametrize(("ticks", "is_offered"), [(-259, False), (-258, True), (258, True), (259, False)])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_joint_at_the_end_of_its_envelope_may_be_two_units_beyond_it(sign: int, ticks: int, is_offered: bool) -> None:
+    """2.5 mm are 256 units."""
+    joint = RIGHT.model_copy(update={"sign": sign, "low_mm": -2.5, "high_mm": 2.5})
+    assert (zero_offer(joint, MODEL, kept(joint, 2000, 0.0), 2000 + ticks) is not None) is is_offered
 
 
 @pytest.mark.parametrize("changes", [{"id": 9}, {"sign": -1}, {"mm_per_turn": 62.8}])
@@ -138,6 +149,8 @@ OFFER = ZeroOffer("right", 0.42, 0.0, 2005, 1000.0)
         (ZeroRequest(kept=("left",)), (OFFER,), "left has no kept zero that fits"),
         (ZeroRequest(positions_mm={"right": 0.3}), (), "right: a tendon is zeroed where its wire is slack"),
         (ZeroRequest(positions_mm={"advance": 40.0}), (ZeroOffer("advance", 38.0, 0.0, 0, 0.0),), ""),  # a feed goes by its number
+        (ZeroRequest(positions_mm={"advance": -5.0, "delivery_1": 400.0}), (), ""),
+        (ZeroRequest(positions_mm={"advance": 400.1}), (), r"advance cannot be at 400\.1 mm: give -5 to 400 mm"),
         (ZeroRequest(positions_mm={"advance": -5.1}), (), r"advance cannot be at -5\.1 mm: give -5 to 400 mm"),
     ],
 )
