@@ -22,14 +22,14 @@ from core.types import Point, Scene
 
 WRONG_TURN_DEG = 4.0
 """Turn against the command that disarms."""
-WRONG_FEED_MM = 2.0
+WRONG_FEED_MM = 1.5
 """Way against the feed that disarms."""
 _LINE_PX = 32.0
 """End of the robot whose direction is compared: the 40 px of theta turn by half of what the tip does, 16 px are not steady."""
 _WINDOW_S, _DENSE_S, _APART_S = 4.0, 0.3, 0.12
 """Longest time over which a turn or a way is compared; the time in which every frame is kept, and the distance of those before."""
-_LAGS_S = (0.0, 0.15)
-"""Shortest and longest time from a command to its motion: the command must have had one direction at both."""
+_LAGS_S = (0.0, 0.12, 0.25)
+"""Times from a command to its motion, shortest to longest: the command must have had one direction at all of them."""
 _BENDING_MM = 15.0
 """Fed by so much, a bent head turns on by as much as it is bent: the length of its bending part, at least."""
 _FOLLOWED, _FOLLOWED_LEAST = 1.5, (0.5, 0.5, 0.1)
@@ -112,7 +112,7 @@ class _Seen:
     head: HeadSeen
     turns_deg: tuple[float, ...]
     feds_mm: tuple[float, ...]
-    drift_deg: float
+    drifts_deg: tuple[float, ...]
     raw: _Motion = (0.0, 0.0, 0.0)
     moved: _Motion = (0.0, 0.0, 0.0)
     step: _Motion = (0.0, 0.0, 0.0)
@@ -173,13 +173,13 @@ class DirectionMonitor:
             if asked:
                 sign = math.copysign(1.0, asked)
                 turned = sign * (now.moved[0] - then.moved[0]), sign * (now.moved[1] - then.moved[1])
-                drift = sign * (now.drift_deg - then.drift_deg)
+                drifts = [sign * (a - b) for a, b in zip(now.drifts_deg, then.drifts_deg, strict=True)]
                 held = sign * ((then.turns_deg[0] - earlier[0].turns_deg[0]) - (then.moved[0] - earlier[0].moved[0]))
                 # bent by so much, a robot that is wired right is turned on by a wall only where theta follows the bend
                 is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE * WRONG_TURN_DEG
                 back = -turned[0] if is_deaf else -max(turned)
-                against = min(back - max(0.0, -drift) - max(0.0, -held) - noise_deg, abs(asked))
-                followed = min(min(turned) - max(0.0, drift) - noise_deg, abs(asked))
+                against = min(back - max(0.0, -min(drifts)) - max(0.0, -held) - noise_deg, abs(asked))
+                followed = min(min(turned) - max(0.0, *drifts) - noise_deg, abs(asked))
                 is_held = abs(asked) >= _ENOUGH_DEG and -min(turned) <= _LITTLE * WRONG_TURN_DEG
                 turns = turns or is_held or followed >= _RIGHT_TURN_DEG
                 if against > wrong_deg:
@@ -227,7 +227,7 @@ def _kept(seen: tuple[_Seen, ...], now_s: float) -> tuple[_Seen, ...]:
 def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent]) -> _Seen:
     turns_deg = tuple(command.turn_deg for command in commands)
     feds_mm = tuple(command.fed_mm for command in commands)
-    now = _Seen(head, turns_deg, feds_mm, commands[-1].drift_deg)
+    now = _Seen(head, turns_deg, feds_mm, tuple(command.drift_deg for command in commands))
     if not earlier:
         return now
     before = earlier[-1]

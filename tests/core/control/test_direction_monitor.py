@@ -78,9 +78,9 @@ def test_a_head_that_follows_is_no_fault_and_soon_known_to_turn(deg_s: float) ->
     assert not course[0].turns
 
 
-@pytest.mark.parametrize(("deg_s", "within_deg"), [(15.0, 7.0), (-15.0, 7.0), (60.0, 16.0), (-140.0, 37.0)])
+@pytest.mark.parametrize(("deg_s", "within_deg"), [(10.0, 7.0), (-15.0, 8.5), (60.0, 22.0), (-140.0, 46.0)])
 def test_a_head_that_turns_the_other_way_is_noticed(deg_s: float, within_deg: float) -> None:
-    """At the slow start's 15 degrees a second within 7 degrees; later as fast as lag and frames allow."""
+    """At the slow start's 10 degrees a second within 7 degrees; later as fast as lags and frames allow."""
     course = _course(Robot(turn=-1.0), _ramp(deg_s), seconds=1.0)
     at_s = _first_s(course, Cause.WRONG_TURN)
     assert abs(deg_s) * at_s <= within_deg
@@ -99,7 +99,7 @@ def test_the_limit_is_four_degrees() -> None:
 def test_a_feed_that_goes_the_other_way_is_noticed(feed_mm_s: float) -> None:
     course = _course(Robot(feed=-1.0), _ramp(0.0), lambda _: feed_mm_s)
     at_s = _first_s(course, Cause.WRONG_FEED)
-    assert abs(feed_mm_s) * at_s <= WRONG_FEED_MM + 0.3 * abs(feed_mm_s)
+    assert abs(feed_mm_s) * at_s <= WRONG_FEED_MM + 0.38 * abs(feed_mm_s)
     assert f"{math.copysign(1.0, feed_mm_s):+.0f}"[0] in course[round(at_s / FRAME_S)].faults()[0].detail
     right = _course(Robot(), _ramp(0.0), lambda _: feed_mm_s)
     assert _first_s(right, Cause.WRONG_FEED) == math.inf
@@ -224,7 +224,7 @@ def test_the_head_of_a_scene() -> None:
 _rates = st.lists(st.floats(-140.0, 140.0), min_size=2, max_size=6)
 
 
-@given(rates=_rates, share=st.floats(0.0, 1.0), feed=st.floats(-8.0, 8.0), late_s=st.floats(0.02, 0.14))
+@given(rates=_rates, share=st.floats(0.0, 1.0), feed=st.floats(-8.0, 8.0), late_s=st.floats(0.02, 0.24))
 @settings(max_examples=60, deadline=None)
 def test_a_robot_that_is_wired_right_never_seems_to_go_the_other_way(
     rates: list[float], share: float, feed: float, late_s: float
@@ -256,4 +256,4 @@ def test_a_robot_that_is_wired_the_other_way_is_always_noticed(rate: float, shar
             if monitor.faults():
                 break
     assert monitor.faults()
-    assert most_deg <= WRONG_TURN_DEG + 2.0 + rate * 0.25
+    assert most_deg <= WRONG_TURN_DEG + 2.0 + rate * 0.35
