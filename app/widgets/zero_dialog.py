@@ -149,6 +149,7 @@ class _FeedRow(QWidget):
         layout.addWidget(self.box)
         layout.addWidget(self.number, 1)
         self._known: tuple[bool, ...] | None = None
+        self._shown_mm: float | None = None
         self.box.toggled.connect(self._on_changed)
         self.number.valueChanged.connect(self._on_edited)
 
@@ -159,14 +160,16 @@ class _FeedRow(QWidget):
         return max(self._low_mm, round(self.number.value(), 1)) if is_given else None
 
     def show_joint(self, known: JointZero) -> None:
-        """Fill in what is offered, or where it is; what the operator has typed stays."""
-        key = known.position_mm is None, known.offer is not None, known.holds is not None
-        if key == self._known:
-            return
-        self._known = key
+        """Fill in what is offered, or where it is, also while it is moved by hand; what the operator has typed stays."""
         at_mm = known.offer.position_mm if known.offer is not None else known.position_mm
+        key = known.position_mm is None, known.offer is not None, known.holds is not None
+        if key == self._known and self.number.value() != self._shown_mm:  # typed
+            return
         self.number.setValue(self.number.minimum() if at_mm is None else at_mm)
-        self.box.setChecked(known.position_mm is None and known.holds is not None)
+        self._shown_mm = self.number.value()
+        if key != self._known:
+            self._known = key
+            self.box.setChecked(known.position_mm is None and known.holds is not None)
 
     @Slot()
     def _on_edited(self) -> None:

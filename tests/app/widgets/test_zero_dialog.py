@@ -120,6 +120,8 @@ def test_what_was_chosen_stays_while_it_is_possible(dialog: ZeroDialog, qtbot: Q
     dialog.show_joints(joint_zeros(restarted(offer("advance", 40.1), torque=True)))
     with qtbot.waitSignal(dialog.torque_off_asked):
         dialog.off_button.click()
+    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.9), torque=False)))
+    assert dialog.request == ZeroRequest(positions_mm={"advance": 40.9}), "moved by hand"
     dialog.feed("advance")[1].setValue(38.0)
     dialog.show_joints(joint_zeros(restarted(offer("advance", 40.2), torque=False)))
     assert not dialog.off_button.isEnabled()
