@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from core.config.safety import JointConfig, ServosConfig
@@ -125,6 +127,18 @@ def test_the_limit_in_the_servo_is_never_above_the_force(row: Row, force_n: floa
     if model.stall_nm / radius_m > 2.0 * force_n > 10.0 * step:
         assert force >= 0.5 * force_n, "no weaker than the register's step demands"
     assert limit.force_n <= max(force_n, step) + 1e-9
+
+
+@given(st.sampled_from(sorted(SERVO_MODELS)), st.floats(0.1, 150.0), st.floats(1.0, 500.0))
+def test_no_force_drum_or_model_makes_a_register_that_the_servo_does_not_know(
+    number: int, force_n: float, mm_per_turn: float
+) -> None:
+    model = SERVO_MODELS[number]
+    limit, weaker = force_limit(model, mm_per_turn, force_n), force_limit(model, mm_per_turn, force_n / 2.0)
+    most = PWM_FULL if limit.current_ma is None else model.stall_ma / (model.current_unit_ma or 1.0)
+    assert 1 <= weaker.units <= limit.units <= most + 1e-6
+    assert limit.force_n <= model.stall_nm / drum_radius_mm(mm_per_turn) * 1000.0 + 1e-6
+    assert limit.current_ma is None or limit.strain_ma == pytest.approx(0.9 * limit.current_ma)
 
 
 def test_by_hand() -> None:
