@@ -55,7 +55,7 @@ def readiness_of(
     known = rig.calibration if rig is not None else None
     if known is None or known.drums is None or not known.drums.fit(config.servos):
         found.append(Hindrance.DRUMS_UNKNOWN)
-    if known is None or known.wiring is None or known.wiring != wiring_of(config.servos):
+    if known is None or known.wiring != wiring_of(config.servos):
         found.append(Hindrance.DIRECTIONS_UNKNOWN)
     elif known.assumed and not is_accepted:  # the acceptance has each direction confirmed by eye
         found.append(Hindrance.DIRECTIONS_ASSUMED)

@@ -14,7 +14,7 @@ from core.config.models import Config, load_config
 from core.config.rig_file import RigFile, as_calibrated, make_rig, read_rig, with_rig, write_rig
 from core.config.safety import TENDONS, wiring_of
 from core.control.modes import OF_THE_RIG, Hindrance
-from core.control.readiness import Readiness, read_readiness, readiness_of
+from core.control.readiness import READY, Readiness, read_readiness, readiness_of
 from core.perception.model_file import ModelInfo, model_folder, read_model_info
 from tests.core.config.test_acceptance import accepted_rig
 
@@ -70,11 +70,17 @@ def test_a_rig_that_was_calibrated_and_taught_is_ready() -> None:
         ({"steering": None}, Hindrance.STEERING_UNKNOWN),
         ({"steering": {**STEERING, "turn_deg_per_mm": None}}, Hindrance.STEERING_UNKNOWN),  # a file of an earlier version
         ({"steering": {**STEERING, "roll_deg": 180.0}}, Hindrance.STEERING_WRONG),  # right and left swapped, or seen from below
-        ({"steering": {**STEERING, "roll_deg": -50.0}}, Hindrance.STEERING_WRONG),
+        ({"steering": {**STEERING, "roll_deg": -45.1}}, Hindrance.STEERING_WRONG),
     ],
 )
 def test_what_was_not_learnt_of_the_servos_is_named(calibration: dict[str, Any], lack: Hindrance) -> None:
     assert _lacks(_rig(**calibration)) == {lack}
+
+
+def test_a_roll_of_45_degrees_is_the_most_and_a_model_that_cannot_be_read_is_another_checks_matter() -> None:
+    assert _lacks(_rig(steering={**STEERING, "roll_deg": 45.0})) == set()
+    assert _lacks(_rig(), None) == set()
+    assert READY == Readiness((), keyboard_deadman=True)
 
 
 def test_what_was_assumed_of_the_directions_is_confirmed_by_the_acceptance_or_in_the_wizard() -> None:
