@@ -686,3 +686,24 @@ def test_a_robot_whose_insertion_is_wrong_comes_out_completely_and_stops_with_th
         assert held or goal == before[4]
         at, state = tuple(here + 0.5 * (to - here) for here, to in zip(at, step.goals_mm, strict=True)), step.state
     assert at[4] < -5.0 - 38.0
+
+
+@pytest.mark.parametrize(
+    ("measurement", "reason"),
+    [
+        (None, RejectReason.NO_MEASUREMENT),
+        (JointMeasurement(AT[:6], NOW), RejectReason.WRONG_COUNT),
+        (JointMeasurement(_moved(advance=math.nan), NOW), RejectReason.NON_FINITE),
+    ],
+)
+def test_by_hand_nothing_goes_by_positions_that_are_none(measurement: JointMeasurement | None, reason: RejectReason) -> None:
+    request = GoalRequest(AT, Source.OPERATOR, NOW, None, retracts=True)
+    step = gate_step(_running(), request, measurement, Source.OPERATOR, NOW, SERVOS, SAFETY)
+    assert _reason(step) is reason
+    assert step.goals_mm is None
+
+
+def test_from_the_very_end_a_feed_comes_back_at_its_full_speed() -> None:
+    at = _moved(advance=-5.0)
+    assert by_hand(SERVOS, at, None, retracts=False).joints[4].max_speed_mm_s == 20.0
+    assert by_hand(SERVOS, _moved(advance=-5.01), None, retracts=False).joints[4].max_speed_mm_s == 2.0
