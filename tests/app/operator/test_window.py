@@ -145,14 +145,14 @@ def test_millimetres_are_those_of_the_calibrated_rig(
 
 
 def test_everything_is_shown(running: OperatorWindow, qtbot: QtBot) -> None:
-    tick = running.shown_tick
-    assert tick is not None
-    pose = tick.scene.pose
-    assert pose is not None
-    assert running.panels.badge.letter == pose.state.value
-    assert running.panels.gauge.text.endswith("°")
-    assert running.panels.bars.texts[0].endswith("px")
-    assert running.panels.advice.text.startswith(("Fast", "Slow", "Slowest", "Moderate"))
+    def is_the_same_state() -> bool:
+        tick = running.shown_tick
+        return tick is not None and tick.scene.pose is not None and running.panels.badge.letter == tick.scene.pose.state.value
+
+    until(qtbot, is_the_same_state)
+    until(qtbot, lambda: running.panels.gauge.text.endswith("°"))
+    until(qtbot, lambda: running.panels.bars.texts[0].endswith("px"))
+    until(qtbot, lambda: running.panels.advice.text.startswith(("Fast", "Slow", "Slowest", "Moderate")))
     until(qtbot, lambda: "total 27.5" in running.panels.performance.text)
     assert "SIM" in running.windowTitle()
     assert running.panels.banner.word == "SIM"

@@ -397,7 +397,6 @@ def test_a_camera_is_lost_and_found(bench: Bench, how: str) -> None:
         lost = until_lost(camera)
         bench.plug(2)
         after = until_back(camera)
-        assert camera.reconnects >= 1
     finally:
         camera.close()
     assert "cable" in str(lost) and "\n" not in str(lost)

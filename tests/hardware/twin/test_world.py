@@ -50,6 +50,7 @@ def test_inserting_shows_a_robot_with_a_truth() -> None:
     assert not picture.robot[0:2, 0:2].any()
 
 
+@pytest.mark.real_time
 def test_the_real_time_camera_gives_new_frames_and_stops() -> None:
     world = _world()
     camera = TwinCamera(world)
