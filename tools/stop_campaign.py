@@ -236,7 +236,6 @@ _ARM: Ask = ("arm", {})
 PROCEDURES: dict[str, tuple[bool, list[Ask]]] = {
     "open, zero and switch on": (False, [("open", {}), _ZERO, _ARM]),
     "switch on again, under tension": (True, [_ARM]),
-    "switch on again, one register changed": (True, [_ARM]),
     "zero and restart a servo": (False, [("open", {}), _ZERO, ("reboot", {"servo_id": 3}), _ARM]),
 }
 """Name; whether the servos hold before; what is asked for."""
@@ -279,8 +278,6 @@ def run_procedure(name: str, draw: random.Random, stop_after_s: float | None) ->
         if holds:
             with patch.object(bus, "close"):
                 loop.run()
-            if "register" in name:
-                line.servos[2].table["velocity_limit"] = 5
             end = LockstepEnd(line, requests)
             loop = BusLoop(cast(BusServer, end), bus, config, SafetyConfig())
         else:
@@ -303,8 +300,6 @@ def press(name: str, draw: random.Random, stop_after_s: float) -> StopOutcome:
     came_on = [one for time_s, one, value in line.torques if value and time_s > free_s + _WRITE_S]
     holds = PROCEDURES[name][0]
     dropped = sorted({one for _, one, value in line.torques if not value}) if holds else []
-    if "register" in name:
-        dropped = [one for one in dropped if one != 2]  # its EEPROM is locked while it holds
     return StopOutcome(name, stop_after_s, max(0.0, late_ms), came_on, dropped)
 
 

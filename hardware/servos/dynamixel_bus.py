@@ -27,7 +27,7 @@ from hardware.servos.dynamixel_port import (
     WriteRefused,
     WrongServo,
 )
-from hardware.servos.eeprom import EEPROM_BYTES, keep_eeprom
+from hardware.servos.eeprom import CHANGED, EEPROM_BYTES, keep_eeprom
 from hardware.servos.registers import (
     ANSWERS_ALL,
     INDIRECT_ADDRESS,
@@ -255,7 +255,7 @@ class ServoBus:
     def open(self) -> None:
         """Open and lock the port, and make sure that the seven servos are those of the configuration. Nothing moves, none lets go.
 
-        A servo whose torque is on is not set up, which takes the torque off: it may hold a wire. ``arm`` does it.
+        A servo whose torque is on is not set up, which needs the torque off: it may hold a wire.
 
         Raises PortError, PortTaken: the port cannot be opened; NoAnswer, WrongServo: a servo is missing, or not the one that the
         configuration names. The port is closed again.
@@ -265,11 +265,7 @@ class ServoBus:
         try:
             self.identities = identify(self._line, self.config, makes_answer=True)
             for joint in self._joints:
-                if not self._holds(joint):
-                    self._configure(joint)
-                elif self._differences(joint):
-                    self._put_off.add(joint.id)
-                    _log.warning("%s holds, so it is not set up before the servos are switched on", _title(joint))
+                self._set_up(joint)
                 self._map_block(joint)
         except ServoError:
             self.close()
@@ -322,8 +318,7 @@ class ServoBus:
         """Set a servo up that was left as it was because it holds. Raises NotReady when it holds in a mode of another program."""
         if joint.id in self._put_off:
             self._check_counting(joint)
-            if not self._holds(joint):
-                self._configure(joint)
+            self._set_up(joint)
 
     def _kept_zero(self, joint: JointConfig, kept: KeptJoint) -> int:
         """Position register at the kept zero, as the servo counts now. Raises NotReady."""
@@ -358,12 +353,12 @@ class ServoBus:
     def arm(self) -> None:
         """Torque on, each servo holding where it stands. A servo that holds already goes on holding.
 
-        The order: watchdog off; EEPROM where it differs, for which this one servo lets go and holds again; force limit; profile;
-        position read, goal = position; torque on where it is off; watchdog on.
+        The order: watchdog off; EEPROM where it differs; force limit; profile; position read, goal = position; torque on where it
+        is off; watchdog on.
 
         Raises
         ------
-        NotReady : a joint has no zero, has lost it by a restart, holds in another mode, or a servo reports a hardware error.
+        NotReady : a joint has no zero, has lost it by a restart, or holds though its EEPROM differs; a servo reports an error.
         WrongServo, NoAnswer, WriteRefused, StoppedMeanwhile : the torque that was switched on is off again; the rest holds.
         TorqueStillOn : that is not proven.
         """
@@ -376,7 +371,7 @@ class ServoBus:
             for joint in self._joints:
                 if self._map_block(joint):  # the only sign that it has restarted: it counts from another turn now
                     self._zeros.pop(joint.id, None)
-                self._set_up_held(joint)
+                self._configure(joint)
                 self._limit_force(joint)
                 self._set_profile(joint)
             self._check_zeroed()
@@ -398,18 +393,6 @@ class ServoBus:
                 raise TorqueStillOn(f"{error}; {still_on}") from error
             raise
         self._armed = True
-
-    def _set_up_held(self, joint: JointConfig) -> None:
-        """``_configure``; a servo that holds lets go for that, where something differs, and holds again at once."""
-        if not self._differences(joint):
-            self._put_off.discard(joint.id)
-            return
-        held = self._holds(joint)
-        self._configure(joint)
-        if held:
-            self._limit_force(joint)
-            self._send_position_as_goal([joint])
-            self._line.write(joint.id, TORQUE, b"\1")
 
     def _undo_arming(self, switched_on: Sequence[int]) -> None:
         """Torque off of the servos that this arming has switched on; the others hold, with their watchdogs on again."""
@@ -548,7 +531,7 @@ class ServoBus:
             if time.monotonic() > until:
                 raise NoAnswer(f"{_title(joint)} did not come back after its reboot: switch the servos' power off and on")
         _check_model(joint, model, self.config)
-        self._configure(joint)
+        self._set_up(joint)
         self._map_block(joint)
 
     def _check_ready(self) -> None:
@@ -562,6 +545,19 @@ class ServoBus:
             if error:
                 raise NotReady(f"{_title(joint)} reports {describe(error)}: find the cause, then reboot the servo")
             self._check_counting(joint)
+            self._check_not_held(joint, self._differences(joint))
+
+    def _check_not_held(self, joint: JointConfig, differences: Mapping[int, bytes]) -> None:
+        """Raise NotReady for a servo that holds though its EEPROM differs: writing it would let its wire go."""
+        if differences and self._holds(joint):
+            raise NotReady(
+                message(
+                    "{joint} holds with another {what}: close the program with Relax slowly, or switch the torque off (the wires "
+                    "go slack), then arm",
+                    joint=_title(joint),
+                    what=", ".join(CHANGED[address][0] for address in differences),
+                )
+            )
 
     def _check_counting(self, joint: JointConfig) -> None:
         """Raise NotReady for a servo that holds in a mode in which its positions mean something else."""
@@ -587,23 +583,36 @@ class ServoBus:
             # the force of a servo in extended position mode is limited by its duty only
             _MODE: bytes([_CURRENT_POSITION if self.config.model_of(joint).has_current_mode else _EXTENDED_POSITION]),
             _HOMING_OFFSET: bytes(4),  # with one, a tripped watchdog can move the motor
-            _VELOCITY_LIMIT: registers.profile_velocity(joint).to_bytes(4, "little"),
             _STARTUP: b"\0",  # no torque at power-up, and no RAM brought back, which would hide a restart; firmware 44 has 0 there
         }
         table = self._line.read(joint.id, 0, EEPROM_BYTES)
-        return {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
+        found = {address: data for address, data in wanted.items() if table[address : address + len(data)] != data}
+        # the profile's speed may be anything up to the limit: so another speed in the settings needs nothing of the EEPROM
+        needed = registers.profile_velocity(joint)
+        if int.from_bytes(table[_VELOCITY_LIMIT : _VELOCITY_LIMIT + 4], "little") < needed:
+            no_load = int(self.config.model_of(joint).no_load_rpm / registers.VELOCITY_RPM)
+            found[_VELOCITY_LIMIT] = max(needed, min(no_load, registers.MAX_VELOCITY)).to_bytes(4, "little")
+        return found
+
+    def _set_up(self, joint: JointConfig) -> None:
+        """``_configure``, but not of a servo that holds: that may be done when it was let go."""
+        if not self._holds(joint):
+            self._configure(joint)
+        elif self._differences(joint):
+            self._put_off.add(joint.id)
+            _log.warning("%s holds, so it is not set up before it was let go", _title(joint))
 
     def _configure(self, joint: JointConfig) -> None:
-        """EEPROM as we need it, written only where it differs, because it wears; that takes the torque off.
+        """EEPROM as we need it, written only where it differs, because it wears, and while the torque is off.
 
-        A joint whose positions mean something else afterwards loses its zero. Raises WrongServo when a register keeps its value.
+        A joint whose positions mean something else afterwards loses its zero. Raises NotReady: it holds; WrongServo: a register
+        keeps its value.
         """
-        self._put_off.discard(joint.id)
         wrong = self._differences(joint)
-        if wrong:
-            if self._backups is not None:
-                keep_eeprom(self._backups, self._line.port, self._line.read(joint.id, 0, EEPROM_BYTES))
-            self._line.write(joint.id, TORQUE, b"\0")
+        self._check_not_held(joint, wrong)
+        self._put_off.discard(joint.id)
+        if wrong and self._backups is not None:
+            keep_eeprom(self._backups, self._line.port, self._line.read(joint.id, 0, EEPROM_BYTES))
         if _STARTUP in wrong:
             was = self._line.read(joint.id, _STARTUP, 1)[0]
             _log.warning(

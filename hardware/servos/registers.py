@@ -25,7 +25,7 @@ ACCELERATION_RPM2 = 214.577
 """One unit of acceleration in revolutions per minute squared."""
 WATCHDOG_S = 0.02
 VOLTAGE_V = 0.1
-_MAX_VELOCITY, _MAX_ACCELERATION = 1023, 32767
+MAX_VELOCITY, _MAX_ACCELERATION = 1023, 32767
 
 
 def to_ticks(joint: JointConfig, position_mm: float, zero_ticks: int) -> int:
@@ -45,7 +45,7 @@ def to_mm(joint: JointConfig, ticks: int, zero_ticks: int) -> float:
 
 def profile_velocity(joint: JointConfig) -> int:
     """Register 112 of the joint's greatest speed; at least 1, because 0 means no limit at all."""
-    return max(1, min(_MAX_VELOCITY, math.floor(joint.max_speed_mm_s / joint.mm_per_turn * 60.0 / VELOCITY_RPM)))
+    return max(1, min(MAX_VELOCITY, math.floor(joint.max_speed_mm_s / joint.mm_per_turn * 60.0 / VELOCITY_RPM)))
 
 
 def profile_acceleration(joint: JointConfig) -> int:

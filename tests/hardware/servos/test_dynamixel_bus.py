@@ -589,7 +589,7 @@ def _writes(twin: SoftServoBus, servo_id: int) -> list[tuple[int, bytes]]:
 def test_the_arming_order(twin: SoftServoBus, closed: ServoBus) -> None:
     closed.open()
     opened = [address for address, _ in _writes(twin, 3)]
-    assert opened == [64, 9, 11, 44, 168, 224]  # torque off, then what differs from what we need, then the status block, its mark
+    assert opened == [9, 11, 168, 224]  # what differs from what we need, then the status block, its mark
     closed.set_zero()
     twin.log.clear()
     closed.arm()
@@ -640,20 +640,39 @@ def test_a_servo_that_keeps_another_profile_is_not_armed(
     assert _torques(twin) == [0] * 7
 
 
-@pytest.mark.parametrize("register", ["velocity_limit", "return_delay"])
-def test_connecting_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, register: str) -> None:
-    """Another speed in the settings is another velocity limit, and that can only be written with the torque off."""
+@pytest.mark.parametrize(("register", "name"), [("velocity_limit", "velocity limit"), ("return_delay", "return delay")])
+def test_neither_connecting_nor_arming_lets_go_of_a_wire(
+    twin: SoftServoBus, armed: ServoBus, register: str, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The EEPROM can only be written with the torque off: the wire would be loose for some ten transactions."""
     armed.close()
     twin.modify_servo(3, lambda servo: servo.table.__setitem__(register, 7))
-    before = twin.positions_mm()
+    changes = TorqueChanges(twin, monkeypatch)
     armed.open()
-    assert _torques(twin) == [1] * 7
-    assert twin.servo(3).table[register] == 7
     armed.set_zero(basis=ZeroBasis.SEARCHED)
-    assert _torques(twin) == [1] * 7
+    with pytest.raises(NotReady, match=rf"servo up \(id 3\) holds with another {name}: .*switch the torque off.* then arm"):
+        armed.arm()
+    assert changes.seen == []
+    assert twin.servo(3).table[register] == 7
+    armed.torque_off()
     armed.arm()
-    assert twin.servo(3).table[register] == {"velocity_limit": 65, "return_delay": 0}[register]
-    assert twin.positions_mm() == before
+    assert twin.servo(3).table[register] == {"velocity_limit": 200, "return_delay": 0}[register]
+    assert _torques(twin) == [1] * 7
+
+
+def test_another_speed_needs_nothing_of_the_eeprom(twin: SoftServoBus, armed: ServoBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The speed is in the profile, which a servo that holds takes, too; the velocity limit only may not be below it."""
+    armed.close()
+    changes = TorqueChanges(twin, monkeypatch)
+    slow = CONFIG.model_copy(update={"joints": tuple(j.model_copy(update={"max_speed_mm_s": 2.0}) for j in CONFIG.joints)})
+    for config, units in ((slow, 13), (CONFIG, 65)):
+        bus = ServoBus(config, twin.port)
+        bus.open()
+        bus.set_zero(basis=ZeroBasis.SEARCHED)
+        bus.arm()
+        bus.close()
+        assert twin.servo(3).table["profile_velocity"] == units
+    assert changes.seen == []
 
 
 def test_a_servo_that_holds_in_another_mode_is_not_zeroed_before_it_was_let_go(twin: SoftServoBus, armed: ServoBus) -> None:
@@ -750,20 +769,6 @@ def test_arming_again_lets_go_of_no_wire(twin: SoftServoBus, armed: ServoBus, mo
     armed.arm()
     assert changes.seen == []
     assert armed.is_armed
-
-
-def test_arming_again_with_another_speed_lets_go_of_one_wire_at_a_time(
-    twin: SoftServoBus, armed: ServoBus, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    armed.disarm()
-    for servo_id in (2, 5):
-        twin.modify_servo(servo_id, lambda servo: servo.table.__setitem__("velocity_limit", 7))
-    changes = TorqueChanges(twin, monkeypatch)
-    before = twin.positions_mm()
-    armed.arm()
-    assert changes.seen == [(2, 0), (2, 1), (5, 0), (5, 1)]
-    assert twin.servo(2).table["velocity_limit"] == 65
-    assert twin.positions_mm() == before
 
 
 def test_a_servo_that_holds_in_another_mode_is_not_armed_and_does_not_let_go(twin: SoftServoBus, armed: ServoBus) -> None:
@@ -1135,19 +1140,6 @@ def test_a_force_limit_that_another_master_takes_away_is_seen(twin: SoftServoBus
     assert [state.is_limited for state in _states(armed)] == [True] * 5 + [False, True]
 
 
-def test_after_a_change_of_the_mode_the_limit_is_there_before_it_holds_again(twin: SoftServoBus, armed: ServoBus) -> None:
-    """A servo that holds lets go for a register of its EEPROM, and holds again at once."""
-    armed.disarm()
-    twin.modify_servo(3, lambda servo: servo.table.__setitem__("return_delay", 100))
-    twin.modify_servo(3, lambda servo: servo.table.__setitem__("goal_current", 1193))
-    twin.log.clear()
-    armed.arm()
-    order = [(packet.id, packet.parameters[0], packet.parameters[2:]) for packet in twin.log if packet.instruction == 3]
-    held_again = [at for at, (servo_id, register, data) in enumerate(order) if (servo_id, register, data) == (3, 64, b"\1")]
-    assert order.index((3, 102, b"\x1a\0")) < held_again[0]
-    assert _limits(twin)[2] == 26
-
-
 @pytest.fixture
 def load_bus(clock: Clock) -> Iterator[tuple[SoftServoBus, ServoBus]]:
     """Tendons with a model that reports no current: its duty is limited."""
@@ -1184,7 +1176,7 @@ def _has_backup(servo: SoftServo, startup: int) -> None:
 def test_27_startup_configuration_is_set_to_0(
     twin: SoftServoBus, closed: ServoBus, caplog: pytest.LogCaptureFixture, startup: int
 ) -> None:
-    """While the torque is off; a servo that holds is left alone until it is switched on."""
+    """While the torque is off; a servo that holds is left alone, and not armed."""
     for servo_id in (3, 5):
         twin.modify_servo(servo_id, lambda servo: _has_backup(servo, startup))
     twin.modify_servo(5, lambda servo: servo.table.__setitem__("operating_mode", 5))
@@ -1193,6 +1185,11 @@ def test_27_startup_configuration_is_set_to_0(
     assert [twin.servo(servo_id).table["startup"] for servo_id in (3, 5)] == [0, startup]
     assert f"servo up (id 3) had Startup Configuration (register 60) {startup}: set to 0" in caplog.text
     closed.set_zero()
+    with pytest.raises(
+        NotReady, match=r"servo advance \(id 5\) holds with another .*startup configuration: .*switch the torque off"
+    ):
+        closed.arm()
+    closed.torque_off()
     closed.arm()
     assert twin.servo(5).table["startup"] == 0
 

@@ -11,7 +11,7 @@ from tools.stop_campaign import BOUND_MS, PROCEDURES, campaign, run_procedure
 
 def test_stop_comes_before_everything() -> None:
     """It was noticed after up to 0.8 s, when the torque had come on; and switching on let go of all wires."""
-    for outcome in campaign(60, seed=51):
+    for outcome in campaign(30, seed=51):
         assert outcome.late_ms <= BOUND_MS, outcome
         assert outcome.came_on == [], outcome
         assert outcome.dropped == [], outcome
