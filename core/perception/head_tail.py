@@ -10,6 +10,7 @@ import numpy as np
 
 from core import geometry
 from core.config.models import PathConfig
+from core.perception.centerline import plan_route
 from core.types import Mask, Masks, Point, Points, RobotPath, VesselGraph
 
 END_PART_PX = 20.0
@@ -23,6 +24,8 @@ NEAR_PX = 20
 """Half side of the area around an end in which the robot may meet the border."""
 OUTSIDE_LEAD_PX = 10.0
 """The end that runs this much further outside the vessel than the other is the tail."""
+OPENING_LEAD_PX = 20.0
+"""The end that is this much nearer than the other to the vessel's only opening is the tail."""
 NEARER_BY = 0.6
 """An end is at the vessel's end only if the other end is clearly further from one: this share or less of its distance."""
 
@@ -86,7 +89,8 @@ def tail_first(points: Points, around: Surroundings) -> Points:
 
     The first clear answer counts: the one end at border or port (unless it is a head that has just arrived there); the last frame's
     tail and head, or the direction of the path before a gap; the end further outside the vessel; the one end at an end of the
-    vessel; the thicker end; and at last the end nearer to an end of the vessel.
+    vessel; the end nearer, along the vessel, to the one place where the vessel meets the image border; the thicker end; and at last
+    the end nearer to an end of the vessel.
     """
     for looks_like_tail, margin in (
         (_entry, 0.5),
@@ -94,6 +98,7 @@ def tail_first(points: Points, around: Surroundings) -> Points:
         (_as_earlier, ALONG_STEP_PX),
         (_outside_vessel, OUTSIDE_LEAD_PX),
         (_at_vessel_end, 0.5),
+        (_from_opening, OPENING_LEAD_PX),
         (_thickness, 0.2),
         (_vessel_end_distance, 0.0),
     ):
@@ -188,6 +193,20 @@ def _at_vessel_end(points: Points, around: Surroundings) -> float:
     here, radius = _distance_to_vessel_end(points[0], around.vessel)
     there, _ = _distance_to_vessel_end(points[-1], around.vessel)
     return float(_is_near(here, radius) and here < NEARER_BY * there)
+
+
+def _from_opening(points: Points, around: Surroundings) -> float:
+    """Negative distance along the vessel from this end to the one end of the vessel at the image border; 0 where there is no such."""
+    graph = around.vessel
+    if graph is None or not graph.edges:
+        return 0.0
+    degrees = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
+    openings = [node for node in graph.nodes[degrees == 1] if _is_at_border(node, around.masks.vessel, around.config)]
+    if len(openings) != 1:
+        return 0.0
+    (x, y), (to_x, to_y) = points[0], openings[0]
+    route = plan_route(graph, (float(x), float(y)), (float(to_x), float(to_y)))
+    return -route.length_px if route is not None else 0.0
 
 
 def _thickness(points: Points, around: Surroundings) -> float:

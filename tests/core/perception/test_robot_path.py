@@ -185,6 +185,15 @@ def test_the_end_outside_the_vessel_is_the_tail() -> None:
     assert path_of(robot, vessel=probability(depth(vessel, 20.0))).head == pytest.approx(tuple(vessel[179]), abs=1.0)
 
 
+def test_the_end_nearer_along_the_vessel_to_its_only_opening_is_the_tail() -> None:
+    """An arch that begins at the left border: the head lies nearer to the opening than the tail, but not along the vessel."""
+    angles = np.linspace(0.5 * np.pi, -1.2 * np.pi, 160)[:, None]
+    arch = np.concatenate([[[-10.0, 400.0]], np.hstack([330 + 130 * np.cos(angles), 270 + 130 * np.sin(angles)])])
+    vessel, part = probability(depth(arch, 18.0)), arch[55:130]
+    robot = probability(depth(part, 4.0), depth(part[-25:], 6.0))  # its head's end is the thicker one
+    assert path_of(robot, vessel=vessel).head == pytest.approx(tuple(part[-1]), abs=4.0)
+
+
 def test_the_thicker_end_is_the_tail_where_nothing_else_tells() -> None:
     line = np.array([[150.0, 240.0], [450.0, 240.0]])
     robot = probability(depth(line, 4.0), depth(line[:1] + [[0.0, 0.0], [120.0, 0.0]], 7.0))
