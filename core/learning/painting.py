@@ -64,10 +64,10 @@ class Tube:
 XRAY = "xray"
 """The kind that is seen by absorption: no walls, lamps or colours."""
 TUBES = {
-    "clear": Tube(0.25, (0.0, 0.18), (1, 1), (0.15, 0.9), shades=0.55, refracts=0.6),
+    "clear": Tube(0.22, (0.0, 0.18), (1, 1), (0.15, 0.9), shades=0.55, refracts=0.6),
     "milky": Tube(0.20, (0.25, 0.92), (0, 1), veil_share=1.0, veil=(0, 0.55), shades=0.55, refracts=0.6),
     "channel": Tube(0.17, (0.05, 0.6), (0, 1), (0.15, 0.9)),
-    XRAY: Tube(0.13, (0, 0), (1, 1), (0, 0)),
+    XRAY: Tube(0.16, (0, 0), (1, 1), (0, 0)),
     "solid": Tube(0.08, (0.7, 1), (0, 0), veil_share=1.0, veil=(0, 0.55)),
     "liquid": Tube(0.10, (0.15, 0.7), (0.3, 1), veil_share=1.0, veil=(0, 0.55), shades=0.55, refracts=0.6),
     "faint": Tube(0.07, (0.02, 0.1), (0, 0), (0.15, 0.9), shades=0.55),
@@ -88,6 +88,8 @@ _REFRACTION_PX = 6.0
 """Shift of what is seen at the wall of a tube that refracts, times -0.6 to 0.8."""
 _COLOR_TRIES = 12
 """Colours that are drawn until a robot stands out from what lies below it."""
+_FADING = 0.5
+"""Share of the robots in X-rays whose body grows darker or fainter away from the tip."""
 _STEP_PX = 0.4
 """Distance of the points on a robot's line."""
 _GRAINS = np.array([NormalDist().inv_cdf((level + 0.5) / 256) for level in range(256)], np.float32)
@@ -438,10 +440,10 @@ def _robot_color(rng: Generator, below: F32, veil: float, *, is_xray: bool) -> F
     """A colour (3, 1) that stands out from what lies `below` (3, N) the robot; in X-rays darker than that."""
     mean = below.mean(axis=1, keepdims=True)
     if is_xray:
-        return np.full((3, 1), float(mean.mean()) * rng.uniform(0.1, 0.65), np.float32)
+        return np.full((3, 1), float(mean.mean()) * rng.uniform(0.1, 0.8), np.float32)
     for _ in range(_COLOR_TRIES):
         color = random_color(rng)[:, :, 0]
-        if float(np.abs(color - mean).max()) * (1 - veil) > rng.uniform(0.1, 0.3):
+        if float(np.abs(color - mean).max()) * (1 - veil) > rng.uniform(0.07, 0.3):
             break
     return color
 
@@ -453,6 +455,8 @@ def _robot_colors(rng: Generator, band: _Band, color: F32, pattern: str, *, is_x
         return color * np.float32(rng.uniform(darkest, brightest)) if is_xray else random_color(rng)[:, :, 0]
 
     body = np.repeat(color, len(band.rows), axis=1)
+    if is_xray and rng.random() < _FADING:
+        body *= np.interp(band.from_tip_px, [0, rng.uniform(40, 300)], [1, rng.uniform(0.6, 1.8)]).astype(np.float32)
     if pattern != "plain":
         pitch, phase = float(rng.uniform(3, 16)), band.from_tip_px
         if pattern == "coil":

@@ -20,7 +20,7 @@ from core.learning.scenes import MOST_RATIO, REACH_PX, BenchScene, read_scene
 from core.learning.training_plan import TrainingPlan
 from core.types import Mask, Points
 
-CROPS_PER_BENCH = 3
+CROPS_PER_BENCH = 4
 """Crops that share a painted bench, which costs four times as much as a robot in it and its exposure."""
 TWIN_SHARE = 0.3
 """Share of the benches that are the twin's own pictures, where the scene has some."""
