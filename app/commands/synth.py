@@ -22,7 +22,7 @@ def synth(
         list[str] | None,
         typer.Option(
             help="only these families of looks, rare ones among them (gel, drape, stage_light, glow, tank, picture, resin: drawn "
-            "only where they are named), or bench: the twin's own; may be repeated"
+            "only where they are named), bench: the twin's own, or painted: drawn from geometry alone; may be repeated"
         ),
     ] = None,
     phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
@@ -55,12 +55,12 @@ def make_set(
 ) -> None:
     """Write a set of frames, or of scenes; raises SynthError, and ClusterError with `scheduler`."""
     from hardware.twin.catalog import LOOKS
-    from hardware.twin.dataset import SynthError, SynthPlan, write_set
+    from hardware.twin.dataset import PAINTED_LOOK, SynthError, SynthPlan, write_set
     from hardware.twin.phantoms import make_phantom
 
-    unknown = [name for name in families or () if name not in LOOKS]
+    unknown = [name for name in families or () if name not in (*LOOKS, PAINTED_LOOK)]
     if unknown:
-        raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join(LOOKS)}")
+        raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join((*LOOKS, PAINTED_LOOK))}")
     if scenes and poses != 1:
         raise SynthError("--poses is for frames: a scene has several robots already; leave it out")
     if phantom is not None:

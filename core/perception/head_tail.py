@@ -196,7 +196,10 @@ def _at_vessel_end(points: Points, around: Surroundings) -> float:
 
 
 def _from_opening(points: Points, around: Surroundings) -> float:
-    """Negative distance along the vessel from this end to the one end of the vessel at the image border; 0 where there is no such."""
+    """Negative distance in px, along the vessel, from this end to the vessel's only opening: an end of it at the image border.
+
+    0 where there is none, or several.
+    """
     graph = around.vessel
     if graph is None or not graph.edges:
         return 0.0

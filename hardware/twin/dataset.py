@@ -2,6 +2,7 @@
 
 A set consists of episodes: one random phantom (seed = first seed + episode) through which the robot is driven once, in
 ``LOOKS_PER_EPISODE`` looks. Painting a look takes far longer than painting a robot into it, so one look can serve several poses.
+Of the family ``painted``, pictures are drawn from their geometry alone (``core.learning.painting``), with the same truth.
 A set of scenes has geometry in place of frames (``core.learning.scenes``), and pictures of every second scene alone.
 A frame depends only on the seed of its episode and on the plan: a set can be continued after an interruption, and two sets with
 disjoint seed ranges are disjoint.
@@ -20,11 +21,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.config.models import PerceptionConfig
 from core.devices import UserError
 from core.files import is_unfinished, sweep_unfinished, write_atomic
 from core.learning.dataset import mask_png, png
+from core.learning.painting import PaintedBench, exposed
 from core.learning.scenes import BenchScene
 from core.system import begin_as_worker
 from core.types import Image, Mask, Points
@@ -35,13 +38,15 @@ from hardware.twin.physics import TwinPhysics
 from hardware.twin.rendering.appearance import Appearance, make_view, named_appearance
 from hardware.twin.rendering.renderer import RenderedFrame, Renderer
 from hardware.twin.truth import RouteFollower, truth_of
-from hardware.twin.view import measure_lumen
+from hardware.twin.view import CameraView, measure_lumen
 
 LOOKS_PER_EPISODE = 16
 SCENES_PER_EPISODE = 4
 _ROBOTS_PER_SCENE, _PICTURES_PER_SCENE = 6, 2
 _SCENE_REACH_PX = 20.0
 """Distance outside the lumen up to which it is measured: painted walls are up to 5.5 px thick, in crops of 0.6 of the size."""
+PAINTED_LOOK = "painted"
+"""Family of benches that are painted from their geometry."""
 _EMPTY_SHARE = 0.03  # of the frames show no robot
 _STEP_S = 0.02
 _FEED_MM_S = 40.0
@@ -141,7 +146,8 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
         if pose == 0:
             appearance = _look_of(plan, rng, first_look + look)
             view = make_view(appearance, plan.size, phantom)
-            renderer = Renderer(phantom, appearance, plan.size, seed)
+            is_painted = appearance.family == PAINTED_LOOK
+            renderer = (_PaintedRenderer if is_painted else Renderer)(phantom, appearance, plan.size, seed, view)
         moment = int(moments[place])
         points, sheath_mm, clearance_mm = shapes[moment]
         empty = bool(rng.random() < _EMPTY_SHARE)
@@ -157,8 +163,41 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
 
 def _look_of(plan: SynthPlan, rng: np.random.Generator, number: int) -> Appearance:
     family = str(rng.choice(plan.families)) if plan.families else None
-    appearance = named_appearance(family, number)
-    return replace(appearance, family=BENCH_LOOK) if family == BENCH_LOOK else appearance
+    appearance = named_appearance(None if family == PAINTED_LOOK else family, number)
+    return replace(appearance, family=family) if family in (BENCH_LOOK, PAINTED_LOOK) else appearance
+
+
+class _PaintedRenderer:
+    """Stands in for ``Renderer``: the same geometry and exact labels, in a painted look."""
+
+    def __init__(self, phantom: Phantom, appearance: Appearance, size: tuple[int, int], seed: int, view: CameraView) -> None:
+        self._rng = np.random.default_rng((seed, appearance.clutter_seed, 19))
+        distance_px, ratio = _measured(phantom, appearance, view)
+        self._bench = PaintedBench(self._rng, distance_px, ratio)
+        self._view, self._radius_px = view, appearance.robot_radius_mm * _pixels_per_mm(view)
+
+    def render(self, robot_points_mm: Points | None, sheath_mm: float = 0.0, noise_seed: int = 0) -> RenderedFrame:
+        """As ``Renderer.render``; no sheath is drawn."""
+        del sheath_mm
+        rng = np.random.default_rng((int(self._rng.integers(2**31)), noise_seed))
+        bench, robot = self._bench, np.zeros_like(self._bench.vessel)
+        if robot_points_mm is None or len(robot_points_mm) < 2:
+            picture = bench.empty()
+        else:
+            picture, robot = bench.with_robot(rng, self._view.project(robot_points_mm), self._radius_px)
+        levels = exposed(rng, picture, bench.vessel, bench.blur_px)
+        return RenderedFrame(np.ascontiguousarray(levels.transpose(1, 2, 0)), bench.vessel.copy(), robot)
+
+
+def _pixels_per_mm(view: CameraView) -> float:
+    return view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
+
+
+def _measured(phantom: Phantom, appearance: Appearance, view: CameraView) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Signed distance (h, w) to the vessel's wall in px, and the ratio of the distance to the centerline and the radius."""
+    scale = _pixels_per_mm(view)
+    lumen = measure_lumen(phantom.graph, view, view.grid_mm().astype(np.float32), appearance.wall_mm, _SCENE_REACH_PX / scale)
+    return lumen.distance_mm * np.float32(scale), lumen.ratio
 
 
 def episode_scenes(plan: SynthPlan, episode: int) -> Iterator[tuple[BenchScene, dict[str, Any]]]:
@@ -171,8 +210,7 @@ def episode_scenes(plan: SynthPlan, episode: int) -> Iterator[tuple[BenchScene, 
     for place in range(plan.frames_of(episode)):
         appearance = _look_of(plan, rng, seed * LOOKS_PER_EPISODE + place)
         view = make_view(appearance, plan.size, phantom)
-        scale = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
-        lumen = measure_lumen(phantom.graph, view, view.grid_mm().astype(np.float32), appearance.wall_mm, _SCENE_REACH_PX / scale)
+        distance_px, ratio = _measured(phantom, appearance, view)
         first = place * _ROBOTS_PER_SCENE
         robots = [shapes[moment] for moment in order[first : first + _ROBOTS_PER_SCENE]]
         pictures: list[tuple[Image, Mask]] = []
@@ -185,10 +223,10 @@ def episode_scenes(plan: SynthPlan, episode: int) -> Iterator[tuple[BenchScene, 
             empty = renderer.render(None, 0.0, noise_seed=_PICTURES_PER_SCENE).image
         yield (
             BenchScene(
-                distance_px=lumen.distance_mm * np.float32(scale),
-                ratio=lumen.ratio,
+                distance_px=distance_px,
+                ratio=ratio,
                 lines=tuple(view.project(points) for points, _, _ in robots),
-                radius_px=appearance.robot_radius_mm * scale,
+                radius_px=appearance.robot_radius_mm * _pixels_per_mm(view),
                 pictures=tuple(pictures),
                 empty=empty,
             ),

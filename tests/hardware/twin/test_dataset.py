@@ -111,6 +111,18 @@ def test_the_benchs_own_look_is_the_trials_one() -> None:
     assert frame.truth["family"] == "bench"
 
 
+def test_painted_benches_have_exact_labels() -> None:
+    plan = SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("painted",))
+    painted, again = (next(dataset.episode_frames(plan, 0)) for _ in range(2))
+    assert painted.truth["family"] == "painted"
+    assert np.array_equal(painted.picture.image, again.picture.image)
+    path = np.rint(painted.truth["robot_path_xy"]).astype(int)
+    inside = np.all((path >= 3) & (path < (317, 237)), axis=1)
+    assert painted.picture.robot[path[inside, 1], path[inside, 0]].mean() > 0.95
+    assert painted.picture.vessel.shape == painted.picture.robot.shape
+    assert painted.picture.vessel.any()
+
+
 def test_a_look_is_shown_with_several_poses() -> None:
     plan = SynthPlan(Path("unused"), 50, 3, size=(320, 240), poses=3)
     assert (plan.episodes, plan.frames_of(0), plan.frames_of(1)) == (2, 48, 2)
