@@ -62,6 +62,10 @@ def trial(
     look: Annotated[
         str, typer.Option(help="random: every trial another picture; bench: the default clear one; or a family, as in synth")
     ] = "random",
+    wall_force: Annotated[
+        bool,
+        typer.Option("--wall-force/--no-wall-force", help="whether the policy is told the wall force, which no real rig measures"),
+    ] = True,
     scheduler: SchedulerOption = None,
     model: ModelOption = None,
     config_path: ConfigOption = None,
@@ -78,7 +82,7 @@ def trial(
         config = load_config(config_path, None, overrides)
     if look not in TRIAL_LOOKS:
         raise TrialError(f"unknown look {look!r}; known: {', '.join(TRIAL_LOOKS)}")
-    plan = TrialPlan(config, true_masks, max_seconds, look)
+    plan = TrialPlan(config, true_masks, max_seconds, look, wall_force)
     # All policies meet a seed one after the other, so that a part of a campaign can already be compared.
     jobs: list[Job] = [(name, seed) for seed in parse_seeds(seeds) for name in policies]
     rows, interrupted = _run(plan, jobs, out, workers, scheduler)
@@ -192,6 +196,7 @@ def _described(plan: TrialPlan) -> dict[str, Any]:
         info = read_model_info(model_folder(plan.config.perception.segmentation.model), verify=())
         model_sha256 = hashlib.sha256(info.model_dump_json(exclude={"figures"}).encode()).hexdigest()
     described = {"true_masks": plan.true_masks, "max_seconds": plan.max_seconds, "look": plan.look}
+    described |= {} if plan.wall_force else {"wall_force": False}
     return described | {"model_sha256": model_sha256, "config": settings}
 
 
@@ -336,6 +341,7 @@ def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> N
     everything = [row for rows in by_policy.values() for row in rows]
     looks = {RANDOM_LOOK: "random looks", BENCH_LOOK: "the default look"}.get(plan.look, f"looks: {plan.look}")
     seen = "true masks instead of the network" if plan.true_masks else f"model {plan.config.perception.segmentation.model}"
+    seen += "" if plan.wall_force else ", without wall force"
     lowest = enumerate(worst(everything, _WORST))
     text = render_page(
         "trial.html.j2",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,13 +51,15 @@ class TrialPlan:
     """Settings of all trials of a campaign.
 
     ``true_masks``: the twin's masks in place of the network's. ``look`` of ``TRIAL_LOOKS``: every trial has another look, of any
-    of the ten families or of the named one, or all have the default clear bench.
+    of the ten families or of the named one, or all have the default clear bench. ``wall_force``: whether the policy is told the
+    wall contact force, which real rigs do not measure.
     """
 
     config: Config
     true_masks: bool = False
     max_seconds: float = 120.0
     look: str = RANDOM_LOOK
+    wall_force: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,7 +164,7 @@ class Trial:
         frame = self._read()
         scene = self._pipeline(frame, self.target.click_px)
         status = self._world.robot.status()
-        advice = self._policy(scene, status)
+        advice = self._policy(scene, status if self._plan.wall_force else replace(status, wall_contact_n=None))
         if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
             advice = None  # autonomy has to hold
         self._watch_direction(scene)

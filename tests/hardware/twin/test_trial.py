@@ -68,6 +68,24 @@ def test_the_look_may_be_named(look: str) -> None:
     assert trial._world.appearance == random_appearance(FIRST_SEED + 3, look)
 
 
+@pytest.mark.parametrize("wall_force", [True, False])
+def test_the_policy_is_told_the_wall_force_unless_it_is_left_out(wall_force: bool) -> None:
+    config, masks, told = Config(), TrueMasks(), []
+    plan = TrialPlan(config, true_masks=True, max_seconds=0.2, wall_force=wall_force)
+    trial = Trial(plan, 1, "pursuit", Pipeline(masks, config.perception), masks)
+    policy = trial._policy
+
+    class Listening(_GivesUp):
+        def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
+            told.append(status is not None and status.wall_contact_n is not None)
+            return policy(scene, status, followed=followed)
+
+    trial._policy = Listening()
+    row = trial.run()
+    assert told and set(told) == {wall_force}
+    assert row["wall_contact_n"] is not None, "it is measured all the same"
+
+
 class _GivesUp:
     def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         return Advice(Speed.STOP, 0.0, 0.0, "missed")
