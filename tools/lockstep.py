@@ -12,6 +12,7 @@ from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
 from core.control.faults import Cause, Fault
 from core.control.gate import Rejection, Source
+from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
@@ -78,7 +79,12 @@ class LockStepServos:
         self._beat = Heartbeat(self._clock(), permitted)
 
     def send(
-        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+        self,
+        command: Command,
+        *,
+        source: Source = Source.OPERATOR,
+        captured_s: float | None = None,
+        retracts: Retracted = Retracted.NONE,
     ) -> Command:
         self._order = BusOrder(command, source, self._clock(), captured_s, retracts)
         return self._guard.sent.motion if self._guard.armed and self._guard.sent is not None else Command()

@@ -20,12 +20,10 @@ from core.config.acceptance import (
     AcceptanceError,
     ForceReading,
     acceptance_path,
-    basis_of,
     changes_since,
     force_problem,
     new_acceptance,
     problems_of,
-    program_version,
     read_acceptance,
     write_acceptance,
 )
@@ -88,7 +86,7 @@ def _begin(path: Path, rig: RigFile, config: Config, operator: str | None, *, an
     """The acceptance to go on with, or a new one where there is none, or something has changed since."""
     before = None if anew else read_acceptance(path)
     if before is not None:
-        changed = changes_since(before, basis_of(config.servos, config.safety, program_version()))
+        changed = changes_since(before, config)
         if not changed and (operator is None or operator == before.operator):
             return before
         why = "; ".join(changed) if changed else f"it was begun by {before.operator}"
@@ -96,7 +94,7 @@ def _begin(path: Path, rig: RigFile, config: Config, operator: str | None, *, an
     operator = operator or _ask("your name: ")
     if not operator:
         raise UserError("an acceptance needs the name of who makes it: --operator NAME")
-    accepted = new_acceptance(rig.name, operator, config, rig.camera.serial or rig.camera.device or "")
+    accepted = new_acceptance(operator, config, rig.camera.serial or rig.camera.device or "")
     write_acceptance(path, accepted, keeps_older=True)
     return accepted
 
@@ -109,7 +107,7 @@ def _steps(config: Config, accepted: Acceptance, readings: dict[str, float], *, 
 
     bench = AcceptanceBench(config, StopSwitch(), backups_folder())
     servos, supply_v = bench.identify()
-    if accepted.servos and changes_since(accepted, accepted.basis, [servo.firmware for servo in servos]):
+    if accepted.servos and changes_since(accepted, config, [servo.firmware for servo in servos]):
         raise UserError("the servos' firmware has changed since this acceptance was begun: begin again with --anew")
     accepted = accepted.model_copy(update={"servos": servos, "supply_v": supply_v})
     _say(f"servos: {len(servos)} answer, {supply_v[0]:.1f} to {supply_v[1]:.1f} V")

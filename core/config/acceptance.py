@@ -1,8 +1,8 @@
 """The acceptance of a rig with real servos: what was checked, when and by whom, and whether it still holds. Pure but for its file.
 
-It lies beside the rig file as NAME.acceptance.json. It holds for the servos, directions, ways, force limits, STOP behaviour and
-major version of the program that it was made with (``Basis``): when one of them changes, the rig is advisory until it is accepted
-again.
+It lies beside the rig file as NAME.acceptance.json. It holds for the rig, adapter, servos, directions, envelopes, speeds, steps,
+force limits, pull, STOP behaviour and major version of the program that it was made with (``Basis``): when one of them changes, the
+rig is advisory until it is accepted again.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from core.config.models import Config
-from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig, wiring_of
+from core.config.safety import JOINT_NAMES, JointName, wiring_of
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
 from core.files import write_atomic
@@ -30,6 +30,7 @@ STOP_TRIES = 3
 MOST_STOP_MS = 500.0
 """A longer way to stand-still is no stop: the rules end every motion after 500 ms."""
 ESTOP_STEP = "E-stop"
+_OF_BEFORE = "it does not say with which envelopes, speeds and pull it was made: main.py rig accept NAME"
 _ENDING, _OLDER = ".acceptance.json", ".acceptance.older.json"
 _MAX_BYTES = 200_000
 _SOURCE = Path(__file__).resolve().parents[2]
@@ -49,6 +50,12 @@ class StopBehaviour(ConfigSection):
     deadman_timeout_s: float
 
 
+_LIMITS = ("low_mm", "high_mm", "max_speed_mm_s", "max_acceleration_mm_s2", "max_step_mm")
+"""Settings of each joint that an acceptance holds for."""
+_PULL = ("pretension_mm", "pretension_mm_s", "max_pull_mm")
+"""And those of all tendons."""
+
+
 class Basis(ConfigSection):
     """What an acceptance holds for; tuples are per joint, in the order of JOINT_NAMES."""
 
@@ -56,6 +63,8 @@ class Basis(ConfigSection):
     models: tuple[int, ...]
     mm_per_turn: tuple[float, ...]
     max_force_n: tuple[float, ...]
+    limits: dict[str, tuple[float, ...]] = Field({}, description="by setting; older records have none")
+    pull: dict[str, float] = Field({}, description="by setting; older records have none")
     stop: StopBehaviour
     major: str = Field(description="major version of the program")
 
@@ -151,13 +160,16 @@ def force_problem(name: str, read_n: float, limit_n: float) -> str:
     )
 
 
-def basis_of(servos: ServosConfig, safety: SafetyConfig, version: str) -> Basis:
+def basis_of(config: Config, version: str) -> Basis:
     """What an acceptance of this configuration would hold for."""
+    servos, safety = config.servos, config.safety
     return Basis(
         wiring=wiring_of(servos),
         models=tuple(servos.model_of(joint).number for joint in servos.joints),
         mm_per_turn=tuple(joint.mm_per_turn for joint in servos.joints),
         max_force_n=tuple(joint.max_force_n for joint in servos.joints),
+        limits={key: tuple(getattr(joint, key) for joint in servos.joints) for key in _LIMITS},
+        pull={key: getattr(servos, key) for key in _PULL},
         stop=StopBehaviour(
             torque_off_on_stop=servos.torque_off_on_stop,
             watchdog_s=servos.watchdog_s,
@@ -169,26 +181,34 @@ def basis_of(servos: ServosConfig, safety: SafetyConfig, version: str) -> Basis:
     )
 
 
-def changes_since(accepted: Acceptance, now: Basis, firmware: Sequence[int] = ()) -> tuple[str, ...]:
-    """What an acceptance no longer holds for, each in a few words.
+def changes_since(accepted: Acceptance, config: Config, firmware: Sequence[int] = ()) -> tuple[str, ...]:
+    """What an acceptance no longer holds for as the rig is configured, each in a few words.
 
     Parameters
     ----------
     firmware : of the seven servos, in the order of the joints; empty: they were not asked.
     """
-    then, found = accepted.basis, []
+    then, now = accepted.basis, basis_of(config, program_version())
+    found = [] if then.limits and then.pull else [_OF_BEFORE]
+    for what, was, name in (("rig", accepted.rig, config.rig.name), ("adapter", accepted.adapter, config.servos.port or "")):
+        if was != name:
+            found.append(f"{what} was {was} and is {name}")
     columns: tuple[tuple[str, Sequence[Any], Sequence[Any]], ...] = (
         ("id", [one[0] for one in then.wiring], [one[0] for one in now.wiring]),
         ("sign", [one[1] for one in then.wiring], [one[1] for one in now.wiring]),
         ("model", then.models, now.models),
         ("mm_per_turn", then.mm_per_turn, now.mm_per_turn),
         ("max_force_n", then.max_force_n, now.max_force_n),
+        *((key, then.limits.get(key, ()), now.limits[key]) for key in _LIMITS),
         ("firmware", [servo.firmware for servo in accepted.servos], firmware),
     )
     for what, before, after in columns:
         for name, old, new in zip(JOINT_NAMES, before, after, strict=False):
             if old != new:
                 found.append(f"{what} of {name} was {old:g} and is {new:g}")
+    for key in _PULL:
+        if key in then.pull and then.pull[key] != now.pull[key]:
+            found.append(f"{key} was {then.pull[key]:g} and is {now.pull[key]:g}")
     for key, old in then.stop:
         if (new := getattr(now.stop, key)) != old:
             found.append(f"{key} was {old} and is {new}")
@@ -199,14 +219,14 @@ def changes_since(accepted: Acceptance, now: Basis, firmware: Sequence[int] = ()
 
 def is_outdated(accepted: Acceptance, config: Config, firmware: Sequence[int] = ()) -> bool:
     """Whether something has changed since."""
-    return bool(changes_since(accepted, basis_of(config.servos, config.safety, program_version()), firmware))
+    return bool(changes_since(accepted, config, firmware))
 
 
 def problems_of(accepted: Acceptance | None, config: Config, firmware: Sequence[int] = ()) -> tuple[str, ...]:
     """Why a rig of this configuration is not accepted; empty when it is."""
     if accepted is None:
         return ("no acceptance is recorded",)
-    if changed := changes_since(accepted, basis_of(config.servos, config.safety, program_version()), firmware):
+    if changed := changes_since(accepted, config, firmware):
         return changed
     return tuple(f"not done: {step}" for step in accepted.missing)
 
@@ -271,16 +291,16 @@ def write_acceptance(rig_file: Path, accepted: Acceptance, *, keeps_older: bool 
     return path
 
 
-def new_acceptance(rig: str, operator: str, config: Config, camera: str) -> Acceptance:
+def new_acceptance(operator: str, config: Config, camera: str) -> Acceptance:
     """An acceptance that begins."""
     version = program_version()
     return Acceptance(
-        rig=rig,
+        rig=config.rig.name,
         operator=operator,
         begun_utc=datetime.now(UTC).replace(microsecond=0),
         version=version,
         commit=program_commit(),
-        basis=basis_of(config.servos, config.safety, version),
+        basis=basis_of(config, version),
         adapter=config.servos.port or "",
         camera=camera,
     )

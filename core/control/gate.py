@@ -16,8 +16,9 @@ A hold is the measured position, taken once when the hold begins and kept while 
 writing each measured position would let a loaded tendon creep, as every servo rests a little short of its goal. Without valid
 positions nothing is sent; the servos then keep their last goal, which was within one step of them.
 
-Unless the program drives, a feed below the low end of its envelope is not out of bounds: it stays there, or comes back slowly.
-While the operator holds a retraction that was begun at the end, it goes on backwards, slowly (``joints.by_hand``).
+A feed below the low end of its envelope is not out of bounds (further than a step it is while the program drives): it stays there,
+or comes back slowly. While the operator holds its retraction that was begun at the end, it goes on backwards, slowly
+(``joints.by_hand``).
 """
 
 from __future__ import annotations
@@ -28,7 +29,19 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
-from core.control.joints import ONE_CATHETER, Goal, Joints, Limit, SentGoals, by_hand, joint_room, limited_goal, together
+from core.control.joints import (
+    ONE_CATHETER,
+    Goal,
+    Joints,
+    Limit,
+    Retracted,
+    SentGoals,
+    by_hand,
+    by_program,
+    joint_room,
+    limited_goal,
+    together,
+)
 from core.messages import message
 
 _COUNT = len(JOINT_NAMES)
@@ -67,14 +80,14 @@ class RejectReason(StrEnum):
 class GoalRequest:
     """Requested goals (mm). ``captured_s`` is the capture of the frame behind them; the operator's need none.
 
-    ``retracts``: the operator holds a retraction that was begun at the low end of a feed's envelope, and may go beyond it.
+    ``retracts``: the feeds whose retraction the operator has begun at the low end of their envelope: they may go beyond it.
     """
 
     goals_mm: Sequence[float]
     source: Source
     issued_s: float
     captured_s: float | None = None
-    retracts: bool = False
+    retracts: Retracted = Retracted.NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,9 +290,13 @@ def gate_step(
     GateStep
         Either a rejection with a hold, or seven goals inside every limit, with a record of what was limited.
     """
-    if permitted is not Source.PROGRAM and measurement is not None and _not_seven_numbers(measurement.positions_mm) is None:
-        retracts = request is not None and request.retracts and request.source is Source.OPERATOR
-        servos = by_hand(servos, measurement.positions_mm, state.sent, retracts=retracts)
+    if measurement is not None and _not_seven_numbers(measurement.positions_mm) is None:
+        if permitted is Source.PROGRAM:
+            servos = by_program(servos, measurement.positions_mm, state.sent)
+        else:
+            is_operators = request is not None and request.source is Source.OPERATOR
+            retracts = request.retracts if request is not None and is_operators else Retracted.NONE
+            servos = by_hand(servos, measurement.positions_mm, state.sent, retracts=retracts)
     mistrust = measurement_problem(measurement, now_s, servos, safety)
     believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None
     objection = (
@@ -356,7 +373,7 @@ def _hold(state: GateState, measured_mm: Joints | None, now_s: float, why: Rejec
     if measured_mm is None:
         return GateStep(None, GateState(time_s, held_mm, issued_s=issued_s), why)
     if held_mm is None or not _near(held_mm, measured_mm, servos):
-        held_mm = _inside(measured_mm, servos)
+        held_mm = _inside(measured_mm, by_program(servos, measured_mm, None))
     return GateStep(held_mm, GateState(time_s, held_mm, issued_s=issued_s), why)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import IntFlag, StrEnum
 
 from core.config.safety import JOINT_NAMES, TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.types import Command
@@ -29,6 +29,14 @@ _TOUCHING_MM = 1e-9
 _ADVANCE = JOINT_NAMES.index("advance")
 
 
+class Retracted(IntFlag):
+    """The feeds that the operator holds back, with a control that was pressed at the low end: each goes beyond its own end only."""
+
+    NONE = 0
+    ROBOT = 1
+    CATHETER = 2
+
+
 @dataclass(frozen=True, slots=True)
 class SentGoals:
     """The goals that were sent last (mm), and when."""
@@ -37,12 +45,12 @@ class SentGoals:
     time_s: float
 
 
-def by_hand(servos: ServosConfig, at_mm: Sequence[float], last: SentGoals | None, *, retracts: bool) -> ServosConfig:
+def by_hand(servos: ServosConfig, at_mm: Sequence[float], last: SentGoals | None, *, retracts: Retracted) -> ServosConfig:
     """The servos with the envelope that holds while the operator drives.
 
     A feed may be below the low end of its envelope, where a wrong zero or a retraction has left it: slowly, and not further down.
-    While the operator holds a retraction (`retracts`) it has no low end, so that a robot whose insertion is not known can be pulled
-    out.
+    While the operator holds its retraction (`retracts`) it has no low end, so that a robot whose insertion is not known can be
+    pulled out.
 
     Parameters
     ----------
@@ -53,15 +61,27 @@ def by_hand(servos: ServosConfig, at_mm: Sequence[float], last: SentGoals | None
     for place in FEEDS:
         joint = joints[place]
         lowest_mm = min(at_mm[place], at_mm[place] if last is None else last.goals_mm[place])
-        if not retracts and lowest_mm >= joint.low_mm:
-            continue
-        joints[place] = joint.model_copy(
-            update={
-                "low_mm": -math.inf if retracts else lowest_mm,
-                "max_speed_mm_s": min(joint.max_speed_mm_s, RETRACTION_MM_S),
-            }
-        )
+        is_held = bool(retracts & (Retracted.ROBOT if joint.name == "advance" else Retracted.CATHETER))
+        if is_held or lowest_mm < joint.low_mm:
+            joints[place] = _beyond_end(joint, -math.inf if is_held else lowest_mm)
     return servos.model_copy(update={"joints": tuple(joints)})
+
+
+def by_program(servos: ServosConfig, at_mm: Sequence[float], last: SentGoals | None) -> ServosConfig:
+    """The servos with the envelope that holds while the program drives: a feed a step at most below its low end stays there, or
+    comes back slowly. `at_mm`, `last` : as ``by_hand`` takes them.
+    """
+    joints = list(servos.joints)
+    for place in FEEDS:
+        joint = joints[place]
+        from_mm = at_mm[place] if last is None else last.goals_mm[place]
+        if joint.low_mm - joint.max_step_mm <= from_mm < joint.low_mm:
+            joints[place] = _beyond_end(joint, from_mm)
+    return servos.model_copy(update={"joints": tuple(joints)})
+
+
+def _beyond_end(joint: JointConfig, low_mm: float) -> JointConfig:
+    return joint.model_copy(update={"low_mm": low_mm, "max_speed_mm_s": min(joint.max_speed_mm_s, RETRACTION_MM_S)})
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from core.control.faults import Cause, Fault
 from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.health import Beat, DeadmanReport, EstopReport, GateReport, ModelReport, Part, ServoCheckReport, ServosBusy
+from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, Retraction, combined, next_retraction
@@ -480,15 +481,18 @@ class Pilot:
         robot.beat(permitted)
         return program_command
 
-    def _hold_retraction(self, jog: Jog, sent: SentMotion | None) -> bool:
-        """Whether the operator holds a retraction that may go beyond the end of a feed's envelope."""
+    def _hold_retraction(self, jog: Jog, sent: SentMotion | None) -> Retracted:
+        """The feeds whose retraction the operator holds, beyond the end of their envelope."""
         low = sent.at_low if sent is not None else {}
         robot, catheter = self._retractions
         self._retractions = (
             next_retraction(robot, pulls=jog.advance < 0.0, at_low="advance" in low),
             next_retraction(catheter, pulls=jog.delivery < 0.0, at_low="delivery_1" in low or "delivery_2" in low),
         )
-        return Retraction.BEYOND in self._retractions
+        found = Retracted.NONE
+        for state, feed in zip(self._retractions, (Retracted.ROBOT, Retracted.CATHETER), strict=True):
+            found |= feed if state is Retraction.BEYOND else Retracted.NONE
+        return found
 
     def _make_view(
         self, decision: Decision, inputs: Inputs, program_command: Command | None, sent: SentMotion | None, now_s: float

@@ -9,6 +9,7 @@ from typing import Protocol
 from core.config.safety import JointName
 from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
+from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.devices import Robot
 from core.types import Command
@@ -46,7 +47,12 @@ class GuardedRobot(Robot, Protocol):
     def failure(self) -> str | None: ...
     def beat(self, permitted: Source | None) -> None: ...
     def send(
-        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+        self,
+        command: Command,
+        *,
+        source: Source = Source.OPERATOR,
+        captured_s: float | None = None,
+        retracts: Retracted = Retracted.NONE,
     ) -> Command: ...
     def stop(self) -> None: ...
     def arm(self) -> None: ...

@@ -24,7 +24,7 @@ from core.control.gate import (
     measurement_problem,
     outside_envelope,
 )
-from core.control.joints import Joints, by_hand, joint_goals
+from core.control.joints import Joints, Retracted, by_hand, by_program, joint_goals
 from core.messages import message
 from core.types import Command
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
@@ -352,7 +352,7 @@ class BusGuard:
         at = self._measurement
         if at is not None and self._cycle_s - at.measured_s <= self._safety.measurement_max_age_s:
             advice = "switch the torque off and move it back by hand, or zero it again"
-            servos = by_hand(self._servos, at.positions_mm, None, retracts=False)
+            servos = by_hand(self._servos, at.positions_mm, None, retracts=Retracted.NONE)
             reasons += [f"outside its envelope: {joint}: {advice}" for joint in outside_envelope(at.positions_mm, servos)]
         if reasons:
             raise NotReady(message("not armed: {why}", why="; ".join(reasons)))
@@ -406,9 +406,10 @@ class BusGuard:
             return None, ()
         at_mm = tuple(self._measurement.positions_mm)
         before_mm = tuple((self._before or self._measurement).positions_mm)
-        servos = self._servos
         if order.source is Source.OPERATOR:
-            servos = by_hand(servos, at_mm, self._gate.sent, retracts=order.retracts)
+            servos = by_hand(self._servos, at_mm, self._gate.sent, retracts=order.retracts)
+        else:
+            servos = by_program(self._servos, at_mm, self._gate.sent)
         wanted = joint_goals(order.command, self._gate.sent, at_mm, now_s, servos, self._safety)
         goals_mm = self._one_step.bounded(wanted.goals_mm, (order.issued_s, order.command), before_mm)
         return GoalRequest(goals_mm, order.source, order.issued_s, order.captured_s, order.retracts), wanted.at_end

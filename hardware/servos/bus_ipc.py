@@ -28,7 +28,7 @@ from core.config.calibration import ZeroConfig
 from core.config.safety import TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault
 from core.control.gate import Clamp, Rejection, RejectReason, Source
-from core.control.joints import Joints
+from core.control.joints import Joints, Retracted
 from core.control.kept_zero import ZeroOffer
 from core.control.robot import SentMotion
 from core.messages import message
@@ -73,14 +73,14 @@ class BusPhase(StrEnum):
 class BusOrder:
     """The newest command. ``command`` None: hold. Times are monotonic; ``captured_s`` is that of the frame behind it.
 
-    ``retracts``: a retraction by the operator that may go beyond the low end of a feed's envelope.
+    ``retracts``: the feeds whose retraction by the operator may go beyond the low end of their envelope.
     """
 
     command: Command | None
     source: Source
     issued_s: float
     captured_s: float | None = None
-    retracts: bool = False
+    retracts: Retracted = Retracted.NONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,6 +196,7 @@ class BusStatus:
 _SOURCES: tuple[Source | None, ...] = (None, *Source)
 _ORDER = struct.Struct("<BBBBdd4d")  # has a command, source, has a frame, retracts, issued, captured, command
 _HEARTBEAT = struct.Struct("<Bd")
+_ALL_FEEDS = Retracted.ROBOT | Retracted.CATHETER
 
 
 def pack_order(order: BusOrder) -> bytes:
@@ -221,9 +222,10 @@ def unpack_order(data: bytes) -> BusOrder | None:
         return None
     has_command, source, has_frame, retracts, issued_s, captured_s, *numbers = _ORDER.unpack(data)
     sender = _SOURCES[source] if source < len(_SOURCES) else None
-    if sender is None or max(has_command, has_frame, retracts) > 1:
+    if sender is None or max(has_command, has_frame) > 1 or retracts > _ALL_FEEDS:
         return None
-    return BusOrder(Command(*numbers) if has_command else None, sender, issued_s, captured_s if has_frame else None, bool(retracts))
+    command = Command(*numbers) if has_command else None
+    return BusOrder(command, sender, issued_s, captured_s if has_frame else None, Retracted(retracts))
 
 
 def pack_heartbeat(beat: Heartbeat) -> bytes:

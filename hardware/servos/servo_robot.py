@@ -17,6 +17,7 @@ from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
 from core.control.faults import Cause
 from core.control.gate import Rejection, Source
+from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
@@ -209,7 +210,12 @@ class ServoRobot:
             client.put_heartbeat(Heartbeat(time.monotonic(), permitted))
 
     def send(
-        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+        self,
+        command: Command,
+        *,
+        source: Source = Source.OPERATOR,
+        captured_s: float | None = None,
+        retracts: Retracted = Retracted.NONE,
     ) -> Command:
         """Make `command` the newest order.
 
@@ -217,7 +223,7 @@ class ServoRobot:
         ----------
         command : limited to -1..1 and to the joints' speeds.
         captured_s : when the frame behind it was taken (monotonic); needed of the program.
-        retracts : the operator holds a retraction that may go beyond the low end of a feed's envelope, at 2 mm/s.
+        retracts : the feeds whose retraction the operator holds beyond the low end of their envelope, at 2 mm/s.
 
         Returns
         -------

@@ -19,6 +19,7 @@ from core.config.models import PerceptionConfig, TwinConfig
 from core.config.safety import JOINT_NAMES, SafetyConfig
 from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
+from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import SentMotion
 from core.devices import DeviceError, Latest
@@ -309,7 +310,12 @@ class DirectRobot:
                 self._execute(waiting)
 
     def send(
-        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+        self,
+        command: Command,
+        *,
+        source: Source = Source.OPERATOR,
+        captured_s: float | None = None,
+        retracts: Retracted = Retracted.NONE,
     ) -> Command:
         """Make the command the current one if its source may drive; otherwise hold."""
         with self._lock:

@@ -12,6 +12,7 @@ from core.control.bus_monitor import BusReport
 from core.control.faults import Cause
 from core.control.gate import Rejection, Source
 from core.control.health import ModelReport
+from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST
@@ -37,7 +38,7 @@ class Robot:
         self.calls: list[str] = []
         self.failure: str | None = None
         self.problem = ""
-        self.retracts = False
+        self.retracts = Retracted.NONE
         self.bus: BusReport | None = WELL
         self.permitted: Source | None = None
         self.ordered: Source | None = None
@@ -51,7 +52,12 @@ class Robot:
         self.failure = None
 
     def send(
-        self, command: Command, *, source: Source = Source.OPERATOR, captured_s: float | None = None, retracts: bool = False
+        self,
+        command: Command,
+        *,
+        source: Source = Source.OPERATOR,
+        captured_s: float | None = None,
+        retracts: Retracted = Retracted.NONE,
     ) -> Command:
         self.retracts = retracts
         if self.failure is not None:

@@ -51,7 +51,7 @@ def accepted_rig(config: Config = CONFIG, **changes: Any) -> Acceptance:
     )
     estop = EstopRecord(cause="servo power lost", silent_ms=200.0, refused="no servo answers", refused_after="not zeroed")
     done: dict[str, Any] = {"servos": servos, "supply_v": (11.9, 12.1), "directions": JOINT_NAMES, "forces": forces, "stops": stops}
-    return new_acceptance("lab", "Ada", config, "cam 1").model_copy(update=done | {"estop": estop} | changes)
+    return new_acceptance("Ada", config, "cam 1").model_copy(update=done | {"estop": estop} | changes)
 
 
 def test_a_complete_acceptance_of_an_unchanged_rig_is_valid() -> None:
@@ -64,7 +64,7 @@ def test_a_complete_acceptance_of_an_unchanged_rig_is_valid() -> None:
 
 def test_without_one_nothing_is_accepted() -> None:
     assert problems_of(None, CONFIG) == ("no acceptance is recorded",)
-    fresh = new_acceptance("lab", "Ada", CONFIG, "")
+    fresh = new_acceptance("Ada", CONFIG, "")
     assert fresh.missing[:2] == ("servos", "direction of right")
     assert fresh.missing[-3:] == ("STOP times", "deadman times", "E-stop")
     assert len(fresh.missing) == 1 + 7 + 7 + 3
@@ -93,6 +93,10 @@ def _joint(config: Config, place: int, **changes: Any) -> Config:
     return config.model_copy(update={"servos": config.servos.model_copy(update={"joints": tuple(joints)})})
 
 
+def _servos(**changes: Any) -> Config:
+    return CONFIG.model_copy(update={"servos": CONFIG.servos.model_copy(update=changes)})
+
+
 @pytest.mark.parametrize(
     ("config", "problem"),
     [
@@ -101,9 +105,19 @@ def _joint(config: Config, place: int, **changes: Any) -> Config:
         (_joint(CONFIG, 0, model=1030), "model of right was 1020 and is 1030"),
         (_joint(CONFIG, 1, mm_per_turn=62.8), "mm_per_turn of left was 40 and is 62.8"),
         (_joint(CONFIG, 5, max_force_n=31.0), "max_force_n of delivery_1 was 30 and is 31"),
+        (_joint(CONFIG, 0, high_mm=3.2), "high_mm of right was 2.8 and is 3.2"),
+        (_joint(CONFIG, 4, low_mm=-20.0), "low_mm of advance was -5 and is -20"),
+        (_joint(CONFIG, 6, max_speed_mm_s=30.0), "max_speed_mm_s of delivery_2 was 20 and is 30"),
+        (_joint(CONFIG, 3, max_acceleration_mm_s2=400.0), "max_acceleration_mm_s2 of down was 200 and is 400"),
+        (_joint(CONFIG, 1, max_step_mm=0.9), "max_step_mm of left was 0.6 and is 0.9"),
+        (_servos(pretension_mm=0.5), "pretension_mm was 0.3 and is 0.5"),
+        (_servos(pretension_mm_s=2.0), "pretension_mm_s was 1 and is 2"),
+        (_servos(max_pull_mm=2.5), "max_pull_mm was 2 and is 2.5"),
+        (_servos(torque_off_on_stop=True), "torque_off_on_stop was False and is True"),
+        (_servos(port="/dev/serial/by-id/other"), "adapter was /dev/serial/by-id/u2d2 and is /dev/serial/by-id/other"),
         (
-            CONFIG.model_copy(update={"servos": CONFIG.servos.model_copy(update={"torque_off_on_stop": True})}),
-            "torque_off_on_stop was False and is True",
+            CONFIG.model_copy(update={"rig": CONFIG.rig.model_copy(update={"name": "b"})}),
+            f"rig was {CONFIG.rig.name} and is b",
         ),
         (
             CONFIG.model_copy(update={"safety": CONFIG.safety.model_copy(update={"deadman_timeout_s": 0.06})}),
@@ -118,8 +132,16 @@ def test_what_was_changed_since_is_named(config: Config, problem: str) -> None:
 def test_firmware_counts_where_it_is_known_and_so_does_the_major_version(monkeypatch: pytest.MonkeyPatch) -> None:
     accepted = accepted_rig()
     assert problems_of(accepted, CONFIG, (45, 45, 45, 45, 47, 45, 45)) == ("firmware of advance was 45 and is 47",)
-    newer = accepted.basis.model_copy(update={"major": "77"})
-    assert changes_since(accepted, newer) == (f"version of the program was {accepted.version}",)
+    older = accepted.model_copy(update={"basis": accepted.basis.model_copy(update={"major": "77"})})
+    assert changes_since(older, CONFIG) == (f"version of the program was {accepted.version}",)
+
+
+def test_an_acceptance_of_before_envelopes_and_speeds_were_recorded_is_named() -> None:
+    """It opens, and is not taken for one of today's envelopes and speeds."""
+    record = accepted_rig().model_dump(mode="json")
+    del record["basis"]["limits"], record["basis"]["pull"]
+    problems = problems_of(Acceptance.model_validate(record), CONFIG)
+    assert problems == ("it does not say with which envelopes, speeds and pull it was made: main.py rig accept NAME",)
 
 
 def test_a_force_ten_percent_above_the_limit_is_refused() -> None:

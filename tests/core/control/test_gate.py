@@ -11,7 +11,7 @@ import pytest
 
 from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.gate import Clamp, GateState, GateStep, GoalRequest, JointMeasurement, RejectReason, Source, gate_step
-from core.control.joints import Limit, by_hand, joint_goals
+from core.control.joints import Limit, Retracted, by_hand, by_program, joint_goals
 from core.types import Command
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
@@ -601,6 +601,8 @@ def test_a_dead_host_leaves_every_joint_within_one_step_of_where_it_was() -> Non
 
 # --- a feed below the low end of its envelope ------------------------------------------------------------------------------------
 
+_BOTH = Retracted.ROBOT | Retracted.CATHETER
+
 
 def _by_hand(
     at: float,
@@ -614,7 +616,7 @@ def _by_hand(
     """One tick of a motion that was under way at `at`, towards `to`."""
     places = _moved(**{name: at})
     state = _running(places, _moved((0.0,) * 7, **{name: math.copysign(2.0, to - at)}))
-    request = GoalRequest(_moved(**{name: to}), source, NOW, NOW, retracts)
+    request = GoalRequest(_moved(**{name: to}), source, NOW, NOW, _BOTH if retracts else Retracted.NONE)
     return gate_step(state, request, _at(places), permitted, NOW, SERVOS, SAFETY)
 
 
@@ -674,9 +676,10 @@ def test_a_robot_whose_insertion_is_wrong_comes_out_completely_and_stops_with_th
         now_s += TICK
         held = tick % 400 != 399  # a control that is let go in between
         command = Command(advance_mm_s=-20.0 if held else 0.0)
-        servos = by_hand(SERVOS, at, state.sent, retracts=held)
+        retracts = Retracted.ROBOT if held else Retracted.NONE
+        servos = by_hand(SERVOS, at, state.sent, retracts=retracts)
         request = GoalRequest(
-            joint_goals(command, state.sent, at, now_s, servos, SAFETY).goals_mm, Source.OPERATOR, now_s, retracts=held
+            joint_goals(command, state.sent, at, now_s, servos, SAFETY).goals_mm, Source.OPERATOR, now_s, retracts=retracts
         )
         step = gate_step(state, request, JointMeasurement(at, now_s), Source.OPERATOR, now_s, SERVOS, SAFETY)
         assert step.rejection is None
@@ -697,7 +700,7 @@ def test_a_robot_whose_insertion_is_wrong_comes_out_completely_and_stops_with_th
     ],
 )
 def test_by_hand_nothing_goes_by_positions_that_are_none(measurement: JointMeasurement | None, reason: RejectReason) -> None:
-    request = GoalRequest(AT, Source.OPERATOR, NOW, None, retracts=True)
+    request = GoalRequest(AT, Source.OPERATOR, NOW, None, retracts=_BOTH)
     step = gate_step(_running(), request, measurement, Source.OPERATOR, NOW, SERVOS, SAFETY)
     assert _reason(step) is reason
     assert step.goals_mm is None
@@ -705,5 +708,46 @@ def test_by_hand_nothing_goes_by_positions_that_are_none(measurement: JointMeasu
 
 def test_from_the_very_end_a_feed_comes_back_at_its_full_speed() -> None:
     at = _moved(advance=-5.0)
-    assert by_hand(SERVOS, at, None, retracts=False).joints[4].max_speed_mm_s == 20.0
-    assert by_hand(SERVOS, _moved(advance=-5.01), None, retracts=False).joints[4].max_speed_mm_s == 2.0
+    assert by_hand(SERVOS, at, None, retracts=Retracted.NONE).joints[4].max_speed_mm_s == 20.0
+    assert by_hand(SERVOS, _moved(advance=-5.01), None, retracts=Retracted.NONE).joints[4].max_speed_mm_s == 2.0
+
+
+@pytest.mark.parametrize(("held", "pulled"), [(Retracted.ROBOT, "advance"), (Retracted.CATHETER, "delivery_1")])
+def test_a_retraction_that_is_held_is_that_of_one_feed(held: Retracted, pulled: JointName) -> None:
+    """The other one keeps its end and its speed."""
+    at = _moved(advance=-5.0, delivery_1=-5.0, delivery_2=-5.0)
+    free = [joint.name for joint in by_hand(SERVOS, at, None, retracts=held).joints if joint.low_mm == -math.inf]
+    assert free == (["advance"] if pulled == "advance" else ["delivery_1", "delivery_2"])
+    lower = {name: -5.04 for name in JOINT_NAMES[4:] if name not in free}
+    request = GoalRequest(_moved(at, **lower), Source.OPERATOR, NOW, None, held)
+    assert _reason(gate_step(_running(at), request, _at(at), Source.OPERATOR, NOW, SERVOS, SAFETY)) is RejectReason.OUT_OF_ENVELOPE
+
+
+@pytest.mark.parametrize("moving", [False, True])
+@pytest.mark.parametrize("at_mm", [-5.02, -5.5])
+def test_a_program_that_holds_a_feed_below_its_end_does_not_drive_it_in(at_mm: float, moving: bool) -> None:
+    """It went in by up to a whole step, without a command."""
+    at = _moved(advance=at_mm)
+    state = _running(_moved(advance=-5.0)) if moving else GateState(NOW - TICK)
+    for held in (None, GoalRequest(at, Source.PROGRAM, NOW - 1.0, NOW - 1.0)):  # nothing is asked for, or something too old
+        step = gate_step(state, held, _at(at), Source.PROGRAM, NOW, SERVOS, SAFETY)
+        assert step.is_hold
+        assert step.goals_mm == at
+
+
+def test_a_program_feeds_from_below_the_end_slowly_and_never_further_down() -> None:
+    at, state, now_s = _moved(advance=-5.5), GateState(), NOW
+    for tick in range(60):
+        now_s += TICK
+        command = Command(advance_mm_s=-20.0 if tick < 20 else 20.0)
+        servos = by_program(SERVOS, at, state.sent)
+        goals = joint_goals(command, state.sent, at, now_s, servos, SAFETY).goals_mm
+        request = GoalRequest(goals, Source.PROGRAM, now_s, now_s)
+        step = gate_step(state, request, JointMeasurement(at, now_s), Source.PROGRAM, now_s, SERVOS, SAFETY)
+        assert step.rejection is None
+        assert step.goals_mm is not None
+        before = (state.goals_mm or at)[4]
+        assert step.goals_mm[4] >= before  # the servo sags, which is no reason to follow it
+        assert before >= -5.0 or step.goals_mm[4] - before <= 2.0 * TICK + 1e-9
+        at, state = _moved(step.goals_mm, advance=step.goals_mm[4] - 0.1), step.state
+    assert at[4] > -5.0

@@ -17,6 +17,7 @@ from core.control.alerts import Note
 from core.control.faults import Cause, Fault
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.health import ModelReport
+from core.control.joints import Retracted
 from core.control.modes import Act, Hindrance, Mode
 from core.control.motion import AT_REST, Jog
 from core.control.pilot import KEYBOARD, PERIOD_S, LeftOver, Pilot, PilotLoop
@@ -936,8 +937,16 @@ def _at_low(bench: Bench, **feeds_mm: float) -> None:
     bench.robot.edit = lambda motion: replace(motion, at_end=tuple(feeds_mm), at_low=feeds_mm)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("jog", "feed"), [(Jog(advance=-1.0), "advance"), (Jog(delivery=-0.4), "delivery_2")])
-def test_the_operator_lets_go_at_the_end_and_pulls_again_to_go_beyond_it(bench: Bench, jog: Jog, feed: str) -> None:
+@pytest.mark.parametrize(
+    ("jog", "feed", "retracted"),
+    [
+        (Jog(advance=-1.0, delivery=-0.4), "advance", Retracted.ROBOT),
+        (Jog(delivery=-0.4), "delivery_2", Retracted.CATHETER),
+    ],
+)
+def test_the_operator_lets_go_at_the_end_and_pulls_again_to_go_beyond_it(
+    bench: Bench, jog: Jog, feed: str, retracted: Retracted
+) -> None:
     bench.on()
     bench.jog = jog
     bench.turn(5)
@@ -951,7 +960,7 @@ def test_the_operator_lets_go_at_the_end_and_pulls_again_to_go_beyond_it(bench: 
     bench.jog = jog
     _at_low(bench, **{feed: -6.2})
     bench.turn(2)
-    assert bench.robot.retracts
+    assert bench.robot.retracts is retracted
     bench.pilot.news()
     bench.seconds(2.5)
     (alert,) = (alert for alert in bench.pilot.news().alerts if alert.key is Note.BEYOND_END)

@@ -19,7 +19,7 @@ from core.control.camera_monitor import FrameReport, RouteState
 from core.control.faults import Cause, Fault
 from core.control.gate import GateState, GateStep, GoalRequest, JointMeasurement, Source, gate_step
 from core.control.health import Beat, DeadmanReport, GateReport, ServoCheckReport
-from core.control.joints import by_hand, joint_goals
+from core.control.joints import Retracted, by_hand, by_program, joint_goals
 from core.control.modes import Act, Decision, Event, Mode
 from core.types import Command, Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, Bench
@@ -88,7 +88,8 @@ class Drive(RuleBasedStateMachine):
         self.moving = False
         self.speeds = (0.0,) * 7
         self.last_s = self.bench.now_s
-        self.impostor = self.retracts = False
+        self.impostor = False
+        self.retracts = Retracted.NONE
         self.command = Command()
         self.wild: tuple[float, ...] | None = None
         self.command_age_s = self.frame_age_s = self.measured_age_s = 0.0
@@ -179,14 +180,14 @@ class Drive(RuleBasedStateMachine):
         if not math.isfinite(self.at_mm[place]) or abs(push_mm) > 1.0:
             self.at_mm[place] = kept
 
-    @rule(retracts=st.booleans(), ticks=st.integers(1, 8))
-    def the_operator_pulls_the_feeds_back_at_their_end(self, retracts: bool, ticks: int) -> None:
+    @rule(retracts=st.integers(0, 3).map(Retracted), ticks=st.integers(1, 8))
+    def the_operator_pulls_the_feeds_back_at_their_end(self, retracts: Retracted, ticks: int) -> None:
         """Whoever drives says so; only the operator may."""
         self.at_mm[4], self.at_mm[5], self.at_mm[6] = -4.9, -4.95, -4.95
         self.command, self.wild, self.retracts = Command(advance_mm_s=-20.0, delivery_mm_s=-20.0), None, retracts
         for _ in range(ticks):
             self._tick([], 0.02)
-        self.retracts = False
+        self.retracts = Retracted.NONE
         self._tick([], 0.02)
 
     @rule(follow=st.sampled_from([0.0, 0.3, 0.7, 1.0]))
@@ -238,9 +239,10 @@ class Drive(RuleBasedStateMachine):
             source = Source.OPERATOR if source is Source.PROGRAM else Source.PROGRAM
         goals = self.wild
         if goals is None:
-            servos = SERVOS
             if source is Source.OPERATOR:
                 servos = by_hand(SERVOS, self.at_mm, self.gate.sent, retracts=self.retracts)
+            else:
+                servos = by_program(SERVOS, self.at_mm, self.gate.sent)
             goals = joint_goals(self.command, self.gate.sent, self.at_mm, now_s, servos, SAFETY).goals_mm
         return GoalRequest(goals, source, now_s - self.command_age_s, now_s - self.frame_age_s, self.retracts)
 
@@ -302,13 +304,14 @@ class Drive(RuleBasedStateMachine):
         self._check_motion(goals, measured, now_s)
 
     def _check_beyond(self, place: int, goal: float, at: float, request: GoalRequest, decision: Decision, now_s: float) -> None:
-        """Below its envelope is a feed only while the program does not drive: where it stands, or farther while it is retracted."""
+        """Below its envelope a feed goes only while it is retracted; else it stays where it stands, or comes back."""
         assert place >= 4
-        assert decision.permitted is not Source.PROGRAM
         SEEN["below the envelope"] += 1
         last = self.sent_mm[place] if self.sent_mm is not None else at
+        if decision.permitted is Source.PROGRAM:
+            assert goal >= (last if self.moving else at) - 1e-9 or goal == at
         if goal < min(at, last) - 1e-9:
-            assert request.retracts
+            assert request.retracts & (Retracted.ROBOT if place == 4 else Retracted.CATHETER)
             assert request.source is Source.OPERATOR is decision.permitted
             assert last - goal <= 2.0 * (now_s - self.last_s) + 1e-6
             SEEN["pulled out"] += 1

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import Rejection, RejectReason, Source
+from core.control.joints import Retracted
 from core.control.kept_zero import ZeroRequest
 from core.types import Command
 from hardware.servos.bus_guard import RELEASE_MM_S, Attention, BusGuard, OneStep, ReleaseRamp, UnattendedWatch
@@ -33,6 +34,7 @@ def test_orders_and_heartbeats_come_over_whole() -> None:
     orders = [
         BusOrder(Command(0.1, -0.2, 3.0, -4.0), Source.OPERATOR, 12.5),
         BusOrder(Command(), Source.PROGRAM, 12.5, 12.4),
+        *(BusOrder(Command(), Source.OPERATOR, 12.5, None, Retracted(flags)) for flags in range(4)),
         BusOrder(None, Source.OPERATOR, 1e9),
     ]
     assert [unpack_order(pack_order(order)) for order in orders] == orders

@@ -17,6 +17,7 @@ import pytest
 from core.config.calibration import ZeroConfig
 from core.config.safety import JointName, SafetyConfig, ServosConfig
 from core.control.gate import Source
+from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, KeptZeros, ZeroBasis, ZeroOffer, ZeroRequest, keep
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
@@ -66,7 +67,7 @@ def connect(servos: SoftServoBus, tmp_path: Path) -> Iterator[Connect]:
         robot.close()
 
 
-def drive(robot: ServoRobot, command: Command, seconds: float, *, retracts: bool = False) -> BusStatus:
+def drive(robot: ServoRobot, command: Command, seconds: float, *, retracts: Retracted = Retracted.NONE) -> BusStatus:
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         robot.beat(Source.OPERATOR)
@@ -278,7 +279,7 @@ def test_or_it_is_pulled_out_slowly_beyond_the_end(servos: SoftServoBus, stuck: 
     end_mm = inserted_mm(servos)
     assert end_mm > 33.0
     started_s = time.monotonic()
-    status = drive(stuck, Command(advance_mm_s=-20.0), 1.5, retracts=True)
+    status = drive(stuck, Command(advance_mm_s=-20.0), 1.5, retracts=Retracted.ROBOT)
     assert status.armed
     gone_mm = end_mm - inserted_mm(servos)
     assert 1.0 < gone_mm <= 2.0 * (time.monotonic() - started_s) + 0.2
@@ -288,7 +289,7 @@ def test_or_it_is_pulled_out_slowly_beyond_the_end(servos: SoftServoBus, stuck: 
     assert inserted_mm(servos) == pytest.approx(held_mm, abs=0.02), "without the hold it stays"
     stuck.disarm()
     stuck.arm()  # from there, too
-    status = drive(stuck, Command(advance_mm_s=-20.0), 1.0, retracts=True)
+    status = drive(stuck, Command(advance_mm_s=-20.0), 1.0, retracts=Retracted.ROBOT)
     assert inserted_mm(servos) < held_mm - 0.8
     assert (status.armed, status.active) == (True, ())
 
