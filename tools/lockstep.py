@@ -116,7 +116,7 @@ class LockStepServos:
     def reboot(self, servo_id: int) -> None:
         """Nothing to do."""
 
-    def relax(self) -> None:
+    def relax(self, is_overtaken: Callable[[], bool] = lambda: False) -> None:
         """At once."""
         self.torque_off()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -40,7 +40,8 @@ class GuardedRobot(Robot, Protocol):
     ``connect``, ``arm``, ``disarm``, ``acknowledge``, ``zero``, ``reboot``, ``relax`` and ``torque_off`` may take seconds and raise
     ``DeviceError``; all the others are quick. ``kept_back`` is why nothing has left the gate since arming, not even a hold: while
     it is not None there is no ``sent_motion`` either, and neither source can drive. A command that ``retracts`` is the operator's,
-    and may pull a feed beyond the low end of its envelope.
+    and may pull a feed beyond the low end of its envelope. ``relax`` waits no longer when a torque-off was asked for
+    (``is_overtaken``).
     """
 
     @property
@@ -60,7 +61,7 @@ class GuardedRobot(Robot, Protocol):
     def acknowledge(self) -> None: ...
     def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None: ...
     def reboot(self, servo_id: int) -> None: ...
-    def relax(self) -> None: ...
+    def relax(self, is_overtaken: Callable[[], bool] = ...) -> None: ...
     def torque_off(self) -> None: ...
     def report(self) -> BusReport | None: ...
     def sent_motion(self) -> SentMotion | None: ...

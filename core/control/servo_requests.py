@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from enum import Enum
+from functools import partial
 
 from core.control.faults import Cause, Fault
 from core.control.health import ServoCheckReport, ServoRequestBegun
@@ -172,11 +173,17 @@ class ServoRequests:
         self._request(message("restarting servo {a}", a=servo_id), lambda: self._disarm_and(lambda: self._robot.reboot(servo_id)))
 
     def relax(self) -> None:
-        """Let the wires go slowly, then switch the torque off."""
-        self._request("relaxing the wires", lambda: self._disarm_and(self._robot.relax))
+        """Let the wires go slowly, then switch the torque off; a torque-off that is asked for meanwhile does not wait for it."""
+        with self._lock:
+            asked = self._offs
+        relax = partial(self._robot.relax, lambda: self._offs != asked)
+        self._request("relaxing the wires", lambda: self._disarm_and(relax))
 
     def torque_off(self, *, is_bus_lost: bool = False) -> None:
-        """Let the wires go slack after what is under way; servos being switched on stay off. A lost bus is not held first."""
+        """Let the wires go slack after what is under way, but for a relaxation, which it ends; servos being switched on stay off.
+
+        A lost bus is not held first.
+        """
         with self._lock:
             self._offs += 1
             asked = self._offs

@@ -161,8 +161,9 @@ class ServoRobot:
         """Restart a servo, which clears its hardware error; its joint must be zeroed again."""
         self._request(self._connected(), "reboot", _REQUEST_S, servo_id=servo_id)
 
-    def relax(self) -> None:
-        """Let the tension off slowly, then switch all torque off; waits for both, some seconds.
+    def relax(self, is_overtaken: Callable[[], bool] = lambda: False) -> None:
+        """Let the tension off slowly, then switch all torque off; waits for both, some seconds, or until `is_overtaken` says that
+        a torque-off was asked for.
 
         Raises NotReady: STOP came meanwhile, and the wires are as they were then; TorqueStillOn.
         """
@@ -172,6 +173,8 @@ class ServoRobot:
         client.request("relax", _REQUEST_S)
         until_s = time.monotonic() + _RELAX_S
         while time.monotonic() < until_s:
+            if is_overtaken():
+                return
             status = self._connected().status()
             if status is not None and status.torque_offs > offs:
                 return

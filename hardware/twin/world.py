@@ -347,7 +347,7 @@ class DirectRobot:
     def reboot(self, servo_id: int) -> None:
         """No servos."""
 
-    def relax(self) -> None:
+    def relax(self, is_overtaken: Callable[[], bool] = lambda: False) -> None:
         self.stop()
 
     def torque_off(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -206,6 +207,27 @@ def test_a_request_that_takes_long_is_no_silent_bus(bench: Bench) -> None:
 
 
 # ---- torque off
+
+
+def test_torque_off_overtakes_a_relaxation(bench: Bench) -> None:
+    """It waited for up to 15 s behind it."""
+    bench.seconds(0.2)
+    begun, ended = threading.Event(), []
+
+    def relax(is_overtaken: Callable[[], bool]) -> None:
+        begun.set()
+        until_s = time.monotonic() + 10.0
+        while not is_overtaken() and time.monotonic() < until_s:
+            time.sleep(0.001)
+        ended.append(is_overtaken())
+
+    bench.robot.relax = relax  # type: ignore[attr-defined]
+    assert bench.pilot.relax()
+    assert begun.wait(10.0)
+    assert bench.pilot.torque_off()
+    bench.done().turn()
+    assert ended == [True]
+    assert bench.robot.calls[-2:] == ["disarm", "torque off"]
 
 
 def test_a_torque_off_that_waits_when_the_program_ends_is_still_done(bench: Bench) -> None:

@@ -961,6 +961,14 @@ def test_wires_are_relaxed_slowly_and_let_go_on_request(servos: SoftServoBus, ar
     assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
 
 
+def test_torque_off_does_not_wait_for_wires_that_are_relaxed(servos: SoftServoBus, armed: ServoRobot) -> None:
+    _bend(armed)
+    armed.relax(lambda: True)
+    armed.torque_off()
+    assert _torques(servos) == [0] * 7
+    assert servos.positions_mm()[0] > 0.5
+
+
 def test_stop_while_wires_are_relaxed_is_told(servos: SoftServoBus, armed: ServoRobot) -> None:
     _bend(armed)
     stopper = threading.Timer(0.5, armed.stop)
