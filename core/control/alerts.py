@@ -27,6 +27,8 @@ class Note(StrEnum):
     BEYOND_END = "retracting beyond the end"
     NEW_TARGET = "destination changed"
     TORQUE_OFF = "torque off"
+    LET_OUT = "wires let out"
+    STILL_TIGHT = "wires not let out"
 
 
 AlertKey = Cause | Hindrance | RejectReason | Note
@@ -65,6 +67,8 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Note.REACHED: ("Destination reached", "you drive again: choose the next one, or go on by hand"),
     Note.NEW_TARGET: ("Another destination: you drive again", "hand over again to go there"),
     Note.TORQUE_OFF: ("The torque is off: all servos have said so", "the wires hang loose; switch the servos on to drive"),
+    Note.LET_OUT: ("The wires were let out slowly", "find the cause before you pull them again"),
+    Note.STILL_TIGHT: ("Wires may still be tight", "look at them; let them go by Torque off (page Servos)"),
     Note.AT_END: ("A joint is at the end of its travel", "drive the other way"),
     Note.AT_LOW_END: ("A feed is at the end of its way back", "to pull it out further, slowly: let go, then hold retract again"),
     Note.BEYOND_END: (

@@ -34,6 +34,7 @@ class BusReport:
     armed, ended : whether the bus process follows commands, and why it does not any more.
     torque_off : all servos have said since the last report that their torque is off.
     torque_problem : why a torque-off that was requested is not proven yet.
+    let_out : tendons were let go slowly since the last report; ``still_tight`` those that may not have been.
     """
 
     port_open: bool = True
@@ -52,6 +53,8 @@ class BusReport:
     ended: Fault | None = None
     torque_off: bool = False
     torque_problem: str = ""
+    let_out: bool = False
+    still_tight: Sequence[str] = ()
 
 
 STRAIN_S = 0.5

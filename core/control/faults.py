@@ -77,7 +77,7 @@ class Cause(StrEnum):
     TRACKING = ("servo does not follow", Area.SERVOS, Reaction.STOP,
         "A servo does not follow: jam or slack wire", "look for a jam or a slack wire, then acknowledge")
     STRAINED = ("servo draws too much current", Area.SERVOS, Reaction.STOP,
-        "A servo draws too much current", "the wires were let out: free what blocks, let it cool, then acknowledge")
+        "A servo draws too much current", "free what blocks, let it cool, then acknowledge")
     TORQUE_ON = ("torque not proven to be off", Area.SERVOS, Reaction.DISARM,
         "The torque is not proven to be off", "cut the servos' power; until they say so it is tried again")
     SERVOS_WRONG = ("servos are not as configured", Area.SERVOS, Reaction.DISARM,
@@ -100,7 +100,7 @@ class Cause(StrEnum):
     WATCHDOG = ("bus watchdog tripped", Area.SERVOS, Reaction.DISARM,
         "The servos' watchdog tripped", "check the servos, then acknowledge", True)
     HOT = ("servo too hot", Area.SERVOS, Reaction.DISARM,
-        "A servo is too hot", "the wires were let out: let it cool, lower the pretension, then acknowledge")
+        "A servo is too hot", "let it cool, lower the pretension, then acknowledge")
     VOLTAGE_LOW = ("supply voltage too low", Area.SERVOS, Reaction.DISARM,
         "The servos' supply voltage is too low", "check the power supply, then acknowledge")
     WINDOW_HUNG = ("window hangs", Area.HOST, Reaction.DISARM,

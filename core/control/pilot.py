@@ -404,6 +404,9 @@ class Pilot:
         elif (report := self._robot.report()) is not None:
             events.append(report)
             is_released = is_released or report.torque_off
+            if report.let_out:
+                note = Note.STILL_TIGHT if report.still_tight else Note.LET_OUT
+                self._alerts.report([(note, ", ".join(report.still_tight))], now_s)
         if is_released:
             self._release.handle(ReleaseEvent.CONFIRM)
             self._alerts.report([(Note.TORQUE_OFF, "")], now_s)

@@ -85,37 +85,60 @@ class ReleaseRamp:
     not the current: a gear of 350:1 holds a wire without any current, so a current that fades would leave the tension as it is.
 
     A tendon is never tightened: one that stands at zero pull or below stays there, and goals are at most one step below the
-    measured position. Feed and delivery keep their goals: nothing is pulled out of a vessel without an order.
+    measured position. Feed and delivery keep their goals: nothing is pulled out of a vessel without an order. Each tendon goes by
+    itself: one that cannot be read keeps no other one tight, and is let go from where it is when it tells that.
 
     Parameters
     ----------
-    from_mm : positions of the joints at the start, at `now_s` (monotonic).
+    from_mm : positions of the joints at the start, at `now_s` (monotonic); None: not known.
     """
 
-    def __init__(self, joints: Sequence[JointConfig], from_mm: Joints, now_s: float, speed_mm_s: float = RELEASE_MM_S) -> None:
-        self._joints, self._from_mm, self._start_s, self._speed_mm_s = joints, from_mm, now_s, speed_mm_s
-        longest_mm = max(at for at, joint in zip(from_mm, joints, strict=True) if joint.name in TENDONS)
-        self._end_s = now_s + max(0.0, longest_mm) / speed_mm_s + _RELEASE_EXTRA_S
+    def __init__(
+        self, joints: Sequence[JointConfig], from_mm: Sequence[float | None], now_s: float, speed_mm_s: float = RELEASE_MM_S
+    ) -> None:
+        self._joints, self._start_s, self._speed_mm_s = joints, now_s, speed_mm_s
+        self._begun: dict[int, tuple[float, float]] = {}
+        self._last_mm: dict[int, float] = {}
+        self._note(from_mm, now_s)
 
-    def is_over(self, now_s: float) -> bool:
-        """Whether its time is over, wherever the joints are."""
-        return now_s > self._end_s
+    def _note(self, at_mm: Sequence[float | None], now_s: float) -> None:
+        """Where tendons are, and where and when each was read first."""
+        for place, (at, joint) in enumerate(zip(at_mm, self._joints, strict=True)):
+            if at is not None and joint.name in TENDONS:
+                self._begun.setdefault(place, (at, now_s))
+                self._last_mm[place] = at
 
-    def goals(self, at_mm: Sequence[float], now_s: float) -> tuple[float | None, ...] | None:
+    def _end_s(self, place: int, joint: JointConfig) -> float:
+        """When a tendon's time is over, wherever it is."""
+        from_mm, start_s = self._begun.get(place, (joint.high_mm, self._start_s))
+        return start_s + max(0.0, from_mm) / self._speed_mm_s + _RELEASE_EXTRA_S
+
+    @property
+    def tight(self) -> tuple[JointName, ...]:
+        """The tendons of which it is not known that they were let out."""
+        places = [place for place, joint in enumerate(self._joints) if joint.name in TENDONS]
+        return tuple(self._joints[place].name for place in places if self._last_mm.get(place, math.inf) > _SLACK_MM)
+
+    def goals(self, at_mm: Sequence[float | None], now_s: float) -> tuple[float | None, ...] | None:
         """The goals now, None for a joint that keeps its own; None altogether when it is over.
 
         Parameters
         ----------
-        at_mm : measured positions.
+        at_mm : measured positions, None of a joint that does not tell.
         """
-        tight = [at > _SLACK_MM for at, joint in zip(at_mm, self._joints, strict=True) if joint.name in TENDONS]
-        if self.is_over(now_s) or not any(tight):
+        self._note(at_mm, now_s)
+        tight = self.tight
+        if not any(joint.name in tight and now_s <= self._end_s(place, joint) for place, joint in enumerate(self._joints)):
             return None
-        gone_mm = self._speed_mm_s * max(0.0, now_s - self._start_s)
-        return tuple(
-            min(at, max(0.0, start - gone_mm, at - joint.max_step_mm)) if joint.name in TENDONS and at > 0.0 else None
-            for at, start, joint in zip(at_mm, self._from_mm, self._joints, strict=True)
-        )
+        goals: list[float | None] = []
+        for place, (at, joint) in enumerate(zip(at_mm, self._joints, strict=True)):
+            if at is None or at <= 0.0 or place not in self._begun:
+                goals.append(None)
+                continue
+            from_mm, start_s = self._begun[place]
+            gone_mm = self._speed_mm_s * max(0.0, now_s - start_s)
+            goals.append(min(at, max(0.0, from_mm - gone_mm, at - joint.max_step_mm)))
+        return tuple(goals)
 
 
 class Attention(Enum):
@@ -237,6 +260,7 @@ class BusGuard:
         self._written_mm: Joints | None = None
         self._measurement: JointMeasurement | None = None
         self._before: JointMeasurement | None = None
+        self._told_mm: dict[int, tuple[float, float]] = {}
         self._orders: dict[Source, BusOrder] = {}
         self._request_s = self._cycle_s = self._armed_s = now_s
 
@@ -255,6 +279,9 @@ class BusGuard:
         self._watch = self._watch.update(report, now_s, self._servos, self._safety)
         # a whole set of positions replaces the last one; one with gaps does not
         found = [(r.position_mm, r.time_s) for r in readings if isinstance(r, ServoState) and r.position_mm is not None]
+        for place, reading in enumerate(readings):
+            if isinstance(reading, ServoState) and reading.position_mm is not None:
+                self._told_mm[place] = (reading.position_mm, reading.time_s)
         if readings and len(found) == len(readings):
             self._before = self._measurement
             self._measurement = JointMeasurement(tuple(at for at, _ in found), min(time_s for _, time_s in found))
@@ -295,7 +322,7 @@ class BusGuard:
 
     def lose_port(self) -> Fault:
         """The servos' state is unknown from now on; returns the fault."""
-        self._watch, self._measurement, self._before = BusMonitor(), None, None
+        self._watch, self._measurement, self._before, self._told_mm = BusMonitor(), None, None, {}
         fault = Fault(Cause.PORT_LOST)
         self._activate([fault])
         return fault
@@ -327,12 +354,15 @@ class BusGuard:
         return not self.armed and self._too_hot_c >= max(0.0, self._released_at_c + _RELEASE_AGAIN_C)
 
     def release_ramp(self, now_s: float, speed_mm_s: float = RELEASE_MM_S) -> ReleaseRamp | None:
-        """The ramp that lets the tendons go from where they are; None when that is not known."""
-        at = self._measurement
-        if at is None or now_s - at.measured_s > self._safety.measurement_max_age_s:
+        """The ramp that lets the tendons go from where they are; None when that is known of none."""
+        told, oldest_s = self._told_mm, now_s - self._safety.measurement_max_age_s
+        at_mm = [
+            told[place][0] if place in told and told[place][1] >= oldest_s else None for place in range(len(self._servos.joints))
+        ]
+        if all(at is None for at, joint in zip(at_mm, self._servos.joints, strict=True) if joint.name in TENDONS):
             return None
         self._released_at_c = max(self._released_at_c, self._too_hot_c)
-        return ReleaseRamp(self._servos.joints, tuple(at.positions_mm), now_s, speed_mm_s)
+        return ReleaseRamp(self._servos.joints, at_mm, now_s, speed_mm_s)
 
     def acknowledge(self) -> None:
         """The operator has seen the cause. Faults that are still there go on to hinder arming."""
@@ -360,7 +390,7 @@ class BusGuard:
     def set_armed(self, now_s: float) -> None:
         """The driver has armed the servos. Orders from before do not count."""
         self._watch = BusMonitor()
-        self._gate, self._measurement, self._before = GateState(), None, None
+        self._gate, self._measurement, self._before, self._told_mm = GateState(), None, None, {}
         self._written_mm = None
         self._tracking.reset()
         self.armed = True

@@ -153,6 +153,7 @@ class BusStatus:
     zeroed : by joint.
     firmware : versions of the servos' firmware, by joint; empty while the port is closed.
     releasing : whether tendons are being let go slowly.
+    releases, still_tight : how often that has ended, and the tendons of which it is not known that the last time let them out.
     offers : where joints that are not zeroed stand by their kept zeros, for the operator to confirm.
     torque_offs : how often the torque was switched off and read back; ``torque_problem`` why a requested one is not confirmed yet.
     """
@@ -176,6 +177,8 @@ class BusStatus:
     times: CycleTimes
     zeroed: tuple[bool, ...]
     releasing: bool = False
+    releases: int = 0
+    still_tight: tuple[JointName, ...] = ()
     offers: tuple[ZeroOffer, ...] = ()
     torque_offs: int = 0
     torque_problem: str = ""

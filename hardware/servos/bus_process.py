@@ -30,7 +30,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from core.config.calibration import ZeroConfig
-from core.config.safety import SafetyConfig, ServosConfig
+from core.config.safety import TENDONS, JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
 from core.control.kept_zero import ZeroBasis, ZeroRequest, request_problem
 from core.messages import message
@@ -197,6 +197,7 @@ class BusLoop:
         self._settle = 0
         self._ramp: ReleaseRamp | None = None
         self._is_off_after_ramp = False
+        self._releases, self._still_tight = 0, tuple[JointName, ...]()
         self._ended = self._quiet = self._lost = self._is_signalled = self._is_hurried = False
         self._watch = UnattendedWatch()
         self._is_let_go = False
@@ -402,10 +403,8 @@ class BusLoop:
             self._follow_ramp(self._ramp)
         elif self._guard.must_relax:
             self._let_go_slowly(RELEASE_MM_S, then_off=False)
-        elif self._settle > 0:
-            self._settle -= 1
-            if not self._holds():
-                self._bus.hold()
+        else:
+            self._hold_again()
 
     def _let_go_slowly(self, speed_mm_s: float, *, then_off: bool) -> None:
         """Begin a ramp from where the servos are; where that is not known, the torque goes off at once if it is to."""
@@ -416,18 +415,14 @@ class BusLoop:
 
     def _follow_ramp(self, ramp: ReleaseRamp) -> None:
         """Let the tendons go a little further; in the end all servos hold where they are, or the torque goes off."""
-        at_mm = [r.position_mm for r in self._readings if isinstance(r, ServoState) and r.position_mm is not None]
-        if len(at_mm) < len(self._servos.joints):
-            is_silent = any(isinstance(r, MissingServo) and not r.restarted for r in self._readings)
-            if not is_silent or ramp.is_over(time.monotonic()):
-                self._end_ramp()
-            return
+        at_mm = [reading.position_mm if isinstance(reading, ServoState) else None for reading in self._readings]
         goals_mm = ramp.goals(at_mm, time.monotonic())
         if goals_mm is None:
             self._settle = _SETTLE_CYCLES
             self._bus.hold()
             self._end_ramp()
             return
+        self._hold_again()
         try:
             self._bus.slacken(goals_mm, self._readings)
         except PortLost:
@@ -436,6 +431,8 @@ class BusLoop:
             _log.warning("a tendon was not let go further: %s", error)
 
     def _end_ramp(self) -> None:
+        self._releases += 1
+        self._still_tight = self._ramp.tight if self._ramp is not None else TENDONS
         self._ramp = None
         if self._is_off_after_ramp:
             self._is_off_after_ramp = False
@@ -474,12 +471,19 @@ class BusLoop:
         elif is_ramp:
             self._let_go_slowly(RELEASE_MM_S, then_off=is_off)
 
+    def _hold_again(self) -> None:
+        """For some cycles after a hold: a hold has no answer, and may have got lost."""
+        if self._settle > 0:
+            self._settle -= 1
+            if not self._holds():
+                self._bus.hold()
+
     def _holds(self) -> bool:
-        """Whether all servos that tell have a goal where they are; a hold has no answer, and may have got lost."""
+        """Whether all servos that tell have a goal where they are, but for tendons that are let go."""
         return all(
             abs(reading.goal_ticks - reading.ticks) <= _SETTLED_MM * abs(joint.ticks_per_mm)
             for joint, reading in zip(self._servos.joints, self._readings, strict=True)
-            if isinstance(reading, ServoState) and reading.torque
+            if isinstance(reading, ServoState) and reading.torque and (self._ramp is None or joint.name not in TENDONS)
         )
 
     def _guard_port(self, action: Callable[[], None]) -> None:
@@ -687,6 +691,8 @@ class BusLoop:
                 bad_packets=self._bad_packets,
                 restarts=guard.restarts,
                 releasing=self._ramp is not None,
+                releases=self._releases,
+                still_tight=self._still_tight,
                 torque_offs=self._release.confirmed,
                 torque_problem=self._release.problem,
                 times=self._timer.summary,

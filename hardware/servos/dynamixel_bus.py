@@ -464,7 +464,8 @@ class ServoBus:
 
         A watchdog that has tripped is cleared first, and speed and acceleration set again: until then the servo takes no goals.
 
-        Raises ValueError, and sends nothing: a goal that would tighten, is more than a step away, or is that of no tendon.
+        Raises ValueError, and sends nothing: a goal that would tighten, is more than a step away, or is that of no tendon. Raises
+        NoAnswer, WriteRefused: of one servo; the others were sent their goals.
         """
         goals: dict[int, int] = {}
         for joint, goal_mm, reading in zip(self._joints, goals_mm, readings, strict=True):
@@ -475,13 +476,20 @@ class ServoBus:
                 raise ValueError(f"joint {joint.name}: from {reading.position_mm:g} mm it cannot be slackened to {goal_mm:g} mm")
             goals[joint.id] = registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
         tripped = [r.id for r in readings if isinstance(r, ServoState) and r.watchdog_tripped]
+        failed: NoAnswer | WriteRefused | None = None
         for joint in self._joints:
             if joint.id in goals and joint.id in tripped:
-                for units in (0, registers.watchdog_units(self.config.watchdog_s)):
-                    self._line.write(joint.id, _WATCHDOG, bytes([units]))
-                self._set_profile(joint)
+                try:
+                    for units in (0, registers.watchdog_units(self.config.watchdog_s)):
+                        self._line.write(joint.id, _WATCHDOG, bytes([units]))
+                    self._set_profile(joint)
+                except (NoAnswer, WriteRefused) as error:
+                    failed = error
+                    del goals[joint.id]
         if goals:
             self._send_goals(goals)
+        if failed is not None:
+            raise failed
 
     def torque_off(self) -> None:
         """Switch all torque off: one packet to all, three times, read back. It releases the tension of the wires.

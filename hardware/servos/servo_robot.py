@@ -80,7 +80,7 @@ class ServoRobot:
         self._supervised = False
         self._states: tuple[ServoReading, ...] = ()
         self._reported = (0, 0, 0)  # cycle, bad packets and restarts of the last report
-        self._reported_offs = 0
+        self._reported_offs = self._reported_releases = 0
         self._not_connected: str | None = None
 
     @property
@@ -120,7 +120,7 @@ class ServoRobot:
                         raise NotReady(f"the {self._name} was closed meanwhile")
                     self._not_connected = None
                     self._reported = (0, 0, 0)
-                    self._reported_offs = 0
+                    self._reported_offs = self._reported_releases = 0
                     self._states = ()
                     self._supervised = False
                     self._client = client
@@ -300,13 +300,20 @@ class ServoRobot:
             if status.phase is not BusPhase.CLOSED and not status.servos:
                 return None
             torque_off, self._reported_offs = status.torque_offs > self._reported_offs, status.torque_offs
+            let_out, self._reported_releases = status.releases > self._reported_releases, status.releases
             if status.phase is BusPhase.CLOSED:
                 return BusReport(port_open=False, torque_off=torque_off, torque_problem=status.torque_problem)
             self._reported = status.cycle, status.bad_packets, status.restarts
         errors, rebooted = status.bad_packets - bad_packets, status.restarts > restarts
         report = report_of(status.servos, armed=status.armed, errors=errors, rebooted=rebooted)
         return replace(
-            report, armed=status.armed, ended=status.latched, torque_off=torque_off, torque_problem=status.torque_problem
+            report,
+            armed=status.armed,
+            ended=status.latched,
+            torque_off=torque_off,
+            torque_problem=status.torque_problem,
+            let_out=let_out,
+            still_tight=status.still_tight,
         )
 
     def sent_motion(self) -> SentMotion | None:

@@ -20,7 +20,7 @@ from tests.core.config.test_acceptance import accepted_rig
 
 LIVE = load_config(
     overrides={
-        "rig": {"camera": "webcam", "robot": "servos"},
+        "rig": {"name": "lab", "camera": "webcam", "robot": "servos"},
         "camera": {"device": "/dev/v4l/by-id/cam"},
         "servos": {"port": "/dev/serial/by-id/u2d2"},
     }

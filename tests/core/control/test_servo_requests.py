@@ -296,6 +296,18 @@ def test_the_result_of_a_torque_off_is_reported_also_while_the_servos_are_off(be
     assert {Note.TORQUE_OFF, Cause.TORQUE_ON} <= set(bench.alerts())
 
 
+@pytest.mark.parametrize(("tight", "note"), [((), Note.LET_OUT), (("up", "down"), Note.STILL_TIGHT)])
+def test_that_wires_were_let_out_is_said_where_it_is_true_and_else_which_were_not(
+    bench: Bench, tight: tuple[str, ...], note: Note
+) -> None:
+    bench.seconds(0.2).alerts()
+    bench.robot.bus = replace(WELL, armed=False, let_out=True, still_tight=tight)
+    bench.turn()
+    found = {alert.key: alert.detail for alert in bench.pilot.news().alerts}
+    assert found.keys() & {Note.LET_OUT, Note.STILL_TIGHT} == {note}
+    assert found[note] == ", ".join(tight)
+
+
 # ---- torque off after a stop
 
 

@@ -89,6 +89,27 @@ def test_a_drum_that_does_not_turn_ends_it() -> None:
     assert ramp.goals(PULLED, 10.0 + 2.3 / RELEASE_MM_S + 0.51) is None
 
 
+def test_a_tendon_that_cannot_be_read_keeps_no_other_one_tight_and_is_named() -> None:
+    """One that tells where it is later is let go from there; one that never does is waited for as long as its whole way takes."""
+    left, blind = PULLED[1], (PULLED[0], None, None, *PULLED[3:])
+    ramp = ReleaseRamp(SERVOS.joints, blind, 10.0)
+    goals = ramp.goals(blind, 10.1)
+    assert goals is not None
+    assert goals[:4] == pytest.approx((2.1, None, None, 0.1))
+    at_mm: tuple[float | None, ...] = (0.0, left, None, 0.0, *PULLED[4:])
+    assert ramp.goals(at_mm, 11.2) is not None
+    assert ramp.tight == ("up",)
+    late = ramp.goals((*at_mm[:2], 0.3, *at_mm[3:]), 11.3)
+    assert late is not None
+    assert late[2] == pytest.approx(0.3)
+    assert ramp.goals((*at_mm[:2], 0.0, *at_mm[3:]), 11.5) is None
+    assert ramp.tight == ()
+    never = ReleaseRamp(SERVOS.joints, (0.0, 0.0, None, 0.0, *PULLED[4:]), 10.0)
+    assert never.goals((0.0, 0.0, None, 0.0, *PULLED[4:]), 11.8) is not None
+    assert never.goals((0.0, 0.0, None, 0.0, *PULLED[4:]), 12.0) is None
+    assert never.tight == ("up",)
+
+
 pulls = st.floats(-3.0, 6.0)
 
 

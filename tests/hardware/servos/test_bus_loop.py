@@ -119,6 +119,10 @@ class Paper:
     """Loop, bus and application, with a clock that the test turns."""
 
     temperature_c, tendon_mm = 30.0, 0.0
+    missing: int | None = None
+    """Place of a servo that does not answer."""
+    feed_goal_mm = 0.0
+    """How far the goal of the robot's feed is from where it is."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **servos: bool) -> None:
         self.now_s = 100.0
@@ -143,9 +147,27 @@ class Paper:
         self.tendon_mm = tendon_mm
         places = zip(ServosConfig().joints, (tendon_mm, 0.0, 0.0, 0.0, advance_mm, 0.0, 0.0), strict=True)
         hot_c = self.temperature_c
+        goals = {"advance": round(102.4 * self.feed_goal_mm)}
         states = tuple(
-            ServoState(joint.name, joint.id, self.now_s, 0, 0, at_mm, at_mm, 0.0, 8.0, 12.0, hot_c, HardwareError(0), True, False)
-            for joint, at_mm in places
+            MissingServo(joint.name, joint.id, self.now_s, 1, "silent")
+            if place == self.missing
+            else ServoState(
+                joint.name,
+                joint.id,
+                self.now_s,
+                0,
+                goals.get(joint.name, 0),
+                at_mm,
+                at_mm,
+                0.0,
+                8.0,
+                12.0,
+                hot_c,
+                HardwareError(0),
+                True,
+                False,
+            )
+            for place, (joint, at_mm) in enumerate(places)
         )
         self.bus.read = lambda: states  # type: ignore[method-assign]
         self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
@@ -307,6 +329,45 @@ def test_a_port_that_is_lost_while_wires_are_relaxed_owes_the_torque_off(paper: 
     _follow(paper, 20)
     paper.loop._lose_port()
     assert paper.loop._release.is_requested
+
+
+def test_a_servo_that_is_missing_does_not_keep_the_others_tight(paper: Paper) -> None:
+    """The wires stayed as they were, though the program said that they were let out."""
+    paper.missing = 3  # down
+    paper.reads(tendon_mm=2.0)
+    paper.loop._read_decide_write()
+    paper.loop._end_motion(Fault(Cause.STRAINED, "right"))
+    _follow(paper, 25)
+    assert paper.bus.told[-1] == "slacken to 1.00"
+    _follow(paper, 80)
+    paper.loop._publish(paper.now_s)
+    assert not paper.end.told.releasing
+    assert (paper.end.told.releases, paper.end.told.still_tight) == (1, ("down",))
+
+
+def test_wires_that_were_let_out_are_told_so(paper: Paper) -> None:
+    paper.reads(tendon_mm=2.0)
+    paper.loop._read_decide_write()
+    paper.loop._end_motion(Fault(Cause.STRAINED, "right"))
+    paper.loop._publish(paper.now_s)
+    assert paper.end.told.releases == 0
+    _follow(paper, 110)
+    paper.loop._publish(paper.now_s)
+    assert (paper.end.told.releases, paper.end.told.still_tight) == (1, ())
+
+
+def test_a_hold_that_was_lost_is_repeated_while_the_wires_are_let_out(paper: Paper) -> None:
+    """The feed went on to its last goal meanwhile."""
+    paper.reads(tendon_mm=2.0)
+    paper.loop._read_decide_write()
+    paper.loop._end_motion(Fault(Cause.STRAINED, "right"))
+    paper.feed_goal_mm = 0.9
+    told = len(paper.bus.told)
+    _follow(paper, 3)
+    assert paper.bus.told[told:] == ["hold", "slacken to 1.96", "hold", "slacken to 1.92", "hold", "slacken to 1.88"]
+    paper.feed_goal_mm = 0.0
+    _follow(paper, 2)
+    assert "hold" not in paper.bus.told[-2:]
 
 
 def test_where_the_pull_is_not_known_the_torque_goes_off_at_once(paper: Paper) -> None:
