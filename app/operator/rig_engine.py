@@ -14,7 +14,7 @@ from core.control.frame_reports import view_picture
 from core.control.health import ModelReport
 from core.control.pilot import LeftOver, Pilot
 from core.control.policies import make_policy
-from core.control.readiness import READY, read_readiness
+from core.control.readiness import READY, RigRecords, read_records
 from core.perception.inference import cores
 from core.perception.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
@@ -35,12 +35,15 @@ class RigEngine(Engine):
         policy = make_policy(config.policy.name, config)
         status = rig.robot.bus_status() if isinstance(rig.robot, ServoRobot) else None
         firmware = status.firmware if status is not None else ()
-        pilot = None
+        pilot, self._config, self._records = None, config, RigRecords()
         if rig.robot is not None:
-            is_live = rig.kind is RigKind.LIVE
-            readiness, view = (read_readiness(config, firmware), _calibrated_view(config)) if is_live else (READY, None)
+            readiness, view = READY, None
+            if rig.kind is RigKind.LIVE:
+                self._records = read_records(config, firmware)
+                readiness, view = self._records.readiness(config), _calibrated_view(config)
             pilot = Pilot(rig.robot, policy, config, model, left_over=left_over, readiness=readiness, view=view)
         super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
+        self._is_live = rig.kind is RigKind.LIVE
         self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None
         self._network: Pipeline | None = None
         self._knows_past = True
@@ -52,9 +55,14 @@ class RigEngine(Engine):
         self._network, self._knows_past = network, knows_past
 
     def set_perception(self, config: PerceptionConfig) -> bool:
-        """Perceive under other thresholds from the next frame on, with the same head; from any thread. False without a network."""
+        """Perceive under other thresholds from the next frame on, with the same head; from any thread. False without a network.
+
+        On a LIVE rig what stands against a hand-over is found again, before the first such frame.
+        """
         if self._network is None:
             return False
+        if self.pilot is not None and self._is_live:
+            self.pilot.set_readiness(self._records.readiness(self._config.model_copy(update={"perception": config})))
         changed, running = self._network.with_config(config), self._perceive
         if isinstance(running, Pipeline):
             changed.follow_on(running)

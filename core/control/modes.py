@@ -79,9 +79,17 @@ OF_THE_RIG = frozenset(
         Hindrance.ACCEPTANCE_OUTDATED,
     }
 )
-"""What a LIVE rig lacks (``readiness``): nothing that happens while it is open changes it."""
+"""What a LIVE rig lacks (``readiness``): while it is open, only a change of the settings changes it."""
 
-Event = Act | Report
+
+@dataclass(frozen=True, slots=True)
+class AgainstProgram:
+    """What stands against the program's driving under the settings that are in force from now on."""
+
+    hindrances: tuple[Hindrance, ...] = ()
+
+
+Event = Act | Report | AgainstProgram
 
 DRIVING_MODES = frozenset({Mode.AUTONOMOUS, Mode.HOLD})
 ARMED_MODES = DRIVING_MODES | {Mode.ARMED}
@@ -101,7 +109,7 @@ class SupervisorState:
 
     Attributes
     ----------
-    against_program : why the program may not drive this rig, as long as it is open.
+    against_program : why the program may not drive this rig under the settings in force.
     latched : first cause, until it is acknowledged.
     """
 

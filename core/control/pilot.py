@@ -27,7 +27,7 @@ from core.control.gate import Rejection, RejectReason, Source
 from core.control.health import Beat, DeadmanReport, EstopReport, GateReport, ModelReport, Part, ServoCheckReport, ServosBusy
 from core.control.joints import Retracted
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
-from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, Decision, Event, Hindrance, Mode, SupervisorState
+from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, AgainstProgram, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, Retraction, combined, next_retraction
 from core.control.policies import Policy
 from core.control.readiness import READY, Readiness
@@ -128,7 +128,7 @@ class Pilot:
     model : whether perception's model passed its check.
     clock : monotonic, the one of the frames.
     left_over : what is not acknowledged yet of the rig before this one: starting again acknowledges nothing.
-    readiness : what stands against the program's driving of this rig.
+    readiness : what stands against the program's driving of this rig; ``set_readiness`` when settings have changed.
     view : a picture of the rig's calibration, with which the camera's are compared.
     """
 
@@ -270,6 +270,11 @@ class Pilot:
     def window_alive(self) -> None:
         """A sign of life of the window's thread."""
         self._inputs.post(Beat(Part.WINDOW))
+
+    def set_readiness(self, readiness: Readiness) -> None:
+        """What stands against the program's driving under other settings, before they act. It ends a hand-over where it has to."""
+        self._readiness = readiness
+        self._inputs.post(AgainstProgram(readiness.hindrances))
 
     def report_fault(self, fault: Fault) -> None:
         """A fault that another part of the program found."""
@@ -535,6 +540,11 @@ class Turns(Protocol):
     """What a ``PilotLoop`` turns: a pilot."""
 
     def tick(self) -> object: ...
+    def set_readiness(self, readiness: Readiness) -> None:
+        """What stands against the program's driving under other settings, before they act. It ends a hand-over where it has to."""
+        self._readiness = readiness
+        self._inputs.post(AgainstProgram(readiness.hindrances))
+
     def report_fault(self, fault: Fault) -> None: ...
     def close(self) -> None: ...
 

@@ -1,6 +1,7 @@
 """What a LIVE rig needs before the program drives it: drums, directions, a model of this bench, a policy, an acceptance. Pure.
 
-A rig without it stays advisory: pictures, advice and driving by hand. On a simulated rig nothing hinders.
+A rig without it stays advisory: pictures, advice and driving by hand. On a simulated rig nothing hinders. It is a function of the
+settings in force: who changes them asks again.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 from core.config.acceptance import Acceptance, AcceptanceError, is_outdated, read_acceptance
 from core.config.models import Config, PolicyName, QualityConfig
@@ -34,6 +36,23 @@ class Readiness:
 
 READY = Readiness()
 """Of a simulated rig."""
+
+
+@dataclass(frozen=True, slots=True)
+class RigRecords:
+    """What is recorded of a rig: its file, the manifest of its model, and its acceptance; None: there is none that can be read.
+
+    ``firmware`` is that of the seven servos; empty: they were not asked.
+    """
+
+    rig: RigFile | None = None
+    model: ModelInfo | None = None
+    accepted: Acceptance | None = None
+    firmware: Sequence[int] = ()
+
+    def readiness(self, config: Config) -> Readiness:
+        """Of the LIVE rig as it is configured."""
+        return readiness_of(config, self.rig, self.model, self.accepted, self.firmware)
 
 
 def readiness_of(
@@ -81,12 +100,19 @@ def readiness_of(
 
 
 def _is_taught(config: Config, rig: RigFile, model: ModelInfo) -> bool:
-    """Whether the model was taught on the bench that the rig file names; pictures of another bench are refused then."""
-    return rig.bench is not None and rig.model == config.perception.segmentation.model and "taught" in model.training
+    """Whether the model was taught on the bench of the rig file, which is in force: pictures of another one are refused."""
+    bench = str(Path(config.rig.file or "").parent / rig.bench) if rig.bench is not None else None
+    is_its_bench = bench is not None and config.perception.bench == bench
+    return is_its_bench and rig.model == config.perception.segmentation.model and "taught" in model.training
 
 
 def read_readiness(config: Config, firmware: Sequence[int] = ()) -> Readiness:
     """The same with rig file, acceptance and manifest read from disk. Raises RigFileError."""
+    return read_records(config, firmware).readiness(config)
+
+
+def read_records(config: Config, firmware: Sequence[int] = ()) -> RigRecords:
+    """What is recorded of the configured rig. Raises RigFileError."""
     found = rig_in_use(config)
     try:
         model = read_model_info(model_folder(config.perception.segmentation.model), verify=())
@@ -96,4 +122,4 @@ def read_readiness(config: Config, firmware: Sequence[int] = ()) -> Readiness:
     if found is not None:
         with suppress(AcceptanceError):  # ``doctor`` and ``rig show`` say what is wrong with it
             accepted = read_acceptance(found[0])
-    return readiness_of(config, found[1] if found is not None else None, model, accepted, firmware)
+    return RigRecords(found[1] if found is not None else None, model, accepted, firmware)

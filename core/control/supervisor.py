@@ -5,7 +5,7 @@ program drives while the deadman is held. HOLD: an autonomous motion is interrup
 
 Arming arms the *program*. The operator drives by hand in ADVISORY, too, as soon as the servos were checked: they must be able to
 bring back a robot that perception lost. So a fault of camera or perception never takes the hand controls away, one of the servos
-always does.
+always does. Settings that loosen what a LIVE rig needs disarm it.
 
 In one tick, in whatever order its events come: an acknowledgement is handled first and never clears what the same tick reports;
 every report counts, even when a later one in the tick is better; faults take effect; then requests, the more careful ones last; and
@@ -31,6 +31,7 @@ from core.control.modes import (
     ARMED_MODES,
     DRIVING_MODES,
     Act,
+    AgainstProgram,
     Decision,
     Event,
     Hindrance,
@@ -51,13 +52,19 @@ def supervise(
         if state.mode is Mode.STOPPED:  # nothing moves by an acknowledgement, whatever was checked meanwhile
             state = replace(state, mode=Mode.ADVISORY, health=replace(state.health, servo_problems=None))
         state = replace(state, latched=None)
-    reports = [event for event in events if not isinstance(event, Act)]
+    reports = [event for event in events if not isinstance(event, Act | AgainstProgram)]
+    for event in events:
+        if isinstance(event, AgainstProgram):
+            state = replace(state, against_program=event.hindrances)
     before = state.active
     health, active = _collect_faults(state, reports, now_s, servos, safety)
     stop = [Fault(Cause.STOP_PRESSED)] if Act.STOP in acts else []
     in_use = were_on or health.servos_ready
     state = _react(replace(state, health=health, active=(*stop, *clock, *active)), in_use, now_s, safety)
     refused = []
+    if state.mode in ARMED_MODES and state.against_program:
+        refused.append(RequestRefused(Act.HAND_OVER, state.against_program))
+        state = replace(state, mode=Mode.ADVISORY, health=state.health.disarmed())
     if Act.ACKNOWLEDGE in acts and state.latched is not None:
         refused.append(RequestRefused(Act.ACKNOWLEDGE, (state.latched.cause,)))
     state, denied = _handle_requests(state, acts, now_s, safety)

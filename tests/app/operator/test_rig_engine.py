@@ -21,6 +21,7 @@ from core.control.faults import Cause, Fault
 from core.control.frame_reports import kept_view
 from core.control.health import ModelReport
 from core.control.modes import OF_THE_RIG, Act, Hindrance, Mode
+from core.control.pilot import Pilot
 from core.control.policies import Policy, make_policy
 from core.devices import DeviceError
 from core.perception.pipeline import Pipeline
@@ -161,6 +162,22 @@ def test_a_live_rig_that_nothing_was_learnt_of_is_advisory_only_and_a_twin_is_no
     }
     assert set(view.against_arming) & OF_THE_RIG == (lacks if kind is RigKind.LIVE else set())
     assert view.keyboard_deadman is (kind is RigKind.SIM)
+
+
+def test_checks_that_are_switched_off_on_an_open_live_rig_stand_against_a_hand_over_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They acted at once, and the rig stayed as ready as it was when it was opened."""
+    told: list[tuple[Hindrance, ...]] = []
+    monkeypatch.setattr(Pilot, "set_readiness", lambda _pilot, readiness: told.append(readiness.hindrances))
+    for kind in (RigKind.LIVE, RigKind.SIM):
+        pipeline = Pipeline(DrawnNetwork(), PerceptionConfig())
+        engine = RigEngine(Rig("drawn", kind, _Grey([0]), Robot()), pipeline, Config(), ModelReport(True))
+        engine.use_network(pipeline, knows_past=True)
+        for quality in ({"enabled": False}, {"max_novelty": 900.0}, {}):
+            assert engine.set_perception(PerceptionConfig.model_validate({"quality": quality}))
+        engine.close()
+    assert [Hindrance.CHECKS_OFF in hindrances for hindrances in told] == [True, True, False]
 
 
 @pytest.mark.parametrize(("knows_past", "head_x"), [(True, 424.0), (False, 190.0)])

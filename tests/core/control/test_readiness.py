@@ -47,7 +47,8 @@ def _rig(changes: dict[str, Any] | None = None, **calibration: Any) -> RigFile:
 
 
 def _config(rig: RigFile, overrides: dict[str, Any] | None = None) -> Config:
-    return with_rig(load_config(overrides=overrides), rig, Path("lab.toml"))
+    config = with_rig(load_config(overrides=overrides), rig, Path("lab.toml"))
+    return config.model_copy(update={"perception": config.perception.model_copy(update={"bench": rig.bench})})
 
 
 def _lacks(rig: RigFile | None, model: ModelInfo | None = TAUGHT, overrides: dict[str, Any] | None = None) -> set[Hindrance]:
@@ -108,6 +109,13 @@ def test_another_model_than_the_rigs_is_not_the_taught_one() -> None:
     config = _config(_rig())
     segmentation = config.perception.segmentation.model_copy(update={"model": "before"})
     config = config.model_copy(update={"perception": config.perception.model_copy(update={"segmentation": segmentation})})
+    assert set(readiness_of(config, _rig(), TAUGHT, ACCEPTED).hindrances) == {Hindrance.MODEL_UNTAUGHT}
+
+
+@pytest.mark.parametrize("bench", [None, "/benches/other"])
+def test_a_model_that_was_taught_on_another_bench_than_the_one_in_force_is_not_the_taught_one(bench: str | None) -> None:
+    config = _config(_rig())
+    config = config.model_copy(update={"perception": config.perception.model_copy(update={"bench": bench})})
     assert set(readiness_of(config, _rig(), TAUGHT, ACCEPTED).hindrances) == {Hindrance.MODEL_UNTAUGHT}
 
 

@@ -308,8 +308,6 @@ class Drive(RuleBasedStateMachine):
         assert place >= 4
         SEEN["below the envelope"] += 1
         last = self.sent_mm[place] if self.sent_mm is not None else at
-        if decision.permitted is Source.PROGRAM:
-            assert goal >= (last if self.moving else at) - 1e-9 or goal == at
         if goal < min(at, last) - 1e-9:
             assert request.retracts & (Retracted.ROBOT if place == 4 else Retracted.CATHETER)
             assert request.source is Source.OPERATOR is decision.permitted

@@ -24,7 +24,7 @@ from core.control.health import (
     ServoCheckReport,
     ServoRequestBegun,
 )
-from core.control.modes import Act, Decision, Event, Hindrance, Mode, SupervisorState
+from core.control.modes import ARMED_MODES, Act, AgainstProgram, Decision, Event, Hindrance, Mode, RequestRefused, SupervisorState
 from core.control.supervisor import supervise
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S, Bench
@@ -578,7 +578,23 @@ def test_what_a_rig_lacks_refuses_arming_and_hand_over_in_every_mode(benches: di
         bench = benches[mode].copy()
         bench.state = replace(bench.state, against_program=LACKS)
         assert set(LACKS) <= _refused(bench.tick(act), act)
-        assert bench.state.mode is mode
+        assert bench.state.mode is (V if mode in ARMED_MODES else mode)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_settings_that_loosen_what_a_rig_needs_end_a_hand_over_and_refuse_the_next_one(
+    benches: dict[Mode, Bench], mode: Mode
+) -> None:
+    """Nothing arms itself again when they are as they were; the operator may drive by hand."""
+    bench = benches[mode].copy()
+    decision = bench.tick(AgainstProgram(LACKS))
+    assert decision.mode is (V if mode in ARMED_MODES else mode)
+    assert decision.permitted is not Source.PROGRAM
+    assert (RequestRefused(Act.HAND_OVER, LACKS) in decision.refused) is (mode in ARMED_MODES)
+    assert set(LACKS) <= _refused(bench.tick(Act.ARM), Act.ARM)
+    bench.tick(AgainstProgram())
+    assert bench.state.mode is (V if mode in ARMED_MODES else mode)
+    assert not set(LACKS) & _refused(bench.tick(Act.HAND_OVER), Act.HAND_OVER)
 
 
 def test_what_a_rig_lacks_outlasts_all_events_and_leaves_the_operator_driving() -> None:
