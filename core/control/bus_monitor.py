@@ -61,9 +61,36 @@ STRAIN_S = 0.5
 """So long a current must be above the limit."""
 _NO_SUPPLY_SHARE = 0.75
 """Of the recommended supply: when all servos tell less, it is not weak but going away, and they fall silent next."""
+_FALL_S = 2.0
+"""A supply that was cut falls from well to too low within this time; a battery that runs down takes longer."""
+_SPARE_V = 0.5
+"""Above the lowest supply: a servo has enough."""
+_LOAD_MA = 1500.0
+"""Together the servos draw more only while several pull hard: then a weak supply sags at all of them, too."""
+_VOLTAGE_ERROR = 0x01
+"""Bit of the servos' register 70 (Hardware Error Status): the supply is beyond their own limits."""
 _RIPPLE_S, _RIPPLE_CYCLES = 0.06, 2.5
 """Longest pause of a ripple, in seconds and in cycles of the bus; the longer of both counts."""
 _ROUNDING_S = 1e-9
+
+
+def supply_cause(volts: Sequence[float], since_well_s: float, load_ma: float, servos: ServosConfig) -> Cause | None:
+    """What is wrong with the supply: cut, by E-stop or switch, or too low; None: neither.
+
+    Parameters
+    ----------
+    volts : by joint; empty: not known. NaN counts as too low.
+    since_well_s : since all servos had enough, with some to spare; infinite: never.
+    load_ma : the amounts of all currents together.
+    """
+    low = [not v > servos.lowest_v(joint) for joint, v in zip(servos.joints, volts, strict=False)]
+    if not any(low):
+        return None
+    is_gone = all(
+        v < _NO_SUPPLY_SHARE * servos.model_of(joint).recommended_v for joint, v in zip(servos.joints, volts, strict=False)
+    )
+    fell = all(low) and since_well_s <= _FALL_S and load_ma <= _LOAD_MA
+    return Cause.SUPPLY_LOST if is_gone or fell else Cause.VOLTAGE_LOW
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +146,7 @@ class BusMonitor:
     ----------
     reported_s : of the last report; None: there was none yet.
     disarmed_run : reports in a row in which the bus process was not armed.
+    powered_s : when all servos had enough supply last, with some to spare.
     gap_run, gaps : cycles in a row in which not all servos have answered (time says nothing: the process may have been suspended),
         and the joints whose answers were missed in them.
     """
@@ -134,6 +162,7 @@ class BusMonitor:
     disarmed_run: int = 0
     gap_run: int = 0
     gaps: frozenset[str] = frozenset()
+    powered_s: float = -math.inf
 
     def update(self, report: BusReport, now_s: float, servos: ServosConfig, safety: SafetyConfig) -> BusMonitor:
         """The state after a report. A restarted servo counts as restarted until the servos are checked again."""
@@ -154,6 +183,9 @@ class BusMonitor:
         if report.misses:
             missing = {name for name, misses in zip(JOINT_NAMES, report.misses, strict=False) if misses > 0}
             gap_run, gaps = (gap_run + 1, gaps | missing) if missing else (0, frozenset())
+        powered_s = self.powered_s
+        if report.voltages_v and all(spare_v > _SPARE_V for spare_v in _spare_v(report.voltages_v, servos)):
+            powered_s = now_s
         newest = replace(
             report,
             hardware_errors=report.hardware_errors or self.newest.hardware_errors,
@@ -162,7 +194,9 @@ class BusMonitor:
         )
         disarmed_run = 0 if report.armed else self.disarmed_run + 1
         rebooted = self.rebooted or report.rebooted
-        return BusMonitor(now_s, newest, errors, since_s, astray, currents, strained, rebooted, disarmed_run, gap_run, gaps)
+        return BusMonitor(
+            now_s, newest, errors, since_s, astray, currents, strained, rebooted, disarmed_run, gap_run, gaps, powered_s
+        )
 
     def busy(self, now_s: float) -> BusMonitor:
         """The state while the bus is busy with a request: its silence is no fault."""
@@ -209,14 +243,16 @@ class BusMonitor:
         is_astray = self.astray_since_s is not None and now_s - self.astray_since_s >= safety.tracking_time_s
         # room to each joint's own limit: its model's, or a tighter one of the configuration
         cooler_c = [servos.hottest_c(joint) - c for joint, c in zip(servos.joints, newest.temperatures_c, strict=False)]
-        spare_v = [v - servos.lowest_v(joint) for joint, v in zip(servos.joints, newest.voltages_v, strict=False)]
-        least_v = [_NO_SUPPLY_SHARE * servos.model_of(joint).recommended_v for joint in servos.joints]
-        is_gone = not silent and bool(spare_v) and all(v < least for v, least in zip(newest.voltages_v, least_v, strict=False))
+        spare_v = _spare_v(newest.voltages_v, servos)
+        load_ma = sum(abs(ma) for ma in newest.currents_ma if ma is not None)
+        is_gone = supply_cause(newest.voltages_v, now_s - self.powered_s, load_ma, servos) is Cause.SUPPLY_LOST
+        # what a servo says of a supply that is going away is no defect of the servo
+        errors = [bits & ~_VOLTAGE_ERROR if is_gone else bits for bits in newest.hardware_errors]
         hot, low = _short(newest.temperatures_c, cooler_c, 0.0, " {:.0f} °C"), _short(newest.voltages_v, spare_v, 0.0, " {:.1f} V")
         warm = _short(newest.temperatures_c, cooler_c, safety.temperature_warn_margin_c, " {:.0f} °C")
         sags = _short(newest.voltages_v, spare_v, safety.voltage_warn_margin_v, " {:.1f} V")
         found += [
-            (Cause.SERVO_ALERT, _listed(newest.hardware_errors, lambda bits: bits != 0, " {:#04x}")),
+            (Cause.SERVO_ALERT, _listed(errors, lambda bits: bits != 0, " {:#04x}")),
             (Cause.TRACKING, is_astray and self.astray),
             (Cause.STRAINED, self.strained),
             (Cause.TORQUE_ON, newest.torque_problem),
@@ -226,11 +262,16 @@ class BusMonitor:
             (Cause.WATCHDOG, newest.watchdog_tripped),
             (Cause.HOT, hot),
             (Cause.WARM, not hot and warm),
-            (Cause.SUPPLY_LOST, is_gone and message("{a:.1f} V at most", a=max(newest.voltages_v))),
+            (Cause.SUPPLY_LOST, is_gone and not silent and message("{a:.1f} V at most", a=max(newest.voltages_v))),
             (Cause.VOLTAGE_LOW, not is_gone and low),
             (Cause.VOLTAGE_SAGS, not low and sags),
         ]
         return [Fault(cause, "" if told is True else told) for cause, told in found if told]
+
+
+def _spare_v(volts: Sequence[float], servos: ServosConfig) -> list[float]:
+    """Room of each servo's supply to the lowest that it may have."""
+    return [v - servos.lowest_v(joint) for joint, v in zip(servos.joints, volts, strict=False)]
 
 
 def _listed(values: Sequence[Any], is_bad: Callable[[Any], bool], how: str) -> str:

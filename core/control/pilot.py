@@ -540,11 +540,6 @@ class Turns(Protocol):
     """What a ``PilotLoop`` turns: a pilot."""
 
     def tick(self) -> object: ...
-    def set_readiness(self, readiness: Readiness) -> None:
-        """What stands against the program's driving under other settings, before they act. It ends a hand-over where it has to."""
-        self._readiness = readiness
-        self._inputs.post(AgainstProgram(readiness.hindrances))
-
     def report_fault(self, fault: Fault) -> None: ...
     def close(self) -> None: ...
 

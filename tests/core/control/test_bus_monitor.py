@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from core.config.safety import ServosConfig
-from core.control.bus_monitor import BusMonitor, BusReport
+from core.control.bus_monitor import BusMonitor, BusReport, supply_cause
 from core.control.faults import Cause, Fault, Reaction
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS
 
@@ -71,6 +71,43 @@ def test_silence_of_the_bus(age_s: float, causes: list[Cause]) -> None:
 )
 def test_one_report_of_the_bus(change: dict[str, object], causes: list[Cause]) -> None:
     assert _bus_causes(_bus((0.0, replace(GOOD_BUS, **change))), 0.0) == causes  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("volts", "since_well_s", "load_ma", "cause"),
+    [
+        ((), 0.1, 0.0, None),
+        ((12.0,) * 7, 0.0, 0.0, None),
+        ((10.6,) * 7, 0.1, 0.0, None),  # sags, which warns
+        ((10.4,) * 7, 0.1, 400.0, Cause.SUPPLY_LOST),  # all fell together: the E-stop, or the supply's switch
+        ((10.4,) * 7, 2.0, 1500.0, Cause.SUPPLY_LOST),
+        ((10.4,) * 7, 2.1, 0.0, Cause.VOLTAGE_LOW),  # a battery that runs down
+        ((10.4,) * 7, math.inf, 0.0, Cause.VOLTAGE_LOW),  # a supply that was never enough
+        ((10.4,) * 7, 0.1, 1600.0, Cause.VOLTAGE_LOW),  # a weak supply under load
+        ((10.4,) * 6 + (10.6,), 0.1, 0.0, Cause.VOLTAGE_LOW),  # a poor plug in the chain
+        ((8.9,) * 7, math.inf, 9000.0, Cause.SUPPLY_LOST),
+        ((8.9,) * 6 + (9.1,), math.inf, 0.0, Cause.VOLTAGE_LOW),
+        ((math.nan,) * 7, 0.1, 0.0, Cause.SUPPLY_LOST),
+        ((12.0,) * 6 + (math.nan,), 0.1, 0.0, Cause.VOLTAGE_LOW),
+    ],
+)
+def test_a_supply_that_was_cut_is_told_from_a_weak_one(
+    volts: tuple[float, ...], since_well_s: float, load_ma: float, cause: Cause | None
+) -> None:
+    assert supply_cause(volts, since_well_s, load_ma, SERVOS) is cause
+
+
+def test_an_e_stop_whose_supply_falls_slowly_is_neither_low_voltage_nor_an_alert_of_the_servos() -> None:
+    """12 V to 8 V in 0.8 s; below 9.5 V the servos report an error of their input voltage."""
+    watch, found = BusMonitor(), []
+    for tick in range(40):
+        volts = 12.0 - 0.1 * tick
+        errors = (int(volts < 9.5),) * 7
+        watch = watch.update(replace(GOOD_BUS, voltages_v=(volts,) * 7, hardware_errors=errors), 0.02 * tick, SERVOS, SAFETY)
+        found += [fault.cause for fault in watch.faults(0.02 * tick, SERVOS, SAFETY)]
+    assert set(found) == {Cause.VOLTAGE_SAGS, Cause.SUPPLY_LOST}
+    alone = replace(GOOD_BUS, hardware_errors=_one(1, 0))  # type: ignore[arg-type]
+    assert _bus_causes(_bus((0.0, alone)), 0.0) == [Cause.SERVO_ALERT]
 
 
 def test_bad_packets_count_over_one_second() -> None:
