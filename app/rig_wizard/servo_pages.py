@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderVie
 from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, button, enable, note, set_cell, set_note, table
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import friction_note
 from app.widgets.painting import NONE
 from core.calibration.servos import Assignment
 from core.config.calibration import DrumsConfig
@@ -177,7 +178,8 @@ class DrumsPage(WizardPage):
             return
         limits = [draft.config.servos.force_limit(draft.config.servos.joints[place]) for place in (0, 4, 5)]
         forces = " / ".join(f"{limit.force_n:.0f}" for limit in limits)
-        set_note(self.result, tr("Greatest force, limited in the servos: {forces} N.", forces=forces))
+        told = tr("Greatest force, limited in the servos: {forces} N.", forces=forces)
+        set_note(self.result, " ".join(filter(None, (told, friction_note(draft.config.servos)))))
 
     @staticmethod
     def _show(field: QDoubleSpinBox, mm: float) -> None:

@@ -10,6 +10,7 @@ from enum import Enum
 from app.ui.i18n import ENGLISH, language_in_use, mark, tr, tr_text
 from core.config.models import PoseConfig
 from core.config.rig_file import RigFile
+from core.config.safety import ServosConfig
 from core.control.alerts import AlertKey, alert_of
 from core.control.drive_view import DriveView
 from core.control.faults import Area, Cause
@@ -605,6 +606,14 @@ def rig_line(rig: RigFile) -> str:
     )
 
 
+def friction_note(servos: ServosConfig) -> str:
+    """Which joints the gear's own friction may keep from moving; "" for none."""
+    weak = ", ".join(f"{tr_text(joint.name)} {least_n:g}" for joint, least_n in servos.weak_joints)
+    if not weak:
+        return ""
+    return tr("The gear's friction may take it all: larger drums, or max_force_n of at least {forces} N", forces=weak)
+
+
 def calibration_lines(rig: RigFile) -> list[str]:
     """What was calibrated, a line each."""
     known = rig.calibration
@@ -639,6 +648,8 @@ def calibration_lines(rig: RigFile) -> list[str]:
         lines.append(tr("way at one turn of the horn, as it is set and not measured: {ways} mm", ways=ways))
     forces = ", ".join(f"{tr_text(joint.name)} {rig.servos.force_limit(joint).force_n:.0f}" for joint in rig.servos.joints)
     lines.append(tr("greatest force, limited in the servo, friction included: {forces} N", forces=forces))
+    if weak := friction_note(rig.servos):
+        lines.append(weak)
     if known.assumed:
         lines.append(
             tr(

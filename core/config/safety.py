@@ -9,6 +9,7 @@ joint was zeroed; there, a tendon has no tension.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -221,6 +222,12 @@ class ServosConfig(ConfigSection):
     def force_limit(self, joint: JointConfig) -> ForceLimit:
         """How the joint's servo limits its force."""
         return force_limit(self.model_of(joint), joint.mm_per_turn, joint.max_force_n)
+
+    @property
+    def weak_joints(self) -> tuple[tuple[JointConfig, float], ...]:
+        """Joints whose force the gear's friction may take, and the least ``max_force_n`` (N) that is more."""
+        limits = [(joint, self.force_limit(joint)) for joint in self.joints]
+        return tuple((joint, math.ceil(1.05 * limit.friction_n)) for joint, limit in limits if limit.is_weak)
 
     def lowest_v(self, joint: JointConfig) -> float:
         """A lower supply of the joint's servo ends the driving."""

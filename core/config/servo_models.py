@@ -15,8 +15,10 @@ _WATCHDOG_FIRMWARE = 38
 """First firmware with Bus Watchdog(98) in the 430 and 540 size; the 330 size had it from its first firmware on."""
 _LOWEST_SUPPLY_SHARE = 0.875
 """Of the recommended supply: 10.5 of 12 V, 4.4 of 5 V. Below, the supply sags, and the motor is weaker than its figures say."""
-_FRICTION_SHARE = 0.05
-"""Of the stall current: what a servo without a load draws at most."""
+_FRICTION_SHARE = 0.057
+"""Of the stall torque: what the gear's friction takes at most. The line of the XM430-W350's performance graph in the e-Manual
+(0.84 N m at 0.60 A, 2.45 N m at 1.50 A) ends at no torque with 0.13 A, which are 0.23 of 4.1 N m. Without load it takes less: a
+user saw 13 mA (DynamixelSDK issue 564)."""
 _SHUTDOWN_MARGIN_C = 5.0
 """The program ends the driving so far below the temperature at which the servo switches itself off."""
 
@@ -75,6 +77,11 @@ class ServoModel:
         """A higher current is not taken for friction of gear and wire."""
         return _FRICTION_SHARE * self.stall_ma
 
+    @property
+    def friction_nm(self) -> float:
+        """Torque at the horn that the gear's friction takes at most; it hinders a motor that pulls, and helps one that holds."""
+        return _FRICTION_SHARE * self.stall_nm
+
     def current_ma(self, units: int) -> float | None:
         """Current of a register; None for models that report a load."""
         return None if self.current_unit_ma is None else units * self.current_unit_ma
@@ -113,6 +120,7 @@ class ForceLimit:
     force_n : what it means at the drum, the gear's friction included.
     current_ma : the same as current; None for models without it.
     speed_mm_s : what the joint reaches at most without load.
+    friction_n : what the gear's friction takes of the force at the drum at most.
     """
 
     register: int
@@ -120,6 +128,12 @@ class ForceLimit:
     force_n: float
     current_ma: float | None
     speed_mm_s: float
+    friction_n: float
+
+    @property
+    def is_weak(self) -> bool:
+        """Whether friction may take it all: the joint may not move, and its current does not tell a wire that is pulled."""
+        return self.force_n <= self.friction_n
 
     @property
     def strain_ma(self) -> float | None:
@@ -139,15 +153,15 @@ def drum_radius_mm(mm_per_turn: float) -> float:
 def force_limit(model: ServoModel, mm_per_turn: float, max_force_n: float) -> ForceLimit:
     """The register that keeps a joint's force below `max_force_n`."""
     radius_m = drum_radius_mm(mm_per_turn) / 1000.0
-    full_mm_s = model.no_load_rpm / 60.0 * mm_per_turn
+    full_mm_s, friction_n = model.no_load_rpm / 60.0 * mm_per_turn, model.friction_nm / radius_m
     if model.current_unit_ma is not None:
         most_ma = min(model.current_for_ma(max_force_n * radius_m), model.stall_ma)
         units = max(1, math.floor(most_ma / model.current_unit_ma + 1e-9))
         limit_ma = units * model.current_unit_ma
-        return ForceLimit(GOAL_CURRENT, units, model.torque_nm(limit_ma) / radius_m, limit_ma, full_mm_s)
+        return ForceLimit(GOAL_CURRENT, units, model.torque_nm(limit_ma) / radius_m, limit_ma, full_mm_s, friction_n)
     units = max(1, model.pwm_for(max_force_n * radius_m))
     duty = units / PWM_FULL
-    return ForceLimit(GOAL_PWM, units, model.stall_nm * duty / radius_m, None, full_mm_s * duty)
+    return ForceLimit(GOAL_PWM, units, model.stall_nm * duty / radius_m, None, full_mm_s * duty, friction_n)
 
 
 _12_V = (10.0, 14.8)

@@ -29,10 +29,11 @@ MAX_TICKS_S = _XM430.no_load_rpm / 60.0 * TICKS_PER_TURN
 """No-load speed of an XM430-W350."""
 STALL_MA = _XM430.stall_ma
 GEAR_FRICTION_MNM = 233.0
-"""Torque below which its gear holds without current: where the line of the performance graph (0.84 A at 0.60 N m, 2.45 A at 1.50)
-ends at no current. It is friction of motion, taken for that of standing still too; other models have the same share of their stall
-torque."""
+"""Torque below which its gear holds without current: where the line of the performance graph (0.84 N m at 0.60 A, 2.45 N m at
+1.50 A) ends at no current. Other models have the same share of their stall torque."""
 _STAND_MA, _FRICTION_MA = 8.0, 40.0
+"""Currents of a horn that stands without load, and that friction takes of one that turns: more than the 13 mA that a user saw
+without load (DynamixelSDK issue 564), less than the 130 mA of the graph's line under load."""
 _FULL_PWM = 885
 """Goal PWM(100) at the whole supply voltage."""
 _P_GAIN_UNIT = 128.0

@@ -154,6 +154,31 @@ def test_by_hand() -> None:
 
 
 @pytest.mark.parametrize(
+    ("number", "mm_per_turn", "force_n", "friction_n", "is_weak"),
+    [
+        (1020, 40.0, 20.0, 36.7, True),  # 0.234 N m on 6.366 mm
+        (1020, 40.0, 38.0, 36.7, False),
+        (1020, 94.2, 20.0, 15.6, False),  # a larger drum
+        (1200, 40.0, 20.0, 4.7, False),  # a smaller servo
+        (1060, 40.0, 20.0, 12.5, False),
+    ],
+)
+def test_a_force_that_the_gears_own_friction_may_take_is_known(
+    number: int, mm_per_turn: float, force_n: float, friction_n: float, is_weak: bool
+) -> None:
+    limit = force_limit(SERVO_MODELS[number], mm_per_turn, force_n)
+    assert limit.friction_n == pytest.approx(friction_n, abs=0.1)
+    assert limit.is_weak is is_weak
+
+
+def test_joints_that_may_not_move_are_named_with_the_least_force() -> None:
+    assert [(joint.name, least_n) for joint, least_n in ServosConfig().weak_joints] == [
+        (joint.name, 39) for joint in ServosConfig().joints
+    ]
+    assert ServosConfig(model=1200).weak_joints == ()
+
+
+@pytest.mark.parametrize(
     ("number", "name"),
     [(350, "XL-320 (350)"), (12, "AX-12A (12)"), (30, "MX-28(2.0) (30)"), (2000, "DYNAMIXEL P (2000)"),
      (4150, "DYNAMIXEL Y (4150)"), (1710, "XM335-T323 (1710)"), (9999, "model 9999")],

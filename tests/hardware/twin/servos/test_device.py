@@ -11,7 +11,7 @@ from dynamixel_sdk import COMM_SUCCESS, PortHandler, Protocol2PacketHandler
 from core.config.safety import ServosConfig
 from core.config.servo_models import SERVO_MODELS, ServoModel
 from hardware.twin.servos.bus import SoftServoBus
-from hardware.twin.servos.device import GEAR_FRICTION_MNM, STALL_MA, ElasticWire, SoftServo
+from hardware.twin.servos.device import GEAR_FRICTION_MNM, STALL_MA, ElasticWire, MotorGoal, ServoMotor, SoftServo
 
 CONFIG = ServosConfig()
 ACCESS, RANGE, LIMIT, RESULT = 7, 4, 6, 1
@@ -163,6 +163,22 @@ def test_a_load_beyond_what_motor_and_gear_hold_turns_the_horn_back(mode: int) -
     _run(servo, 1.0)
     assert servo.table["present_position"] < held - 50
     assert servo.table["present_velocity"] < 0
+
+
+@pytest.mark.parametrize(
+    ("load_ma", "moves"),
+    [
+        (20.0, 1),  # 70 - 40 mA pull it up
+        (50.0, 0),  # friction hinders the pull, and helps to hold
+        (190.0, 0),
+        (210.0, -1),  # more than motor and friction hold: 70 + 131 mA
+    ],
+)
+def test_friction_hinders_a_motor_that_pulls_and_helps_one_that_holds(load_ma: float, moves: int) -> None:
+    motor = ServoMotor(0.0)
+    motor.load_mnm = load_ma * motor.mnm_per_ma
+    motor.step(MotorGoal(torque=True, goal=100, limit_ma=70.0), 1.0)
+    assert (motor.position > 1.0) - (motor.position < -1.0) == moves
 
 
 @pytest.mark.parametrize(("gear_mnm", "left_mnm"), [(GEAR_FRICTION_MNM, GEAR_FRICTION_MNM), (20.0, 20.0), (1000.0, 500.0)])
