@@ -317,7 +317,8 @@ class ServoBus:
     def _make_countable(self, joint: JointConfig) -> None:
         """Set a servo up that was left as it was because it holds. Raises NotReady when it holds in a mode of another program."""
         if joint.id in self._put_off:
-            self._check_counting(joint)
+            wrong = self._differences(joint)
+            self._check_not_held(joint, {address: data for address, data in wrong.items() if address in _COUNTING})
             self._set_up(joint)
 
     def _kept_zero(self, joint: JointConfig, kept: KeptJoint) -> int:
@@ -552,12 +553,15 @@ class ServoBus:
             error = HardwareError(self._line.read(joint.id, _HARDWARE_ERROR, 1)[0])
             if error:
                 raise NotReady(f"{_title(joint)} reports {describe(error)}: find the cause, then reboot the servo")
-            self._check_counting(joint)
             self._check_not_held(joint, self._differences(joint))
 
     def _check_not_held(self, joint: JointConfig, differences: Mapping[int, bytes]) -> None:
         """Raise NotReady for a servo that holds though its EEPROM differs: writing it would let its wire go."""
         if differences and self._holds(joint):
+            if not _COUNTING.isdisjoint(differences):
+                raise NotReady(
+                    f"{_title(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
+                )
             raise NotReady(
                 message(
                     "{joint} holds with another {what}: close the program with Relax slowly, or switch the torque off (the wires "
@@ -565,13 +569,6 @@ class ServoBus:
                     joint=_title(joint),
                     what=", ".join(CHANGED[address][0] for address in differences),
                 )
-            )
-
-    def _check_counting(self, joint: JointConfig) -> None:
-        """Raise NotReady for a servo that holds in a mode in which its positions mean something else."""
-        if not _COUNTING.isdisjoint(self._differences(joint)) and self._holds(joint):
-            raise NotReady(
-                f"{_title(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
             )
 
     def _check_zeroed(self) -> None:
