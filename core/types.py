@@ -287,19 +287,20 @@ class Command:
 
     ``bend`` and ``pitch`` are the head's bend in the image plane and out of it, each -1..1 of the tendons' full pull; positive bend
     = to the robot's right as seen on screen. ``advance_mm_s`` feeds the robot (negative retracts), ``delivery_mm_s`` the catheter
-    sheath.
+    sheath. ``rotation_deg_s`` turns the shaft where it can be turned, and keeps the bend; with two tendons only without a bend.
     """
 
     bend: float = 0.0
     pitch: float = 0.0
     advance_mm_s: float = 0.0
     delivery_mm_s: float = 0.0
+    rotation_deg_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class RobotStatus:
-    """Measurements of the robot. ``time_s`` on the clock of the frames; tendon order: right, left, up, down (pull in mm, force in
-    mN).
+    """Measurements of the robot. ``time_s`` on the clock of the frames; tendons in the order of the joints, by default right, left,
+    up, down (pull in mm, force in mN). ``rotation_deg`` of the shaft; 0 where it cannot be turned.
 
     ``wall_contact_n`` is the low-passed sum of wall contact forces, known in the twin only (None on a real rig).
     """
@@ -307,9 +308,10 @@ class RobotStatus:
     time_s: float
     insertion_mm: float
     delivery_mm: float
-    tendon_pull_mm: tuple[float, float, float, float]
-    tendon_force_mn: tuple[float, float, float, float]
+    tendon_pull_mm: tuple[float, ...]
+    tendon_force_mn: tuple[float, ...]
     wall_contact_n: float | None = None
+    rotation_deg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from core.control.bus_monitor import BusReport
 from core.control.faults import Cause, Fault
 from core.control.gate import Rejection, Source
 from core.control.joints import Retracted
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.control.kept_zero import ZeroRequest
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
 from hardware.servos.bus_guard import BusGuard, report_of
@@ -110,8 +110,9 @@ class LockStepServos:
     def acknowledge(self) -> None:
         self._guard.acknowledge()
 
-    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
-        self._at_mm = tuple(request.positions_mm.get(name, at) for name, at in zip(JOINT_NAMES, self._at_mm, strict=True))
+    def zero(self, request: ZeroRequest | None = None) -> None:
+        positions_mm = request.positions_mm if request is not None else dict.fromkeys(JOINT_NAMES, 0.0)
+        self._at_mm = tuple(positions_mm.get(name, at) for name, at in zip(JOINT_NAMES, self._at_mm, strict=True))
 
     def reboot(self, servo_id: int) -> None:
         """Nothing to do."""

@@ -30,7 +30,7 @@ from core.config.acceptance import (
 from core.config.files import own_settings_path, read_settings
 from core.config.models import Config
 from core.config.rig_file import RigFile, find_rig, with_rig
-from core.config.safety import JOINT_NAMES, TENDONS, JointConfig
+from core.config.safety import JOINT_NAMES, JointConfig
 from core.devices import UserError
 
 if TYPE_CHECKING:
@@ -58,6 +58,8 @@ def accept_rig(
         return
     if rig.robot != "servos":
         raise UserError(f"rig {rig.name} has no servos of its own: there is nothing to accept")
+    if not rig.servos.is_default:
+        raise UserError(f"rig {rig.name} has other joints than the default robot, which alone can be accepted: it stays advisory")
     readings = _readings(force or [])
     accepted = _begin(path, rig, config, operator, anew=anew)
     _say(f"Ctrl-C stops the servos at any moment and keeps what was done; the E-stop is within reach of {accepted.operator}")
@@ -113,14 +115,14 @@ def _steps(config: Config, accepted: Acceptance, readings: dict[str, float], *, 
     _say(f"servos: {len(servos)} answer, {supply_v[0]:.1f} to {supply_v[1]:.1f} V")
     yield accepted
     joints = {joint.name: joint for joint in config.servos.joints}
-    for name in JOINT_NAMES:
+    for name, joint in joints.items():
         if name not in accepted.directions:
-            _confirm_direction(bench, joints[name])
+            _confirm_direction(bench, joint)
             accepted = accepted.model_copy(update={"directions": (*accepted.directions, name)})
             yield accepted
-    for name in JOINT_NAMES:
+    for name, joint in joints.items():
         if name not in {reading.name for reading in accepted.forces}:
-            reading = _read_force(bench, joints[name], readings.get(name), pulls=pulls)
+            reading = _read_force(bench, joint, readings.get(name), pulls=pulls)
             accepted = accepted.model_copy(update={"forces": (*accepted.forces, reading)})
             yield accepted
     for kind, what in (("STOP", "STOP"), ("deadman", "a deadman that falls silent")):
@@ -137,8 +139,8 @@ def _steps(config: Config, accepted: Acceptance, readings: dict[str, float], *, 
 def _confirm_direction(bench: AcceptanceBench, joint: JointConfig) -> None:
     from hardware.calibration.acceptance import DIRECTION_MM
 
-    way_mm = DIRECTION_MM[joint.name in TENDONS]
-    what = f"did its wire tighten, and bend the head to the robot's {joint.name}" if joint.name in TENDONS else "did it go forward"
+    way_mm = DIRECTION_MM[joint.is_tendon]
+    what = f"did its wire tighten, and bend the head to the robot's {joint.name}" if joint.is_tendon else "did it go forward"
     _wait(f"direction of {joint.name}: look at the robot; Enter moves it by {way_mm:g} mm and back")
     bench.show_direction(joint)
     if not _ask(f"  {what}? y or n: ").lower().startswith("y"):

@@ -23,13 +23,12 @@ from app.operator.recording import Recorder
 from app.operator.rig_session import RigSession, StopOutcome
 from app.operator.stop_keys import COMMAND_MODIFIERS, application, is_stop
 from app.ui.i18n import tr, tr_text
-from app.ui.texts import OperatorStep, Undriven
+from app.ui.texts import OperatorStep, Undriven, joint_title
 from app.widgets.alerts import AlertSounds
 from app.widgets.basics import SCROLL_KEYS
 from app.widgets.event_log import LogKind
 from app.widgets.jog_panel import KEYS, Motion
 from core.config.models import Config
-from core.config.safety import JOINT_NAMES
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.kept_zero import ZeroRequest
@@ -392,8 +391,8 @@ class DriveController(QObject):
     @Slot(object)
     def zero(self, request: ZeroRequest) -> None:
         if (pilot := self._rig.pilot) is not None and pilot.zero(request):
-            names = sorted({*request.positions_mm, *request.kept}, key=JOINT_NAMES.index)
-            self._log(tr("zero {what}", what=", ".join(tr_text(name) for name in names)))
+            names = dict.fromkeys((*request.positions_mm, *request.kept))
+            self._log(tr("zero {what}", what=", ".join(joint_title(name) for name in names)))
 
     @Slot()
     def torque_off(self) -> None:

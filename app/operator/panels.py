@@ -63,7 +63,7 @@ class OperatorPanels(ScenePanels):
         self.live.set_covers(self.alerts, self.offers)
         self.trends = TrendPlot(config.perception.pose)
         self.performance = PerformancePanel()
-        self.jog = JogPanel(config.servos.max_pull_mm)
+        self.jog = JogPanel(config.servos)
         self.jog.set_speeds(config.hand, config.servos)
         self.mode_bar = ModeBar()
         self.servos = ServoTable()
@@ -99,7 +99,6 @@ class OperatorPanels(ScenePanels):
         known = _calibration_of(config)
         self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)  # for the head prediction, which may be rough
         self.servos.set_safety(config.safety)
-        self.jog.max_pull_mm = config.servos.max_pull_mm
         self.jog.set_speeds(config.hand, config.servos)
         self._servo_config = config.servos
         self._scale = known.scale if known is not None else None
@@ -127,9 +126,9 @@ class OperatorPanels(ScenePanels):
             self.alerts.show_view(view)
         why_still = tr("This rig has no robot") if why_not is Undriven.NO_ROBOT else self._blank_title
         self.jog.set_enabled(view is not None, "" if view is not None else why_still)
-        self.jog.show_known(known_joints(bus, time.monotonic()))
+        self.jog.show_known(known_joints(bus, self._servo_config, time.monotonic()))
         if not self._has_picture:  # a robot in a vessel is brought back by hand, and the operator must see how far
-            self.jog.show_status(status_by_servos(bus))
+            self.jog.show_status(status_by_servos(bus, self._servo_config))
         self.servos.show_status(bus, self._servo_config)
         self.commands.show_view(view, bus)
 

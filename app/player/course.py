@@ -17,6 +17,7 @@ from app.ui.texts import refusal_text
 from app.widgets.painting import number
 from core.evaluation.replay import event_target
 from core.session.codec import RecordedRow
+from core.session.export import tendon_names
 from core.session.manifest import Event, EventKind
 from core.session.reader import Timeline
 from core.types import Point, Scene
@@ -265,7 +266,7 @@ def value_lines(row: RecordedRow) -> list[str]:
     if status is not None:
         inserted, sheath = status.insertion_mm, status.delivery_mm
         lines.append(tr("insertion {insertion:.1f} mm, sheath {sheath:.1f} mm", insertion=inserted, sheath=sheath))
-        pulls = zip(("right", "left", "up", "down"), status.tendon_pull_mm, status.tendon_force_mn, strict=True)
+        pulls = zip(tendon_names(len(status.tendon_pull_mm)), status.tendon_pull_mm, status.tendon_force_mn, strict=True)
         told = [f"{tr_text(name)} {number(pull, 2)} mm {number(force, 0)} mN" for name, pull, force in pulls]
         lines.append(tr("tendons: ") + ", ".join(told))
     if drive is not None:

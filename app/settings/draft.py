@@ -13,7 +13,7 @@ from app.ui.i18n import tr, tr_text
 from core.config.files import changed_keys
 from core.config.models import Config, load_config
 from core.config.rig_file import sections_of_rig
-from core.config.schema import Effect, FieldKind, Section, Setting, schema, settings_by_key, value_at, with_value
+from core.config.schema import Effect, FieldKind, Section, Setting, schema, setting_at, settings_by_key, with_value
 
 _SEPARATORS = re.compile(r"[\s_.,]+")
 
@@ -171,7 +171,7 @@ class SettingsDraft:
 
 def _flat(data: dict[str, Any]) -> dict[str, Any]:
     """All settings by key."""
-    return {key: value_at(data, key) for key in settings_by_key()}
+    return {key: setting_at(data, key) for key in settings_by_key()}
 
 
 def parse(setting: Setting, entry: object) -> tuple[Any, str]:
@@ -259,10 +259,10 @@ def with_changes(running: Config, before: Config, after: Config, effects: frozen
     data, new = running.model_dump(mode="json"), after.model_dump(mode="json")
     settings, kept = settings_by_key(), sections_of_rig(running, after)
     old = since.model_dump(mode="json") if since is not None else data
-    newer = {key for key in changed_keys(before, after) if value_at(old, key) != value_at(data, key)}
+    newer = {key for key in changed_keys(before, after) if setting_at(old, key) != setting_at(data, key)}
     for key in changed_keys(before, after):
         if settings[key].effect in effects and key.partition(".")[0] not in kept and key not in newer:
-            data = with_value(data, key, value_at(new, key))
+            data = with_value(data, key, setting_at(new, key))
     try:
         return Config.model_validate(data)
     except ValidationError:

@@ -614,6 +614,11 @@ def friction_note(servos: ServosConfig) -> str:
     return tr("The gear's friction may take it all: larger drums, or max_force_n of at least {forces} N", forces=weak)
 
 
+def joint_title(name: str) -> str:
+    """A joint's name in words."""
+    return tr_text(name).replace("_", " ")
+
+
 def calibration_lines(rig: RigFile) -> list[str]:
     """What was calibrated, a line each."""
     known = rig.calibration

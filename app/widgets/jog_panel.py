@@ -26,7 +26,8 @@ from app.widgets.painting import (
     text_width,
 )
 from core.config.models import JogConfig
-from core.config.safety import ServosConfig
+from core.config.safety import JointKind, ServosConfig
+from core.control.joints import bend_of_status, direction
 from core.control.motion import hand_speeds
 from core.types import Advice, RobotStatus
 
@@ -68,6 +69,27 @@ def advised_motions(advice: Advice | None) -> frozenset[Motion]:
     if abs(advice.steer_deg) >= _STRAIGHT_DEG:
         feed.add(Motion.STEER_RIGHT if advice.steer_deg > 0.0 else Motion.STEER_LEFT)
     return frozenset(feed)
+
+
+def motions_of(servos: ServosConfig) -> frozenset[Motion]:
+    """The motions that a robot has: one with two tendons needs a rotation to pitch."""
+    found = {Motion.STEER_LEFT, Motion.STEER_RIGHT, Motion.STRAIGHTEN}
+    kinds = {joint.kind for joint in servos.joints}
+    if len(servos.tendons) > 2 or JointKind.ROTATION in kinds:
+        found |= {Motion.PITCH_UP, Motion.PITCH_DOWN}
+    if JointKind.ADVANCE in kinds:
+        found |= {Motion.ADVANCE, Motion.RETRACT}
+    if JointKind.DELIVERY in kinds:
+        found |= {Motion.DELIVER, Motion.WITHDRAW}
+    return frozenset(found)
+
+
+def _taking_part(servos: ServosConfig) -> tuple[list[int], list[int]]:
+    """Places of the joints that bend and pitch rest on."""
+    rotation = [place for place, joint in enumerate(servos.joints) if joint.kind is JointKind.ROTATION]
+    ways = [direction(joint) for joint in servos.tendons]
+    across, up = ([place for place, way in enumerate(ways) if rotation or way[axis] != 0.0] + rotation for axis in (0, 1))
+    return across, up
 
 
 _LINE_PX, _BETWEEN_PX, _SMALLEST_PX = 17, 6, 10
@@ -141,20 +163,20 @@ _PULLED = mark("{motion}: hold to move, release to stop; the tendons are pulled 
 class JogPanel(QWidget):
     """``pressed`` and ``released`` carry a motion that is held with the mouse; ``speed_changed`` a share of full speed, 0..1.
 
-    `max_pull_mm` is the tendons' pull at a bend of 1.
+    Keys of motions that the robot does not have are hidden.
     """
 
     pressed = Signal(object)
     released = Signal(object)
     speed_changed = Signal(float)
 
-    def __init__(self, max_pull_mm: float) -> None:
+    def __init__(self, servos: ServosConfig) -> None:
         super().__init__()
-        self.max_pull_mm = max_pull_mm
+        self._servos = servos
         self._caps: dict[Motion, _Cap] = {}
         self._rig: tuple[JogConfig, ServosConfig] | None = None
         self._status: RobotStatus | None = None
-        self._known: tuple[bool, ...] = (True,) * 7
+        self._known: tuple[bool, ...] | None = None
         self._enabled = (True, "")
         grid = QGridLayout()
         grid.setSpacing(4)
@@ -196,7 +218,10 @@ class JogPanel(QWidget):
 
     def set_speeds(self, hand: JogConfig, servos: ServosConfig) -> None:
         """The speeds of the keys: a share of `hand`'s full speeds, limited by the joints' speeds."""
-        self._rig = hand, servos
+        self._rig, self._servos = (hand, servos), servos
+        had = motions_of(servos)
+        for motion, cap in self._caps.items():
+            cap.setVisible(motion in had)
         self._show_speeds()
 
     def _show_speeds(self) -> None:
@@ -242,16 +267,18 @@ class JogPanel(QWidget):
         if status is None:
             self._readout.show_values(None, None, None)
             return
-        right, left, up, down = status.tendon_pull_mm
-        full_mm = 2.0 * self.max_pull_mm
-        bend, pitch, insertion_mm = (right - left) / full_mm, (up - down) / full_mm, status.insertion_mm
-        known = self._known
+        servos, values = self._servos, bend_of_status(status, self._servos)
+        known = self._known if self._known is not None else (True,) * len(servos.joints)
+        across, up = _taking_part(servos)
+        is_inserted_known = all(known[servos.places(JointKind.ADVANCE)])
         self._readout.show_values(
-            bend if known[0] and known[1] else None, pitch if known[2] and known[3] else None, insertion_mm if known[4] else None
+            values[0] if values is not None and all(known[place] for place in across) else None,
+            values[1] if values is not None and all(known[place] for place in up) else None,
+            status.insertion_mm if is_inserted_known else None,
         )
 
     def show_known(self, joints: tuple[bool, ...]) -> None:
-        """Of which of the seven joints it is known where they are."""
+        """Of which of the joints it is known where they are."""
         if joints != self._known:
             self._known = joints
             self.show_status(self._status)

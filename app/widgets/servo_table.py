@@ -1,6 +1,6 @@
-"""The seven servos: what each reports, the balance of the tendon pairs, the bus itself, and what can be done about them.
+"""The servos: what each reports, the balance of the tendon pairs, the bus itself, and what can be done about them.
 
-A bus status becomes seven rows of cells, two tendon pairs and one line; the widgets below show them.
+A bus status becomes a row of cells for each joint, the balance of its tendons and one line; the widgets below show them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from PySide6.QtWidgets import (
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.ui.texts import tip
+from app.ui.texts import joint_title, tip
 from app.ui.workers import Pace
 from app.widgets.basics import column, holder, line, text_button
 from app.widgets.messages import BUTTON_STYLE, QuestionStrip
@@ -48,8 +48,9 @@ from app.widgets.painting import (
     text_width,
 )
 from app.widgets.zero_dialog import ZeroDialog, joint_zeros
-from core.config.safety import JOINT_NAMES, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JointConfig, JointKind, JointName, SafetyConfig, ServosConfig
 from core.config.servo_models import PWM_FULL
+from core.control.joints import status_at
 from core.types import RobotStatus
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, wire_force_mn
 
@@ -137,9 +138,10 @@ def error_words(error: HardwareError) -> str:
 
 
 def servo_rows(status: BusStatus | None, servos: ServosConfig, safety: SafetyConfig) -> tuple[Row, ...]:
-    """Seven rows in the order of the joints, each with a cell for every column; dashes where nothing is known."""
-    readings: tuple[ServoReading | None, ...] = status.servos if status is not None and status.servos else (None,) * 7
-    zeroed: tuple[bool | None, ...] = status.zeroed if status is not None and status.servos else (None,) * 7
+    """Rows in the order of the joints, each with a cell for every column; dashes where nothing is known."""
+    nothing, is_told = (None,) * len(servos.joints), status is not None and len(status.servos) == len(servos.joints)
+    readings: tuple[ServoReading | None, ...] = status.servos if status is not None and is_told else nothing
+    zeroed: tuple[bool | None, ...] = status.zeroed if status is not None and is_told else nothing
     armed = status is not None and status.armed
     rows = []
     for joint, reading, is_zeroed in zip(servos.joints, readings, zeroed, strict=True):
@@ -150,28 +152,27 @@ def servo_rows(status: BusStatus | None, servos: ServosConfig, safety: SafetyCon
     return tuple(rows)
 
 
-def known_joints(status: BusStatus | None, now_s: float) -> tuple[bool, ...]:
+def known_joints(status: BusStatus | None, servos: ServosConfig, now_s: float) -> tuple[bool, ...]:
     """Which joints have a known position: those that are zeroed, and whose servo has answered lately.
 
     Without a bus all of them: such a robot reports its own position. `now_s` is monotonic, as ``BusStatus.time_s`` is.
     """
     if status is None:
-        return (True,) * 7
-    if not status.servos or now_s - status.time_s > SILENT_AFTER_S:
-        return (False,) * 7
+        return (True,) * len(servos.joints)
+    if len(status.servos) != len(servos.joints) or now_s - status.time_s > SILENT_AFTER_S:
+        return (False,) * len(servos.joints)
     return tuple(zeroed and isinstance(reading, ServoState) for reading, zeroed in zip(status.servos, status.zeroed, strict=True))
 
 
-def status_by_servos(status: BusStatus | None) -> RobotStatus | None:
+def status_by_servos(status: BusStatus | None, servos: ServosConfig) -> RobotStatus | None:
     """The robot's status from its servos alone, while there is no picture; None when not all of them answer.
 
     The position of a joint that is not zeroed is meaningless: see ``known_joints``.
     """
     states = [reading for reading in status.servos if isinstance(reading, ServoState)] if status is not None else []
-    if status is None or len(states) != len(JOINT_NAMES):
+    if status is None or len(states) != len(servos.joints):
         return None
-    right, left, up, down, advance, first, second = (state.position_mm or 0.0 for state in states)
-    return RobotStatus(status.time_s, advance, (first + second) / 2.0, (right, left, up, down), (0.0,) * 4)
+    return status_at([state.position_mm or 0.0 for state in states], (0.0,) * len(servos.tendons), status.time_s, servos)
 
 
 def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, servos: ServosConfig, safety: SafetyConfig) -> Row:
@@ -183,11 +184,16 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
     if state.current_ma is None or limit.current_ma is None or limit.strain_ma is None:
         duty = 100.0 * limit.units / PWM_FULL
         current = Cell(
-            NONE, tip=tr("the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)", force=limit.force_n, duty=duty)
+            NONE,
+            tip=_of_joint(
+                joint, tr("the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)", force=limit.force_n, duty=duty)
+            ),
         )
     else:
         strain = Tone.BAD if abs(state.current_ma) > limit.strain_ma else Tone.PLAIN
-        tip = tr("the servo gives {force:.0f} N at most ({most:.0f} mA)", force=limit.force_n, most=limit.current_ma)
+        tip = _of_joint(
+            joint, tr("the servo gives {force:.0f} N at most ({most:.0f} mA)", force=limit.force_n, most=limit.current_ma)
+        )
         current = _signed(number(state.current_ma, 0), strain, tip)
     return (
         Cell(_name(joint), max(Tone.PLAIN, heat, volts, error.tone)),
@@ -227,6 +233,7 @@ def _position(joint: JointConfig, state: ServoState) -> Cell:
     explanation = tr(
         "envelope {low_mm:g} to {high_mm:g} mm, slow within {margin:g} mm of its ends", low_mm=low, high_mm=high, margin=margin
     )
+    explanation = _of_joint(joint, explanation)
     track = Track(share(at), goal, share(low + margin), share(high - margin))
     return Cell(SIGN[tone] + _mm(joint, at), tone, explanation, track)
 
@@ -245,7 +252,14 @@ def _signed(text: str, tone: Tone, tip: str = "") -> Cell:
 
 
 def _name(joint: JointConfig) -> str:
-    return f"{_plain(joint.name)} \N{MIDDLE DOT} {joint.id}"
+    return f"{joint_title(joint.name)} \N{MIDDLE DOT} {joint.id}"
+
+
+def _of_joint(joint: JointConfig, text: str) -> str:
+    """A text about a tendon or feed in the units of the joint: a rotation has degrees for mm and N mm for N."""
+    if joint.kind is not JointKind.ROTATION:
+        return text
+    return text.replace(" mm", "°").replace(" N ", f" {joint.force_unit} ")
 
 
 def _mm(joint: JointConfig, value_mm: float | None) -> str:
@@ -255,15 +269,15 @@ def _mm(joint: JointConfig, value_mm: float | None) -> str:
 
 @dataclass(frozen=True, slots=True)
 class PairBalance:
-    """Two wires that pull against each other. ``sum_mm`` of their pulls should be ``wanted_mm``, twice the pretension.
+    """Wires that pull against each other, two or three. ``sum_mm`` of their pulls should be ``wanted_mm``, as often the pretension.
 
     None: not known. ``forces_n`` of the wires are computed from the motors' currents, friction included.
     """
 
-    names: tuple[JointName, JointName]
+    names: tuple[JointName, ...]
     wanted_mm: float
     sum_mm: float | None = None
-    forces_n: tuple[float, float] | None = None
+    forces_n: tuple[float, ...] | None = None
     tone: Tone = Tone.FAINT
 
     @property
@@ -281,7 +295,7 @@ class PairBalance:
 
     @property
     def title(self) -> str:
-        return f"{tr_text(self.names[0])} + {tr_text(self.names[1])}"
+        return " + ".join(map(joint_title, self.names))
 
     @property
     def total(self) -> str:
@@ -295,7 +309,7 @@ class PairBalance:
     def forces(self) -> str:
         if self.forces_n is None:
             return ""
-        return "{} / {} N".format(*(number(force, 1 if abs(force) < 100.0 else 0) for force in self.forces_n))
+        return " / ".join(number(force, 1 if abs(force) < 100.0 else 0) for force in self.forces_n) + " N"
 
     @property
     def text(self) -> str:
@@ -303,24 +317,27 @@ class PairBalance:
         return ", ".join(part for part in (f"{self.title}: {self.sum}", self.word, self.forces) if part)
 
 
-def pair_balances(status: BusStatus | None, servos: ServosConfig) -> tuple[PairBalance, PairBalance]:
-    """Right and left, up and down. Before arming nothing is pretensioned, so slack wires are no warning then."""
-    first, second = (_balance(status, servos, place) for place in (0, 2))
-    return first, second
+def pair_balances(status: BusStatus | None, servos: ServosConfig) -> tuple[PairBalance, ...]:
+    """Opposite tendons, or all three. Before arming nothing is pretensioned, so slack wires are no warning then."""
+    count = len(servos.tendons)
+    size = 3 if count == 3 else 2
+    return tuple(_balance(status, servos, slice(place, place + size)) for place in range(0, count, size))
 
 
-def _balance(status: BusStatus | None, servos: ServosConfig, place: int) -> PairBalance:
-    joints = servos.joints[place : place + 2]
-    balance = PairBalance((joints[0].name, joints[1].name), 2.0 * servos.pretension_mm)
-    states = [state for state in (status.servos[place : place + 2] if status is not None else ()) if isinstance(state, ServoState)]
-    if status is None or len(states) < 2 or states[0].position_mm is None or states[1].position_mm is None:
+def _balance(status: BusStatus | None, servos: ServosConfig, places: slice) -> PairBalance:
+    joints = servos.joints[places]
+    balance = PairBalance(tuple(joint.name for joint in joints), len(joints) * servos.pretension_mm)
+    states = [state for state in (status.servos[places] if status is not None else ()) if isinstance(state, ServoState)]
+    at_mm = [state.position_mm for state in states if state.position_mm is not None]
+    if status is None or len(at_mm) < len(joints):
         return balance
-    one, other = (state.current_ma for state in states)
-    forces = None
-    if one is not None and other is not None:
-        first, second = (servos.model_of(joint) for joint in joints)
-        forces = wire_force_mn(joints[0], first, one) / 1000.0, wire_force_mn(joints[1], second, other) / 1000.0
-    known = replace(balance, sum_mm=states[0].position_mm + states[1].position_mm, forces_n=forces)
+    pulled = [
+        wire_force_mn(joint, servos.model_of(joint), state.current_ma) / 1000.0
+        for joint, state in zip(joints, states, strict=True)
+        if state.current_ma is not None
+    ]
+    forces = tuple(pulled) if len(pulled) == len(joints) else None
+    known = replace(balance, sum_mm=sum(at_mm), forces_n=forces)
     if not status.armed:
         return known
     off = abs(known.share or 0.0)
@@ -348,7 +365,7 @@ def bus_line(status: BusStatus | None, silence_s: float | None = None) -> Cell:
     ]
     whole = f"  {chr(0xB7)}  ".join(parts)
     tip = f"{whole}\n" + tr("cycle: half of the periods of the last ten seconds were shorter than the first, 99 % than p99")
-    if broken := [f"{_plain(r.name)} {error_words(r.error)}" for r in status.servos if isinstance(r, ServoState) and r.error]:
+    if broken := [f"{joint_title(r.name)} {error_words(r.error)}" for r in status.servos if isinstance(r, ServoState) and r.error]:
         return Cell(f"!! {'; '.join(broken)}", Tone.BAD, tip)  # for which a narrow table has no room
     return Cell(whole, Tone.WARN if slow else Tone.PLAIN, tip)
 
@@ -369,21 +386,18 @@ _Index = QModelIndex | QPersistentModelIndex
 
 
 class ServoView(QTableWidget):
-    """All seven rows and all columns at any size; no scroll bars, no keyboard focus. Only changed cells are painted again."""
+    """All rows and all columns at any size; no scroll bars, no keyboard focus. Only changed cells are painted again."""
 
     def __init__(self, rows: tuple[Row, ...]) -> None:
-        super().__init__(len(rows), len(_COLUMNS))
+        super().__init__(0, len(_COLUMNS))
         self._rows: tuple[Row, ...] = ()
-        self._items = [[QTableWidgetItem() for _ in _COLUMNS] for _ in rows]
+        self._items: list[list[QTableWidgetItem]] = []
         for place, kind in enumerate(_COLUMNS):
             heading = tr(kind.value[0])
             item = QTableWidgetItem(f"  {heading}" if kind is Column.ERROR else heading)
             item.setToolTip(tr(kind.value[1]))
             item.setTextAlignment(LEFT if kind in _LEFT else RIGHT)
             self.setHorizontalHeaderItem(place, item)
-            for row in range(len(rows)):
-                self.setItem(row, place, self._items[row][place])
-        self.show_rows(rows)
         self.setItemDelegate(ServoDelegate(self))
         theme.set_sheet(self, _STYLE)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -401,10 +415,12 @@ class ServoView(QTableWidget):
         header.setFixedHeight(_HEADER)
         header.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        self.setMinimumHeight(_HEADER + 7 * _ROW[0])
         self.setAccessibleName(tr("Servos"))
+        self.show_rows(rows)
 
     def show_rows(self, rows: tuple[Row, ...]) -> None:
+        if len(rows) != self.rowCount():
+            self._make_rows(len(rows))
         for row, cells in enumerate(rows):
             for place, cell in enumerate(cells):
                 if not self._rows or self._rows[row][place] != cell:
@@ -414,6 +430,21 @@ class ServoView(QTableWidget):
                     item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{tr(_COLUMNS[place].value[0])} {cell.text}")
                     item.setData(Qt.ItemDataRole.UserRole, cell)
         self._rows = rows
+
+    def _make_rows(self, count: int) -> None:
+        """Empty rows for another robot."""
+        self._rows = ()
+        self._items = [[QTableWidgetItem() for _ in _COLUMNS] for _ in range(count)]
+        self.setRowCount(count)
+        for row, items in enumerate(self._items):
+            for place, item in enumerate(items):
+                self.setItem(row, place, item)
+        self.setMinimumHeight(_HEADER + count * _ROW[0])
+        self._fit_rows()
+
+    def _fit_rows(self) -> None:
+        room = (self.height() - _HEADER) // max(1, self.rowCount())
+        self.verticalHeader().setDefaultSectionSize(max(_ROW[0], min(_ROW[1], room)))
 
     def cell(self, row: int, column: Column) -> Cell:
         return self._rows[row][_COLUMNS.index(column)]
@@ -425,7 +456,7 @@ class ServoView(QTableWidget):
         widths[-1] += max(0, self.width() - sum(widths))
         for place, width in enumerate(widths):
             self.setColumnWidth(place, width)
-        self.verticalHeader().setDefaultSectionSize(max(_ROW[0], min(_ROW[1], (self.height() - _HEADER) // 7)))
+        self._fit_rows()
 
 
 class ServoDelegate(QStyledItemDelegate):
@@ -494,7 +525,7 @@ class TendonBalance(PaintedWidget):
             self.update()
 
     def paint(self, painter: QPainter) -> None:
-        width = (self.width() - 16.0) / 2
+        width = (self.width() - 16.0 * (len(self._pairs) - 1)) / max(1, len(self._pairs))
         for k, pair in enumerate(self._pairs):
             _paint_pair(painter, QRectF(k * (width + 16.0), 0, width, self.height()), pair)
 
@@ -606,7 +637,7 @@ class ServoTable(QWidget):
         free = self._reachable and not self._armed
         if joint is not None:
             restart = menu.addAction(
-                tr("Restart servo {id} ({joint})", id=joint.id, joint=_plain(joint.name)), partial(self._ask_restart, joint)
+                tr("Restart servo {id} ({joint})", id=joint.id, joint=joint_title(joint.name)), partial(self._ask_restart, joint)
             )
             restart.setEnabled(free)
             menu.addSeparator()
@@ -617,7 +648,7 @@ class ServoTable(QWidget):
     def _show(self, status: BusStatus | None, silence_s: float | None) -> None:
         believed = self._status = status if silence_s is None else None
         if self.zeros is not None:
-            self.zeros.show_joints(joint_zeros(believed))
+            self.zeros.show_joints(joint_zeros(believed, self._servos))
         self.table.show_rows(servo_rows(believed, self._servos, self._safety))
         self._balance.show_pairs(pair_balances(believed, self._servos))
         said = bus_line(status, silence_s)
@@ -653,7 +684,7 @@ class ServoTable(QWidget):
     def _open_restart_menu(self) -> None:
         menu = self._make_menu()
         for joint in self._servos.joints:
-            menu.addAction(f"{joint.id}  {_plain(joint.name)}", partial(self._ask_restart, joint))
+            menu.addAction(f"{joint.id}  {joint_title(joint.name)}", partial(self._ask_restart, joint))
         _popup_above(menu, self._restart_button)
 
     @property
@@ -670,7 +701,7 @@ class ServoTable(QWidget):
             self.zeros.raise_()
             return
         self.zeros = dialog = ZeroDialog(self._servos, self)
-        dialog.show_joints(joint_zeros(self._status))
+        dialog.show_joints(joint_zeros(self._status, self._servos))
         dialog.zero_asked.connect(self.zero_asked)
         dialog.search_asked.connect(self.search_asked)
         dialog.torque_off_asked.connect(self.torque_off_asked)
@@ -689,7 +720,7 @@ class ServoTable(QWidget):
         return menu
 
     def _ask_restart(self, joint: JointConfig) -> None:
-        question = tr("Restart servo {id} ({joint})? It must be zeroed again.", id=joint.id, joint=_plain(joint.name))
+        question = tr("Restart servo {id} ({joint})? It must be zeroed again.", id=joint.id, joint=joint_title(joint.name))
         self._ask(self._restart_button, question, tr("Restart"), partial(self.reboot_asked.emit, joint.id))
 
     def _ask_torque_off(self) -> None:
@@ -715,7 +746,3 @@ class ServoTable(QWidget):
 
 def _popup_above(menu: QMenu, button: QPushButton) -> None:
     menu.popup(button.mapToGlobal(QPoint(0, -menu.sizeHint().height())))
-
-
-def _plain(name: str) -> str:
-    return tr_text(name).replace("_", " ")

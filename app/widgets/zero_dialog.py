@@ -13,9 +13,10 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDoubleSpinBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QWidget
 
 from app.ui import theme
-from app.ui.i18n import mark, tr, tr_text
+from app.ui.i18n import mark, tr
+from app.ui.texts import joint_title
 from app.widgets.basics import StillWheel, column, takes_enter
-from core.config.safety import JOINT_NAMES, TENDONS, JointConfig, JointName, ServosConfig
+from core.config.safety import JointConfig, JointKind, JointName, ServosConfig, kind_of_name
 from core.control.kept_zero import ZeroOffer, ZeroRequest
 from hardware.servos.registers import ServoState
 
@@ -33,21 +34,27 @@ _STEP_MM = 0.1
 class JointZero:
     """What is known of a joint's zero.
 
-    ``position_mm``: None where it is not zeroed; ``holds``: None where its servo does not tell.
+    ``position_mm``: None where it is not zeroed; ``holds``: None where its servo does not tell; ``kind``: None as the name says.
     """
 
     name: JointName
     position_mm: float | None = None
     offer: ZeroOffer | None = None
     holds: bool | None = None
+    kind: JointKind | None = None
 
     @property
     def is_tendon(self) -> bool:
-        return self.name in TENDONS
+        return (self.kind or kind_of_name(self.name)) is JointKind.TENDON
 
     @property
     def note(self) -> str:
         """In one line."""
+        text = self._note
+        return text.replace(" mm", "°") if self.kind is JointKind.ROTATION else text
+
+    @property
+    def _note(self) -> str:
         if self.position_mm is not None:
             return tr("at {at:.2f} mm", at=self.position_mm) if self.is_tendon else tr("at {at:.1f} mm", at=self.position_mm)
         if self.holds is None:
@@ -63,16 +70,16 @@ class JointZero:
         return text + moved
 
 
-def joint_zeros(status: BusStatus | None) -> tuple[JointZero, ...]:
-    """Of the seven joints, by a status of the bus."""
-    if status is None or not status.servos:
-        return tuple(JointZero(name) for name in JOINT_NAMES)
+def joint_zeros(status: BusStatus | None, servos: ServosConfig) -> tuple[JointZero, ...]:
+    """Of all joints, by a status of the bus."""
+    if status is None or len(status.servos) != len(servos.joints):
+        return tuple(JointZero(joint.name, kind=joint.kind) for joint in servos.joints)
     offers = {offer.name: offer for offer in status.offers}
     return tuple(
-        JointZero(name, reading.position_mm if zeroed else None, offers.get(name), reading.torque)
+        JointZero(joint.name, reading.position_mm if zeroed else None, offers.get(joint.name), reading.torque, joint.kind)
         if isinstance(reading, ServoState)
-        else JointZero(name)
-        for name, reading, zeroed in zip(JOINT_NAMES, status.servos, status.zeroed, strict=True)
+        else JointZero(joint.name, kind=joint.kind)
+        for joint, reading, zeroed in zip(servos.joints, status.servos, status.zeroed, strict=True)
     )
 
 
@@ -106,7 +113,7 @@ class _TendonRow(QComboBox):
 
     def __init__(self, name: JointName) -> None:
         super().__init__()
-        self.setAccessibleName(tr("Zero of {joint}", joint=tr_text(name)))
+        self.setAccessibleName(tr("Zero of {joint}", joint=joint_title(name)))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._offered: tuple[Choice, ...] = ()
 
@@ -138,12 +145,12 @@ class _FeedRow(QWidget):
         super().__init__()
         self._low_mm = joint.low_mm
         self.box = QCheckBox(tr("it is at"))
-        self.number = QDoubleSpinBox(decimals=1, singleStep=_STEP_MM, suffix=" mm")
+        self.number = QDoubleSpinBox(decimals=1, singleStep=_STEP_MM, suffix=f" {joint.unit}")
         self.number.setRange(joint.low_mm - _STEP_MM, joint.high_mm)
-        self.number.setSpecialValueText(tr("? mm"))
-        self.number.setAccessibleName(tr("Position of {joint}", joint=tr_text(joint.name).replace("_", " ")))
+        self.number.setSpecialValueText(f"? {joint.unit}")
+        self.number.setAccessibleName(tr("Position of {joint}", joint=joint_title(joint.name)))
         self.number.setValue(self.number.minimum())
-        self.box.setAccessibleName(tr("Set the position of {joint}", joint=tr_text(joint.name).replace("_", " ")))
+        self.box.setAccessibleName(tr("Set the position of {joint}", joint=joint_title(joint.name)))
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.box)
@@ -204,15 +211,15 @@ class ZeroDialog(QDialog):
         self.setModal(False)
         theme.set_sheet(self, theme.FORM_SHEET)
         self.resize(_SIZE)
-        self._tendons = {name: _TendonRow(name) for name in TENDONS}
-        self._feeds = {joint.name: _FeedRow(joint) for joint in servos.joints if joint.name not in TENDONS}
+        self._tendons = {joint.name: _TendonRow(joint.name) for joint in servos.tendons}
+        self._feeds = {joint.name: _FeedRow(joint) for joint in servos.joints if not joint.is_tendon}
         self._notes: dict[JointName, QLabel] = {}
         rows = QGridLayout()
         rows.setHorizontalSpacing(14)
         rows.setVerticalSpacing(6)
         rows.setColumnStretch(1, 1)
-        for place, name in enumerate(JOINT_NAMES):
-            title, note = QLabel(tr_text(name).replace("_", " ")), QLabel(wordWrap=True)
+        for place, name in enumerate(servos.names):
+            title, note = QLabel(joint_title(name)), QLabel(wordWrap=True)
             title.setFont(theme.semi_bold(theme.Size.BODY))
             self._notes[name] = note
             for column_number, part in enumerate((title, note, self._tendons.get(name) or self._feeds[name])):
@@ -244,7 +251,7 @@ class ZeroDialog(QDialog):
         self.set_button.clicked.connect(self._on_set)
         self.leave_button.clicked.connect(self.close)
         self._joints: tuple[JointZero, ...] = ()
-        self.show_joints(joint_zeros(None))
+        self.show_joints(joint_zeros(None, servos))
 
     @property
     def request(self) -> ZeroRequest:
@@ -261,7 +268,7 @@ class ZeroDialog(QDialog):
     @property
     def notes(self) -> list[str]:
         """What is said of each joint."""
-        return [self._notes[name].text() for name in JOINT_NAMES]
+        return [note.text() for note in self._notes.values()]
 
     def tendon(self, name: JointName) -> QComboBox:
         return self._tendons[name]

@@ -57,8 +57,9 @@ _PULL = ("pretension_mm", "pretension_mm_s", "max_pull_mm")
 
 
 class Basis(ConfigSection):
-    """What an acceptance holds for; tuples are per joint, in the order of JOINT_NAMES."""
+    """What an acceptance holds for; tuples are per joint, in their order."""
 
+    joints: tuple[JointName, ...] = JOINT_NAMES
     wiring: tuple[tuple[int, int], ...] = Field(description="id and sign")
     models: tuple[int, ...]
     mm_per_turn: tuple[float, ...]
@@ -142,9 +143,9 @@ class Acceptance(ConfigSection):
     def missing(self) -> tuple[str, ...]:
         """The steps that are not done, in their order."""
         read = {reading.name for reading in self.forces}
-        found = [] if len(self.servos) == len(JOINT_NAMES) and self.supply_v is not None else ["servos"]
-        found += [f"direction of {name}" for name in JOINT_NAMES if name not in self.directions]
-        found += [f"force of {name}" for name in JOINT_NAMES if name not in read]
+        found = [] if len(self.servos) == len(self.basis.joints) and self.supply_v is not None else ["servos"]
+        found += [f"direction of {name}" for name in self.basis.joints if name not in self.directions]
+        found += [f"force of {name}" for name in self.basis.joints if name not in read]
         found += [f"{kind} times" for kind in ("STOP", "deadman") if kind not in {one.kind for one in self.stops}]
         return (*found, *([] if self.estop is not None else [ESTOP_STEP]))
 
@@ -164,6 +165,7 @@ def basis_of(config: Config, version: str) -> Basis:
     """What an acceptance of this configuration would hold for."""
     servos, safety = config.servos, config.safety
     return Basis(
+        joints=servos.names,
         wiring=wiring_of(servos),
         models=tuple(servos.model_of(joint).number for joint in servos.joints),
         mm_per_turn=tuple(joint.mm_per_turn for joint in servos.joints),
@@ -186,9 +188,11 @@ def changes_since(accepted: Acceptance, config: Config, firmware: Sequence[int] 
 
     Parameters
     ----------
-    firmware : of the seven servos, in the order of the joints; empty: they were not asked.
+    firmware : of the servos, in the order of the joints; empty: they were not asked.
     """
     then, now = accepted.basis, basis_of(config, program_version())
+    if then.joints != now.joints:
+        return (f"the joints were {', '.join(then.joints)} and are {', '.join(now.joints)}",)
     found = [] if then.limits and then.pull else [_OF_BEFORE]
     for what, was, name in (("rig", accepted.rig, config.rig.name), ("adapter", accepted.adapter, config.servos.port or "")):
         if was != name:
@@ -203,7 +207,7 @@ def changes_since(accepted: Acceptance, config: Config, firmware: Sequence[int] 
         ("firmware", [servo.firmware for servo in accepted.servos], firmware),
     )
     for what, before, after in columns:
-        for name, old, new in zip(JOINT_NAMES, before, after, strict=False):
+        for name, old, new in zip(now.joints, before, after, strict=False):
             if old != new:
                 found.append(f"{what} of {name} was {old:g} and is {new:g}")
     for key in _PULL:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from core.config.safety import JOINT_NAMES, TENDONS, JointName, ServosConfig
+from core.config.safety import MAX_JOINTS, MIN_JOINTS, JointConfig, JointKind, JointName, ServosConfig
 from core.config.section import ConfigSection
 
 SizePx = Annotated[tuple[int, int], Field(description="width and height of the pictures")]
@@ -61,7 +61,7 @@ class ScaleConfig(ConfigSection):
 class TendonConfig(ConfigSection):
     """Where the head goes when a tendon is pulled. Angles in the image: 0 to the right, 90 down."""
 
-    name: Literal["right", "left", "up", "down"]
+    name: JointName
     direction_deg: float | None = Field(None, ge=-360.0, le=360.0, description="None: out of the image plane")
     moved_px: float = Field(ge=0.0, description="way of the head when it was learnt, in working pixels")
     px_per_mm: float = Field(ge=0.0, description="way of the head per millimetre of pull, in working pixels")
@@ -78,20 +78,14 @@ class SteeringConfig(ConfigSection):
     turn_deg_per_mm: float | None = Field(
         None, gt=0.0, le=720.0, description="turn of the head per millimetre of pull to the right or left; empty: not measured"
     )
-    tendons: tuple[TendonConfig, ...] = Field(min_length=4, max_length=4)
-
-    @model_validator(mode="after")
-    def _check_tendons(self) -> Self:
-        if tuple(tendon.name for tendon in self.tendons) != TENDONS:
-            raise ValueError(f"tendons must be these four in this order: {', '.join(TENDONS)}")
-        return self
+    tendons: tuple[TendonConfig, ...] = Field(min_length=2, max_length=4, description="in the order of the joints")
 
 
 class ZeroConfig(ConfigSection):
     """Where the joints were zeroed. Of a tendon, which never goes a whole turn, it holds modulo one turn of the servo."""
 
-    ticks: tuple[int, ...] = Field(min_length=len(JOINT_NAMES), max_length=len(JOINT_NAMES), description="position registers")
-    slack_mm: tuple[float, ...] = Field(min_length=4, max_length=4, description="how far each tendon was from taut before")
+    ticks: tuple[int, ...] = Field(min_length=MIN_JOINTS, max_length=MAX_JOINTS, description="position registers, by joint")
+    slack_mm: tuple[float, ...] = Field(min_length=2, max_length=4, description="how far each tendon was from taut before")
     pretension_mm: float = Field(ge=0.0, le=5.0)
     found_utc: datetime | None = Field(None, description="when the wires were searched; None: by an earlier version")
 
@@ -102,17 +96,20 @@ class DrumsConfig(ConfigSection):
     A lead screw counts as the drum of the same way per turn: its lead over pi.
     """
 
-    tendons_mm: float = Field(gt=0.3, le=150.0, description="of all four, with the wire on them")
+    tendons_mm: float = Field(gt=0.3, le=150.0, description="of all, with the wire on them")
     advance_mm: float = Field(gt=0.3, le=150.0)
-    delivery_mm: float = Field(gt=0.3, le=150.0, description="of both")
+    delivery_mm: float = Field(gt=0.3, le=150.0, description="of all")
 
-    def of(self, name: JointName) -> float:
-        """Diameter of a joint's drum, mm."""
-        return self.tendons_mm if name in TENDONS else self.advance_mm if name == "advance" else self.delivery_mm
+    def mm_per_turn(self, joint: JointConfig) -> float:
+        """The way of a joint at one turn of its drum; a rotation has a ratio of its own and no drum."""
+        if joint.kind is JointKind.ROTATION:
+            return joint.mm_per_turn
+        diameters = {JointKind.TENDON: self.tendons_mm, JointKind.ADVANCE: self.advance_mm, JointKind.DELIVERY: self.delivery_mm}
+        return round(math.pi * diameters[joint.kind], 4)
 
     def applied(self, servos: ServosConfig) -> ServosConfig:
         """The servos with the way per turn that these drums give."""
-        joints = tuple(joint.model_copy(update={"mm_per_turn": round(math.pi * self.of(joint.name), 4)}) for joint in servos.joints)
+        joints = tuple(joint.model_copy(update={"mm_per_turn": self.mm_per_turn(joint)}) for joint in servos.joints)
         return servos.model_copy(update={"joints": joints})
 
     def fit(self, servos: ServosConfig) -> bool:
@@ -136,8 +133,8 @@ class CalibrationConfig(ConfigSection):
     )
     wiring: tuple[tuple[int, int], ...] | None = Field(
         None,
-        min_length=len(JOINT_NAMES),
-        max_length=len(JOINT_NAMES),
+        min_length=MIN_JOINTS,
+        max_length=MAX_JOINTS,
         description="id and sign of each joint, found or confirmed: others in servos.joints are not known to be right",
     )
     drums: DrumsConfig | None = Field(None, description="None: nobody has measured them, and the ways per turn are assumed")
@@ -149,3 +146,14 @@ class CalibrationConfig(ConfigSection):
     view: str | None = Field(
         None, max_length=100_000, description="small picture of the bench at its calibration (JPEG, base64): shows a moved camera"
     )
+
+    def misfit(self, servos: ServosConfig) -> str:
+        """What in it belongs to a robot of another shape than these servos drive, in one line; "" for nothing."""
+        count, tendons = len(servos.joints), servos.names[servos.places(JointKind.TENDON)]
+        if self.wiring is not None and len(self.wiring) != count:
+            return f"calibration.wiring has {len(self.wiring)} joints, the robot has {count}"
+        if self.zero is not None and (len(self.zero.ticks), len(self.zero.slack_mm)) != (count, len(tendons)):
+            return f"calibration.zero must have {count} ticks and {len(tendons)} slack_mm"
+        if self.steering is not None and tuple(one.name for one in self.steering.tendons) != tendons:
+            return f"calibration.steering.tendons must be these in this order: {', '.join(tendons)}"
+        return ""

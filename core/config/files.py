@@ -23,7 +23,7 @@ from tomlkit.items import AoT, Table
 from tomlkit.toml_document import TOMLDocument
 
 from core.config.models import RESOURCES, Config, ConfigError, load_config, merge
-from core.config.schema import JOINTS, FieldKind, settings_by_key, value_at
+from core.config.schema import JOINTS, FieldKind, setting_at, settings_by_key, value_at
 from core.config.section import plain_message
 from core.devices import UserError
 from core.files import write_atomic
@@ -190,7 +190,7 @@ def settings_text(old: str, config: Config) -> tuple[str, bool]:
 def changed_keys(first: Config, second: Config) -> tuple[str, ...]:
     """Dotted paths of all settings that differ."""
     one, other = first.model_dump(mode="json"), second.model_dump(mode="json")
-    return tuple(key for key in settings_by_key() if value_at(one, key) != value_at(other, key))
+    return tuple(key for key in settings_by_key() if setting_at(one, key) != setting_at(other, key))
 
 
 def _old_text(path: Path, seen: str | None) -> tuple[str, str]:

@@ -66,6 +66,8 @@ class RigFile(ConfigSection):
             raise ValueError("a real camera does not see the twin's robot: robot must be servos or none")
         if self.robot == "servos" and (self.kind == "twin" or self.servos.port is None):
             raise ValueError("robot servos needs a real camera and servos.port")
+        if self.calibration is not None and (misfit := self.calibration.misfit(self.servos)):
+            raise ValueError(f"{misfit}: calibrate again")
         if self.robot == "servos" and self.servos.too_loose:
             raise ValueError(f"servos: {self.servos.too_loose}")
         return self

@@ -1,18 +1,22 @@
-"""Thresholds of gate and supervisor, and the seven servos as configuration.
+"""Thresholds of gate and supervisor, and the robot's joints with their servos as configuration.
 
 The safety rules' own numbers are the upper ends: they may be tightened only, and not below what it takes to repeat an input, or a
 held control or deadman would be released again and again.
 
-Joint coordinates are millimetres: of tendon pull (positive tightens), of robot advance, of catheter delivery. Zero is where the
-joint was zeroed; there, a tendon has no tension.
+Joints are data: ``JointKind`` has their kinds in the order in which they stand everywhere, and all else (gate, bus, recording,
+windows, twin) follows from ``ServosConfig.joints``. Joint coordinates are millimetres: of tendon pull (positive tightens), of robot
+advance, of catheter delivery; of the shaft's rotation they are degrees, whatever the name of a value says (``JointConfig.unit``).
+Zero is where the joint was zeroed; there, a tendon has no tension.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, Self
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator
 
 from core.config.section import ConfigSection
 from core.config.servo_models import SERVO_MODELS, ForceLimit, ServoModel, force_limit, unsupported
@@ -81,19 +85,60 @@ class SafetyConfig(ConfigSection):
 TICKS_PER_TURN = 4096
 """Position units of a DYNAMIXEL X servo per turn of its horn."""
 
-JointName = Literal["right", "left", "up", "down", "advance", "delivery_1", "delivery_2"]
-JOINT_NAMES: tuple[JointName, ...] = ("right", "left", "up", "down", "advance", "delivery_1", "delivery_2")
-TENDONS = JOINT_NAMES[:4]
+
+class JointKind(StrEnum):
+    """What a joint moves. The joints of a robot stand in this order."""
+
+    TENDON = "tendon"
+    ADVANCE = "advance"
+    DELIVERY = "delivery"
+    ROTATION = "rotation"
+
+
+JointName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,23}$")]
+"""Name of a joint in files, unique in its robot."""
+TENDON_ANGLES_DEG: dict[str, float] = {"right": 0.0, "left": 180.0, "up": 90.0, "down": 270.0}
+"""Tendons whose name says their direction around the shaft: 0 to the robot's right on the screen, 90 towards the camera."""
+TENDONS: tuple[JointName, ...] = tuple(TENDON_ANGLES_DEG)
+"""Tendons of the default robot."""
+JOINT_NAMES: tuple[JointName, ...] = (*TENDONS, "advance", "delivery_1", "delivery_2")
+"""Joints of the default robot, which is the one that the wizard calibrates."""
+MIN_JOINTS, MAX_JOINTS = 2, 12
+_TENDON_COUNTS = (2, 3, 4)
+_EVENLY_DEG = 1e-6
+"""Rounding of directions that are evenly spaced."""
 _TENDON_FORCE_N = 20.0
 """Below what a steel or nitinol wire of 0.15 mm bears (25 to 35 N, by its cross-section); five times what bends the twin's head."""
+_ROTATION_TORQUE_NMM = 30.0
+"""Of the shaft: 20 N at the surface of a shaft of 3 mm."""
+_DEG_PER_MM = 10.0
+"""A distance of the shaft's rotation from its goal counts as that of a tendon or feed at so many degrees for each millimetre."""
 _FEED_FORCE_N = 30.0
 """Of the feed and of each servo of the catheter's delivery: what their own friction leaves of it reaches the catheter."""
+
+
+_FIELDS_OF_ROTATION = {
+    "mm_per_turn": "deg_per_turn",
+    "low_mm": "low_deg",
+    "high_mm": "high_deg",
+    "warn_margin_mm": "warn_margin_deg",
+    "max_speed_mm_s": "max_speed_deg_s",
+    "max_acceleration_mm_s2": "max_acceleration_deg_s2",
+    "max_step_mm": "max_step_deg",
+    "max_force_n": "max_torque_nmm",
+}
+"""Names in files of the values of a rotation, by those of ``JointConfig``."""
+_KEYS_OF_ROTATION = {key: field for field, key in _FIELDS_OF_ROTATION.items()}
 
 
 class JointConfig(ConfigSection):
     """One servo and the joint that it drives."""
 
     name: JointName
+    kind: JointKind = Field(description="what it moves; names of the default robot and rotation say it")
+    angle_deg: float | None = Field(
+        None, ge=-360.0, lt=360.0, description="direction of a tendon around the shaft: 0 right, 90 towards the camera, 180 left"
+    )
     id: int = Field(ge=0, le=252, description="on the bus")
     model: int | None = Field(None, ge=0, le=65535, description="model number of its servo; empty: servos.model")
     sign: Literal[-1, 1] = Field(1, description="direction of the servo that increases the joint's millimetres")
@@ -114,17 +159,64 @@ class JointConfig(ConfigSection):
 
     @model_validator(mode="before")
     @classmethod
-    def _fill_force(cls, data: Any) -> Any:
-        """The default depends on what the joint moves; older files have none."""
-        if isinstance(data, dict) and "max_force_n" not in data:
-            return {**data, "max_force_n": _TENDON_FORCE_N if data.get("name") in TENDONS else _FEED_FORCE_N}
+    def _fill(cls, data: Any) -> Any:
+        """Kind and direction follow from a known name, as in older files, and the default force from the kind."""
+        if not isinstance(data, dict):
+            return data
+        data = dict(data)
+        name = str(data.get("name"))
+        if data.get("kind") is None and (kind := kind_of_name(name)) is not None:
+            data["kind"] = kind
+        if data.get("angle_deg") is None and name in TENDON_ANGLES_DEG:
+            data["angle_deg"] = TENDON_ANGLES_DEG[name]
+        if data.get("kind") == JointKind.ROTATION:
+            data = {_KEYS_OF_ROTATION.get(key, key): value for key, value in data.items()}
+            return {"mm_per_turn": 360.0, "warn_margin_mm": 3.0, "max_force_n": _ROTATION_TORQUE_NMM} | data
+        if "max_force_n" not in data:
+            data["max_force_n"] = _TENDON_FORCE_N if data.get("kind") == JointKind.TENDON else _FEED_FORCE_N
         return data
+
+    @model_serializer(mode="wrap")
+    def _with_units(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The keys of a rotation say degrees and N mm."""
+        data: dict[str, Any] = dump(self)
+        if self.kind is not JointKind.ROTATION:
+            return data
+        return {_FIELDS_OF_ROTATION.get(key, key): value for key, value in data.items()}
 
     @model_validator(mode="after")
     def _check_envelope(self) -> Self:
+        if self.is_tendon is not (self.angle_deg is not None):
+            raise ValueError(
+                f"joint {self.name}: a tendon needs angle_deg, its direction around the shaft, and no other joint has one"
+            )
         if self.low_mm + 2 * self.warn_margin_mm >= self.high_mm:
             raise ValueError(f"joint {self.name}: low_mm + 2 warn_margin_mm must be below high_mm")
         return self
+
+    @property
+    def is_tendon(self) -> bool:
+        return self.kind is JointKind.TENDON
+
+    @property
+    def is_feed(self) -> bool:
+        """Whether it feeds robot or catheter."""
+        return self.kind in (JointKind.ADVANCE, JointKind.DELIVERY)
+
+    @property
+    def unit(self) -> str:
+        """Unit of its coordinate."""
+        return "°" if self.kind is JointKind.ROTATION else "mm"
+
+    @property
+    def force_unit(self) -> str:
+        """Unit of what its servo gives at most."""
+        return "N mm" if self.kind is JointKind.ROTATION else "N"
+
+    @property
+    def drum_mm_per_turn(self) -> float:
+        """The way (mm per turn) along which its force acts; of a rotation that at 1 mm from the axis, where N mm are N."""
+        return math.radians(self.mm_per_turn) if self.kind is JointKind.ROTATION else self.mm_per_turn
 
     @property
     def ticks_per_mm(self) -> float:
@@ -132,14 +224,22 @@ class JointConfig(ConfigSection):
         return self.sign * TICKS_PER_TURN / self.mm_per_turn
 
 
+def kind_of_name(name: str) -> JointKind | None:
+    """What a joint of the default robot moves, by its name; None for other names."""
+    if name in TENDON_ANGLES_DEG:
+        return JointKind.TENDON
+    stem = name.rstrip("_0123456789")
+    return JointKind(stem) if stem in (JointKind.ADVANCE, JointKind.DELIVERY, JointKind.ROTATION) else None
+
+
 def _tendon(name: JointName, number: int) -> JointConfig:
     limits: Any = {"low_mm": -2.4, "high_mm": 2.8, "max_speed_mm_s": 10.0, "max_step_mm": 0.6}
-    return JointConfig(name=name, id=number, max_acceleration_mm_s2=200.0, **limits)
+    return JointConfig.model_validate({"name": name, "id": number, "max_acceleration_mm_s2": 200.0, **limits})
 
 
 def _feed(name: JointName, number: int) -> JointConfig:
     limits: Any = {"low_mm": -5.0, "high_mm": 400.0, "warn_margin_mm": 2.0, "max_speed_mm_s": 20.0, "max_step_mm": 1.0}
-    return JointConfig(name=name, id=number, max_acceleration_mm_s2=200.0, **limits)
+    return JointConfig.model_validate({"name": name, "id": number, "max_acceleration_mm_s2": 200.0, **limits})
 
 
 _MOST = {"heartbeat_timeout_s": 0.5, "watchdog_s": 0.5, "tracking_error_mm": 3.0}
@@ -153,6 +253,15 @@ _MOST_TENDON_STEP_MM, _MOST_FEED_STEP_MM = 1.0, 2.0
 """Ceilings of ``max_step_mm`` with real servos: so far a joint goes when the program dies."""
 _MOST_TENDON_FORCE_N, _MOST_FEED_FORCE_N = 60.0, 100.0
 """Ceilings of ``max_force_n`` with real servos: beyond, it protects neither wire nor catheter."""
+_MOST_ROTATION_STEP_DEG, _MOST_ROTATION_TORQUE_NMM = 10.0, 100.0
+"""The same of the shaft's rotation."""
+_CEILINGS: dict[JointKind, tuple[float, float]] = {
+    JointKind.TENDON: (_MOST_TENDON_STEP_MM, _MOST_TENDON_FORCE_N),
+    JointKind.ADVANCE: (_MOST_FEED_STEP_MM, _MOST_FEED_FORCE_N),
+    JointKind.DELIVERY: (_MOST_FEED_STEP_MM, _MOST_FEED_FORCE_N),
+    JointKind.ROTATION: (_MOST_ROTATION_STEP_DEG, _MOST_ROTATION_TORQUE_NMM),
+}
+"""Ceilings of ``max_step_mm`` and ``max_force_n`` with real servos."""
 
 
 AtClose = Literal["ask", "hold", "relax", "torque off"]
@@ -160,7 +269,7 @@ AtClose = Literal["ask", "hold", "relax", "torque off"]
 
 
 class ServosConfig(ConfigSection):
-    """The bus and its seven joints."""
+    """The bus and the robot's joints."""
 
     driver: Literal["dynamixel", "direct"] = Field("dynamixel", description="direct: the twin without servos, a lighter load")
     port: str | None = Field(None, min_length=1, description="serial device; empty: the twin's own pseudo-terminal")
@@ -197,23 +306,42 @@ class ServosConfig(ConfigSection):
             *(_tendon(name, number) for number, name in enumerate(TENDONS, start=1)),
             *(_feed(name, number) for number, name in enumerate(JOINT_NAMES[4:], start=5)),
         ),
-        min_length=7,
-        max_length=7,
+        min_length=MIN_JOINTS,
+        max_length=MAX_JOINTS,
     )
 
     @model_validator(mode="after")
     def _check_joints(self) -> Self:
-        if tuple(joint.name for joint in self.joints) != JOINT_NAMES:
-            raise ValueError(f"joints must be these seven in this order: {', '.join(JOINT_NAMES)}")
+        if problem := _shape_problem(self.joints):
+            raise ValueError(f"joints: {problem}")
         if len({joint.id for joint in self.joints}) != len(self.joints):
             raise ValueError("joints: two servos have the same id")
         for joint in self.joints:
             if problem := unsupported(self.model if joint.model is None else joint.model):
                 raise ValueError(f"joint {joint.name}: {problem}")
-            rest_mm, what = (self.pretension_mm, "pretension_mm") if joint.name in TENDONS else (0.0, "zero")
+            rest_mm, what = (self.pretension_mm, "pretension_mm") if joint.is_tendon else (0.0, "zero")
             if not joint.low_mm <= rest_mm <= joint.high_mm:
                 raise ValueError(f"joint {joint.name}: {what} must lie between low_mm and high_mm, or it would be driven at rest")
         return self
+
+    @property
+    def is_default(self) -> bool:
+        """Whether these are the joints of the default robot."""
+        return self.names == JOINT_NAMES
+
+    @property
+    def names(self) -> tuple[JointName, ...]:
+        return tuple(joint.name for joint in self.joints)
+
+    def places(self, *kinds: JointKind) -> slice:
+        """Indices of the joints of these kinds, which stand one after another; empty for none."""
+        found = [place for place, joint in enumerate(self.joints) if joint.kind in kinds]
+        return slice(found[0], found[-1] + 1) if found else slice(0, 0)
+
+    @property
+    def tendons(self) -> tuple[JointConfig, ...]:
+        """The tendons; they stand first."""
+        return self.joints[self.places(JointKind.TENDON)]
 
     def model_of(self, joint: JointConfig) -> ServoModel:
         """The model of a joint's servo."""
@@ -221,7 +349,11 @@ class ServosConfig(ConfigSection):
 
     def force_limit(self, joint: JointConfig) -> ForceLimit:
         """How the joint's servo limits its force."""
-        return force_limit(self.model_of(joint), joint.mm_per_turn, joint.max_force_n)
+        return force_limit(self.model_of(joint), joint.drum_mm_per_turn, joint.max_force_n)
+
+    def astray_mm(self, joint: JointConfig) -> float:
+        """A joint that is farther from its goal is jammed, in its own unit."""
+        return self.tracking_error_mm * (_DEG_PER_MM if joint.kind is JointKind.ROTATION else 1.0)
 
     @property
     def weak_joints(self) -> tuple[tuple[JointConfig, float], ...]:
@@ -244,14 +376,10 @@ class ServosConfig(ConfigSection):
             if getattr(self, name) > limit:
                 return f"{name} must be {limit:g} at most with real servos"
         for joint in self.joints:
-            is_tendon = joint.name in TENDONS
-            ceilings = {
-                "max_step_mm": _MOST_TENDON_STEP_MM if is_tendon else _MOST_FEED_STEP_MM,
-                "max_force_n": _MOST_TENDON_FORCE_N if is_tendon else _MOST_FEED_FORCE_N,
-            }
-            for name, limit in ceilings.items():
+            for name, limit in zip(("max_step_mm", "max_force_n"), _CEILINGS[joint.kind], strict=True):
                 if getattr(joint, name) > limit:
-                    return f"joint {joint.name}: {name} must be {limit:g} at most with real servos"
+                    key = _FIELDS_OF_ROTATION[name] if joint.kind is JointKind.ROTATION else name
+                    return f"joint {joint.name}: {key} must be {limit:g} at most with real servos"
         if self.unattended_s < _LEAST_UNATTENDED_S:
             return f"unattended_s must be {_LEAST_UNATTENDED_S:g} at least with real servos"
         return "" if self.bus_hz >= _MIN_BUS_HZ else f"bus_hz must be {_MIN_BUS_HZ:g} at least with real servos"
@@ -261,6 +389,32 @@ class ServosConfig(ConfigSection):
         if self.watchdog_s < 2.0 / self.bus_hz:
             raise ValueError("watchdog_s must be two cycles of the bus (2 / bus_hz) at least, or it trips by itself")
         return self
+
+
+def _shape_problem(joints: Sequence[JointConfig]) -> str:
+    """Why joints make no robot that can be driven, in one line; "" when they do."""
+    if len({joint.name for joint in joints}) != len(joints):
+        return "two have the same name"
+    kinds = [joint.kind for joint in joints]
+    if kinds != sorted(kinds, key=list(JointKind).index):
+        return f"their order must be {', '.join(JointKind)}"
+    for kind in (JointKind.ADVANCE, JointKind.ROTATION):
+        if kinds.count(kind) > 1:
+            return f"there may be one {kind} only"
+    angles = [joint.angle_deg or 0.0 for joint in joints if joint.is_tendon]
+    if len(angles) not in _TENDON_COUNTS:
+        return f"{len(angles)} tendons; a robot has 2, 3 or 4"
+    # opposite tendons stand side by side: they are driven against each other
+    wanted = {2: (0, 180), 3: (0, 120, 240), 4: (0, 180, 90, 270)}[len(angles)]
+    turned = [(angle - angles[0]) % 360.0 for angle in angles]
+    ways = [turned, [(-angle) % 360.0 for angle in turned]]
+    if not any(all(_apart(one, other) <= _EVENLY_DEG for one, other in zip(way, wanted, strict=True)) for way in ways):
+        return f"the tendons' angle_deg must be evenly spaced, in the order {', '.join(map(str, wanted))} from the first one"
+    return ""
+
+
+def _apart(one_deg: float, other_deg: float) -> float:
+    return abs(math.remainder(one_deg - other_deg, 360.0))
 
 
 def wiring_of(servos: ServosConfig) -> tuple[tuple[int, int], ...]:

@@ -203,6 +203,14 @@ def value_at(data: Any, key: str) -> Any:
     return data
 
 
+def setting_at(data: Any, key: str) -> Any:
+    """The value of a setting; None for one of a joint that a robot of another shape does not have."""
+    try:
+        return value_at(data, key)
+    except KeyError:
+        return None
+
+
 def with_value(data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
     """A copy of nested dictionaries and lists with one value replaced."""
 
@@ -231,7 +239,7 @@ def _section(model: type[BaseModel], key: str, title: str | None = None) -> Sect
         elif path == JOINTS:
             (item, *_) = get_args(kind)
             sections.extend(_section(item, f"{path}.{k}", f"Joint {name.replace('_', ' ')}") for k, name in enumerate(JOINT_NAMES))
-        elif name != "name" or not key.startswith(JOINTS):  # a joint's name is its place
+        elif not key.startswith(JOINTS) or name not in ("name", "kind", "angle_deg"):  # a joint's place says what it is
             settings += _setting(path, info)
     text = _SOURCE.sub("", " ".join((model.__doc__ or "").split())) if model.__doc__ != BaseModel.__doc__ else ""
     shown = title or _TITLES.get(key) or _title(key.rpartition(".")[2])

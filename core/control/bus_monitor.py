@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
+from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault
 from core.messages import message
 
 
 @dataclass(frozen=True, slots=True)
 class BusReport:
-    """One cycle of the bus; tuples are per joint, in the order of JOINT_NAMES, and empty when not read in this cycle.
+    """One cycle of the bus; tuples are per joint, in the order of the configuration, and empty when not read in this cycle.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ def supply_cause(volts: Sequence[float], since_well_s: float, load_ma: float, se
 
 @dataclass(frozen=True, slots=True)
 class CurrentSample:
-    """The amounts of the seven currents (mA) at a moment; None where a servo reports none, or did not answer."""
+    """The amounts of the currents (mA) at a moment; None where a servo reports none, or did not answer."""
 
     time_s: float
     currents_ma: tuple[float | None, ...]
@@ -171,7 +171,7 @@ class BusMonitor:
             errors = (*errors, (now_s, report.errors))
         since_s, astray = self.astray_since_s, self.astray
         if report.tracking_mm:
-            astray = _first_astray(report.tracking_mm, servos.tracking_error_mm)
+            astray = _first_astray(report.tracking_mm, servos)
             since_s = (since_s if since_s is not None else now_s) if astray else None
         currents, strained = self.currents, self.strained
         if report.currents_ma:
@@ -181,7 +181,7 @@ class BusMonitor:
             strained = _strain(currents, servos)
         gap_run, gaps = self.gap_run, self.gaps
         if report.misses:
-            missing = {name for name, misses in zip(JOINT_NAMES, report.misses, strict=False) if misses > 0}
+            missing = {name for name, misses in zip(servos.names, report.misses, strict=False) if misses > 0}
             gap_run, gaps = (gap_run + 1, gaps | missing) if missing else (0, frozenset())
         powered_s = self.powered_s
         if report.voltages_v and all(spare_v > _SPARE_V for spare_v in _spare_v(report.voltages_v, servos)):
@@ -229,7 +229,7 @@ class BusMonitor:
             found.append(
                 (Cause.BUS_NOISE, message("{a} in {b:g} s (at most {c})", a=bad, b=safety.bus_errors_window_s, c=safety.bus_errors))
             )
-        silent = _listed(newest.misses, lambda misses: misses >= safety.missed_answers, "")
+        silent = _listed(servos.names, newest.misses, lambda misses: misses >= safety.missed_answers, "")
         if (
             silent and min(newest.misses) > 0 and bad <= safety.bus_errors
         ):  # the port is still there, so the adapter has its power, and the servos have none
@@ -237,8 +237,8 @@ class BusMonitor:
         elif silent:
             found.append((Cause.SERVO_SILENT, silent))
         elif self.gap_run > safety.bus_disarm_s * servos.bus_hz:
-            # each one answers often enough, but the positions of all seven, which the motion needs, are never there
-            names = ", ".join(name for name in JOINT_NAMES if name in self.gaps)
+            # each one answers often enough, but the positions of all, which the motion needs, are never there
+            names = ", ".join(name for name in servos.names if name in self.gaps)
             found.append((Cause.SERVO_SILENT, f"in turns, {names}: not all in one cycle for {safety.bus_disarm_s:g} s"))
         is_astray = self.astray_since_s is not None and now_s - self.astray_since_s >= safety.tracking_time_s
         # room to each joint's own limit: its model's, or a tighter one of the configuration
@@ -248,17 +248,20 @@ class BusMonitor:
         is_gone = supply_cause(newest.voltages_v, now_s - self.powered_s, load_ma, servos) is Cause.SUPPLY_LOST
         # what a servo says of a supply that is going away is no defect of the servo
         errors = [bits & ~_VOLTAGE_ERROR if is_gone else bits for bits in newest.hardware_errors]
-        hot, low = _short(newest.temperatures_c, cooler_c, 0.0, " {:.0f} °C"), _short(newest.voltages_v, spare_v, 0.0, " {:.1f} V")
-        warm = _short(newest.temperatures_c, cooler_c, safety.temperature_warn_margin_c, " {:.0f} °C")
-        sags = _short(newest.voltages_v, spare_v, safety.voltage_warn_margin_v, " {:.1f} V")
+        hot, low = (
+            _short(servos.names, newest.temperatures_c, cooler_c, 0.0, " {:.0f} °C"),
+            _short(servos.names, newest.voltages_v, spare_v, 0.0, " {:.1f} V"),
+        )
+        warm = _short(servos.names, newest.temperatures_c, cooler_c, safety.temperature_warn_margin_c, " {:.0f} °C")
+        sags = _short(servos.names, newest.voltages_v, spare_v, safety.voltage_warn_margin_v, " {:.1f} V")
         found += [
-            (Cause.SERVO_ALERT, _listed(errors, lambda bits: bits != 0, " {:#04x}")),
+            (Cause.SERVO_ALERT, _listed(servos.names, errors, lambda bits: bits != 0, " {:#04x}")),
             (Cause.TRACKING, is_astray and self.astray),
             (Cause.STRAINED, self.strained),
             (Cause.TORQUE_ON, newest.torque_problem),
             (Cause.REBOOTED, self.rebooted),
-            (Cause.SERVOS_WRONG, _listed(newest.limit_lost, bool, " has lost its force limit")),
-            (Cause.TORQUE_TAKEN, _listed(newest.torque_taken, bool, "")),
+            (Cause.SERVOS_WRONG, _listed(servos.names, newest.limit_lost, bool, " has lost its force limit")),
+            (Cause.TORQUE_TAKEN, _listed(servos.names, newest.torque_taken, bool, "")),
             (Cause.WATCHDOG, newest.watchdog_tripped),
             (Cause.HOT, hot),
             (Cause.WARM, not hot and warm),
@@ -274,20 +277,22 @@ def _spare_v(volts: Sequence[float], servos: ServosConfig) -> list[float]:
     return [v - servos.lowest_v(joint) for joint, v in zip(servos.joints, volts, strict=False)]
 
 
-def _listed(values: Sequence[Any], is_bad: Callable[[Any], bool], how: str) -> str:
+def _listed(names: Sequence[str], values: Sequence[Any], is_bad: Callable[[Any], bool], how: str) -> str:
     """The joints whose value is bad, with the value as text."""
-    return ", ".join(f"{name}{how.format(value)}" for name, value in zip(JOINT_NAMES, values, strict=False) if is_bad(value))
+    return ", ".join(f"{name}{how.format(value)}" for name, value in zip(names, values, strict=False) if is_bad(value))
 
 
-def _short(values: Sequence[float], rooms: Sequence[float], margin: float, how: str) -> str:
+def _short(names: Sequence[str], values: Sequence[float], rooms: Sequence[float], margin: float, how: str) -> str:
     """The joints whose room to a limit is not above `margin`, with the value as text; NaN counts as no room."""
-    pairs = zip(JOINT_NAMES, values, rooms, strict=False)
+    pairs = zip(names, values, rooms, strict=False)
     return ", ".join(f"{name}{how.format(value)}" for name, value, room in pairs if not room > margin)
 
 
-def _first_astray(tracking_mm: Sequence[float], limit_mm: float) -> str:
+def _first_astray(tracking_mm: Sequence[float], servos: ServosConfig) -> str:
     """The first joint that is too far from its goal; NaN counts as too far."""
-    for name, error_mm in zip(JOINT_NAMES, tracking_mm, strict=False):
-        if not abs(error_mm) <= limit_mm:
-            return message("{joint} off by {a:.2f} mm (at most {b:g} mm)", joint=name, a=error_mm, b=limit_mm)
+    for joint, error in zip(servos.joints, tracking_mm, strict=False):
+        if not abs(error) <= (limit := servos.astray_mm(joint)):
+            if joint.unit == "°":
+                return message("{joint} off by {a:.1f}° (at most {b:g}°)", joint=joint.name, a=error, b=limit)
+            return message("{joint} off by {a:.2f} mm (at most {b:g} mm)", joint=joint.name, a=error, b=limit)
     return ""

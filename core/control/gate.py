@@ -4,7 +4,7 @@
 last, and keeps within speed and envelope), since a clamp would hide the fault and still move the robot: numbers that are not
 finite, wrong counts, times from the future, anything stale, goals more than one position unit beyond the envelope, and goals
 further from the last one than the joint can travel at full speed while a command is valid (``command_max_age_s``). Every
-rejection holds all seven joints.
+rejection holds all joints.
 
 *Limited*, and recorded, is what timing, lag and inertia of an honest run produce: a step longer than this tick allows at the
 joint's speed and acceleration or inside the warn margin, a rounding error at the envelope's end, and a goal further than
@@ -28,9 +28,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JointKind, JointName, SafetyConfig, ServosConfig
 from core.control.joints import (
-    ONE_CATHETER,
     Goal,
     Joints,
     Limit,
@@ -43,8 +42,6 @@ from core.control.joints import (
     together,
 )
 from core.messages import message
-
-_COUNT = len(JOINT_NAMES)
 
 
 class Source(StrEnum):
@@ -92,7 +89,7 @@ class GoalRequest:
 
 @dataclass(frozen=True, slots=True)
 class JointMeasurement:
-    """Positions of the seven joints (mm), and when they were read."""
+    """Positions of the joints (mm), and when they were read."""
 
     positions_mm: Sequence[float]
     measured_s: float
@@ -119,10 +116,10 @@ def clock_objection(last_s: float | None, now_s: float, safety: SafetyConfig) ->
     return None
 
 
-def malformed(request: GoalRequest | None, now_s: float) -> Rejection | None:
+def malformed(request: GoalRequest | None, now_s: float, servos: ServosConfig) -> Rejection | None:
     if request is None:
         return None
-    if (wrong := _not_seven_numbers(request.goals_mm)) is not None:
+    if (wrong := _not_all_numbers(request.goals_mm, servos)) is not None:
         return wrong
     times = [request.issued_s] if request.captured_s is None else [request.issued_s, request.captured_s]
     if not all(math.isfinite(time_s) for time_s in times):
@@ -132,12 +129,12 @@ def malformed(request: GoalRequest | None, now_s: float) -> Rejection | None:
     return None
 
 
-def _not_seven_numbers(values: Sequence[float]) -> Rejection | None:
-    if len(values) != _COUNT:
-        return Rejection(RejectReason.WRONG_COUNT, f"{len(values)} instead of {_COUNT}")
-    for name, value in zip(JOINT_NAMES, values, strict=True):
+def _not_all_numbers(values: Sequence[float], servos: ServosConfig) -> Rejection | None:
+    if len(values) != len(servos.joints):
+        return Rejection(RejectReason.WRONG_COUNT, f"{len(values)} instead of {len(servos.joints)}")
+    for joint, value in zip(servos.joints, values, strict=True):
         if not math.isfinite(value):
-            return Rejection(RejectReason.NON_FINITE, name)
+            return Rejection(RejectReason.NON_FINITE, joint.name)
     return None
 
 
@@ -176,7 +173,7 @@ def measurement_problem(
     """Why the measured positions are not valid; None: they are."""
     if measurement is None:
         return Rejection(RejectReason.NO_MEASUREMENT)
-    if (wrong := _not_seven_numbers(measurement.positions_mm)) is not None:
+    if (wrong := _not_all_numbers(measurement.positions_mm, servos)) is not None:
         return replace(wrong, detail=message("measured position: {what}", what=wrong.detail))
     age_s = now_s - measurement.measured_s
     if not math.isfinite(age_s):
@@ -221,7 +218,6 @@ def too_far(request: GoalRequest, base_mm: Joints, servos: ServosConfig, safety:
     return None
 
 
-_AT_REST: Joints = (0.0,) * len(JOINT_NAMES)
 _RECORDED_MM = 1e-9  # smaller differences are rounding errors
 
 
@@ -237,11 +233,11 @@ class Clamp:
 
 @dataclass(frozen=True, slots=True)
 class GateState:
-    """State of the gate. ``goals_mm`` are the last goals that left it."""
+    """State of the gate. ``goals_mm`` are the last goals that left it; ``speeds_mm_s`` theirs, empty at rest."""
 
     time_s: float | None = None
     goals_mm: Joints | None = None
-    speeds_mm_s: Joints = _AT_REST
+    speeds_mm_s: Joints = ()
     moving: bool = False
     issued_s: float | None = None
 
@@ -288,9 +284,9 @@ def gate_step(
     Returns
     -------
     GateStep
-        Either a rejection with a hold, or seven goals inside every limit, with a record of what was limited.
+        Either a rejection with a hold, or goals of all joints inside every limit, with a record of what was limited.
     """
-    if measurement is not None and _not_seven_numbers(measurement.positions_mm) is None:
+    if measurement is not None and _not_all_numbers(measurement.positions_mm, servos) is None:
         if permitted is Source.PROGRAM:
             servos = by_program(servos, measurement.positions_mm, state.sent)
         else:
@@ -301,7 +297,7 @@ def gate_step(
     believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None
     objection = (
         clock_objection(state.time_s, now_s, safety)
-        or malformed(request, now_s)
+        or malformed(request, now_s, servos)
         or not_permitted(request, permitted)
         or stale(request, state.issued_s, now_s, safety)
         or mistrust
@@ -312,15 +308,15 @@ def gate_step(
     if (far := too_far(request, base.goals_mm, servos, safety)) is not None:
         return _hold(state, believed, now_s, far, servos)
     if state.sent is None:
-        return _entry(request, base, now_s)
+        return _entry(request, base, now_s, servos)
     return _move(state, base, request, believed, now_s, servos, safety)
 
 
-def _entry(request: GoalRequest, base: SentGoals, now_s: float) -> GateStep:
+def _entry(request: GoalRequest, base: SentGoals, now_s: float, servos: ServosConfig) -> GateStep:
     """The first goals of a motion are the measured positions, whatever is asked for."""
     clamps = tuple(
-        Clamp(name, asked, goal, Limit.ENTRY)
-        for name, asked, goal in zip(JOINT_NAMES, request.goals_mm, base.goals_mm, strict=True)
+        Clamp(joint.name, asked, goal, Limit.ENTRY)
+        for joint, asked, goal in zip(servos.joints, request.goals_mm, base.goals_mm, strict=True)
         if abs(asked - goal) > _RECORDED_MM
     )
     return GateStep(base.goals_mm, GateState(now_s, base.goals_mm, moving=True, issued_s=request.issued_s), clamps=clamps)
@@ -336,13 +332,14 @@ def _move(
     safety: SafetyConfig,
 ) -> GateStep:
     passed_s = min(now_s - base.time_s, safety.command_max_age_s)
+    speeds = state.speeds_mm_s or (0.0,) * len(servos.joints)
     limited: list[Goal] = [
         limited_goal(asked_mm, from_mm, speed_mm_s, at_mm, passed_s, joint, safety.margin_speed_share)
         for asked_mm, from_mm, speed_mm_s, at_mm, joint in zip(
-            request.goals_mm, base.goals_mm, state.speeds_mm_s, measured_mm, servos.joints, strict=True
+            request.goals_mm, base.goals_mm, speeds, measured_mm, servos.joints, strict=True
         )
     ]
-    pair = ONE_CATHETER
+    pair = servos.places(JointKind.DELIVERY)  # joints of one catheter: driven apart they would stretch or buckle it
     limited[pair] = together(limited[pair], base.goals_mm[pair], measured_mm[pair], servos.joints[pair])
     goals: list[float] = []
     clamps: list[Clamp] = []
@@ -354,7 +351,6 @@ def _move(
         goals.append(goal_mm)
         if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:
             clamps.append(Clamp(joint.name, asked_mm, goal_mm, limit))
-    speeds = state.speeds_mm_s
     if passed_s > 0.0:
         speeds = tuple((goal - old) / passed_s for goal, old in zip(goals, base.goals_mm, strict=True))
     return GateStep(tuple(goals), GateState(now_s, tuple(goals), speeds, True, request.issued_s), clamps=tuple(clamps))

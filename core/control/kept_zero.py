@@ -15,7 +15,7 @@ from enum import StrEnum
 
 from pydantic import Field
 
-from core.config.safety import JOINT_NAMES, TENDONS, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
+from core.config.safety import JOINT_NAMES, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
 from core.config.section import ConfigSection
 from core.messages import message
 
@@ -46,7 +46,12 @@ class ZeroRequest(ConfigSection):
 
 
 ALL_AT_ZERO = ZeroRequest(positions_mm=dict.fromkeys(JOINT_NAMES, 0.0))
-"""All joints stand at zero, with slack wires."""
+"""All joints of the default robot stand at zero, with slack wires."""
+
+
+def all_at_zero(servos: ServosConfig) -> ZeroRequest:
+    """All joints stand at zero, with slack wires."""
+    return ZeroRequest(positions_mm=dict.fromkeys(servos.names, 0.0))
 
 
 class KeptJoint(ConfigSection):
@@ -123,10 +128,18 @@ def zero_offer(joint: JointConfig, model: int, kept: KeptJoint | None, ticks: in
     return ZeroOffer(joint.name, at_ticks / joint.ticks_per_mm, moved / joint.ticks_per_mm, ticks - at_ticks, kept.kept_s)
 
 
+def unknown_joint(request: ZeroRequest, servos: ServosConfig) -> str:
+    """The first joint of a request that the robot does not have, in one line; "" for none."""
+    for name in (*request.positions_mm, *request.kept, *request.forgotten):
+        if name not in servos.names:
+            return message("{joint} is no joint of this robot: {names}", joint=name, names=", ".join(servos.names))
+    return ""
+
+
 def request_problem(request: ZeroRequest, offers: Iterable[ZeroOffer], servos: ServosConfig) -> str:
     """Why zeros cannot be set as requested, in one line; "" when they can, as far as configuration and kept zeros tell.
 
-    `offers` are those of all joints, zeroed or not.
+    `request` names joints of the robot only; `offers` are those of all joints, zeroed or not.
     """
     joints = {joint.name: joint for joint in servos.joints}
     offered = {offer.name: offer for offer in offers if offer.name not in request.forgotten}
@@ -134,7 +147,7 @@ def request_problem(request: ZeroRequest, offers: Iterable[ZeroOffer], servos: S
         low_mm, high_mm = joints[name].low_mm, joints[name].high_mm
         if not low_mm <= position_mm <= high_mm:
             return message("{joint} cannot be at {a:g} mm: give {b:g} to {c:g} mm", joint=name, a=position_mm, b=low_mm, c=high_mm)
-        if name not in TENDONS:
+        if not joints[name].is_tendon:
             continue
         if position_mm != 0.0:
             return message("{joint}: a tendon is zeroed where its wire is slack, at 0 mm", joint=name)

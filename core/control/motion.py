@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 from core.config.models import DriveConfig, JogConfig
-from core.config.safety import JointConfig, ServosConfig
-from core.control.joints import limited
+from core.config.safety import JointConfig, JointKind, ServosConfig
+from core.control.joints import direction, limited
 from core.types import Advice, Command
 
 _LONGEST_STEP_S = 0.1
@@ -69,13 +69,14 @@ class JogSpeeds:
 
 def hand_speeds(hand: JogConfig, servos: ServosConfig, share: float = 1.0) -> JogSpeeds:
     """The speeds of `hand` at `share` (0..1) of full speed, limited to the slowest joint that takes part."""
-    right, left, up, down, advance, *delivery = servos.joints
     pull_mm_s = share * hand.bend_rate_per_s * servos.max_pull_mm
+    ways = [direction(joint) for joint in servos.tendons]
+    across, up = ([joint for joint, way in zip(servos.tendons, ways, strict=True) if way[axis] != 0.0] for axis in (0, 1))
     return JogSpeeds(
-        _speed_limited(share * hand.advance_mm_s, advance),
-        _speed_limited(share * hand.delivery_mm_s, *delivery),
-        _speed_limited(pull_mm_s, right, left),
-        _speed_limited(pull_mm_s, up, down),
+        _speed_limited(share * hand.advance_mm_s, servos.joints[servos.places(JointKind.ADVANCE)]),
+        _speed_limited(share * hand.delivery_mm_s, servos.joints[servos.places(JointKind.DELIVERY)]),
+        _speed_limited(pull_mm_s, across or servos.tendons),
+        _speed_limited(pull_mm_s, up or servos.tendons),
     )
 
 
@@ -135,8 +136,9 @@ class JogIntegrator:
         )
 
 
-def _speed_limited(speed_mm_s: float, *joints: JointConfig) -> float:
-    return min(speed_mm_s, *(joint.max_speed_mm_s for joint in joints))
+def _speed_limited(speed_mm_s: float, joints: Sequence[JointConfig]) -> float:
+    """0 without joints."""
+    return min((speed_mm_s, *(joint.max_speed_mm_s for joint in joints))) if joints else 0.0
 
 
 class AdviceController:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from core.config.models import Config
-from core.config.safety import SafetyConfig
+from core.config.safety import JointKind, SafetyConfig
 from core.control.alerts import AlertReporter, Note
 from core.control.camera_monitor import FrameArrived, FrameLate, RouteState
 from core.control.direction_monitor import MotionSent
@@ -26,7 +26,7 @@ from core.control.frame_reports import FrameReports, is_finite, is_sound
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.health import Beat, DeadmanReport, EstopReport, GateReport, ModelReport, Part, ServoCheckReport, ServosBusy
 from core.control.joints import Retracted
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.control.kept_zero import ZeroRequest, all_at_zero
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, AgainstProgram, Decision, Event, Hindrance, Mode, SupervisorState
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, Retraction, combined, next_retraction
 from core.control.policies import Policy
@@ -205,10 +205,10 @@ class Pilot:
             self._requests.switch_on()
         return is_free
 
-    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> bool:
+    def zero(self, request: ZeroRequest | None = None) -> bool:
         """Set where joints are now, or confirm their kept zeros; refused like ``switch_on``."""
         if is_free := self._may_request():
-            self._requests.zero(request)
+            self._requests.zero(request or all_at_zero(self._config.servos))
         return is_free
 
     def reboot(self, servo_id: int) -> bool:
@@ -491,11 +491,13 @@ class Pilot:
 
     def _hold_retraction(self, jog: Jog, sent: SentMotion | None) -> Retracted:
         """The feeds whose retraction the operator holds, beyond the end of their envelope."""
-        low = sent.at_low if sent is not None else {}
+        low = set(sent.at_low) if sent is not None else set()
+        feeds = [self._config.servos.joints[self._config.servos.places(kind)] for kind in (JointKind.ADVANCE, JointKind.DELIVERY)]
+        robot_low, catheter_low = (any(joint.name in low for joint in joints) for joints in feeds)
         robot, catheter = self._retractions
         self._retractions = (
-            next_retraction(robot, pulls=jog.advance < 0.0, at_low="advance" in low),
-            next_retraction(catheter, pulls=jog.delivery < 0.0, at_low="delivery_1" in low or "delivery_2" in low),
+            next_retraction(robot, pulls=jog.advance < 0.0, at_low=robot_low),
+            next_retraction(catheter, pulls=jog.delivery < 0.0, at_low=catheter_low),
         )
         found = Retracted.NONE
         for state, feed in zip(self._retractions, (Retracted.ROBOT, Retracted.CATHETER), strict=True):

@@ -10,7 +10,7 @@ from core.config.safety import JointName
 from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.joints import Retracted
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.control.kept_zero import ZeroRequest
 from core.devices import Robot
 from core.types import Command
 
@@ -41,7 +41,7 @@ class GuardedRobot(Robot, Protocol):
     ``DeviceError``; all the others are quick. ``kept_back`` is why nothing has left the gate since arming, not even a hold: while
     it is not None there is no ``sent_motion`` either, and neither source can drive. A command that ``retracts`` is the operator's,
     and may pull a feed beyond the low end of its envelope. ``relax`` waits no longer when a torque-off was asked for
-    (``is_overtaken``).
+    (``is_overtaken``). ``zero`` without a request: all joints stand at zero.
     """
 
     @property
@@ -59,7 +59,7 @@ class GuardedRobot(Robot, Protocol):
     def arm(self) -> None: ...
     def disarm(self) -> None: ...
     def acknowledge(self) -> None: ...
-    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None: ...
+    def zero(self, request: ZeroRequest | None = None) -> None: ...
     def reboot(self, servo_id: int) -> None: ...
     def relax(self, is_overtaken: Callable[[], bool] = ...) -> None: ...
     def torque_off(self) -> None: ...

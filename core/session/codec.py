@@ -148,7 +148,7 @@ _Maybe5 = Annotated[float | None, _As(Annotated[float | None, _rounded(5)], plai
 _Maybe6 = Annotated[float | None, _As(Annotated[float | None, _rounded(6)], plain=_finite)]
 _Pair = tuple[float, float]
 _Point = Annotated[_Pair, _rounded(3)]
-_Four = tuple[float, float, float, float]
+_Tendons = Annotated[tuple[float, ...], Field(min_length=2, max_length=4)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
 Moment = Annotated[float, Field(ge=-_LONGEST_S, le=_LONGEST_S), _rounded(6)]
 """Seconds of a monotonic clock."""
@@ -187,9 +187,12 @@ _VectorField = Annotated[
 _CommandField = Annotated[
     Command,
     _As(
-        Annotated[_Four, _rounded(5)],
-        lambda four: Command(*four),
-        lambda command: (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s),
+        Annotated[tuple[float, ...], Field(min_length=4, max_length=5), _rounded(5)],  # the fifth where a shaft is turned
+        lambda numbers: Command(*numbers),
+        lambda command: (
+            *(command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s),
+            *((command.rotation_deg_s,) if command.rotation_deg_s else ()),
+        ),
     ),
 ]
 _FaultField = Annotated[Fault, _As(tuple[Cause, Text], lambda pair: Fault(*pair), lambda fault: (fault.cause, fault.detail))]
@@ -232,9 +235,10 @@ class _StatusLayout(JsonLayout):
     time_s: Moment
     insertion_mm: _F4
     delivery_mm: _F4
-    tendon_pull_mm: Annotated[_Four, _rounded(4)]
-    tendon_force_mn: Annotated[_Four, _rounded(3)]
+    tendon_pull_mm: Annotated[_Tendons, _rounded(4)]
+    tendon_force_mn: Annotated[_Tendons, _rounded(3)]
     wall_contact_n: _Maybe6 = None
+    rotation_deg: _F4 = 0.0
 
 
 class _MasksLayout(JsonLayout):

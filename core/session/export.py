@@ -95,7 +95,8 @@ def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None
     return written
 
 
-_SIDES = ("right", "left", "up", "down")
+TENDON_NAMES = ("right", "left", "up", "down")
+"""Tendons of the default robot, in the order of a status; those of other robots are numbered."""
 _MOTIONS = tuple(f"{who}_{name}" for who in ("asked", "commanded", "sent") for name in Command.__slots__)
 _COLUMNS = (
     *("row", "index", "captured_s", "time_s", "video", "pts_ms", "dropped_frames", "camera_lost", "dropped_rows"),
@@ -122,6 +123,11 @@ _PATHS = {
 }
 
 
+def tendon_names(count: int) -> tuple[str, ...]:
+    """Names for the tendons of a status."""
+    return TENDON_NAMES if count == len(TENDON_NAMES) else tuple(f"{number}" for number in range(1, count + 1))
+
+
 def _flat(row: RecordedRow) -> dict[str, Any]:
     """The values of a row by name; None where something is missing."""
     scene, path, start = row.scene, row.scene.path, cast(Any, row)
@@ -134,8 +140,8 @@ def _flat(row: RecordedRow) -> dict[str, Any]:
         x, y = scene.to_source(point) if point is not None else (None, None)
         values[f"{end}_x_px"], values[f"{end}_y_px"] = (None, None) if x is None or y is None else (round(x, 3), round(y, 3))
     for name in ("pull_mm", "force_mn"):
-        four = getattr(row.status, f"tendon_{name}", (None,) * 4)
-        values |= {f"tendon_{name}_{side}": value for side, value in zip(_SIDES, four, strict=True)}
+        each = getattr(row.status, f"tendon_{name}", (None,) * 4)
+        values |= {f"tendon_{name}_{tendon}": value for tendon, value in zip(tendon_names(len(each)), each, strict=True)}
     return values
 
 
@@ -251,7 +257,7 @@ _POSE = {
     "refusal": _TEXT,
 }
 _PACE = {"frames_per_second": _NUMBER, "dropped_frames": _NUMBER, "dropped_rows": _NUMBER, "perception_ms": _MAYBE}
-_TENDONS = {f"tendon_{what}_{side}": _NUMBER for what in ("pull_mm", "force_mn") for side in _SIDES}
+_TENDONS = {f"tendon_{what}_{side}": _NUMBER for what in ("pull_mm", "force_mn") for side in TENDON_NAMES}
 _ROBOT = {"insertion_mm": _NUMBER, "delivery_mm": _NUMBER, "wall_contact_n": _MAYBE, **_TENDONS}
 _MOTION = {"mode": _TEXT, "mode_number": _MAYBE, "sent_by": _TEXT, **dict.fromkeys(_MOTIONS, _MAYBE)}
 
@@ -385,7 +391,7 @@ def _rows(reader: SessionReader, clock: _Clock, on_row: Advance) -> Iterator[Mes
         for order, topic, names, is_there in (
             (2, "/pose", _POSE, True),
             (3, "/pace", _PACE, True),
-            (4, "/robot", _ROBOT, row.status is not None),
+            (4, "/robot", [name for name in values if name in _ROBOT or name.startswith("tendon_")], row.status is not None),
             (5, "/motion", _MOTION, row.sent is not None or row.drive is not None),
         ):
             if is_there:

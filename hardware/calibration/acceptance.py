@@ -14,7 +14,7 @@ from typing import Self
 
 from core.config.acceptance import STOP_TRIES, AcceptanceError, AcceptedServo, EstopRecord, StopTimes
 from core.config.models import Config
-from core.config.safety import TENDONS, JointConfig
+from core.config.safety import JointConfig
 from core.config.servo_models import drum_radius_mm
 from core.control.faults import Cause
 from core.control.health import Deadman
@@ -223,7 +223,7 @@ class AcceptanceBench:
 
     def show_direction(self, joint: JointConfig) -> None:
         """A short way in the joint's positive direction, and back."""
-        way_mm = DIRECTION_MM[joint.name in TENDONS]
+        way_mm = DIRECTION_MM[joint.is_tendon]
         limits = ProbeLimits(-way_mm, way_mm, min(3.0, joint.max_speed_mm_s))
         with AcceptanceProbe.of(self._config, joint, limits, self._stop, self._backups) as probe:
             probe.move_to(way_mm)
@@ -232,7 +232,7 @@ class AcceptanceBench:
 
     def pull(self, joint: JointConfig) -> ScalePull:
         """Pull at the scale until the servo gives all that its force limit allows, then let go."""
-        way_mm = PULL_MM[joint.name in TENDONS]
+        way_mm = PULL_MM[joint.is_tendon]
         limits = ProbeLimits(-1.0, way_mm, 4.0)
         with AcceptanceProbe.of(self._config, joint, limits, self._stop, self._backups) as probe:
             was_held = probe.pull_to(way_mm)
@@ -240,7 +240,7 @@ class AcceptanceBench:
         model = self._config.servos.model_of(joint)
         by_current_n = None
         if model.has_current_mode:
-            by_current_n = round(model.torque_nm(peak_ma) / (drum_radius_mm(joint.mm_per_turn) / 1000.0), 2)
+            by_current_n = round(model.torque_nm(peak_ma) / (drum_radius_mm(joint.drum_mm_per_turn) / 1000.0), 2)
         return ScalePull(by_current_n, was_held)
 
     def stop_times(self, kind: str, joint: JointConfig, report: Callable[[str], None]) -> StopTimes:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from core.config.safety import TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusMonitor, BusReport
 from core.control.faults import Cause, Fault, Reaction, worst
 from core.control.gate import (
@@ -24,9 +24,8 @@ from core.control.gate import (
     measurement_problem,
     outside_envelope,
 )
-from core.control.joints import Joints, Retracted, by_hand, by_program, joint_goals
+from core.control.joints import Joints, Retracted, by_hand, by_program, joint_goals, joint_motion
 from core.messages import message
-from core.types import Command
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
 from hardware.servos.dynamixel_port import NotReady
 from hardware.servos.registers import MissingServo, ServoReading, ServoState
@@ -104,7 +103,7 @@ class ReleaseRamp:
     def _note(self, at_mm: Sequence[float | None], now_s: float) -> None:
         """Where tendons are, and where and when each was read first."""
         for place, (at, joint) in enumerate(zip(at_mm, self._joints, strict=True)):
-            if at is not None and joint.name in TENDONS:
+            if at is not None and joint.is_tendon:
                 self._begun.setdefault(place, (at, now_s))
                 self._last_mm[place] = at
 
@@ -116,7 +115,7 @@ class ReleaseRamp:
     @property
     def tight(self) -> tuple[JointName, ...]:
         """The tendons of which it is not known that they were let out."""
-        places = [place for place, joint in enumerate(self._joints) if joint.name in TENDONS]
+        places = [place for place, joint in enumerate(self._joints) if joint.is_tendon]
         return tuple(self._joints[place].name for place in places if self._last_mm.get(place, math.inf) > _SLACK_MM)
 
     def goals(self, at_mm: Sequence[float | None], now_s: float) -> tuple[float | None, ...] | None:
@@ -359,7 +358,7 @@ class BusGuard:
         at_mm = [
             told[place][0] if place in told and told[place][1] >= oldest_s else None for place in range(len(self._servos.joints))
         ]
-        if all(at is None for at, joint in zip(at_mm, self._servos.joints, strict=True) if joint.name in TENDONS):
+        if all(at is None for at, joint in zip(at_mm, self._servos.joints, strict=True) if joint.is_tendon):
             return None
         self._released_at_c = max(self._released_at_c, self._too_hot_c)
         return ReleaseRamp(self._servos.joints, at_mm, now_s, speed_mm_s)
@@ -447,9 +446,7 @@ class BusGuard:
     def record_sent(self, goals_mm: Joints, order: BusOrder | None, now_s: float) -> None:
         """These goals went out, as the servos count them."""
         self._written_mm = goals_mm
-        right, left, up, down, *_ = goals_mm
-        speeds, pull_mm = self._gate.speeds_mm_s, 2.0 * self._servos.max_pull_mm
-        motion = Command((right - left) / pull_mm, (up - down) / pull_mm, speeds[4], (speeds[5] + speeds[6]) / 2.0)
+        motion = joint_motion(goals_mm, self._gate.speeds_mm_s or (0.0,) * len(goals_mm), self._servos)
         self.sent = IssuedGoals(goals_mm, motion, now_s, order if self.rejection is None else None)
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from core.config.calibration import ZeroConfig
-from core.config.safety import TENDONS, JointConfig, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JointConfig, JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Joints, Retracted
@@ -114,7 +114,7 @@ class IssuedGoals:
         low_mm = {
             joint.name: goal
             for joint, goal in zip(joints, self.goals_mm, strict=True)
-            if joint.name not in TENDONS and goal <= joint.low_mm + _AT_LOW_MM
+            if joint.is_feed and goal <= joint.low_mm + _AT_LOW_MM
         }
         return SentMotion(
             cycle=cycle,
@@ -197,7 +197,7 @@ class BusStatus:
 
 
 _SOURCES: tuple[Source | None, ...] = (None, *Source)
-_ORDER = struct.Struct("<BBBBdd4d")  # has a command, source, has a frame, retracts, issued, captured, command
+_ORDER = struct.Struct("<BBBBdd5d")  # has a command, source, has a frame, retracts, issued, captured, command
 _HEARTBEAT = struct.Struct("<Bd")
 _ALL_FEEDS = Retracted.ROBOT | Retracted.CATHETER
 
@@ -216,6 +216,7 @@ def pack_order(order: BusOrder) -> bytes:
         command.pitch,
         command.advance_mm_s,
         command.delivery_mm_s,
+        command.rotation_deg_s,
     )
 
 

@@ -30,9 +30,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from core.config.calibration import ZeroConfig
-from core.config.safety import TENDONS, JointName, SafetyConfig, ServosConfig
+from core.config.safety import JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
-from core.control.kept_zero import ZeroBasis, ZeroRequest, request_problem
+from core.control.kept_zero import ZeroBasis, ZeroRequest, request_problem, unknown_joint
 from core.messages import message
 from hardware.servos.bus_guard import (
     LINGER_S,
@@ -432,7 +432,7 @@ class BusLoop:
 
     def _end_ramp(self) -> None:
         self._releases += 1
-        self._still_tight = self._ramp.tight if self._ramp is not None else TENDONS
+        self._still_tight = self._ramp.tight if self._ramp is not None else tuple(one.name for one in self._servos.tendons)
         self._ramp = None
         if self._is_off_after_ramp:
             self._is_off_after_ramp = False
@@ -483,7 +483,7 @@ class BusLoop:
         return all(
             abs(reading.goal_ticks - reading.ticks) <= _SETTLED_MM * abs(joint.ticks_per_mm)
             for joint, reading in zip(self._servos.joints, self._readings, strict=True)
-            if isinstance(reading, ServoState) and reading.torque and (self._ramp is None or joint.name not in TENDONS)
+            if isinstance(reading, ServoState) and reading.torque and (self._ramp is None or not joint.is_tendon)
         )
 
     def _guard_port(self, action: Callable[[], None]) -> None:
@@ -582,6 +582,8 @@ class BusLoop:
             wanted = ZeroRequest.model_validate(request.details)
         except ValidationError as error:
             raise NotReady(f"no zeros that can be set: {error.errors()[0]['msg']}") from None
+        if problem := unknown_joint(wanted, self._servos):
+            raise NotReady(problem)
         if wanted.basis is not ZeroBasis.SLACK:
             if self._keeper.has_file:
                 raise NotReady("the zeros of a rig are confirmed or measured by its operator")

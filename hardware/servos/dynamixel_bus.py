@@ -1,4 +1,4 @@
-"""The seven DYNAMIXEL X servos through the real SDK: identity, set-up, arming, goals, state, and recovery."""
+"""The DYNAMIXEL X servos of a robot through the real SDK: identity, set-up, arming, goals, state, and recovery."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.config.safety import TENDONS, JointConfig, JointName, ServosConfig
+from core.config.safety import JointConfig, JointName, ServosConfig
 from core.config.servo_models import GOAL_CURRENT, GOAL_PWM, ServoModel, model_name
 from core.control.kept_zero import KeptJoint, ZeroBasis, zero_offer
 from core.messages import message
@@ -79,11 +79,11 @@ class ServoIdentity:
 
 
 def identify(line: ServoLine, config: ServosConfig, *, makes_answer: bool = False) -> tuple[ServoIdentity, ...]:
-    """Ping all seven and compare them with the configuration.
+    """Ping all servos and compare them with the configuration.
 
-    With `makes_answer` servos that are set not to answer reads or writes are told to, once the models of all seven are known.
+    With `makes_answer` servos that are set not to answer reads or writes are told to, once the models of all are known.
 
-    Raises NoAnswer, WrongServo: naming the servo. After a silence of all seven the line may have been closed.
+    Raises NoAnswer, WrongServo: naming the servo. After a silence of all of them the line may have been closed.
     """
     models = {joint.id: line.ping(joint.id) for joint in config.joints}
     for _ in range(2):
@@ -184,7 +184,7 @@ def _blocks(config: ServosConfig) -> tuple[tuple[int, int, tuple[int, ...]], ...
 
 
 class ServoBus:
-    """Seven servos on one line, in the order of the configuration's joints. One thread opens, uses and closes it.
+    """The servos on one line, in the order of the configuration's joints. One thread opens, uses and closes it.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ class ServoBus:
         self._line.pause(seconds)
 
     def open(self) -> None:
-        """Open and lock the port, and make sure that the seven servos are those of the configuration. Nothing moves, none lets go.
+        """Open and lock the port, and make sure that the servos are those of the configuration. Nothing moves, none lets go.
 
         A servo whose torque is on is not set up, which needs the torque off: it may hold a wire.
 
@@ -290,7 +290,7 @@ class ServoBus:
 
         Parameters
         ----------
-        positions_mm : in millimetres from zero, 0 of a tendon where its wire is slack; None: all seven are at 0.
+        positions_mm : in millimetres from zero, 0 of a tendon where its wire is slack; None: all are at 0.
         kept : joints whose kept zero holds.
         basis : what the zeros of tendons in `positions_mm` rest on.
 
@@ -308,7 +308,7 @@ class ServoBus:
                 zeros[joint.id] = self._kept_zero(joint, (kept or {})[joint.name])
             elif joint.name in (positions_mm or {}):
                 self._make_countable(joint)
-                if joint.name in TENDONS and basis is not ZeroBasis.HERE:
+                if joint.is_tendon and basis is not ZeroBasis.HERE:
                     self._check_slack(joint, basis)
                 at_ticks = round((positions_mm or {})[joint.name] * joint.ticks_per_mm)
                 zeros[joint.id] = self._read_signed(joint, _POSITION) - at_ticks
@@ -410,7 +410,7 @@ class ServoBus:
         self.hold()
 
     def read(self) -> tuple[ServoReading, ...]:
-        """State of all seven, in the order of the joints; a servo without a usable answer is a ``MissingServo``.
+        """State of all servos, in the order of the joints; a servo without a usable answer is a ``MissingServo``.
 
         Takes 3 ms at 1 Mbps, and at most 80 ms when servos are silent. Small servos (330 size) beside others take a second request.
         """
@@ -437,7 +437,7 @@ class ServoBus:
         return tuple(readings)
 
     def write(self, goals_mm: Sequence[float]) -> tuple[float, ...]:
-        """Send the seven goals in one packet; returns the goals in mm as the servos count them.
+        """Send the goals of all joints in one packet; returns the goals in mm as the servos count them.
 
         No servo answers: ``ServoState.goal_mm`` of the next read tells what was taken.
 
@@ -473,7 +473,7 @@ class ServoBus:
             if goal_mm is None or not isinstance(reading, ServoState) or reading.position_mm is None or not reading.torque:
                 continue
             lowest_mm = reading.position_mm - joint.max_step_mm - _ROUNDING_MM
-            if joint.name not in TENDONS or not lowest_mm <= goal_mm <= reading.position_mm:
+            if not joint.is_tendon or not lowest_mm <= goal_mm <= reading.position_mm:
                 raise ValueError(f"joint {joint.name}: from {reading.position_mm:g} mm it cannot be slackened to {goal_mm:g} mm")
             goals[joint.id] = registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
         tripped = [r.id for r in readings if isinstance(r, ServoState) and r.watchdog_tripped]
@@ -512,7 +512,7 @@ class ServoBus:
             )
 
     def let_go(self) -> None:
-        """``torque_off`` on a closed bus that cannot be opened because not all seven answer: those that hear it obey.
+        """``torque_off`` on a closed bus that cannot be opened because not all servos answer: those that hear it obey.
 
         Raises PortError, PortTaken: the port cannot be opened; TorqueStillOn: when a servo still has torque, or does not tell.
         """

@@ -66,7 +66,7 @@ def watchdog_units(watchdog_s: float) -> int:
 
 def wire_force_mn(joint: JointConfig, model: ServoModel, current_ma: float) -> float:
     """Pull of a wire as the motor's current tells it, friction included; positive tightens."""
-    return joint.sign * model.torque_nm(current_ma) / drum_radius_mm(joint.mm_per_turn) * 1e6
+    return joint.sign * model.torque_nm(current_ma) / drum_radius_mm(joint.drum_mm_per_turn) * 1e6
 
 
 def signed(data: bytes) -> int:

@@ -1,8 +1,7 @@
-"""The robot behind the ``GuardedRobot`` protocol, moved by seven servos through the guarded bus process."""
+"""The robot behind the ``GuardedRobot`` protocol, moved by its servos through the guarded bus process."""
 
 from __future__ import annotations
 
-import math
 import re
 import threading
 import time
@@ -17,8 +16,8 @@ from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
 from core.control.faults import Cause
 from core.control.gate import Rejection, Source
-from core.control.joints import Retracted
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.control.joints import Retracted, status_at, within_speeds
+from core.control.kept_zero import ZeroRequest, all_at_zero
 from core.control.robot import SentMotion
 from core.types import Command, RobotStatus
 from hardware.processes import DeviceProcess
@@ -129,12 +128,13 @@ class ServoRobot:
             self._not_connected = str(error)
             raise
 
-    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
+    def zero(self, request: ZeroRequest | None = None) -> None:
         """Set where joints are now, or confirm their kept zeros (``BusStatus.offers``).
 
         Raises NotReady, NoAnswer: the zero of a tendon is refused while its servo holds or pulls, and where one is kept.
         """
-        self._request(self._connected(), "zero", _REQUEST_S, **request.model_dump(mode="json"))
+        wanted = request or all_at_zero(self._servos)
+        self._request(self._connected(), "zero", _REQUEST_S, **wanted.model_dump(mode="json"))
 
     def arm(self) -> None:
         """Torque on, each servo holding where it stands; from now on the permitted source's orders are followed.
@@ -236,16 +236,7 @@ class ServoRobot:
         Raises ValueError: when a number is not finite; the order before stays; BusProcessLost: not connected, or the bus process
         is gone.
         """
-        if not all(math.isfinite(number) for number in (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s)):
-            raise ValueError(f"command is not finite: {command}")
-        joints = self._servos.joints
-        delivery_limit = min(joint.max_speed_mm_s for joint in joints[5:])
-        limited = Command(
-            bend=max(-1.0, min(1.0, command.bend)),
-            pitch=max(-1.0, min(1.0, command.pitch)),
-            advance_mm_s=max(-joints[4].max_speed_mm_s, min(joints[4].max_speed_mm_s, command.advance_mm_s)),
-            delivery_mm_s=max(-delivery_limit, min(delivery_limit, command.delivery_mm_s)),
-        )
+        limited = within_speeds(command, self._servos)
         client = self._connected()
         client.put_order(BusOrder(limited, source, time.monotonic(), captured_s, retracts))
         self._beat_unsupervised()
@@ -266,20 +257,15 @@ class ServoRobot:
         if self._truth is not None:
             return self._truth()
         states = [reading for reading in self._states if isinstance(reading, ServoState)]
+        servos = self._servos
         if not states:
-            return RobotStatus(time.monotonic(), 0.0, 0.0, (0.0,) * 4, (0.0,) * 4)
+            return status_at((0.0,) * len(servos.joints), (0.0,) * len(servos.tendons), time.monotonic(), servos)
+        forces_mn = tuple(
+            wire_force_mn(joint, servos.model_of(joint), state.current_ma or 0.0)
+            for joint, state in zip(servos.tendons, states, strict=False)
+        )
         at_mm = [state.position_mm or 0.0 for state in states]
-        right, left, up, down = (
-            wire_force_mn(joint, self._servos.model_of(joint), state.current_ma or 0.0)
-            for joint, state in zip(self._servos.joints[:4], states[:4], strict=True)
-        )
-        return RobotStatus(
-            time_s=min(state.time_s for state in states),
-            insertion_mm=at_mm[4],
-            delivery_mm=(at_mm[5] + at_mm[6]) / 2.0,
-            tendon_pull_mm=(at_mm[0], at_mm[1], at_mm[2], at_mm[3]),
-            tendon_force_mn=(right, left, up, down),
-        )
+        return status_at(at_mm, forces_mn, min(state.time_s for state in states), servos)
 
     def bus_status(self) -> BusStatus | None:
         """The newest status of the bus process, also after its end (see ``failure``); None before the first. No heartbeat."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from core.config.calibration import ZeroConfig
-from core.config.safety import JOINT_NAMES, TENDONS, TICKS_PER_TURN, JointName, ServosConfig
+from core.config.safety import TICKS_PER_TURN, JointName, ServosConfig
 from core.control.kept_zero import KeptJoint, KeptZeros, ZeroOffer, keep, zero_offer
 from core.files import sweep_unfinished, write_atomic
 from hardware.servos.registers import ServoReading, ServoState
@@ -71,9 +71,7 @@ class ZeroKeeper:
         found_s = searched.found_utc.timestamp() if searched.found_utc is not None else 0.0
         for joint, ticks in zip(self._joints, searched.ticks, strict=True):
             known = self._kept.get(joint.name)
-            if joint.name in TENDONS and (
-                known is None or not known.is_of(joint, self._models[joint.name]) or known.kept_s < found_s
-            ):
+            if joint.is_tendon and (known is None or not known.is_of(joint, self._models[joint.name]) or known.kept_s < found_s):
                 self._kept[joint.name] = keep(joint, self._models[joint.name], ticks, 0.0, found_s)
 
     @property
@@ -117,7 +115,7 @@ class ZeroKeeper:
             return
         self._written = {name: one.ticks for name, one in self._kept.items()}
         self._written_s = now_s
-        zeros = KeptZeros(joints=tuple(self._kept[name] for name in JOINT_NAMES if name in self._kept))
+        zeros = KeptZeros(joints=tuple(self._kept[one.name] for one in self._joints if one.name in self._kept))
         with self._lock:
             self._content = zeros.model_dump_json().encode()
         self._due.set()

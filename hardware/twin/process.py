@@ -32,7 +32,10 @@ if TYPE_CHECKING:
 
 _START_S, _END_S = 60.0, 5.0  # time limits for start and end of the process
 _FRAME = struct.Struct("<Qdii")  # index, captured, width, height
-_STATUS = struct.Struct("<3d8dd")  # time, insertion, delivery, pulls and forces, contact (NaN: unknown)
+_STATUS = struct.Struct(
+    "<B3d8d2d"
+)  # tendons; time, insertion, delivery; pulls and forces, filled up; contact (NaN: unknown), rotation
+_MOST_TENDONS = 4
 
 
 def slot_sizes(twin: TwinConfig) -> tuple[int, int]:
@@ -53,15 +56,16 @@ def unpack_frame(data: bytes) -> Frame:
 
 def pack_status(status: RobotStatus) -> bytes:
     contact_n = float("nan") if status.wall_contact_n is None else status.wall_contact_n
-    pulls, forces = status.tendon_pull_mm, status.tendon_force_mn
-    return _STATUS.pack(status.time_s, status.insertion_mm, status.delivery_mm, *pulls, *forces, contact_n)
+    count, both = len(status.tendon_pull_mm), (status.tendon_pull_mm, status.tendon_force_mn)
+    numbers = [number for four in both for number in (*four, *(0.0,) * (_MOST_TENDONS - count))]
+    return _STATUS.pack(count, status.time_s, status.insertion_mm, status.delivery_mm, *numbers, contact_n, status.rotation_deg)
 
 
 def unpack_status(data: bytes) -> RobotStatus:
-    time_s, insertion_mm, delivery_mm, *rest = _STATUS.unpack(data)
-    a, b, c, d, e, f, g, h, contact_n = rest
+    count, time_s, insertion_mm, delivery_mm, *numbers, contact_n, rotation_deg = _STATUS.unpack(data)
+    pulls, forces = tuple(numbers[:count]), tuple(numbers[_MOST_TENDONS : _MOST_TENDONS + count])
     known_n = None if math.isnan(contact_n) else contact_n
-    return RobotStatus(time_s, insertion_mm, delivery_mm, (a, b, c, d), (e, f, g, h), known_n)
+    return RobotStatus(time_s, insertion_mm, delivery_mm, pulls, forces, known_n, rotation_deg)
 
 
 def start_twin() -> DeviceProcess:
@@ -195,7 +199,7 @@ def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
         return servos
     numbers = [int(number) for number in twin.wiring.split(",")]
     if len({abs(number) for number in numbers}) != len(numbers) or not all(0 < abs(number) <= 252 for number in numbers):
-        raise ValueError(f"twin.wiring {twin.wiring}: seven different ids of 1 to 252")
+        raise ValueError(f"twin.wiring {twin.wiring}: different ids of 1 to 252")
     joints = tuple(
         joint.model_copy(update={"id": abs(number), "sign": -1 if number < 0 else 1})
         for joint, number in zip(servos.joints, numbers, strict=True)

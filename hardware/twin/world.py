@@ -20,7 +20,7 @@ from core.config.safety import JOINT_NAMES, SafetyConfig
 from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.joints import Retracted
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.control.kept_zero import ZeroRequest
 from core.control.robot import SentMotion
 from core.devices import DeviceError, Latest
 from core.perception.centerline import plan_route
@@ -34,6 +34,7 @@ from hardware.twin.truth import RouteFollower, Truth, true_graph, truth_of
 
 MAX_ADVANCE_MM_S = 20.0
 MAX_DELIVERY_MM_S = 10.0
+MAX_ROTATION_DEG_S = 90.0
 
 
 class TwinRobot:
@@ -69,7 +70,7 @@ class TwinRobot:
         DeviceError
             When the robot is not connected.
         """
-        values = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s)
+        values = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s, command.rotation_deg_s)
         if not all(math.isfinite(value) for value in values):
             raise ValueError(f"command is not finite: {command}")
         sent = Command(
@@ -77,6 +78,7 @@ class TwinRobot:
             pitch=_clamp(command.pitch, 1.0),
             advance_mm_s=_clamp(command.advance_mm_s, MAX_ADVANCE_MM_S),
             delivery_mm_s=_clamp(command.delivery_mm_s, MAX_DELIVERY_MM_S),
+            rotation_deg_s=_clamp(command.rotation_deg_s, MAX_ROTATION_DEG_S),
         )
         with self._lock:
             if not self._connected:
@@ -341,7 +343,7 @@ class DirectRobot:
     def acknowledge(self) -> None:
         """No fault latches."""
 
-    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
+    def zero(self, request: ZeroRequest | None = None) -> None:
         """No servos."""
 
     def reboot(self, servo_id: int) -> None:

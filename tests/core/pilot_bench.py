@@ -13,7 +13,7 @@ from core.control.faults import Cause
 from core.control.gate import Rejection, Source
 from core.control.health import ModelReport
 from core.control.joints import Retracted
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.control.kept_zero import ZeroRequest
 from core.control.modes import Act, Mode
 from core.control.motion import AT_REST
 from core.control.pilot import PERIOD_S, LeftOver, Pilot
@@ -90,7 +90,7 @@ class Robot:
     def acknowledge(self) -> None:
         self.calls.append("acknowledge")
 
-    def zero(self, request: ZeroRequest = ALL_AT_ZERO) -> None:
+    def zero(self, request: ZeroRequest | None = None) -> None:
         self.calls.append("zero")
 
     def reboot(self, servo_id: int) -> None:

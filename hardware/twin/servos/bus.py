@@ -426,7 +426,7 @@ def _end_exclusive_mode(slave: int) -> None:
 
 def _radius_mm(joint: JointConfig) -> float:
     """Of the joint's drum; a torque in mN m over it is a force in N."""
-    return joint.mm_per_turn / (2.0 * math.pi)
+    return joint.drum_mm_per_turn / (2.0 * math.pi)
 
 
 def _obey_second_ids(awake: dict[int, SoftServo], servo_id: int, address: int, data: bytes) -> None:

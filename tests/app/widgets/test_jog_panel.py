@@ -13,7 +13,7 @@ from tests.app.widgets.conftest import Own
 
 
 def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:
-    panel = own(JogPanel(2.0))
+    panel = own(JogPanel(ServosConfig()))
     assert panel.speeds == "", "no rig is known"
     panel.set_speeds(JogConfig(bend_rate_per_s=1.2, advance_mm_s=10.0, delivery_mm_s=8.0), ServosConfig(max_pull_mm=2.0))
     assert panel.speeds == "feed 10, sheath 8, wires 2.4 mm/s"
@@ -30,7 +30,7 @@ def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:
 
 
 def test_key_caps_light_up_and_can_be_held_with_the_mouse(own: Own, qtbot: QtBot) -> None:
-    panel = own(JogPanel(2.0), 280, 140, show=True)
+    panel = own(JogPanel(ServosConfig()), 280, 140, show=True)
     events: list[tuple[str, Motion]] = []
     panel.pressed.connect(lambda motion: events.append(("down", motion)))
     panel.released.connect(lambda motion: events.append(("up", motion)))
@@ -47,7 +47,7 @@ def test_key_caps_light_up_and_can_be_held_with_the_mouse(own: Own, qtbot: QtBot
 
 
 def test_readout_shows_and_says_how_the_robot_stands(own: Own) -> None:
-    panel = own(JogPanel(2.0), 203, 170, show=True)
+    panel = own(JogPanel(ServosConfig()), 203, 170, show=True)
     pictures = []
     for pulls, text in (
         ((0.3, 0.3, 0.3, 0.3), "bend 0.00, pitch 0.00, in 84 mm"),
@@ -65,7 +65,7 @@ def test_readout_shows_and_says_how_the_robot_stands(own: Own) -> None:
 
 
 def test_readout_shows_nothing_of_unknown_joints(own: Own) -> None:
-    panel = own(JogPanel(2.0))
+    panel = own(JogPanel(ServosConfig()))
     panel.show_known((False,) * 7)
     panel.show_status(RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4))
     assert panel.readout == "bend –, pitch –, in – mm"

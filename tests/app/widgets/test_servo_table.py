@@ -37,13 +37,13 @@ def test_no_heading_of_the_table_is_cut_in_the_smallest_window(own: Own) -> None
 
 
 def test_where_a_joint_is_is_known_of_a_zeroed_one_that_answers() -> None:
-    assert known_joints(None, 100.0) == (True,) * 7, "a robot without a bus tells it itself"
-    assert known_joints(bus(), 100.5) == (True,) * 7
-    assert known_joints(bus(), 102.0) == (False,) * 7, "the bus is silent"
-    assert known_joints(bus(servos=(), zeroed=(False,) * 7), 100.0) == (False,) * 7
+    assert known_joints(None, SERVOS, 100.0) == (True,) * 7, "a robot without a bus tells it itself"
+    assert known_joints(bus(), SERVOS, 100.5) == (True,) * 7
+    assert known_joints(bus(), SERVOS, 102.0) == (False,) * 7, "the bus is silent"
+    assert known_joints(bus(servos=(), zeroed=(False,) * 7), SERVOS, 100.0) == (False,) * 7
     silent = MissingServo(SERVOS.joints[2].name, SERVOS.joints[2].id, 100.0, 5, "no answer")
     some = bus(silent, zeroed=(True, False, True, True, True, True, False))
-    assert known_joints(some, 100.0) == (True, False, False, True, True, True, False)
+    assert known_joints(some, SERVOS, 100.0) == (True, False, False, True, True, True, False)
 
 
 def test_a_healthy_servo_in_words_and_numbers() -> None:

@@ -8,7 +8,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.widgets.zero_dialog import Choice, JointZero, ZeroDialog, choices, joint_zeros
-from core.config.safety import JOINT_NAMES, TENDONS, JointName
+from core.config.safety import TENDONS, JointKind, JointName
 from core.control.kept_zero import ZeroOffer, ZeroRequest
 from hardware.servos.bus_ipc import BusPhase, BusStatus
 from hardware.servos.registers import MissingServo, ServoState
@@ -77,14 +77,14 @@ def test_a_wire_is_slack_only_where_its_servo_does_not_hold_and_is_never_propose
 
 
 def test_after_a_restart_the_kept_values_are_proposed_and_only_set_when_asked(dialog: ZeroDialog, qtbot: QtBot) -> None:
-    dialog.show_joints(joint_zeros(restarted(*(offer(name, 0.3) for name in TENDONS), offer("advance", 40.1))))
+    dialog.show_joints(joint_zeros(restarted(*(offer(name, 0.3) for name in TENDONS), offer("advance", 40.1)), SERVOS))
     with qtbot.waitSignal(dialog.zero_asked) as asked:
         dialog.set_button.click()
     assert asked.args == [ZeroRequest(positions_mm={"advance": 40.1}, kept=TENDONS)]
 
 
 def test_a_number_that_nobody_gave_is_not_set(dialog: ZeroDialog) -> None:
-    dialog.show_joints(joint_zeros(restarted(torque=False)))
+    dialog.show_joints(joint_zeros(restarted(torque=False), SERVOS))
     assert dialog.request == ZeroRequest()
     assert not dialog.set_button.isEnabled()
     box, number = dialog.feed("advance")
@@ -97,7 +97,7 @@ def test_a_number_that_nobody_gave_is_not_set(dialog: ZeroDialog) -> None:
 
 
 def test_a_wire_that_was_hung_in_again_is_forgotten_and_zeroed_here(dialog: ZeroDialog) -> None:
-    dialog.show_joints(joint_zeros(restarted(offer("up", 1.0), torque=False)))
+    dialog.show_joints(joint_zeros(restarted(offer("up", 1.0), torque=False), SERVOS))
     up = dialog.tendon("up")
     up.setCurrentIndex(up.findData(Choice.AGAIN))
     right = dialog.tendon("right")
@@ -106,9 +106,9 @@ def test_a_wire_that_was_hung_in_again_is_forgotten_and_zeroed_here(dialog: Zero
 
 
 def test_without_a_kept_zero_the_search_is_the_way(dialog: ZeroDialog, qtbot: QtBot) -> None:
-    dialog.show_joints(joint_zeros(restarted(*(offer(name, 0.3) for name in TENDONS))))
+    dialog.show_joints(joint_zeros(restarted(*(offer(name, 0.3) for name in TENDONS)), SERVOS))
     assert (dialog.search_button.objectName(), dialog.set_button.objectName()) == ("", "main_button")
-    dialog.show_joints(joint_zeros(restarted(*(offer(name, 0.3) for name in TENDONS[1:]))))
+    dialog.show_joints(joint_zeros(restarted(*(offer(name, 0.3) for name in TENDONS[1:])), SERVOS))
     assert (dialog.search_button.objectName(), dialog.set_button.objectName()) == ("main_button", "")
     with qtbot.waitSignal(dialog.search_asked):
         dialog.search_button.click()
@@ -117,26 +117,27 @@ def test_without_a_kept_zero_the_search_is_the_way(dialog: ZeroDialog, qtbot: Qt
 
 def test_what_was_chosen_stays_while_it_is_possible(dialog: ZeroDialog, qtbot: QtBot) -> None:
     """The state of the servos is shown five times a second, and the torque goes off meanwhile."""
-    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.1), torque=True)))
+    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.1), torque=True), SERVOS))
     with qtbot.waitSignal(dialog.torque_off_asked):
         dialog.off_button.click()
-    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.9), torque=False)))
+    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.9), torque=False), SERVOS))
     assert dialog.request == ZeroRequest(positions_mm={"advance": 40.9}), "moved by hand"
     dialog.feed("advance")[1].setValue(38.0)
-    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.2), torque=False)))
+    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.2), torque=False), SERVOS))
     assert not dialog.off_button.isEnabled()
     left = dialog.tendon("left")
     left.setCurrentIndex(left.findData(Choice.SLACK))
-    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.3), torque=False)))
+    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.3), torque=False), SERVOS))
     assert dialog.request == ZeroRequest(positions_mm={"left": 0.0, "advance": 38.0})
-    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.3), torque=True)))
+    dialog.show_joints(joint_zeros(restarted(offer("advance", 40.3), torque=True), SERVOS))
     assert dialog.request == ZeroRequest(positions_mm={"advance": 38.0}), "its servo holds again"
 
 
 def test_all_is_shown_of_a_bus_that_is_silent_or_lacks_a_servo() -> None:
-    assert joint_zeros(None) == joint_zeros(bus(servos=())) == tuple(JointZero(name) for name in JOINT_NAMES)
-    known = joint_zeros(bus(MissingServo("up", 3, 100.0, 4, "silent"), phase=BusPhase.DISARMED))
-    assert known[2] == JointZero("up")
+    nothing = tuple(JointZero(joint.name, kind=joint.kind) for joint in SERVOS.joints)
+    assert joint_zeros(None, SERVOS) == joint_zeros(bus(servos=()), SERVOS) == nothing
+    known = joint_zeros(bus(MissingServo("up", 3, 100.0, 4, "silent"), phase=BusPhase.DISARMED), SERVOS)
+    assert known[2] == nothing[2]
     state = servo(0)
     assert isinstance(state, ServoState)
-    assert known[0] == JointZero("right", state.position_mm, None, True)
+    assert known[0] == JointZero("right", state.position_mm, None, True, JointKind.TENDON)

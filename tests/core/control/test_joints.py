@@ -1,12 +1,16 @@
 """Command -> joint goals in mm, by hand: pretension 0.3 mm, full pull 2 mm, tendons 10 mm/s, feeds 20 mm/s."""
 
 import math
+import re
+from typing import Any
 
 import pytest
 
 from core.config.safety import JointConfig, SafetyConfig, ServosConfig
-from core.control.joints import JointRequest, SentGoals, joint_goals
+from core.control.gate import GateState, GoalRequest, JointMeasurement, Source, gate_step
+from core.control.joints import JointRequest, SentGoals, joint_goals, joint_motion
 from core.types import Command
+from tests.core.robots import ADVANCE, ROTATION, TENDON, THREE, TURNED, robot, tendons
 
 SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 REST = (0.3, 0.3, 0.3, 0.3, 10.0, 20.0, 20.0)
@@ -158,3 +162,129 @@ def test_an_end_stops_both_tendons_of_a_pair_so_that_no_wire_hangs(
 def test_a_pretension_outside_the_envelope_leaves_the_decision_to_the_gate() -> None:
     servos = _with("right", high_mm=0.4).model_copy(update={"pretension_mm": 0.5})  # the configuration itself refuses it
     assert _settled(Command(bend=0.5), servos).goals_mm[0] == pytest.approx(0.5)
+
+
+# --- robots of other shapes ------------------------------------------------------------------------
+
+
+def _driven(command: Command, servos: ServosConfig, seconds: float = 3.2) -> tuple[float, ...]:
+    """Where the joints of a straight robot at its pretension end up; speed and envelope hold in every step."""
+    goals: tuple[float, ...] = tuple(0.3 if joint.is_tendon else 0.0 for joint in servos.joints)
+    for _ in range(round(seconds / 0.02)):
+        before, request = goals, joint_goals(command, SentGoals(goals, 5.0), goals, 5.02, servos, SAFETY)
+        goals = request.goals_mm
+        for joint, old, new in zip(servos.joints, before, goals, strict=True):
+            assert joint.low_mm - 1e-9 <= new <= joint.high_mm + 1e-9
+            assert abs(new - old) <= 0.02 * joint.max_speed_mm_s + 1e-9
+    return goals
+
+
+@pytest.mark.parametrize("servos", [THREE, TURNED, SERVOS], ids=["three", "two and rotation", "four"])
+@pytest.mark.parametrize(("bend", "pitch"), [(0.5, 0.0), (-0.8, 0.0), (0.0, 0.6), (0.4, -0.4), (-0.3, -0.5), (0.0, 0.0)])
+def test_every_shape_bends_the_head_where_it_is_commanded(servos: ServosConfig, bend: float, pitch: float) -> None:
+    goals = _driven(Command(bend, pitch), servos)
+    motion = joint_motion(goals, (0.0,) * len(goals), servos)
+    assert (motion.bend, motion.pitch) == pytest.approx((bend, pitch), abs=1e-6)
+    count = len(servos.tendons)
+    assert sum(goals[:count]) == pytest.approx(0.3 * count), "the pretension stays"
+
+
+def test_three_tendons_share_a_bend_by_their_directions() -> None:
+    up, left, right = _driven(Command(bend=1.0), THREE)[:3]
+    assert (up, left, right) == pytest.approx((0.3, 0.3 - 2.0 * math.cos(math.pi / 6), 0.3 + 2.0 * math.cos(math.pi / 6)))
+
+
+def test_one_end_stops_all_three_tendons_in_the_bends_direction() -> None:
+    short = robot(*tendons(90.0, 210.0, 330.0), ADVANCE)
+    joints = tuple(one.model_copy(update={"high_mm": 1.3} if one.name == "tendon_3" else {}) for one in short.joints)
+    short = short.model_copy(update={"joints": joints})
+    goals = _driven(Command(bend=1.0), short)
+    assert goals[2] == pytest.approx(1.3)
+    motion = joint_motion(goals, (0.0,) * len(goals), short)
+    assert motion.pitch == pytest.approx(0.0, abs=1e-9)
+    assert motion.bend == pytest.approx(1.0 / (2.0 * math.cos(math.pi / 6)))
+
+
+def test_two_tendons_bend_only_as_far_as_the_shaft_is_turned_into_the_plane() -> None:
+    first = joint_goals(Command(bend=0.5), SentGoals((0.3, 0.3, 0.0, 0.0), 5.0), (0.3, 0.3, 0.0, 0.0), 5.02, TURNED, SAFETY)
+    assert abs(first.goals_mm[3]) == pytest.approx(1.2), "60 degrees a second"
+    assert abs(first.goals_mm[0] - 0.3) < 0.05, "its plane is still across the picture"
+    goals = _driven(Command(bend=0.5), TURNED)
+    assert abs(goals[3]) == pytest.approx(90.0)
+    assert abs(goals[0] - goals[1]) == pytest.approx(2.0)
+
+
+def test_a_shaft_at_its_end_is_turned_the_other_way_round() -> None:
+    at = (0.3, 0.3, 0.0, 195.0)
+    angle = math.radians(195.0 + 90.0 + 40.0)  # the plane is 40 degrees further than the shaft is now
+    command = Command(bend=0.5 * math.cos(angle), pitch=0.5 * math.sin(angle))
+    assert joint_goals(command, SentGoals(at, 5.0), at, 5.02, TURNED, SAFETY).goals_mm[3] == pytest.approx(195.0 - 1.2)
+
+
+def test_a_turned_shaft_of_four_tendons_keeps_the_bend() -> None:
+    names = [{**TENDON, "name": name} for name in ("right", "left", "up", "down")]
+    servos = robot(*names, ADVANCE, ROTATION)
+    goals = _driven(Command(bend=0.5, rotation_deg_s=30.0), servos, seconds=3.0)
+    assert goals[-1] == pytest.approx(90.0)
+    assert goals[:4] == pytest.approx((0.3, 0.3, 0.3 - 1.0, 0.3 + 1.0), abs=0.03)
+    motion = joint_motion(goals, (*(0.0,) * 5, 30.0), servos)
+    assert (motion.bend, motion.pitch, motion.rotation_deg_s) == pytest.approx((0.5, 0.0, 30.0), abs=0.02)
+
+
+def test_a_small_bend_turns_nothing() -> None:
+    assert _driven(Command(bend=0.01), TURNED)[3] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("joints", "problem"),
+    [
+        ((*tendons(0.0), ADVANCE), "1 tendons; a robot has 2, 3 or 4"),
+        ((ADVANCE, *tendons(0.0, 180.0)), "their order must be tendon, advance, delivery, rotation"),
+        ((*tendons(0.0, 90.0), ADVANCE), "angle_deg must be evenly spaced, in the order 0, 180"),
+        ((*tendons(0.0, 120.0, 230.0), ADVANCE), "in the order 0, 120, 240 from the first"),
+        ((*tendons(0.0, 180.0), ADVANCE, {**ADVANCE, "name": "other", "kind": "advance"}), "there may be one advance only"),
+        ((*tendons(0.0, 180.0), {**ADVANCE, "name": "tendon_1", "kind": "advance"}), "two have the same name"),
+        (({**TENDON, "name": "one"}, *tendons(180.0), ADVANCE), "joint one: a tendon needs angle_deg"),
+        (({**ADVANCE, "name": "odd"}, *tendons(0.0, 180.0)), "kind"),
+        (tendons(0.0), "at least 2"),
+        ((*tendons(0.0, 180.0), *({**ADVANCE, "name": f"delivery_{n}"} for n in range(11))), "at most 12"),
+    ],
+)
+def test_joints_that_make_no_robot_are_refused_in_one_line(joints: list[dict[str, Any]], problem: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(problem)):
+        robot(*joints)
+
+
+def test_joints_of_older_files_get_their_kind_and_a_rotation_has_units_of_its_own() -> None:
+    plain = [joint.model_dump(mode="json", exclude={"kind", "angle_deg"}) for joint in SERVOS.joints]
+    assert ServosConfig.model_validate({"joints": plain}) == SERVOS
+    assert [joint.kind.value for joint in SERVOS.joints] == ["tendon"] * 4 + ["advance", "delivery", "delivery"]
+    said = TURNED.joints[3].model_dump(mode="json")
+    assert (said["low_deg"], said["max_speed_deg_s"], said["max_torque_nmm"], said["deg_per_turn"]) == (-200.0, 60.0, 30.0, 360.0)
+    assert not any("_mm" in key for key in said if key != "max_torque_nmm")
+    assert ServosConfig.model_validate(TURNED.model_dump()) == TURNED
+    limit = TURNED.force_limit(TURNED.joints[3])
+    assert 27.0 < limit.force_n <= 30.0, "N mm, in steps of 4.8"
+    assert TURNED.astray_mm(TURNED.joints[3]) == 15.0
+
+
+@pytest.mark.parametrize("servos", [THREE, TURNED], ids=["three", "two and rotation"])
+def test_the_gate_takes_the_joints_of_every_shape(servos: ServosConfig) -> None:
+    count, now_s = len(servos.joints), 100.0
+    at = tuple(0.3 if joint.is_tendon else 0.0 for joint in servos.joints)
+    state = GateState()
+    for turn in range(50):
+        now_s = 100.0 + 0.02 * turn
+        wanted = joint_goals(Command(bend=0.5, advance_mm_s=5.0), state.sent, at, now_s, servos, SAFETY)
+        request = GoalRequest(wanted.goals_mm, Source.OPERATOR, now_s)
+        step = gate_step(state, request, JointMeasurement(at, now_s), Source.OPERATOR, now_s, servos, SAFETY)
+        assert step.rejection is None
+        state, at = step.state, step.goals_mm or at
+    motion = joint_motion(at, state.speeds_mm_s, servos)
+    assert motion.advance_mm_s == pytest.approx(5.0)
+    assert motion.bend > 0.2
+    wrong = gate_step(
+        state, GoalRequest((0.3,) * 7, Source.OPERATOR, now_s), JointMeasurement(at, now_s), Source.OPERATOR, now_s, servos, SAFETY
+    )
+    assert wrong.rejection is not None
+    assert wrong.rejection.detail == f"7 instead of {count}"

@@ -19,6 +19,7 @@ from core.control.kept_zero import (
     ZeroRequest,
     keep,
     request_problem,
+    unknown_joint,
     zero_offer,
 )
 
@@ -159,12 +160,17 @@ def test_zeros_that_are_refused_and_why(request_: ZeroRequest, offers: tuple[Zer
     assert re.match(said or "$", problem), problem
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"positions_mm": {"advance": float("nan")}}, {"positions_mm": {"hook": 0.0}}, {"kept": ("hook",)}]
-)
+@pytest.mark.parametrize("wrong", [{"positions_mm": {"advance": float("nan")}}, {"positions_mm": {"Hook!": 0.0}}, {"kept": ("",)}])
 def test_a_request_that_is_none_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ValueError, match="ZeroRequest"):
         ZeroRequest.model_validate(wrong)
+
+
+@pytest.mark.parametrize("key", ["positions_mm", "kept", "forgotten"])
+def test_a_joint_that_the_robot_does_not_have_is_named(key: str) -> None:
+    request = ZeroRequest.model_validate({key: {"hook": 0.0} if key == "positions_mm" else ("hook",)})
+    assert unknown_joint(request, SERVOS).startswith("hook is no joint of this robot: right, left")
+    assert unknown_joint(ALL_AT_ZERO, SERVOS) == ""
 
 
 def test_a_file_is_read_as_it_was_written_and_another_one_is_refused() -> None:
