@@ -80,8 +80,8 @@ def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None
     written = 0
     first_s: float | None = None
     with new_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        out = csv.writer(file)
-        out.writerow(_COLUMNS)
+        out, columns = csv.writer(file), (*_COLUMNS, *(_TURNING if _has_rotation(reader) else ()))
+        out.writerow(columns)
         for place in range(len(reader)):
             row = reader.row(place)
             if row is not None:
@@ -89,7 +89,7 @@ def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None
                 values = _flat(row)
                 values["time_s"] = round(row.captured_s - first_s, 6)
                 values["source_px_per_working_px"] = round(row.source_px_per_working_px, 6)
-                out.writerow(values[name] for name in _COLUMNS)
+                out.writerow(values[name] for name in columns)
                 written += 1
             on_row()
     return written
@@ -97,7 +97,10 @@ def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None
 
 TENDON_NAMES = ("right", "left", "up", "down")
 """Tendons of the default robot, in the order of a status; those of other robots are numbered."""
-_MOTIONS = tuple(f"{who}_{name}" for who in ("asked", "commanded", "sent") for name in Command.__slots__)
+_WHO = ("asked", "commanded", "sent")
+_MOTIONS = tuple(f"{who}_{name}" for who in _WHO for name in Command.__slots__ if name != "rotation_deg_s")
+_TURNING = (*(f"{who}_rotation_deg_s" for who in _WHO), "rotation_deg")
+"""Columns of a robot whose shaft is turned, after the others."""
 _COLUMNS = (
     *("row", "index", "captured_s", "time_s", "video", "pts_ms", "dropped_frames", "camera_lost", "dropped_rows"),
     *("width_px", "height_px", "source_px_per_working_px", "state", "theta_deg", "theta_signed_deg", "c_head_px", "c_tail_px"),
@@ -117,10 +120,17 @@ _PATHS = {
     **{f"asked_{name}": f"drive.operator_command.{name}" for name in Command.__slots__},
     **{f"commanded_{name}": f"drive.program_command.{name}" for name in Command.__slots__},
     **{f"sent_{name}": f"sent.{name}" for name in Command.__slots__},
-    **{name: f"status.{name}" for name in ("insertion_mm", "delivery_mm", "wall_contact_n")},
+    **{name: f"status.{name}" for name in ("insertion_mm", "delivery_mm", "wall_contact_n", "rotation_deg")},
     **{name: name for name in ("row", "index", "captured_s", "video", "pts_ms", "frames_per_second", "dropped_frames")},
     **{name: name for name in ("camera_lost", "dropped_rows", "source_px_per_working_px")},
 }
+
+
+def _has_rotation(reader: SessionReader) -> bool:
+    """Whether the session's robot has a shaft that is turned."""
+    config = reader.manifest.config if reader.manifest is not None else {}
+    joints = (config.get("servos") or {}).get("joints") or ()
+    return any(isinstance(joint, dict) and joint.get("kind") == "rotation" for joint in joints)
 
 
 def tendon_names(count: int) -> tuple[str, ...]:
@@ -258,8 +268,8 @@ _POSE = {
 }
 _PACE = {"frames_per_second": _NUMBER, "dropped_frames": _NUMBER, "dropped_rows": _NUMBER, "perception_ms": _MAYBE}
 _TENDONS = {f"tendon_{what}_{side}": _NUMBER for what in ("pull_mm", "force_mn") for side in TENDON_NAMES}
-_ROBOT = {"insertion_mm": _NUMBER, "delivery_mm": _NUMBER, "wall_contact_n": _MAYBE, **_TENDONS}
-_MOTION = {"mode": _TEXT, "mode_number": _MAYBE, "sent_by": _TEXT, **dict.fromkeys(_MOTIONS, _MAYBE)}
+_ROBOT = {"insertion_mm": _NUMBER, "delivery_mm": _NUMBER, "wall_contact_n": _MAYBE, "rotation_deg": _MAYBE, **_TENDONS}
+_MOTION = {"mode": _TEXT, "mode_number": _MAYBE, "sent_by": _TEXT, **dict.fromkeys((*_MOTIONS, *_TURNING[:3]), _MAYBE)}
 
 
 def _message(title: str, **properties: Schema) -> Schema:
