@@ -66,6 +66,8 @@ EXPLAINED = {
     ("joints", "return inside_mm, Limit.STEP if abs(inside_mm - goal_mm) > _ROUNDING_MM else limit", "Gt -> GtE"): TIE,
     ("joints", "found.append((kept_mm, Limit.TOGETHER) if abs(kept_mm - goal_mm) > _ROUNDING_MM else (goal_mm, limit))",
         "Gt -> GtE"): TIE,
+    ("gate", "retracts = request.retracts if request is not None and request.source is Source.OPERATOR else Retracted.NONE",
+        "without term 2"): "a request of another source is refused, whatever its envelope",
     ("kept_zero", "turns = (away + TICKS_PER_TURN // 2) // TICKS_PER_TURN", "2 -> 3"):
         "what was moved by more than a quarter of a turn is not offered, and nearer both round alike",
     ("health", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",

@@ -290,8 +290,7 @@ def gate_step(
         if permitted is Source.PROGRAM:
             servos = by_program(servos, measurement.positions_mm, state.sent)
         else:
-            is_operators = request is not None and request.source is Source.OPERATOR
-            retracts = request.retracts if request is not None and is_operators else Retracted.NONE
+            retracts = request.retracts if request is not None and request.source is Source.OPERATOR else Retracted.NONE
             servos = by_hand(servos, measurement.positions_mm, state.sent, retracts=retracts)
     mistrust = measurement_problem(measurement, now_s, servos, safety)
     believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None
