@@ -181,8 +181,7 @@ class Drive(RuleBasedStateMachine):
             self.at_mm[place] = kept
 
     @rule(
-        retracts=st.sampled_from([Retracted.NONE, Retracted.ROBOT, Retracted.CATHETER, *[~Retracted.NONE] * 3]),
-        ticks=st.integers(1, 8),
+        retracts=st.sampled_from([~Retracted.NONE, Retracted.ROBOT, Retracted.CATHETER, Retracted.NONE]), ticks=st.integers(4, 12)
     )
     def the_operator_pulls_the_feeds_back_at_their_end(self, retracts: Retracted, ticks: int) -> None:
         """Whoever drives says so; only the operator may."""
