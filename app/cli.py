@@ -22,6 +22,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from app.commands.options import ConfigOption, RigOption, SourceOption
 from core.devices import UserError
+from core.program import CALLED, as_called, is_installed, missing_extra, program_commit, program_version
 from core.system import keep_freed_memory, limit_heaps, limit_pictures
 
 COMMANDS = {
@@ -79,7 +80,7 @@ MOVED = {
 }
 """Former commands, and what is said to those who call them."""
 _INTERRUPTED = 130
-_TYPER_OPTIONS: Any = {"add_completion": False, "pretty_exceptions_enable": False, "rich_markup_mode": None}
+_TYPER_OPTIONS: Any = {"pretty_exceptions_enable": False, "rich_markup_mode": None}
 
 
 class LazyGroup(TyperGroup):
@@ -99,7 +100,7 @@ class LazyGroup(TyperGroup):
 def load_command(name: str) -> Any:
     """The command of this name, or the group, with its options."""
     found = getattr(importlib.import_module(COMMANDS[name][0]), name)
-    parent = typer.Typer(**_TYPER_OPTIONS)
+    parent = typer.Typer(add_completion=False, **_TYPER_OPTIONS)
     if isinstance(found, typer.Typer):
         parent.add_typer(found, name=name)
         return typer.main.get_group(parent).commands[name]
@@ -112,12 +113,28 @@ app = typer.Typer(
     name="lumenpilot",
     help="Teleoperation assist for a tendon-driven interventional robot: perception, pose state, advice, and a bench twin.",
     no_args_is_help=False,
+    add_completion=is_installed(),  # in a checkout there is no command whose arguments a shell could complete
     **_TYPER_OPTIONS,
 )
 
 
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        commit = program_commit()
+        print(f"lumenpilot {program_version()}" + (f" ({commit})" if commit else ""))
+        raise typer.Exit
+
+
 @app.callback(invoke_without_command=True)
-def _window(context: typer.Context, rig: RigOption = None, config: ConfigOption = None, source: SourceOption = None) -> None:
+def _window(
+    context: typer.Context,
+    rig: RigOption = None,
+    config: ConfigOption = None,
+    source: SourceOption = None,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="version and commit of this program")
+    ] = False,
+) -> None:
     """Without a command: the operator window."""
     if context.invoked_subcommand is None:
         _open_window(rig, config, source)
@@ -163,11 +180,16 @@ def main() -> None:
     try:
         try:
             _refuse_empty(sys.argv[1:])
-            code = app(prog_name="main.py", standalone_mode=False)
+            code = app(prog_name=CALLED, standalone_mode=False)
         finally:
             _flush_output()
     except UserError as error:
-        _print_error(f"error: {error}")
+        _print_error(as_called(f"error: {error}"))
+        sys.exit(2)
+    except ImportError as error:
+        if (line := missing_extra(error)) is None:
+            raise
+        _print_error(f"error: {line}")
         sys.exit(2)
     except typer.TyperException as error:  # a command line that makes no sense
         message = error.format_message()

@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from core.devices import DeviceError
+from core.program import ROOT
 
 _log = logging.getLogger(__name__)
-_ROOT = Path(__file__).resolve().parents[1]
 MESSAGE_BYTES = 131_072
 """The largest message on a socket between two processes."""
 PARENT_CHECK_S = 1.0
@@ -93,7 +93,7 @@ class DeviceProcess:
             undo.callback(self.socket.close)
             theirs.callback(their_socket.close)
             fds = (self._memory_fd, their_pipe, their_socket.fileno())
-            path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH", ""))))
+            path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH", ""))))
             one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", module, *map(str, fds), str(os.getpid())],

@@ -47,18 +47,23 @@ def pins() -> dict[str, str]:
     return found
 
 
+LOCKED = ("cluster", "l515", "train")
+"""Extras that set-up installs."""
+
+
 def asked_for() -> set[str]:
-    """What pyproject.toml names: to run and to test."""
+    """What pyproject.toml names, and set-up installs: to run and to test."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     lines = project["project"]["dependencies"] + project["dependency-groups"]["test"]
+    lines += [line for extra in LOCKED for line in project["project"]["optional-dependencies"][extra]]
     return {canonicalize_name(Requirement(line).name) for line in lines}
 
 
 def extras() -> set[str]:
-    """What pyproject.toml names as optional: neither pinned nor installed by set-up."""
+    """What pyproject.toml names as optional, and is neither pinned nor installed by set-up."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    lines = [line for extra in project["project"].get("optional-dependencies", {}).values() for line in extra]
-    return {canonicalize_name(Requirement(line).name) for line in lines}
+    lines = [line for extra in project["project"]["optional-dependencies"].values() for line in extra]
+    return {canonicalize_name(Requirement(line).name) for line in lines} - asked_for()
 
 
 def needs(package: str) -> set[str]:

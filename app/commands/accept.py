@@ -32,6 +32,7 @@ from core.config.models import Config
 from core.config.rig_file import RigFile, find_rig, with_rig
 from core.config.safety import JOINT_NAMES, JointConfig
 from core.devices import UserError
+from core.program import CALLED
 
 if TYPE_CHECKING:
     from hardware.calibration.acceptance import AcceptanceBench
@@ -68,7 +69,7 @@ def accept_rig(
             accepted = done
             write_acceptance(path, accepted)
     except (UserError, KeyboardInterrupt) as error:
-        kept = f"what was done is kept in {acceptance_path(path)}; go on: main.py rig accept {shlex.quote(name)}"
+        kept = f"what was done is kept in {acceptance_path(path)}; go on: {CALLED} rig accept {shlex.quote(name)}"
         if isinstance(error, UserError):
             raise UserError(f"{error}; {kept}") from None
         _say(kept)
@@ -168,7 +169,7 @@ def acceptance_lines(accepted: Acceptance | None, config: Config) -> list[str]:
     """What is recorded, and what it no longer holds for, a line each."""
     problems = problems_of(accepted, config)
     if accepted is None:
-        return ["acceptance: none; main.py rig accept NAME"]
+        return [f"acceptance: none; {CALLED} rig accept NAME"]
     state = f"NOT valid: {'; '.join(problems)}" if problems else "valid"
     made = accepted.finished_utc or accepted.begun_utc
     version = f"version {accepted.version}" + (f" ({accepted.commit})" if accepted.commit else "")

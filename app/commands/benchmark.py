@@ -22,6 +22,7 @@ from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOp
 from app.commands.progress import LeftOut, progress_bar
 from core.config.models import Config, TwinConfig, choose_model, load_config
 from core.devices import UserError
+from core.program import ROOT, need_package
 from core.types import Frame, Image, Scene
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ def benchmark(
         raise UserError("--store keeps the figures of one set: give one --accuracy SET")
     settings = load_config(config, preset, choose_model(model))
     if not accuracy:
+        need_package("torch")  # of the baseline
         # The window takes the configuration's model: start-up with another one is not measured.
         first_frame_s = _first_frame_s(config) if model is None and preset is None else None
         print_figures(measure_speed(settings, frames or _FRAMES, first_frame_s), json, "speed")
@@ -171,11 +173,10 @@ def _first_frame_s(config_path: Path | None) -> float | None:
 
     As at the very first start: without caches of earlier ones.
     """
-    main = Path(sys.modules["__main__"].__file__ or "main.py").resolve()
     environment = dict(os.environ)
     use_offscreen(environment)
     started = time.monotonic()
-    command = [sys.executable, str(main), "gui", "--until-first-frame", "--rig", "twin"]
+    command = [sys.executable, str(ROOT / "main.py"), "gui", "--until-first-frame", "--rig", "twin"]
     command += ["--config", str(config_path)] if config_path is not None else []
     try:
         with tempfile.TemporaryDirectory() as cache:

@@ -19,6 +19,7 @@ from app.commands.options import ConfigOption
 from app.commands.progress import LeftOut, progress_bar
 from core.config.models import PerceptionConfig, load_config
 from core.perception.quality import ConfidenceCalibration
+from core.program import CALLED
 from core.types import Image
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def calibrate(
             renew_eight_bit(work, images, lambda share: bar.update(task, completed=round(100 * share)))
         tables = _calibrated(work, frames, config, bar)
     Console(markup=False, emoji=False).print(*[_table(f"{target}, {title}", *of_it) for title, of_it in tables])
-    sys.stderr.write("measure it on another set: main.py benchmark --accuracy SET\n")
+    sys.stderr.write(f"measure it on another set: {CALLED} benchmark --accuracy SET\n")
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,6 +31,7 @@ from core.config.rig_file import (
     write_rig,
 )
 from core.devices import UserError
+from core.program import CALLED
 from hardware.rig import RigKind, kind_of, rig_config
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def print_list(as_json: JsonOption = False) -> None:
         sys.stdout.write(f"{one.name}: {rig_line(one.rig) if one.rig is not None else one.problem}\n")
     if not listed:
         sys.stdout.write(
-            f"no rig files in {rigs_folder()}; make one: main.py rig calibrate NAME --auto, or menu Rig in the window\n"
+            f"no rig files in {rigs_folder()}; make one: {CALLED} rig calibrate NAME --auto, or menu Rig in the window\n"
         )
 
 

@@ -32,6 +32,7 @@ from core.config.rig_file import find_rig, set_bench
 from core.devices import UserError
 from core.learning.training_plan import TrainingPlan
 from core.perception.model_file import BENCH
+from core.program import need_package
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -131,6 +132,7 @@ def _check_places(source: Path, out: Path, folder: Path, init: str) -> None:
     from core.learning.model_writer import check_can_write, check_outside
     from core.perception.model_file import check_model, model_folder
 
+    need_package("torch")
     check_model(init)
     began_with = model_folder(init)
     if is_same(began_with, out):

@@ -25,6 +25,7 @@ from app.commands.progress import (
 from app.commands.synth import make_set
 from core.devices import UserError
 from core.learning.training_plan import TrainingPlan
+from core.program import need_package
 
 if TYPE_CHECKING:
     from app.commands.trainer import TrainingTask
@@ -154,6 +155,7 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
     """
     from core.learning.dataset import DatasetError, without_masks
 
+    need_package("torch")
     init = options.init
     looks = _looks_to_make(options)
     end_like_an_interrupt()

@@ -16,10 +16,10 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import cache
-from pathlib import Path
 from typing import Any, TypeVar
 
 from core.devices import UserError
+from core.program import ROOT, is_installed, missing_extra
 from core.system import begin_as_worker
 
 Task = TypeVar("Task")
@@ -68,11 +68,12 @@ def _start_worker() -> None:
     cv2.setNumThreads(1)
 
 
-_ROOT = Path(__file__).resolve().parents[2]
 _STATE = ("app/**/*.py", "core/**/*.py", "hardware/**/*.py", "resources/models/**/*.onnx")
 """What a trial or a frame depends on: the code, and the networks of the models."""
 _TIMEOUT = "10s"
-_START = "in LumenPilot's folder: .venv/bin/python -m dask worker {address} --nworkers 2 --nthreads 1"
+_WORKER = "-m dask worker {address} --nworkers 2 --nthreads 1"
+_START = f"python {_WORKER} --preload lumenpilot" if is_installed() else f"in LumenPilot's folder: .venv/bin/python {_WORKER}"
+_SCHEDULER = ("python" if is_installed() else ".venv/bin/python") + " -m dask scheduler"
 
 
 _PORT = re.compile(r":\d{1,5}/?$")
@@ -93,14 +94,16 @@ def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequen
     if not _PORT.search(address):  # the client would wait as for an answer
         raise ClusterError(f"--scheduler {address}: says no port; give it as HOST:PORT, as the scheduler tells it")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are one line of ours
-    distributed = importlib.import_module("distributed")  # takes a second
+    try:
+        distributed = importlib.import_module("distributed")  # takes a second
+    except ModuleNotFoundError as error:
+        raise ClusterError(f"--scheduler: {missing_extra(error) or error}") from None
     try:
         client = distributed.Client(address, timeout=_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         why = str(error).partition("\n")[0]
         raise ClusterError(
-            f"--scheduler {address}: no Dask scheduler answers there ({why}); start one (.venv/bin/python -m dask scheduler), "
-            "or use --workers"
+            f"--scheduler {address}: no Dask scheduler answers there ({why}); start one ({_SCHEDULER}), or use --workers"
         ) from None
     with client:
         _check_workers(client, address)
@@ -151,6 +154,6 @@ def code_of_worker() -> str:
     """SHA-256 of the program's files and models, as they were at the first call in this process."""
     digest = hashlib.sha256()
     for pattern in _STATE:
-        for path in sorted(_ROOT.glob(pattern)):
-            digest.update(f"{path.relative_to(_ROOT).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+        for path in sorted(ROOT.glob(pattern)):
+            digest.update(f"{path.relative_to(ROOT).as_posix()} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return digest.hexdigest()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup, QIcon, QKeySequence
@@ -14,19 +13,10 @@ from PySide6.QtWidgets import QMainWindow, QMenu, QMessageBox, QTabWidget, QWidg
 
 from app.ui.i18n import AUTO, CHINESE, ENGLISH, language_in_use, tr
 from core.config.models import RESOURCES
+from core.program import program_version
 
 ICON = RESOURCES / "icons" / "lumenpilot.svg"
 _SIZE_PX = 72
-
-
-@cache
-def program_version() -> str:
-    """As pyproject.toml beside the resources says; empty when it is not there."""
-    try:
-        text = (RESOURCES.parent / "pyproject.toml").read_text(encoding="utf-8")
-        return str(tomllib.loads(text)["project"]["version"])
-    except (OSError, tomllib.TOMLDecodeError, KeyError):
-        return ""
 
 
 def program_icon() -> QIcon:

@@ -25,7 +25,7 @@ from typing import Any, TextIO
 
 import platformdirs
 
-from app.ui.workers import ROOT
+from core.program import ROOT
 from core.session.manifest import package_versions
 
 _LOG_LINES = 200

@@ -6,6 +6,7 @@ import os
 import sys
 
 from core.devices import UserError
+from core.program import CALLED
 
 
 def check_display() -> None:
@@ -36,5 +37,5 @@ def check_qt(instead: str) -> None:
         from PySide6 import QtWidgets  # noqa: F401
     except ImportError as error:
         raise UserError(
-            f"overlays are drawn with Qt, which does not load ({error}): install what main.py doctor names, or {instead}"
+            f"overlays are drawn with Qt, which does not load ({error}): install what {CALLED} doctor names, or {instead}"
         ) from None

@@ -25,6 +25,7 @@ from core.control.gate import RejectReason
 from core.control.joints import Limit
 from core.control.modes import Hindrance
 from core.messages import Message
+from core.program import as_called
 from core.types import Reason
 
 if TYPE_CHECKING:
@@ -182,14 +183,14 @@ def mark(text: str) -> str:
 
 def tr(text: str, /, **values: object) -> str:
     """`text` in the language of the windows, with `values` in the places of its {names}."""
-    shown = text if _IN_USE.lookup is None or _AS_WRITTEN.get() else _IN_USE.lookup(text)
+    shown = as_called(text if _IN_USE.lookup is None or _AS_WRITTEN.get() else _IN_USE.lookup(text))
     return shown.format(**values) if values else shown
 
 
 def tr_text(text: str) -> str:
     """A finished text of a layer below in the language of the windows; an unknown one stays English."""
     if _IN_USE.lookup is None or _AS_WRITTEN.get() or not text:
-        return text
+        return as_called(text)
     if isinstance(text, Message) and text.values and (shown := tr(text.template)) != text.template:
         return shown.format(**{name: tr_text(value) for name, value in text.values.items()})
     return _recognised(str.__str__(text))

@@ -18,12 +18,12 @@ from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
-from pathlib import Path
 from typing import IO, Any, Generic, TypeVar
 
 import shiboken6
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
+from core.program import ROOT
 from core.system import lower_priority
 
 Receiver = TypeVar("Receiver", bound=QObject)
@@ -210,7 +210,6 @@ def error_line(error: Exception) -> str:
     return text if expected else f"unexpected {type(error).__name__}: {text}"
 
 
-ROOT = Path(__file__).resolve().parents[2]
 LOW_PRIORITY = 14
 """Added to the niceness of commands beside a window."""
 NOT_STARTED = 127

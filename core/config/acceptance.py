@@ -7,8 +7,6 @@ rig is advisory until it is accepted again.
 
 from __future__ import annotations
 
-import subprocess
-import tomllib
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,6 +19,7 @@ from core.config.safety import JOINT_NAMES, JointName, wiring_of
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
 from core.files import write_atomic
+from core.program import as_called, program_commit, program_version
 
 FORMAT = 1
 FORCE_ALLOWANCE = 1.1
@@ -33,7 +32,6 @@ ESTOP_STEP = "E-stop"
 _OF_BEFORE = "it does not say with which envelopes, speeds and pull it was made: main.py rig accept NAME"
 _ENDING, _OLDER = ".acceptance.json", ".acceptance.older.json"
 _MAX_BYTES = 200_000
-_SOURCE = Path(__file__).resolve().parents[2]
 
 
 class AcceptanceError(UserError):
@@ -235,29 +233,6 @@ def problems_of(accepted: Acceptance | None, config: Config, firmware: Sequence[
     return tuple(f"not done: {step}" for step in accepted.missing)
 
 
-def program_version() -> str:
-    """Version of this program, which runs from its source; "0" where that does not say."""
-    try:
-        return str(tomllib.loads((_SOURCE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"])
-    except (OSError, ValueError, KeyError):
-        return "0"
-
-
-def program_commit() -> str | None:
-    """Commit of the source that runs, with "+" when files differ from it; None where that is not known."""
-    try:
-        told = subprocess.run(
-            ["git", "-C", str(_SOURCE), "describe", "--always", "--dirty=+", "--abbrev=12"],
-            capture_output=True,
-            text=True,
-            timeout=5.0,
-            check=True,
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return told.stdout.strip() or None
-
-
 def acceptance_path(rig_file: Path) -> Path:
     """Where the acceptance of a rig file lies."""
     return rig_file.with_name(rig_file.stem + _ENDING)
@@ -266,7 +241,7 @@ def acceptance_path(rig_file: Path) -> Path:
 def read_acceptance(rig_file: Path) -> Acceptance | None:
     """The acceptance of a rig file; None without one. Raises AcceptanceError; the file is never changed."""
     path = acceptance_path(rig_file)
-    again = "accept the rig again (main.py rig accept NAME --anew)"
+    again = as_called("accept the rig again (main.py rig accept NAME --anew)")
     try:
         data = path.read_bytes()
     except FileNotFoundError:

@@ -30,6 +30,7 @@ from core.perception.model_file import (
 )
 from core.perception.out_of_distribution import signature_of
 from core.perception.segmentation import Probability, Segmentation, Segmenter
+from core.program import missing_extra
 from core.types import Image
 
 _Result = TypeVar("_Result")
@@ -221,7 +222,10 @@ class TorchSegmenter(Segmenter):
     """The same network in torch: half precision on a CUDA device where there is one, else fp32 on the CPU."""
 
     def __init__(self, folder: Path, threads: int = 0) -> None:
-        import torch
+        try:
+            import torch
+        except ModuleNotFoundError as error:
+            raise ModelError(missing_extra(error) or str(error)) from None
 
         from core.perception.model_file import load_network
         from core.perception.unet import Probabilities
@@ -259,8 +263,10 @@ def cuda_present() -> bool:
     """Whether torch can use a CUDA device. The kernel is asked first, because importing torch to ask costs seconds."""
     if not Path("/proc/driver/nvidia/version").exists() and not Path("/dev/nvidia0").exists():
         return False
-    import torch
-
+    try:
+        import torch
+    except ModuleNotFoundError:  # an extra
+        return False
     return torch.cuda.is_available()
 
 

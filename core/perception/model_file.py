@@ -20,6 +20,7 @@ from core.config.models import RESOURCES
 from core.devices import UserError
 from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.quality import ConfidenceCalibration
+from core.program import missing_extra
 
 if TYPE_CHECKING:
     from core.perception.unet import DualUNet
@@ -224,7 +225,8 @@ def _state_of_onnx(data: bytes) -> dict[str, Any]:
         from onnx import numpy_helper
     except ImportError as error:
         raise ModelError(
-            f"networks are read with the package onnx, which does not load ({error}): make clean && make setup"
+            missing_extra(error)
+            or f"networks are read with the package onnx, which does not load ({error}): make clean && make setup"
         ) from None
     try:
         graph = onnx.load_model_from_string(data).graph

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from core.config.models import CameraConfig, RigConfig
-from core.devices import Camera
+from core.devices import Camera, DeviceError
 from core.messages import message
+from core.program import how_to_install
 from hardware.cameras import sysfs
 
 if TYPE_CHECKING:
@@ -62,19 +63,35 @@ class CameraKind:
     check_library: Callable[[], None] = _no_library
 
 
+_LIBREALSENSE = "pyrealsense2"
+"""The optional package of RealSense cameras."""
+
+
+def _need_realsense() -> None:
+    if find_spec(_LIBREALSENSE) is None:
+        raise DeviceError(
+            message("RealSense cameras need the package pyrealsense2: {command}", command=how_to_install(_LIBREALSENSE))
+        )
+
+
 def _realsense_live(config: CameraConfig) -> Camera:
+    _need_realsense()
     from hardware.cameras.realsense import realsense_camera
 
     return realsense_camera(config)
 
 
 def _realsense_recording(source: Path, _: RigConfig) -> Camera:
+    _need_realsense()
     from hardware.cameras.realsense import RealSenseRecording
 
     return RealSenseRecording(source)
 
 
 def _find_realsense() -> Sequence[FoundCamera]:
+    if find_spec(_LIBREALSENSE) is None and not sysfs.realsense_on_usb():
+        return ()
+    _need_realsense()
     from hardware.cameras.realsense import find_cameras
 
     return [FoundCamera("realsense", camera.describe(), serial=camera.serial) for camera in find_cameras()]
@@ -84,7 +101,7 @@ def _check_realsense_library() -> None:
     """A library cut short ends a process that loads it with a memory fault."""
     from hardware.preflight.checks import REALSENSE, load_problem
 
-    if problem := load_problem(REALSENSE):
+    if find_spec(_LIBREALSENSE) is not None and (problem := load_problem(REALSENSE)):
         raise ImportError(message("the library of RealSense cameras cannot be used: {problem}", problem=problem))
 
 
@@ -96,9 +113,12 @@ _UDEV = (
 
 def _check_realsense(config: CameraConfig) -> Check:
     """There, permitted, on a fast enough port, with a firmware that the library knows."""
+    from hardware.preflight.checks import Check
+
+    if find_spec(_LIBREALSENSE) is None:
+        return Check("camera", False, message("RealSense cameras need the package pyrealsense2"), how_to_install(_LIBREALSENSE))
     _check_realsense_library()
     from hardware.cameras.realsense import find_cameras
-    from hardware.preflight.checks import Check
 
     cameras = find_cameras()
     chosen = [camera for camera in cameras if config.serial in {None, camera.serial}]
@@ -184,7 +204,7 @@ def _check_basler(config: CameraConfig) -> Check:
     from hardware.preflight.checks import Check
 
     if find_spec(_PYPYLON) is None:
-        return Check("camera", False, message("Basler cameras need the package pypylon"), ".venv/bin/pip install pypylon")
+        return Check("camera", False, message("Basler cameras need the package pypylon"), how_to_install(_PYPYLON))
     from hardware.cameras.basler import find_cameras
 
     cameras = find_cameras()

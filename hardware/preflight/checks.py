@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from core.messages import message
+from core.program import ROOT, is_installed
 
 if TYPE_CHECKING:
     from core.config.models import RecordConfig
@@ -40,7 +41,7 @@ class Check:
 
 
 NOT_CONFIGURED = "not configured"
-RENEW = "make clean && make setup"
+RENEW = "install LumenPilot again, into a new environment" if is_installed() else "make clean && make setup"
 """Mends damaged and missing files of installed packages. `make setup` alone leaves them: pip looks at versions, not at files."""
 
 
@@ -115,7 +116,7 @@ def check_clock(wall: Callable[[], float] = time.time) -> Check:
     return Check("clock", True, detail)
 
 
-LOCK = Path(__file__).resolve().parents[2] / "requirements.lock"
+LOCK = ROOT / "requirements.lock"
 
 _REMOVED = {"openvino-telemetry"}
 """Pinned because openvino asks for it, and removed by set-up because it reports over the network."""
@@ -147,14 +148,16 @@ _LOAD_WITHIN_S = 60.0
 
 
 def check_python(version: tuple[int, ...] = sys.version_info[:3]) -> Check:
-    """Python 3.11: the last RealSense package with the L515 has a build for no other."""
+    """Python 3.11 to 3.13."""
     found = ".".join(map(str, version))
-    fix = "" if version[:2] == (3, 11) else "install Python 3.11, then: make PYTHON=python3.11 setup"
+    fix = "" if (3, 11) <= version[:2] <= (3, 13) else "install Python 3.11, then: make PYTHON=python3.11 setup"
     return Check("python", not fix, f"{found}, {sys.executable}", fix)
 
 
 def check_packages(lock: Path = LOCK, installed: Callable[[str], str] = metadata.version) -> Check:
-    """Every package to run with against its pin; local parts of versions ("+cpu") do not count."""
+    """Every package to run with against its pin; local parts of versions ("+cpu") do not count. Installed programs have no pins."""
+    if lock is LOCK and is_installed():
+        return _check_required(metadata.requires("lumenpilot") or ())
     try:
         to_run = lock.read_text(encoding="utf-8").partition("# --- to test")[0]
     except OSError as error:
@@ -170,6 +173,20 @@ def check_packages(lock: Path = LOCK, installed: Callable[[str], str] = metadata
     if wrong:
         return Check("packages", False, "; ".join(wrong), "rm -f .venv/.ready && make setup")
     return Check("packages", True, message("{a} as pinned", a=len(pins) - len(_REMOVED & set(pins))))
+
+
+def _check_required(requirements: Iterable[str], installed: Callable[[str], str] = metadata.version) -> Check:
+    """Every package that the installed program needs, extras left out; their versions were the installer's business."""
+    names = [re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in requirements if "extra ==" not in line]
+    missing = []
+    for name in names:
+        try:
+            installed(name)
+        except metadata.PackageNotFoundError:
+            missing.append(name)
+    if missing:
+        return Check("packages", False, message("missing: {names}", names=", ".join(missing)), RENEW)
+    return Check("packages", True, message("{a} can be loaded", a=len(names)))
 
 
 def check_libraries(load: Callable[[str], object] = ctypes.CDLL) -> Check:
@@ -226,6 +243,8 @@ def check_binaries(
     problems, fine, packages, missing = [], [], [], []
     is_damaged = False
     for title, path in _binaries() if binaries is None else binaries:
+        if title == REALSENSE and path is None and is_installed():
+            continue  # an extra; the check of the camera names it where one is configured
         problem = load(path) if path is not None else "is not installed"
         if not problem:
             fine.append(title)

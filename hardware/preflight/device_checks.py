@@ -27,6 +27,7 @@ from core.control.alerts import ALERTS
 from core.control.readiness import read_readiness
 from core.devices import Camera, DeviceError
 from core.messages import message
+from core.program import CALLED
 from core.types import Frame
 from hardware.cameras import sysfs
 from hardware.cameras.registry import CAMERA_KINDS
@@ -143,7 +144,7 @@ def check_acceptance(config: Config) -> Check:
     name = "acceptance"
     if kind_of(config.rig) is not RigKind.LIVE or config.rig.robot == "none":
         return Check(name, True, "only asked of a rig with a real robot")
-    again = f"main.py rig accept {shlex.quote(config.rig.name)}"
+    again = f"{CALLED} rig accept {shlex.quote(config.rig.name)}"
     try:
         found = rig_in_use(config)
         accepted = read_acceptance(found[0]) if found is not None else None

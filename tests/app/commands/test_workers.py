@@ -152,7 +152,7 @@ def test_an_error_of_a_task_comes_through(address: str) -> None:
 def test_a_worker_of_another_version_is_refused(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert sorted(over_cluster(address, abs, [-1])) == [1]
     code_of_worker.cache_clear()
-    monkeypatch.setattr(workers, "_ROOT", tmp_path)
+    monkeypatch.setattr(workers, "ROOT", tmp_path)
     try:
         with pytest.raises(ClusterError, match=r"another version of LumenPilot runs on tcp://127\.0\.0\.1:\d+; bring its folder"):
             list(over_cluster(address, abs, [-1]))

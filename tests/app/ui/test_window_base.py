@@ -39,7 +39,7 @@ from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
 from app.player.window import PlayerWindow
 from app.ui import window_base
-from app.ui.actions import KEY_HINT, MenuEntry, add_menu, key_name, key_names, menu_tables, mnemonic, plain, program_version
+from app.ui.actions import KEY_HINT, MenuEntry, add_menu, key_name, key_names, menu_tables, mnemonic, plain
 from app.ui.texts import STOP_KEY, OperatorStep
 from app.ui.window_base import GuiLatencyMonitor, run_until_closed
 from app.widgets.jog_panel import KEYS
@@ -48,6 +48,7 @@ from core.annotation.model import ImageView
 from core.annotation.store import AnnotationStore, ItemKey, find_images
 from core.config.models import Config, PerceptionConfig
 from core.learning.dataset import write_png
+from core.program import program_version
 from core.session.reader import SessionReader
 from tests.app.conftest import MakeWindow
 from tests.app.golden_session import GOLDEN

@@ -20,12 +20,12 @@ from core.config.acceptance import (
     force_problem,
     new_acceptance,
     problems_of,
-    program_version,
     read_acceptance,
     write_acceptance,
 )
 from core.config.models import Config, load_config
 from core.config.safety import JOINT_NAMES
+from core.program import program_version
 
 CONFIG = load_config(
     overrides={

@@ -58,7 +58,7 @@ def _good(check: Check, detail: str = "") -> None:
 
 def test_only_python_3_11_will_do() -> None:
     _good(program.check_python((3, 11, 9)), r"3\.11\.9")
-    _bad(program.check_python((3, 12, 0)), r"3\.12\.0", r"Python 3\.11")
+    _bad(program.check_python((3, 14, 0)), r"3\.14\.0", r"Python 3\.11")
 
 
 @pytest.fixture
