@@ -176,14 +176,14 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     from hardware.twin.world import DirectRobot, TwinCamera, TwinWorld
 
     try:
-        world = TwinWorld(config.twin, perception=config.perception)
+        world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety)
     except ValueError as error:
         raise DeviceError(str(error)) from None
     world.insert(START_INSERTION_MM)
     camera = TwinCamera(world)
     robot: GuardedRobot | None = None
     if config.rig.robot == "twin":
-        robot = DirectRobot(world.robot, config.safety)
+        robot = DirectRobot(world.robot, config.safety, config.servos)
         robot.connect()
     try:
         camera.open()
@@ -195,7 +195,7 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
 
 
 def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
-    """The twin and its seven software servos in a process of their own, the real driver in another; zeroed, not armed."""
+    """The twin and its software servos in a process of their own, the real driver in another; zeroed, not armed."""
     from hardware.servos.servo_robot import ServoRobot
     from hardware.twin.process import PrestartedProcesses, RemoteTwin
 

@@ -75,8 +75,8 @@ from hardware.rig import RigKind
 from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
 from hardware.servos.dynamixel_port import LineCounts
 from hardware.servos.registers import HardwareError, ServoState
+from hardware.twin.actuation import JointsToTwin
 from hardware.twin.phantom import PHANTOM_TITLES
-from hardware.twin.process import JointsToTwin
 from hardware.twin.world import TwinWorld
 from tools.lockstep import LockStepServos
 from tools.run import run_tool

@@ -22,6 +22,7 @@ from app.commands.options import ConfigOption, ModelOption, SchedulerOption, che
 from app.commands.progress import console, progress_bar
 from app.commands.workers import over_cluster, over_processes
 from core.config.models import PolicyName, choose_model, load_config
+from core.config.rig_file import find_rig, read_rig
 from core.control.policies import POLICY_NAMES
 from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
@@ -66,6 +67,9 @@ def trial(
         bool,
         typer.Option("--wall-force/--no-wall-force", help="whether the policy is told the wall force, which no real rig measures"),
     ] = True,
+    rig: Annotated[
+        str | None, typer.Option(help="rig file, by name or path: the robot has its joints (resources/rigs has examples)")
+    ] = None,
     scheduler: SchedulerOption = None,
     model: ModelOption = None,
     config_path: ConfigOption = None,
@@ -80,6 +84,9 @@ def trial(
     if workers > 1 or scheduler is not None:  # one thread each: workers must not fight for the cores
         overrides.setdefault("perception", {}).setdefault("segmentation", {})["threads"] = 1
         config = load_config(config_path, None, overrides)
+    if rig is not None:
+        shape = read_rig(Path(rig)) if rig.endswith(".toml") else find_rig(rig)[1]
+        config = config.model_copy(update={"servos": shape.servos})
     if look not in TRIAL_LOOKS:
         raise TrialError(f"unknown look {look!r}; known: {', '.join(TRIAL_LOOKS)}")
     plan = TrialPlan(config, true_masks, max_seconds, look, wall_force)
@@ -195,8 +202,10 @@ def _described(plan: TrialPlan) -> dict[str, Any]:
 
         info = read_model_info(model_folder(plan.config.perception.segmentation.model), verify=())
         model_sha256 = hashlib.sha256(info.model_dump_json(exclude={"figures"}).encode()).hexdigest()
-    described = {"true_masks": plan.true_masks, "max_seconds": plan.max_seconds, "look": plan.look}
+    described: dict[str, Any] = {"true_masks": plan.true_masks, "max_seconds": plan.max_seconds, "look": plan.look}
     described |= {} if plan.wall_force else {"wall_force": False}
+    if not plan.config.servos.is_default:
+        described["joints"] = [joint.model_dump(mode="json") for joint in plan.config.servos.joints]
     return described | {"model_sha256": model_sha256, "config": settings}
 
 

@@ -206,10 +206,10 @@ def bend_of(pulls_mm: Sequence[float], tendons: Sequence[JointConfig]) -> Bend:
 
 def direction(tendon: JointConfig) -> Bend:
     """The unit vector of a tendon's direction."""
-    return _unit(tendon.angle_deg or 0.0)
+    return unit_vector(tendon.angle_deg or 0.0)
 
 
-def _unit(angle_deg: float) -> Bend:
+def unit_vector(angle_deg: float) -> Bend:
     """Cosine and sine, without rounding for whole quarters of a turn."""
     quarters, rest_deg = divmod(angle_deg, 90.0)
     if rest_deg == 0.0:
@@ -226,7 +226,7 @@ def _in_shaft(command: Command, rotation_deg: float) -> Bend:
     """A command's bend in the directions of a shaft that is turned so far."""
     if rotation_deg == 0.0:
         return limited(command.bend, 1.0), limited(command.pitch, 1.0)
-    x, y = _unit(rotation_deg)
+    x, y = unit_vector(rotation_deg)
     bend, pitch = limited(command.bend, 1.0), limited(command.pitch, 1.0)
     return bend * x + pitch * y, pitch * x - bend * y
 
@@ -235,7 +235,7 @@ def _on_screen(bend: Bend, rotation_deg: float) -> Bend:
     """The inverse of ``_in_shaft``."""
     if rotation_deg == 0.0:
         return bend
-    x, y = _unit(rotation_deg)
+    x, y = unit_vector(rotation_deg)
     return bend[0] * x - bend[1] * y, bend[0] * y + bend[1] * x
 
 

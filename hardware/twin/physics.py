@@ -12,6 +12,7 @@ import itertools
 import logging
 import math
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skimage.measure import approximate_polygon, find_contours
 
+from core.control.joints import unit_vector
 from core.types import Command, Point, Points, RobotStatus, VesselGraph
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import node_distances_mm
@@ -130,7 +132,8 @@ LINK_MM = 2.0
 SHAFT_LINK_MM = 3.0
 """Shaft links are longer, which halves the cost of a step; at the tightest bends (8 mm) the axis is off by 0.14 mm."""
 STEERABLE_LINKS = 10
-TENDONS = ("right", "left", "up", "down")
+DEFAULT_TENDONS_DEG = (0.0, 180.0, 90.0, 270.0)
+"""Directions of the default robot's tendons around the shaft: 0 to its right on the screen, 90 towards the camera."""
 TIMESTEP_S = 0.002
 LUMEN_HALF_HEIGHT_MM = 6.0
 TENDON_OFFSET_MM = 1.0
@@ -173,11 +176,13 @@ def link_lengths_mm(shaft_links: int) -> NDArray[np.float64]:
     return np.array([SHAFT_LINK_MM] * shaft_links + [LINK_MM] * STEERABLE_LINKS)
 
 
-def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Specimen) -> mujoco.MjModel:
+def build_model(
+    walls: list[Wall], port: Port, shaft_links: int, specimen: Specimen, tendons_deg: Sequence[float] = DEFAULT_TENDONS_DEG
+) -> mujoco.MjModel:
     """Compile the model: a chain of capsules on a slide along the port's axis, with its tip at the port for slide position 0.
 
     Joint order: slide, then one planar hinge per link, followed by the pitch hinge where the link is steerable. Actuator order:
-    right, left, up, down, feed.
+    the tendons, the feed.
     """
     x, y = port.point
     wall_geoms = "".join(
@@ -187,12 +192,13 @@ def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Speci
     )
     lengths = link_lengths_mm(shaft_links)
     sites = range(shaft_links - 1, len(lengths))
+    names = [f"tendon{place}_" for place in range(len(tendons_deg))]
     tendons = "".join(
-        f'<spatial name="{name}">' + "".join(f'<site site="{name}{link}"/>' for link in sites) + "</spatial>" for name in TENDONS
+        f'<spatial name="{name}">' + "".join(f'<site site="{name}{link}"/>' for link in sites) + "</spatial>" for name in names
     )
     pulls = "".join(
         f'<position name="{name}" tendon="{name}" kp="{_TENDON_KP_MN_MM}" kv="{_TENDON_KV}" forcerange="-{_TENDON_MAX_MN} 0"/>'
-        for name in TENDONS
+        for name in names
     )
     return mujoco.MjModel.from_xml_string(f"""
 <mujoco>
@@ -214,7 +220,7 @@ def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Speci
     <body name="base" pos="{x:.6f} {y:.6f} 0" euler="0 0 {port.angle_rad:.9f}">
       <joint name="feed" type="slide" axis="1 0 0" range="0 {lengths.sum()}" armature="0.05"/>
       <inertial pos="0 0 0" mass="0.001" diaginertia="0.01 0.01 0.01"/>
-      {_chain(lengths, specimen)}
+      {_chain(lengths, specimen, tendons_deg)}
     </body>
   </worldbody>
   <tendon>{tendons}</tendon>
@@ -225,7 +231,7 @@ def build_model(walls: list[Wall], port: Port, shaft_links: int, specimen: Speci
 </mujoco>""")
 
 
-def _chain(lengths: NDArray[np.float64], specimen: Specimen) -> str:
+def _chain(lengths: NDArray[np.float64], specimen: Specimen, tendons_deg: Sequence[float]) -> str:
     """The nested bodies of the chain, from the base on."""
     opening, first = [], len(lengths) - STEERABLE_LINKS
     before = -float(lengths.sum())
@@ -240,10 +246,10 @@ def _chain(lengths: NDArray[np.float64], specimen: Specimen) -> str:
             opening.append(f'<joint axis="0 1 0" {hinge}/>')
         opening.append(f'<geom class="link" fromto="0 0 0 {length} 0 0" mass="{_MASS_KG_MM * length}"/>')
         if link >= first - 1:
-            side = TENDON_OFFSET_MM
-            places = {"right": (side, 0.0), "left": (-side, 0.0), "up": (0.0, -side), "down": (0.0, side)}
             at = length - LINK_MM / 2
-            opening.extend(f'<site name="{name}{link}" pos="{at} {y} {z}"/>' for name, (y, z) in places.items())
+            for place, (across, up) in enumerate(map(unit_vector, tendons_deg)):
+                y, z = TENDON_OFFSET_MM * across, 0.0 - TENDON_OFFSET_MM * up  # the camera is at -z
+                opening.append(f'<site name="tendon{place}_{link}" pos="{at} {y} {z}"/>')
         before = float(length)
     return "".join(opening) + "</body>" * len(lengths)
 
@@ -263,11 +269,18 @@ mujoco.set_mju_user_warning(lambda text: _log.warning("MuJoCo: %s", text))
 class LinkChain:
     """A MuJoCo model of the robot with a fixed number of links; the tip is at the port for slide position 0.
 
-    ``slack_mm`` (4,) are the tendon lengths of the straight robot.
+    ``slack_mm`` (tendons,) are the tendon lengths of the straight robot.
     """
 
-    def __init__(self, walls: list[Wall], port: Port, shaft_links: int, specimen: Specimen) -> None:
-        self.model = build_model(walls, port, shaft_links, specimen)
+    def __init__(
+        self,
+        walls: list[Wall],
+        port: Port,
+        shaft_links: int,
+        specimen: Specimen,
+        tendons_deg: Sequence[float] = DEFAULT_TENDONS_DEG,
+    ) -> None:
+        self.model = build_model(walls, port, shaft_links, specimen, tendons_deg)
         self.data = mujoco.MjData(self.model)
         lengths = link_lengths_mm(shaft_links)
         self.length_mm = float(lengths.sum())
@@ -281,7 +294,11 @@ class LinkChain:
         self._joint_link, self._joint_length = link, lengths[link]
         ei = np.where(link >= shaft_links, specimen.tip_ei, specimen.shaft_ei)
         self._own_stiffness = ei / self._joint_length
-        self._set_rad = self.model.qpos_spring[1:].copy()
+        self._set_rad = self._straight_set_rad = self.model.qpos_spring[1:].copy()
+        self._is_steerable = link >= shaft_links
+        self._is_pitch = self.model.jnt_axis[1:, 1] != 0.0
+        self._sites_mm = self.model.site_pos.copy()
+        self._turned_for = 0.0
         self._shaped_for: tuple[float, float] | None = None
         self.shape(0.0)
         mujoco.mj_forward(self.model, self.data)
@@ -294,7 +311,8 @@ class LinkChain:
     def reset(self) -> None:
         """Straight, at rest, tip at the port, time 0."""
         mujoco.mj_resetData(self.model, self.data)
-        self.data.ctrl[:4] = self.slack_mm
+        self.data.ctrl[: len(self.slack_mm)] = self.slack_mm
+        self.turn(0.0)
         self.shape(0.0)
         mujoco.mj_forward(self.model, self.data)
 
@@ -323,6 +341,19 @@ class LinkChain:
             mine[0] = theirs[0]
             mine[-joints:] = theirs[-joints:]
         self.data.ctrl[:] = other.data.ctrl
+
+    def turn(self, rotation_deg: float) -> None:
+        """Turn the shaft about its axis: its tendons and its set stand in other directions then. The links do not twist."""
+        if rotation_deg == self._turned_for:
+            return
+        self._turned_for = rotation_deg
+        cos, sin = unit_vector(rotation_deg)
+        y, z = self._sites_mm[:, 1], self._sites_mm[:, 2]
+        self.model.site_pos[:, 1], self.model.site_pos[:, 2] = y * cos + z * sin, z * cos - y * sin
+        set_rad = np.radians(self._specimen.tip_set_deg) / STEERABLE_LINKS
+        turned = np.where(self._is_pitch, set_rad * sin, set_rad * cos)
+        self._set_rad = np.where(self._is_steerable, turned, self._straight_set_rad)
+        self._shaped_for = None
 
     def shape(self, delivery_mm: float) -> None:
         """Stiffen what the guide behind the port and the sheath cover; links touch walls only inside.
@@ -368,6 +399,12 @@ MAX_PULL_MM = 2.0
 """Tendon pull at a bend or pitch of 1; the tip bends about 47 degrees per millimetre."""
 
 
+_MOST_ROTATION_DEG_S = 120.0
+"""Of the servo that turns the shaft."""
+_ROTATION_PLAY_DEG = 4.0
+"""Between that servo and the head: the shaft twists against its friction."""
+
+
 @dataclass(frozen=True, slots=True)
 class DriveProperties:
     """``backlash_mm`` is the play between motor and tendon, ``dead_zone_mm`` the slack that must be taken up before it pulls."""
@@ -377,8 +414,25 @@ class DriveProperties:
     dead_zone_mm: float = 0.02
 
 
+class ShaftDrive:
+    """Turns the shaft: ``servo_deg`` is where its servo is; ``tip_deg`` follows with the play of a shaft that twists."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self.servo_deg = self.tip_deg = 0.0
+
+    def step(self, speed_deg_s: float, duration_s: float) -> float:
+        """Turn at this speed; returns ``tip_deg``."""
+        self.servo_deg += max(-_MOST_ROTATION_DEG_S, min(_MOST_ROTATION_DEG_S, speed_deg_s)) * duration_s
+        play = _ROTATION_PLAY_DEG / 2
+        self.tip_deg = max(self.servo_deg - play, min(self.servo_deg + play, self.tip_deg))
+        return self.tip_deg
+
+
 class TendonDrive:
-    """One antagonistic pair. ``pull_mm`` is what reaches the tendons: positive on the first, the second gets its negative."""
+    """The tendons' pull in one direction across the shaft. ``pull_mm`` is what reaches them, the opposite one negatively."""
 
     def __init__(self, properties: DriveProperties) -> None:
         self._properties = properties
@@ -421,14 +475,22 @@ class TwinPhysics:
     ----------
     phantom : where it moves.
     seed : which robot (see ``Specimen``); 0 is the nominal one.
-    drive : the actuator layer of both tendon pairs.
+    drive : the actuator layer of the tendons.
+    tendons_deg : directions of the tendons around the shaft; default: right, left, up, down.
 
     Notes
     -----
-    The same seed and the same commands give bit-equal states. All methods may be called from any thread.
+    The same seed and the same commands give bit-equal states. All methods may be called from any thread. Bend and pitch of a
+    command count in the shaft's own directions, which its rotation turns.
     """
 
-    def __init__(self, phantom: Phantom, seed: int = 0, drive: DriveProperties | None = None) -> None:
+    def __init__(
+        self,
+        phantom: Phantom,
+        seed: int = 0,
+        drive: DriveProperties | None = None,
+        tendons_deg: Sequence[float] = DEFAULT_TENDONS_DEG,
+    ) -> None:
         self.phantom = phantom
         self.specimen = Specimen.drawn(seed)
         outlines = lumen_outline(phantom.graph)
@@ -442,6 +504,9 @@ class TwinPhysics:
         self._outline = cKDTree(np.concatenate(outlines))
         self._lock = threading.RLock()
         self._bend, self._pitch = TendonDrive(drive or DriveProperties()), TendonDrive(drive or DriveProperties())
+        self._shaft = ShaftDrive()
+        self._tendons_deg = tuple(tendons_deg)
+        self._tendons = tuple(map(unit_vector, tendons_deg))
         self._chains: dict[int, LinkChain] = {}
         self.reset()
 
@@ -452,6 +517,7 @@ class TwinPhysics:
             self._chain.reset()
             self._bend.reset()
             self._pitch.reset()
+            self._shaft.reset()
             self._feed_mm = 0.0
             self._delivery_mm = 0.0
             self._contact_mn = 0.0
@@ -464,7 +530,7 @@ class TwinPhysics:
         """
         shaft_links = min(self._shaft_links, (size + 1) * _CHAIN_STEP_LINKS)
         if size not in self._chains:
-            self._chains[size] = LinkChain(self._walls, self._port, shaft_links, self.specimen)
+            self._chains[size] = LinkChain(self._walls, self._port, shaft_links, self.specimen, self._tendons_deg)
         self._size = size
         return self._chains[size]
 
@@ -511,10 +577,11 @@ class TwinPhysics:
         control, slack = chain.data.ctrl, chain.slack_mm
         bend = self._bend.step(command.bend, TIMESTEP_S)
         pitch = self._pitch.step(command.pitch, TIMESTEP_S)
-        # The antagonist releases as much as the other pulls; a fixed one would halve the bend.
-        control[0], control[1] = slack[0] - bend, slack[1] + bend
-        control[2], control[3] = slack[2] - pitch, slack[3] + pitch
-        control[4] = self._feed(command.advance_mm_s)
+        # A tendon is let go as far as the curve takes: a fixed antagonist would halve the bend.
+        for place, (across, up) in enumerate(self._tendons):
+            control[place] = slack[place] - (bend * across + pitch * up)
+        control[len(slack)] = self._feed(command.advance_mm_s)
+        chain.turn(self._shaft.step(command.rotation_deg_s, TIMESTEP_S))
         reach_mm = max(0.0, chain.insertion_mm - STEERABLE_MM)
         self._delivery_mm = max(0.0, min(reach_mm, self._delivery_mm + command.delivery_mm_s * TIMESTEP_S))
         chain.shape(self._delivery_mm)
@@ -559,14 +626,15 @@ class TwinPhysics:
         """What the robot reports, on simulated time."""
         with self._lock:
             data = self._chain.data
-            pull, force = self._chain.slack_mm - data.ten_length, -data.actuator_force[:4]
+            pull, force = self._chain.slack_mm - data.ten_length, -data.actuator_force[: len(self._tendons)]
             return RobotStatus(
                 time_s=self.time_s,
                 insertion_mm=self.insertion_mm,
                 delivery_mm=self._delivery_mm,
-                tendon_pull_mm=(float(pull[0]), float(pull[1]), float(pull[2]), float(pull[3])),
-                tendon_force_mn=(float(force[0]), float(force[1]), float(force[2]), float(force[3])),
+                tendon_pull_mm=tuple(map(float, pull)),
+                tendon_force_mn=tuple(map(float, force)),
                 wall_contact_n=self._contact_mn / 1000.0,
+                rotation_deg=self._shaft.servo_deg,
             )
 
     def contacts(self) -> list[tuple[Point, float]]:

@@ -13,7 +13,6 @@ import os
 import select
 import struct
 import time
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +24,7 @@ from core.messages import message
 from core.types import Command, Frame, RobotStatus
 from hardware.processes import DeviceProcess, SharedSlot
 from hardware.servos.bus_ipc import start_bus
+from hardware.twin.actuation import JointsToTwin
 
 if TYPE_CHECKING:
     from hardware.twin.servos.bus import SoftServoBus
@@ -151,45 +151,6 @@ class RemoteTwin:
             raise DeviceError(message("the bench twin stopped ({why}): start the rig again (F5)", why=why))
 
 
-def pair_bend_mm(first_mm: float, second_mm: float) -> float:
-    """The bend by two antagonistic wires, positive towards the first, from their pulls relative to where each is without tension.
-
-    Two taut stiff wires hold the soft head at half their difference. In a slack pair (negative sum) only a pulled wire acts, and
-    without one the head is straight. Both rules agree where the sum is zero.
-    """
-    if first_mm + second_mm >= 0.0:
-        return (first_mm - second_mm) / 2.0
-    return max(first_mm, 0.0) - max(second_mm, 0.0)
-
-
-class JointsToTwin:
-    """Converts measured joint positions into commands for the twin's physics.
-
-    Feeds are differences, so their sum equals the travel of the joint for any time step. With a roll the robot is turned about its
-    axis: its tendon "right" then acts partly up or down as seen by the camera.
-    """
-
-    def __init__(self, config: ServosConfig, start_mm: Sequence[float], roll_deg: float = 0.0) -> None:
-        self._max_pull_mm = config.max_pull_mm
-        self._turn = math.cos(math.radians(roll_deg)), math.sin(math.radians(roll_deg))
-        self._last_mm = tuple(start_mm)
-
-    def command(self, positions_mm: Sequence[float], duration_s: float) -> Command:
-        """The command for `duration_s`, at whose end the joints (in the order of ``JOINT_NAMES``) are at `positions_mm`."""
-        right, left, up, down = positions_mm[:4]
-        advance, first, second = (now - last for now, last in zip(positions_mm[4:], self._last_mm[4:], strict=True))
-        self._last_mm = tuple(positions_mm)
-        bend_mm, pitch_mm = pair_bend_mm(right, left), pair_bend_mm(up, down)
-        cos, sin = self._turn
-        return Command(
-            bend=_within_one((cos * bend_mm + sin * pitch_mm) / self._max_pull_mm),
-            pitch=_within_one((cos * pitch_mm - sin * bend_mm) / self._max_pull_mm),
-            advance_mm_s=advance / duration_s,
-            # Two rollers drive one sheath, which moves by their mean.
-            delivery_mm_s=(first + second) / 2.0 / duration_s,
-        )
-
-
 def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
     """The servos as the twin's wiring has them, which the program may not know.
 
@@ -210,16 +171,13 @@ def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
 def drive_world(world: TwinWorld, bus: SoftServoBus, config: ServosConfig) -> None:
     """Let the servos of `bus` move the robot of `world`; they get the forces of its wires as loads."""
     joints = JointsToTwin(config, bus.positions_mm(), world.config.roll_deg)
+    others = (0.0,) * (len(config.joints) - len(config.tendons))
 
     def drive(duration_s: float) -> Command:
-        bus.set_loads_mn((*world.physics.status().tendon_force_mn, 0.0, 0.0, 0.0))
+        bus.set_loads_mn((*world.physics.status().tendon_force_mn, *others))
         return joints.command(bus.positions_mm(), duration_s)
 
     world.drive = drive
-
-
-def _within_one(value: float) -> float:
-    return max(-1.0, min(1.0, value))
 
 
 class PrestartedProcesses:

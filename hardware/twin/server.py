@@ -33,7 +33,7 @@ def main(arguments: list[str]) -> int:
     sizes = slot_sizes(config.twin)
     frames, status = SharedSlot.row(link.map_memory(sum(map(SharedSlot.size, sizes))), sizes)
     try:
-        world = TwinWorld(config.twin, perception=config.perception)
+        world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety)
         world.insert(message["insertion_mm"])
         wiring = wired(config.twin, config.servos)
         servos = SoftServoBus(wiring, wire_time=True)

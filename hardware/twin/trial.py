@@ -118,7 +118,15 @@ class Trial:
         phantom = make_phantom(f"random:{own_seed}")
         self._plan, self._seed, self._name = plan, seed, policy
         look = named_appearance(None if plan.look == RANDOM_LOOK else plan.look, own_seed)
-        self._world = TwinWorld(config.twin, phantom=phantom, appearance=look, perception=config.perception, seed=own_seed)
+        self._world = TwinWorld(
+            config.twin,
+            phantom=phantom,
+            appearance=look,
+            perception=config.perception,
+            seed=own_seed,
+            servos=config.servos,
+            safety=config.safety,
+        )
         self.target = choose_target(phantom, self._world.view, own_seed)
         self._camera = TwinCamera(self._world, lock_step=True)
         self._pipeline, self._masks = pipeline, masks

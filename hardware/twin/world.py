@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from core.config.models import PerceptionConfig, TwinConfig
-from core.config.safety import JOINT_NAMES, SafetyConfig
+from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.joints import Retracted
@@ -25,6 +25,7 @@ from core.control.robot import SentMotion
 from core.devices import DeviceError, Latest
 from core.perception.centerline import plan_route
 from core.types import Command, Frame, Point, Points, RobotStatus
+from hardware.twin.actuation import DirectJoints
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
@@ -116,6 +117,8 @@ _log = logging.getLogger(__name__)
 _CONTROL_S = 0.02  # period of the command, in simulated time
 _COMMAND_EXPIRES_S = 0.3
 _CATCH_UP_S = 0.2
+_REST_S = 0.3
+"""After an insertion the robot comes to rest."""
 
 
 class TwinWorld:
@@ -133,14 +136,17 @@ class TwinWorld:
         appearance: Appearance | None = None,
         perception: PerceptionConfig | None = None,
         seed: int = 0,
+        servos: ServosConfig | None = None,
+        safety: SafetyConfig | None = None,
     ) -> None:
         self.config = config
+        servos = servos or ServosConfig()
         self.phantom = phantom or make_phantom(config.phantom)
         self.appearance = appearance_of(config) if appearance is None else appearance
         self._perception = perception or PerceptionConfig()
         size = (config.image_width_px, config.image_height_px)
         self.view = make_view(self.appearance, size, self.phantom)
-        self.physics = TwinPhysics(self.phantom, seed)
+        self.physics = TwinPhysics(self.phantom, seed, tendons_deg=[joint.angle_deg or 0.0 for joint in servos.tendons])
         self.robot = TwinRobot(self.physics)
         self._renderer = Renderer(self.phantom, self.appearance, size, seed)
         self._frame_index = 0
@@ -151,6 +157,9 @@ class TwinWorld:
         self.failure: str | None = None
         self.drive: Callable[[float], Command] | None = None
         """Gives the command for the coming seconds in place of the robot, when the servos move it."""
+        self._joints = None if servos.is_default else DirectJoints(servos, safety or SafetyConfig())
+        if self._joints is not None:
+            self.drive = lambda duration_s: self._of_joints(self.robot.current_command, duration_s)
 
     def advance(self, duration_s: float) -> None:
         """Step the physics by simulated seconds under the robot's current command."""
@@ -160,6 +169,10 @@ class TwinWorld:
                 step = min(_CONTROL_S, left)
                 self.physics.step(self.robot.current_command if self.drive is None else self.drive(step), step)
                 left -= step
+
+    def _of_joints(self, command: Command, duration_s: float) -> Command:
+        """What the physics does with a command, by the joints of a robot of another shape."""
+        return command if self._joints is None else self._joints.command(command, duration_s)
 
     def insert(self, length_mm: float, speed_mm_s: float = 40.0, target: int | None = None) -> None:
         """Feed the robot to an insertion length along the route to `target` (default: the longest route)."""
@@ -173,9 +186,19 @@ class TwinWorld:
                 break
             # Directly in the physics, without the robot's speed limit: this is set-up, not operation.
             with self._lock:
-                self.physics.step(follower.command(self.physics.robot_points_mm(), speed_mm_s, _CONTROL_S), _CONTROL_S)
+                command = follower.command(self.physics.robot_points_mm(), speed_mm_s, _CONTROL_S)
+                self.physics.step(self._of_joints(command, _CONTROL_S), _CONTROL_S)
         with self._lock:
-            self.physics.step(Command(), 0.3)
+            self._come_to_rest()
+
+    def _come_to_rest(self) -> None:
+        """Straight and turned back: what drives the joints from now on begins with all of them at rest."""
+        if self._joints is None:
+            self.physics.step(Command(), _REST_S)
+            return
+        while not self._joints.is_at_rest:
+            self.physics.step(self._joints.command_to_rest(_CONTROL_S), _CONTROL_S)
+        self.physics.step(Command(), _REST_S)
 
     def frame(self, captured_s: float | None = None) -> Frame:
         """Render the present state; `captured_s` defaults to simulated time."""
@@ -269,21 +292,19 @@ class TwinCamera:
         self._world.stop()
 
 
-_HEALTHY = BusReport(
-    misses=(0,) * len(JOINT_NAMES),
-    hardware_errors=(0,) * len(JOINT_NAMES),
-    temperatures_c=(25.0,) * len(JOINT_NAMES),
-    voltages_v=(12.0,) * len(JOINT_NAMES),
-    tracking_mm=(0.0,) * len(JOINT_NAMES),
-)
-"""The report in place of that of servos."""
-
-
 class DirectRobot:
     """Executes commands of the source that the newest ``beat`` permits, while it is fresh. All methods are thread-safe."""
 
-    def __init__(self, robot: TwinRobot, safety: SafetyConfig) -> None:
+    def __init__(self, robot: TwinRobot, safety: SafetyConfig, servos: ServosConfig | None = None) -> None:
         self._robot, self._safety = robot, safety
+        count = len((servos or ServosConfig()).joints)
+        self._healthy = BusReport(
+            misses=(0,) * count,
+            hardware_errors=(0,) * count,
+            temperatures_c=(25.0,) * count,
+            voltages_v=(12.0,) * count,
+            tracking_mm=(0.0,) * count,
+        )
         self._lock = threading.Lock()
         self._permitted: Source | None = None
         self._beat_s = -1.0
@@ -357,7 +378,7 @@ class DirectRobot:
 
     def report(self) -> BusReport | None:
         with self._lock:
-            return replace(_HEALTHY, armed=self._armed)
+            return replace(self._healthy, armed=self._armed)
 
     def sent_motion(self) -> SentMotion | None:
         with self._lock:

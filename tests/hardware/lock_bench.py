@@ -15,7 +15,8 @@ from core.control.gate import Source
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.types import Command, Points
 from hardware.calibration.servo_probe import ProbeLimits, StopSwitch, probe_config
-from hardware.twin.process import JointsToTwin, wired
+from hardware.twin.actuation import JointsToTwin
+from hardware.twin.process import wired
 from hardware.twin.world import TwinWorld
 from tools.lockstep import LockStepServos
 

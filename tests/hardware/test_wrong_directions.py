@@ -20,7 +20,7 @@ from core.control.gate import Source
 from core.control.modes import Act, Mode
 from core.control.pilot import PERIOD_S
 from core.types import Point
-from hardware.twin.process import JointsToTwin
+from hardware.twin.actuation import JointsToTwin
 from tools.fault_campaign.bench import TARGET, FaultBench, open_bench
 from tools.fault_campaign.registry import Kit
 from tools.lockstep import LockStepServos

@@ -36,7 +36,8 @@ from core.session.reader import SessionReader
 from core.session.writer import RecordStatus, SessionWriter, faults_between
 from core.types import Frame, Image, Point, Scene, Tick
 from hardware.servos.servo_robot import ServoRobot
-from hardware.twin.process import JointsToTwin, drive_world
+from hardware.twin.actuation import JointsToTwin
+from hardware.twin.process import drive_world
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.world import TwinWorld
 from tools.fault_campaign.registry import CampaignError, Kit, Observation, fault

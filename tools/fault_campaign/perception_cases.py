@@ -27,7 +27,7 @@ from core.perception.pose import classify
 from core.perception.segmentation import Segmenter
 from core.types import Frame, Image, Point, Reason, Refusal, Scene
 from hardware.preflight.model_checks import judge as judge_model
-from hardware.twin.process import JointsToTwin
+from hardware.twin.actuation import JointsToTwin
 from hardware.twin.world import TwinWorld
 from tools.fault_campaign.bench import ExpectedReaction, FaultBench, Masks, Probability, bench_fault, is_active, judge, open_bench
 from tools.fault_campaign.registry import Kit, Observation, check, fault, run_parts

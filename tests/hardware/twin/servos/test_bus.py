@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from core.config.models import TwinConfig
 from core.config.safety import ServosConfig
-from hardware.twin.process import JointsToTwin, drive_world, pair_bend_mm
+from hardware.twin.actuation import JointsToTwin, pair_bend_mm
+from hardware.twin.process import drive_world
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.device import MAX_TICKS_S, MotorGoal, ServoMotor, SoftServo
 from hardware.twin.servos.protocol import (
