@@ -22,27 +22,42 @@ def pair_bend_mm(first_mm: float, second_mm: float) -> float:
 
 
 def wires_bend_mm(pulls_mm: Sequence[float], tendons: Sequence[JointConfig]) -> tuple[float, float]:
-    """The bend by all wires, in the shaft's directions: of each pair, or of three, of which slack ones do not act either.
+    """The bend by all wires, in the shaft's directions: of opposite pairs, or of three.
 
-    The head bends no further than the pulled wires ask for: each takes its pull from its own side.
+    Three slack wires (negative sum) only limit the head: it bends as little as they let it. Both rules agree where the sum is 0.
     """
-    if len(tendons) == 3 and sum(pulls_mm) < 0.0:
-        pulled = [(pull_mm, direction(one)) for pull_mm, one in zip(pulls_mm, tendons, strict=True) if pull_mm > 0.0]
-        # of two, 120 degrees apart, each also takes half of what the other pulls from the straight head
-        shares = (
-            [pull_mm for pull_mm, _ in pulled]
-            if len(pulled) < 2
-            else [(own + other / 2.0) * 4.0 / 3.0 for own, other in ((pulled[0][0], pulled[1][0]), (pulled[1][0], pulled[0][0]))]
-        )
-        across = sum(share * way[0] for share, (_, way) in zip(shares, pulled, strict=True))
-        return across, sum(share * way[1] for share, (_, way) in zip(shares, pulled, strict=True))
     if len(tendons) == 3:
-        return bend_of(pulls_mm, tendons)
+        return bend_of(pulls_mm, tendons) if sum(pulls_mm) >= 0.0 else _least_bend_mm(pulls_mm, [direction(one) for one in tendons])
     x = y = 0.0
     for first in range(0, len(tendons), 2):
         bend_mm, (across, up) = pair_bend_mm(pulls_mm[first], pulls_mm[first + 1]), direction(tendons[first])
         x, y = x + bend_mm * across, y + bend_mm * up
     return x, y
+
+
+def _least_bend_mm(pulls_mm: Sequence[float], ways: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """The least bend that takes no less from any wire's length than its pull: one or two of the three wires are taut then."""
+    found = [(0.0, 0.0)]
+    for one, (across, up) in enumerate(ways):
+        found.append((pulls_mm[one] * across, pulls_mm[one] * up))
+        second = (one + 1) % len(ways)
+        other_across, other_up = ways[second]
+        area = across * other_up - up * other_across
+        found.append(
+            (
+                (pulls_mm[one] * other_up - pulls_mm[second] * up) / area,
+                (pulls_mm[second] * across - pulls_mm[one] * other_across) / area,
+            )
+        )
+    allowed = [
+        bend
+        for bend in found
+        if all(bend[0] * way[0] + bend[1] * way[1] >= pull_mm - _ROUNDING_MM for pull_mm, way in zip(pulls_mm, ways, strict=True))
+    ]
+    return min(allowed, key=lambda bend: math.hypot(*bend))
+
+
+_ROUNDING_MM = 1e-9
 
 
 class JointsToTwin:

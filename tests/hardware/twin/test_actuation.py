@@ -10,7 +10,7 @@ import pytest
 from core.config.models import RESOURCES, TwinConfig
 from core.config.rig_file import read_rig
 from core.config.safety import ServosConfig
-from core.control.joints import bend_of
+from core.control.joints import bend_of, direction
 from core.types import Command
 from hardware.twin.actuation import JointsToTwin, wires_bend_mm
 from hardware.twin.process import pack_status, unpack_status
@@ -43,8 +43,12 @@ def test_of_three_slack_wires_those_that_are_pulled_hold_the_head(plane_deg: flo
     ways = [math.radians((joint.angle_deg or 0.0) - plane_deg) for joint in THREE.tendons]
     pulls = [1.2 * math.cos(way) for way in ways]
     assert wires_bend_mm([pull - 1e-9 for pull in pulls], THREE.tendons) == pytest.approx(bend_of(pulls, THREE.tendons), abs=1e-7)
-    let_go = [pull - (0.5 if pull < 0.0 else 1e-9) for pull in pulls]
-    assert wires_bend_mm(let_go, THREE.tendons) == pytest.approx(bend_of(pulls, THREE.tendons), abs=1e-7)
+    let_go = [pull - 0.5 for pull in pulls]
+    bend = wires_bend_mm(let_go, THREE.tendons)
+    taken = [bend[0] * way[0] + bend[1] * way[1] for way in map(direction, THREE.tendons)]
+    assert all(took >= pull - 1e-9 for took, pull in zip(taken, let_go, strict=True)), "no wire is shorter than its way"
+    assert min(took - pull for took, pull in zip(taken, let_go, strict=True)) == pytest.approx(0.0, abs=1e-9), "one is taut"
+    assert 0.0 < math.hypot(*bend) < 1.2
     assert wires_bend_mm((-0.1, -0.2, -0.3), THREE.tendons) == (0.0, 0.0)
 
 
