@@ -109,8 +109,8 @@ _EVENLY_DEG = 1e-6
 """Rounding of directions that are evenly spaced."""
 _TENDON_FORCE_N = 20.0
 """Below what a steel or nitinol wire of 0.15 mm bears (25 to 35 N, by its cross-section); five times what bends the twin's head."""
-_ROTATION_TORQUE_NMM = 30.0
-"""Of the shaft: 20 N at the surface of a shaft of 3 mm."""
+_ROTATION_TORQUE_NMM = 60.0
+"""Of the shaft: 40 N at the surface of one of 3 mm. The gear of a strong servo takes more (``weak_joints``): use a small one."""
 _DEG_PER_MM = 10.0
 """A distance of the shaft's rotation from its goal counts as that of a tendon or feed at so many degrees for each millimetre."""
 _FEED_FORCE_N = 30.0

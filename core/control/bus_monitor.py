@@ -13,6 +13,7 @@ from typing import Any
 
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault
+from core.control.joints import in_unit
 from core.messages import message
 
 
@@ -292,7 +293,5 @@ def _first_astray(tracking_mm: Sequence[float], servos: ServosConfig) -> str:
     """The first joint that is too far from its goal; NaN counts as too far."""
     for joint, error in zip(servos.joints, tracking_mm, strict=False):
         if not abs(error) <= (limit := servos.astray_mm(joint)):
-            if joint.unit == "°":
-                return message("{joint} off by {a:.1f}° (at most {b:g}°)", joint=joint.name, a=error, b=limit)
-            return message("{joint} off by {a:.2f} mm (at most {b:g} mm)", joint=joint.name, a=error, b=limit)
+            return in_unit(joint, message("{joint} off by {a:.2f} mm (at most {b:g} mm)", joint=joint.name, a=error, b=limit))
     return ""

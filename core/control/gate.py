@@ -37,6 +37,7 @@ from core.control.joints import (
     SentGoals,
     by_hand,
     by_program,
+    in_unit,
     joint_room,
     limited_goal,
     together,
@@ -192,11 +193,10 @@ def outside_envelope(positions_mm: Sequence[float], servos: ServosConfig) -> tup
     for joint, position_mm in zip(servos.joints, positions_mm, strict=True):
         low_mm, high_mm = joint_room(position_mm, joint)
         if low_mm > high_mm:
-            found.append(
-                message(
-                    "{joint} at {a:.2f} mm ({b:g} to {c:g} mm)", joint=joint.name, a=position_mm, b=joint.low_mm, c=joint.high_mm
-                )
+            text = message(
+                "{joint} at {a:.2f} mm ({b:g} to {c:g} mm)", joint=joint.name, a=position_mm, b=joint.low_mm, c=joint.high_mm
             )
+            found.append(in_unit(joint, text))
     return tuple(found)
 
 
@@ -208,13 +208,11 @@ def too_far(request: GoalRequest, base_mm: Joints, servos: ServosConfig, safety:
             detail = message(
                 "{joint} to {a:.2f} mm ({b:g} to {c:g} mm)", joint=joint.name, a=goal_mm, b=joint.low_mm, c=joint.high_mm
             )
-            return Rejection(RejectReason.OUT_OF_ENVELOPE, detail)
+            return Rejection(RejectReason.OUT_OF_ENVELOPE, in_unit(joint, detail))
         most_mm = joint.max_speed_mm_s * safety.command_max_age_s
         if abs(goal_mm - from_mm) > most_mm + rounding_mm:
-            return Rejection(
-                RejectReason.OVER_RATE,
-                message("{joint} by {a:.2f} mm (at most {b:g} mm)", joint=joint.name, a=abs(goal_mm - from_mm), b=most_mm),
-            )
+            detail = message("{joint} by {a:.2f} mm (at most {b:g} mm)", joint=joint.name, a=abs(goal_mm - from_mm), b=most_mm)
+            return Rejection(RejectReason.OVER_RATE, in_unit(joint, detail))
     return None
 
 
@@ -346,7 +344,7 @@ def _move(
         asked_mm, from_mm, at_mm = request.goals_mm[place], base.goals_mm[place], measured_mm[place]
         if abs(goal_mm - from_mm) > joint.max_speed_mm_s * passed_s + _RECORDED_MM:
             detail = message("{joint} at {a:.2f} mm, sent to {b:.2f} mm", joint=joint.name, a=at_mm, b=from_mm)
-            return _hold(state, measured_mm, now_s, Rejection(RejectReason.OFF_COURSE, detail), servos)
+            return _hold(state, measured_mm, now_s, Rejection(RejectReason.OFF_COURSE, in_unit(joint, detail)), servos)
         goals.append(goal_mm)
         if limit is not None and abs(asked_mm - goal_mm) > _RECORDED_MM:
             clamps.append(Clamp(joint.name, asked_mm, goal_mm, limit))

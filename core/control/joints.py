@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from enum import IntFlag, StrEnum
 
 from core.config.safety import JointConfig, JointKind, JointName, SafetyConfig, ServosConfig
+from core.messages import Message
 from core.types import Command, RobotStatus
 
 Joints = tuple[float, ...]
@@ -140,6 +141,11 @@ def joint_motion(goals_mm: Sequence[float], speeds_mm_s: Sequence[float], servos
         sum(delivery) / len(delivery) if delivery else 0.0,
         sum(speeds_mm_s[rotation]),
     )
+
+
+def in_unit(joint: JointConfig, text: Message) -> Message:
+    """A text with millimetres of a joint in the joint's own unit."""
+    return text if joint.unit == "mm" else Message(text.replace(" mm", joint.unit))
 
 
 def within_speeds(command: Command, servos: ServosConfig) -> Command:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from core.config.safety import JointConfig, JointName, SafetyConfig
 from core.control.gate import JointMeasurement
-from core.control.joints import Joints
+from core.control.joints import Joints, in_unit
 from core.messages import message
 
 _FAR_SHARE, _MOVED_SHARE = 0.5, 0.2
@@ -174,22 +174,25 @@ class TrackingMonitor:
         drift = self._drifts.update(goals, before.positions_mm, at_mm, now_s)
         if outside is not None:
             joint, stays_mm = outside.joint, at_mm[self._joints.index(outside.joint)]
-            return message(
+            text = message(
                 "{joint} stays at {a:.2f} mm, outside its envelope ({b:g} to {c:g} mm)",
                 joint=joint.name,
                 a=stays_mm,
                 b=joint.low_mm,
                 c=joint.high_mm,
             )
+            return in_unit(joint, text)
         if drift is not None:
-            return message("{joint} went {a:.2f} mm where nobody sent it", joint=drift[0].name, a=abs(drift[1]))
+            text = message("{joint} went {a:.2f} mm where nobody sent it", joint=drift[0].name, a=abs(drift[1]))
+            return in_unit(drift[0], text)
         if jam is not None:
-            return message(
+            text = message(
                 "{joint} stands {a:.2f} mm from its goal for {b:.0f} ms",
                 joint=jam.joint.name,
                 a=abs(jam.distance_mm),
                 b=1000 * jam.for_s,
             )
+            return in_unit(jam.joint, text)
         return None
 
     def _inside(self, positions_mm: Sequence[float], goals_mm: Joints | None) -> Joints:

@@ -399,10 +399,8 @@ MAX_PULL_MM = 2.0
 """Tendon pull at a bend or pitch of 1; the tip bends about 47 degrees per millimetre."""
 
 
-_MOST_ROTATION_DEG_S = 120.0
-"""Of the servo that turns the shaft."""
 _ROTATION_PLAY_DEG = 4.0
-"""Between that servo and the head: the shaft twists against its friction."""
+"""Between the servo that turns the shaft and the head: the shaft twists against its friction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -425,7 +423,7 @@ class ShaftDrive:
 
     def step(self, speed_deg_s: float, duration_s: float) -> float:
         """Turn at this speed; returns ``tip_deg``."""
-        self.servo_deg += max(-_MOST_ROTATION_DEG_S, min(_MOST_ROTATION_DEG_S, speed_deg_s)) * duration_s
+        self.servo_deg += speed_deg_s * duration_s
         play = _ROTATION_PLAY_DEG / 2
         self.tip_deg = max(self.servo_deg - play, min(self.servo_deg + play, self.tip_deg))
         return self.tip_deg

@@ -15,7 +15,7 @@ ADVANCE: dict[str, Any] = {
 }  # fmt: skip
 ROTATION: dict[str, Any] = {
     "name": "rotation", "low_deg": -200.0, "high_deg": 200.0, "max_speed_deg_s": 60.0, "max_acceleration_deg_s2": 1200.0,
-    "max_step_deg": 5.0,
+    "max_step_deg": 5.0, "model": 1210, "max_torque_nmm": 80.0,
 }  # fmt: skip
 
 

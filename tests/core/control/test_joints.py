@@ -260,11 +260,12 @@ def test_joints_of_older_files_get_their_kind_and_a_rotation_has_units_of_its_ow
     assert ServosConfig.model_validate({"joints": plain}) == SERVOS
     assert [joint.kind.value for joint in SERVOS.joints] == ["tendon"] * 4 + ["advance", "delivery", "delivery"]
     said = TURNED.joints[3].model_dump(mode="json")
-    assert (said["low_deg"], said["max_speed_deg_s"], said["max_torque_nmm"], said["deg_per_turn"]) == (-200.0, 60.0, 30.0, 360.0)
+    assert (said["low_deg"], said["max_speed_deg_s"], said["max_torque_nmm"], said["deg_per_turn"]) == (-200.0, 60.0, 80.0, 360.0)
     assert not any("_mm" in key for key in said if key != "max_torque_nmm")
     assert ServosConfig.model_validate(TURNED.model_dump()) == TURNED
     limit = TURNED.force_limit(TURNED.joints[3])
-    assert 27.0 < limit.force_n <= 30.0, "N mm, in steps of 4.8"
+    assert 60.0 < limit.force_n <= 80.0, "N mm, by whole mA"
+    assert not limit.is_weak
     assert TURNED.astray_mm(TURNED.joints[3]) == 15.0
 
 
