@@ -14,7 +14,8 @@ import pytest
 
 from app.commands import trial
 from app.commands.trial import TrialError, parse_policies, parse_seeds, run_one, summary_rows
-from core.config.models import Config
+from core.config.models import RESOURCES, Config
+from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, TrialSample, summarise, trial_row
 from core.perception.model_file import model_folder
 from hardware.twin.trial import TrialPlan
@@ -139,6 +140,22 @@ def test_a_damaged_folder_is_refused_and_left_alone(faked: list[Any], tmp_path: 
     with pytest.raises(TrialError, match="damaged"):
         call("0:1", out=tmp_path)
     assert (tmp_path / name).read_text() == text
+
+
+def test_a_rig_file_gives_the_robot_its_joints(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    plans: list[TrialPlan] = []
+
+    def run(plan: TrialPlan, job: tuple[str, int]) -> Row:
+        plans.append(plan)
+        return fake_row(plan, job)
+
+    monkeypatch.setattr(trial, "run_one", run)
+    call("3", out=tmp_path, rig=str(RESOURCES / "rigs/two_tendons_rotation.toml"))
+    assert plans[0].config.servos.names == ("tendon_1", "tendon_2", "advance", "rotation")
+    with pytest.raises(TrialError, match="other settings"):
+        call("3", out=tmp_path)
+    with pytest.raises(UserError, match=r"^unknown rig 'bench 7'"):
+        call("3", rig="bench 7")
 
 
 def test_a_plan_is_written_as_a_whole_or_not_at_all(faked: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -16,10 +17,11 @@ from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_wo
 from core.config.safety import SafetyConfig
 from core.control.kept_zero import ZeroRequest
 from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
-from hardware.servos.registers import HardwareError, MissingServo
+from hardware.servos.registers import HardwareError, MissingServo, ServoState
 from tests.app.bus_status import DASH, MINUS, SERVOS, bus, servo
 from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
+from tests.core.robots import THREE, TURNED
 
 SAFETY = SafetyConfig()
 
@@ -334,3 +336,22 @@ def test_right_click_offers_the_row_under_it_and_tab_reaches_the_buttons_only(ta
         assert button(table, text).focusPolicy() is Qt.FocusPolicy.TabFocus
     table.table.customContextMenuRequested.emit(QPoint(20, table.table.rowViewportPosition(4) + 4))
     assert any(action.text() == "Restart servo 5 (advance)" for action in open_menu(table).actions())
+
+
+def test_a_robot_of_another_shape_has_rows_of_its_own(qtbot: QtBot) -> None:
+    table = ServoTable()
+    qtbot.addWidget(table)
+    table.show_status(None, TURNED)
+    assert [table.table.cell(row, Column.JOINT).text for row in range(table.table.rowCount())] == [
+        "tendon 1 \N{MIDDLE DOT} 1", "tendon 2 \N{MIDDLE DOT} 2", "advance \N{MIDDLE DOT} 3", "rotation \N{MIDDLE DOT} 4",
+    ]  # fmt: skip
+    assert [pair.title for pair in pair_balances(None, TURNED)] == ["tendon 1 + tendon 2"]
+    (three,) = pair_balances(None, THREE)
+    assert three.title == "tendon 1 + tendon 2 + tendon 3"
+    assert three.wanted_mm == pytest.approx(0.9)
+    state = replace(servo(3), name="rotation", position_mm=30.0)
+    assert isinstance(state, ServoState)
+    rows = servo_rows(replace(bus(), servos=(*bus().servos[:2], bus().servos[4], state), zeroed=(True,) * 4), TURNED, SAFETY)
+    tips = [cell.tip for cell in rows[3]]
+    assert any("envelope -200 to 200°" in tip for tip in tips), tips
+    assert any("N mm at most" in tip for tip in tips), tips

@@ -12,8 +12,11 @@ from core.config.rig_file import read_rig
 from core.config.safety import ServosConfig
 from core.control.joints import bend_of, direction
 from core.types import Command
+from hardware.servos.dynamixel_bus import ServoBus
+from hardware.servos.registers import ServoState
 from hardware.twin.actuation import JointsToTwin, wires_bend_mm
 from hardware.twin.process import pack_status, unpack_status
+from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.world import TwinWorld
 from tests.core.robots import THREE, TURNED
 
@@ -83,3 +86,27 @@ def test_the_head_goes_where_it_is_steered_on_the_screen(path: object) -> None:
     assert len(status.tendon_pull_mm) == len(servos.tendons)
     assert status.rotation_deg == pytest.approx(90.0 if path.stem == "two_tendons_rotation" else 0.0, abs=0.01)  # type: ignore[attr-defined]
     assert unpack_status(pack_status(status)) == status
+
+
+@pytest.mark.real_time
+def test_the_real_driver_turns_a_shaft_and_the_wires_load_their_servos() -> None:
+    servos = TURNED.model_copy(update={"watchdog_s": 2.0})
+    twin = SoftServoBus(servos, positions=[1000 + joint.id for joint in servos.joints])
+    twin.start()
+    bus = ServoBus(servos, twin.port)
+    try:
+        bus.open()
+        bus.set_zero()
+        bus.arm()
+        twin.set_loads_mn((100.0, 0.0, 0.0, 0.0))
+        for turn in range(1, 11):
+            written = bus.write((0.3, 0.3, 0.0, 0.5 * turn))
+            readings = bus.read()
+        assert [reading.name for reading in readings] == list(servos.names)
+        assert written[3] == pytest.approx(5.0, abs=0.1), "degrees"
+        turned = next(one for one in bus.read() if one.name == "rotation")
+        assert isinstance(turned, ServoState)
+        assert turned.goal_mm == pytest.approx(5.0, abs=0.1)
+    finally:
+        bus.close()
+        twin.stop()
