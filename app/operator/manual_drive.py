@@ -109,6 +109,7 @@ PERIOD_MS = 33
 _MOTION_OF_KEY = {key: motion for motion, keys in KEYS.items() for key in keys}
 _BY_PLACE = {
     24: Qt.Key.Key_Q, 25: Qt.Key.Key_W, 26: Qt.Key.Key_E, 38: Qt.Key.Key_A, 39: Qt.Key.Key_S, 40: Qt.Key.Key_D, 53: Qt.Key.Key_X,
+    52: Qt.Key.Key_Z, 54: Qt.Key.Key_C,
 }  # fmt: skip
 """Where these letters lie, in the numbers of X11 and Wayland, for a layout that has the letters of another alphabet there."""
 _FIRST_LETTER, _FIRST_OTHER_KEY = 0x80, 0x0100_0000
@@ -144,6 +145,7 @@ class JogKeys(HeldInput):
             advance=_sign(held, Motion.ADVANCE, Motion.RETRACT),
             delivery=_sign(held, Motion.DELIVER, Motion.WITHDRAW),
             straighten=Motion.STRAIGHTEN in held,
+            rotation=_sign(held, Motion.TURN_RIGHT, Motion.TURN_LEFT),
         )
 
     def press(self, source: object, motion: Motion) -> None:

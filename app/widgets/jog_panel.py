@@ -44,6 +44,8 @@ class Motion(Enum):
     DELIVER = mark("sheath forward")
     WITHDRAW = mark("sheath back")
     STRAIGHTEN = mark("straighten the head")
+    TURN_LEFT = mark("turn the shaft left")
+    TURN_RIGHT = mark("turn the shaft right")
 
 
 KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
@@ -56,6 +58,8 @@ KEYS: dict[Motion, tuple[Qt.Key, ...]] = {
     Motion.DELIVER: (Qt.Key.Key_PageUp,),
     Motion.WITHDRAW: (Qt.Key.Key_PageDown,),
     Motion.STRAIGHTEN: (Qt.Key.Key_X,),
+    Motion.TURN_LEFT: (Qt.Key.Key_Z,),
+    Motion.TURN_RIGHT: (Qt.Key.Key_C,),
 }
 _STRAIGHT_DEG = 0.5
 """Less steering is shown as straight (``texts.advice_headline``)."""
@@ -77,6 +81,8 @@ def motions_of(servos: ServosConfig) -> frozenset[Motion]:
     kinds = {joint.kind for joint in servos.joints}
     if len(servos.tendons) > 2 or JointKind.ROTATION in kinds:
         found |= {Motion.PITCH_UP, Motion.PITCH_DOWN}
+    if len(servos.tendons) > 2 and JointKind.ROTATION in kinds:  # that of two tendons follows the bend
+        found |= {Motion.TURN_LEFT, Motion.TURN_RIGHT}
     if JointKind.ADVANCE in kinds:
         found |= {Motion.ADVANCE, Motion.RETRACT}
     if JointKind.DELIVERY in kinds:
@@ -157,6 +163,7 @@ class JogReadout(PaintedWidget):
 
 
 _FED = mark("{motion}: hold to move, release to stop; {speed:.3g} mm/s")
+_TURNED = mark("{motion}: hold to move, release to stop; {speed:.3g} °/s")
 _PULLED = mark("{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s")
 
 
@@ -189,6 +196,8 @@ class JogPanel(QWidget):
             (Motion.STEER_RIGHT, 1, 2, QPointF(1, 0), "D", tr("right")),
             (Motion.DELIVER, 0, 3, None, "PgUp", tr("sheath +")),
             (Motion.WITHDRAW, 1, 3, None, "PgDn", tr("sheath \N{MINUS SIGN}")),
+            (Motion.TURN_LEFT, 0, 4, None, "Z", tr("turn left")),
+            (Motion.TURN_RIGHT, 1, 4, None, "C", tr("turn right")),
             (Motion.STRAIGHTEN, 2, 0, None, "X", tr("straighten")),
         ):
             is_wide = motion is Motion.STRAIGHTEN
@@ -201,6 +210,7 @@ class JogPanel(QWidget):
             self._caps[motion] = cap
         wide = tr("bring bend and pitch back to the middle: hold to move, release to stop")
         self._caps[Motion.STRAIGHTEN].setToolTip(wide)
+        self._show_motions()
         self._speed = self._speed_choice()
         grid.addWidget(self._speed, 2, 2, 1, 2)
         self._readout = JogReadout()
@@ -219,10 +229,13 @@ class JogPanel(QWidget):
     def set_speeds(self, hand: JogConfig, servos: ServosConfig) -> None:
         """The speeds of the keys: a share of `hand`'s full speeds, limited by the joints' speeds."""
         self._rig, self._servos = (hand, servos), servos
-        had = motions_of(servos)
+        self._show_motions()
+        self._show_speeds()
+
+    def _show_motions(self) -> None:
+        had = motions_of(self._servos)
         for motion, cap in self._caps.items():
             cap.setVisible(motion in had)
-        self._show_speeds()
 
     def _show_speeds(self) -> None:
         if self._rig is None:
@@ -245,6 +258,8 @@ class JogPanel(QWidget):
         ):
             for motion in motions:
                 self._caps[motion].setToolTip(tr(text, motion=tr(motion.value), speed=speed_mm_s))
+        for motion in (Motion.TURN_LEFT, Motion.TURN_RIGHT):
+            self._caps[motion].setToolTip(tr(_TURNED, motion=tr(motion.value), speed=speeds.rotation_deg_s))
 
     def show_held(self, held: frozenset[Motion]) -> None:
         """Light the caps of the held motions."""

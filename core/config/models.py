@@ -128,6 +128,7 @@ class JogConfig(ConfigSection):
     bend_rate_per_s: float = Field(1.2, gt=0.0, le=5.0, description="share of the tendons' full pull per second")
     advance_mm_s: float = Field(10.0, gt=0.0, le=20.0, description="of the robot module")
     delivery_mm_s: float = Field(10.0, gt=0.0, le=20.0, description="of the catheter")
+    rotation_deg_s: float = Field(30.0, gt=0.0, le=90.0, description="of the shaft, where it can be turned")
 
 
 class PolicyConfig(ConfigSection):

@@ -30,6 +30,7 @@ class Jog:
     advance: float = 0.0
     delivery: float = 0.0
     straighten: bool = False
+    rotation: float = 0.0
 
     @property
     def is_rest(self) -> bool:
@@ -59,12 +60,13 @@ def next_retraction(state: Retraction, *, pulls: bool, at_low: bool) -> Retracti
 
 @dataclass(frozen=True, slots=True)
 class JogSpeeds:
-    """Speeds of the joints by a held key: feed of robot and catheter, pull of the tendons."""
+    """Speeds of the joints by a held key: feed of robot and catheter, pull of the tendons, turn of the shaft."""
 
     advance_mm_s: float
     delivery_mm_s: float
     bend_mm_s: float
     pitch_mm_s: float
+    rotation_deg_s: float = 0.0
 
 
 def hand_speeds(hand: JogConfig, servos: ServosConfig, share: float = 1.0) -> JogSpeeds:
@@ -77,6 +79,7 @@ def hand_speeds(hand: JogConfig, servos: ServosConfig, share: float = 1.0) -> Jo
         _speed_limited(share * hand.delivery_mm_s, servos.joints[servos.places(JointKind.DELIVERY)]),
         _speed_limited(pull_mm_s, across or servos.tendons),
         _speed_limited(pull_mm_s, up or servos.tendons),
+        _speed_limited(share * hand.rotation_deg_s, servos.joints[servos.places(JointKind.ROTATION)]),
     )
 
 
@@ -93,6 +96,7 @@ def combined(jogs: Iterable[Jog]) -> Jog:
         total(jog.advance for jog in jogs),
         total(jog.delivery for jog in jogs),
         any(jog.straighten for jog in jogs),
+        total(jog.rotation for jog in jogs),
     )
 
 
@@ -133,6 +137,7 @@ class JogIntegrator:
             pitch=self._pitch,
             advance_mm_s=speed * config.advance_mm_s * limited(jog.advance, 1.0),
             delivery_mm_s=speed * config.delivery_mm_s * limited(jog.delivery, 1.0),
+            rotation_deg_s=speed * config.rotation_deg_s * limited(jog.rotation, 1.0),
         )
 
 

@@ -10,7 +10,7 @@ from core.config.models import JogConfig
 from core.config.safety import ServosConfig
 from core.types import RobotStatus
 from tests.app.widgets.conftest import Own
-from tests.core.robots import TURNED
+from tests.core.robots import ADVANCE, ROTATION, TENDON, TURNED, robot
 
 
 def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:
@@ -81,11 +81,20 @@ def test_readout_shows_nothing_of_unknown_joints(own: Own) -> None:
 def test_keys_of_motions_that_the_robot_does_not_have_are_hidden(own: Own) -> None:
     panel = own(JogPanel(TURNED), 280, 140, show=True)
     panel.set_speeds(JogConfig(), TURNED)
-    assert {motion for motion, cap in panel._caps.items() if not cap.isVisible()} == {Motion.DELIVER, Motion.WITHDRAW}
+    turns = {Motion.TURN_LEFT, Motion.TURN_RIGHT}
+    assert {motion for motion, cap in panel._caps.items() if not cap.isVisible()} == {Motion.DELIVER, Motion.WITHDRAW} | turns
     panel.show_status(RobotStatus(0.0, 84.2, 0.0, (1.3, -0.7), (0.0,) * 2, rotation_deg=-90.0))
     assert panel.readout == "bend 0.50, pitch 0.00, in 84 mm", "its tendons bend in the picture's plane now"
     flat = TURNED.model_copy(update={"joints": TURNED.joints[:3]})
     panel.set_speeds(JogConfig(), flat)
     assert not panel._caps[Motion.PITCH_UP].isVisible(), "two tendons cannot pitch without a rotation"
     panel.set_speeds(JogConfig(), ServosConfig())
-    assert all(cap.isVisible() for cap in panel._caps.values())
+    assert {motion for motion, cap in panel._caps.items() if not cap.isVisible()} == turns
+
+
+def test_a_shaft_with_four_tendons_is_turned_by_keys(own: Own) -> None:
+    turned = robot(*({**TENDON, "name": name} for name in ("right", "left", "up", "down")), ADVANCE, ROTATION)
+    panel = own(JogPanel(turned), 280, 140, show=True)
+    panel.set_speeds(JogConfig(rotation_deg_s=90.0), turned)
+    assert panel._caps[Motion.TURN_LEFT].isVisible()
+    assert panel._caps[Motion.TURN_LEFT].toolTip() == "turn the shaft left: hold to move, release to stop; 60 °/s"

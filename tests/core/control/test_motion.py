@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from core.config.models import DriveConfig, JogConfig
 from core.config.safety import ServosConfig
-from core.control.motion import AdviceController, JogSpeeds, Retraction, hand_speeds, next_retraction
+from core.control.motion import AdviceController, Jog, JogIntegrator, JogSpeeds, Retraction, combined, hand_speeds, next_retraction
 from core.types import Advice, Command, Speed
 
 PLAIN = DriveConfig(
@@ -178,3 +178,10 @@ def test_until_the_robot_was_seen_to_follow_bend_and_feed_are_slow() -> None:
             if step == 1:
                 assert command.bend == pytest.approx(bend), "10 degrees a second"
         assert command.advance_mm_s == feed
+
+
+def test_a_held_rotation_is_a_speed() -> None:
+    integrator = JogIntegrator(HAND)
+    command = integrator.command(Jog(rotation=-0.5), 5.0)
+    assert command.rotation_deg_s == -0.5 * HAND.rotation_deg_s
+    assert combined([Jog(rotation=0.8), Jog(rotation=0.8)]).rotation == 1.0
