@@ -514,7 +514,8 @@ class OperatorDevices(QObject):
         if state.stop:
             self._stop()
         if (pilot := self._pilot()) is not None:
-            pilot.jog("gamepad", Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery))
+            jog = Jog(state.bend_rate, state.pitch_rate, state.advance, state.delivery, rotation=state.rotation)
+            pilot.jog("gamepad", jog)
             if state.deadman is not None:
                 pilot.deadman("gamepad", state.deadman)
 

@@ -28,7 +28,7 @@ from app.widgets.painting import (
 from core.config.models import JogConfig
 from core.config.safety import JointKind, ServosConfig
 from core.control.joints import bend_of_status, direction
-from core.control.motion import hand_speeds
+from core.control.motion import can_pitch, can_turn, hand_speeds
 from core.types import Advice, RobotStatus
 
 
@@ -76,12 +76,12 @@ def advised_motions(advice: Advice | None) -> frozenset[Motion]:
 
 
 def motions_of(servos: ServosConfig) -> frozenset[Motion]:
-    """The motions that a robot has: one with two tendons needs a rotation to pitch."""
+    """The motions that a robot has."""
     found = {Motion.STEER_LEFT, Motion.STEER_RIGHT, Motion.STRAIGHTEN}
     kinds = {joint.kind for joint in servos.joints}
-    if len(servos.tendons) > 2 or JointKind.ROTATION in kinds:
+    if can_pitch(servos):
         found |= {Motion.PITCH_UP, Motion.PITCH_DOWN}
-    if len(servos.tendons) > 2 and JointKind.ROTATION in kinds:  # that of two tendons follows the bend
+    if can_turn(servos):
         found |= {Motion.TURN_LEFT, Motion.TURN_RIGHT}
     if JointKind.ADVANCE in kinds:
         found |= {Motion.ADVANCE, Motion.RETRACT}

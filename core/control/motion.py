@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from core.config.models import DriveConfig, JogConfig
@@ -38,6 +38,28 @@ class Jog:
 
 
 AT_REST = Jog()
+
+
+def can_pitch(servos: ServosConfig) -> bool:
+    """Whether the robot bends out of the picture's plane: two tendons need a rotation for that."""
+    return len(servos.tendons) > 2 or any(joint.kind is JointKind.ROTATION for joint in servos.joints)
+
+
+def can_turn(servos: ServosConfig) -> bool:
+    """Whether the shaft is turned by hand; that of two tendons follows the bend."""
+    return len(servos.tendons) > 2 and any(joint.kind is JointKind.ROTATION for joint in servos.joints)
+
+
+def within_robot(jog: Jog, servos: ServosConfig) -> Jog:
+    """The controls without those of motions that the robot does not have: they are no input."""
+    kinds = {joint.kind for joint in servos.joints}
+    return replace(
+        jog,
+        pitch=jog.pitch if can_pitch(servos) else 0.0,
+        advance=jog.advance if JointKind.ADVANCE in kinds else 0.0,
+        delivery=jog.delivery if JointKind.DELIVERY in kinds else 0.0,
+        rotation=jog.rotation if can_turn(servos) else 0.0,
+    )
 
 
 class Retraction(Enum):

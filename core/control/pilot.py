@@ -28,7 +28,7 @@ from core.control.health import Beat, DeadmanReport, EstopReport, GateReport, Mo
 from core.control.joints import Retracted
 from core.control.kept_zero import ZeroRequest, all_at_zero
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, AgainstProgram, Decision, Event, Hindrance, Mode, SupervisorState
-from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, Retraction, combined, next_retraction
+from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, Retraction, combined, next_retraction, within_robot
 from core.control.policies import Policy
 from core.control.readiness import READY, Readiness
 from core.control.robot import GuardedRobot, SentMotion
@@ -252,7 +252,7 @@ class Pilot:
 
     def jog(self, source: Hashable, jog: Jog) -> None:
         """How a control is held; to be repeated while it is, since silence counts as released."""
-        self._inputs.jog(source, jog, self._clock())
+        self._inputs.jog(source, within_robot(jog, self._config.servos), self._clock())
 
     def hand_speed(self, share: float) -> None:
         """The share of full speed, 0..1, at which all controls together move the robot."""

@@ -39,6 +39,7 @@ class Axis(Enum):
     LEFT_X = 0x00
     LEFT_Y = 0x01
     LEFT_TRIGGER = 0x02
+    RIGHT_X = 0x03
     RIGHT_Y = 0x04
     RIGHT_TRIGGER = 0x05
 
@@ -69,8 +70,8 @@ class Layout:
 class GamepadState:
     """How the controls are held, at ``time_s`` on the monotonic clock; each rate -1..1 of full speed.
 
-    Positive: bend to the robot's right as seen on screen, pitch up, advance and sheath forward. ``deadman``: None when the
-    configuration does not make the gamepad a deadman. ``stop``: the STOP button is down.
+    Positive: bend to the robot's right as seen on screen, pitch up, advance and sheath forward, shaft to the right. ``deadman``:
+    None when the configuration does not make the gamepad a deadman. ``stop``: the STOP button is down.
     """
 
     bend_rate: float = 0.0
@@ -80,6 +81,7 @@ class GamepadState:
     deadman: bool | None = None
     stop: bool = False
     time_s: float = 0.0
+    rotation: float = 0.0
 
 
 def shaped(value: float, dead_zone: float, expo: float) -> float:
@@ -152,6 +154,7 @@ class GamepadControls:
             deadman=held if self._config.deadman else None,
             stop=self._down.get(Button.STOP, False),
             time_s=now_s,
+            rotation=self._rate(Axis.RIGHT_X),
         )
 
 

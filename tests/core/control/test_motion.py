@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -10,8 +11,19 @@ from hypothesis import strategies as st
 
 from core.config.models import DriveConfig, JogConfig
 from core.config.safety import ServosConfig
-from core.control.motion import AdviceController, Jog, JogIntegrator, JogSpeeds, Retraction, combined, hand_speeds, next_retraction
+from core.control.motion import (
+    AdviceController,
+    Jog,
+    JogIntegrator,
+    JogSpeeds,
+    Retraction,
+    combined,
+    hand_speeds,
+    next_retraction,
+    within_robot,
+)
 from core.types import Advice, Command, Speed
+from tests.core.robots import THREE, TURNED
 
 PLAIN = DriveConfig(
     turn_deg=100.0, proportional=0.0, integral_s=0.5, max_bend_rate_per_s=10.0, max_acceleration_mm_s2=1000.0, max_gap_s=0.1
@@ -185,3 +197,12 @@ def test_a_held_rotation_is_a_speed() -> None:
     command = integrator.command(Jog(rotation=-0.5), 5.0)
     assert command.rotation_deg_s == -0.5 * HAND.rotation_deg_s
     assert combined([Jog(rotation=0.8), Jog(rotation=0.8)]).rotation == 1.0
+
+
+def test_controls_of_motions_that_the_robot_does_not_have_are_no_input() -> None:
+    jog = Jog(bend=0.1, pitch=0.2, advance=0.3, delivery=0.4, rotation=0.5)
+    assert within_robot(jog, ServosConfig()) == replace(jog, rotation=0.0)
+    assert within_robot(jog, TURNED) == replace(jog, delivery=0.0, rotation=0.0), "two tendons turn with the bend"
+    assert within_robot(Jog(rotation=1.0), THREE).is_rest
+    flat = TURNED.model_copy(update={"joints": TURNED.joints[:2]})
+    assert within_robot(jog, flat) == Jog(bend=0.1)
