@@ -646,12 +646,13 @@ def calibration_lines(rig: RigFile) -> list[str]:
         lines.append(text)
     servos = ", ".join(f"{tr_text(joint.name)} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
     lines.append(tr("servos (direction and id): {servos}", servos=servos))
-    ways = ", ".join(f"{tr_text(joint.name)} {joint.mm_per_turn:g}" for joint in rig.servos.joints)
+    in_mm = [joint for joint in rig.servos.joints if joint.unit == "mm"]
+    ways = ", ".join(f"{tr_text(joint.name)} {joint.mm_per_turn:g}" for joint in in_mm)
     if known.drums is not None and known.drums.fit(rig.servos):
         lines.append(tr("way at one turn of the horn, by the diameters measured: {ways} mm", ways=ways))
     else:
         lines.append(tr("way at one turn of the horn, as it is set and not measured: {ways} mm", ways=ways))
-    forces = ", ".join(f"{tr_text(joint.name)} {rig.servos.force_limit(joint).force_n:.0f}" for joint in rig.servos.joints)
+    forces = ", ".join(f"{tr_text(joint.name)} {rig.servos.force_limit(joint).force_n:.0f}" for joint in in_mm)
     lines.append(tr("greatest force, limited in the servo, friction included: {forces} N", forces=forces))
     if weak := friction_note(rig.servos):
         lines.append(weak)

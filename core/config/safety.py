@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any, Literal, Self
 
@@ -349,7 +350,8 @@ class ServosConfig(ConfigSection):
 
     def force_limit(self, joint: JointConfig) -> ForceLimit:
         """How the joint's servo limits its force."""
-        return force_limit(self.model_of(joint), joint.drum_mm_per_turn, joint.max_force_n)
+        limit = force_limit(self.model_of(joint), joint.drum_mm_per_turn, joint.max_force_n)
+        return replace(limit, speed_mm_s=limit.speed_mm_s * joint.mm_per_turn / joint.drum_mm_per_turn)
 
     def astray_mm(self, joint: JointConfig) -> float:
         """A joint that is farther from its goal is jammed, in its own unit."""

@@ -360,9 +360,9 @@ def check_forces(config: ServosConfig) -> Check:
     for joint in config.joints:
         limit, model = config.force_limit(joint), config.model_of(joint)
         how = "duty" if limit.current_ma is None else f"{limit.current_ma:.0f} mA"
-        told.append(f"{joint.name} {limit.force_n:.0f} N ({how})")
+        told.append(f"{joint.name} {limit.force_n:.0f} {joint.force_unit} ({how})")
         if limit.speed_mm_s < joint.max_speed_mm_s:
-            slow.append(f"{joint.name} {limit.speed_mm_s:.1f} of {joint.max_speed_mm_s:g} mm/s")
+            slow.append(f"{joint.name} {limit.speed_mm_s:.1f} of {joint.max_speed_mm_s:g} {joint.unit}/s")
         if model.is_small:
             told[-1] += f" by {model.name}, whose motor goes on when its own bus watchdog trips"
     if slow:

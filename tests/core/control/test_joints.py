@@ -5,6 +5,8 @@ import re
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from core.config.safety import JointConfig, SafetyConfig, ServosConfig
 from core.control.gate import GateState, GoalRequest, JointMeasurement, Source, gate_step
@@ -266,6 +268,7 @@ def test_joints_of_older_files_get_their_kind_and_a_rotation_has_units_of_its_ow
     limit = TURNED.force_limit(TURNED.joints[3])
     assert 60.0 < limit.force_n <= 80.0, "N mm, by whole mA"
     assert not limit.is_weak
+    assert limit.speed_mm_s == pytest.approx(104.0 * 6.0), "degrees a second, at 104 turns a minute"
     assert TURNED.astray_mm(TURNED.joints[3]) == 15.0
 
 
@@ -289,3 +292,32 @@ def test_the_gate_takes_the_joints_of_every_shape(servos: ServosConfig) -> None:
     )
     assert wrong.rejection is not None
     assert wrong.rejection.detail == f"7 instead of {count}"
+
+
+_SHARE = st.floats(-1.5, 1.5)
+
+
+@pytest.mark.parametrize("servos", [THREE, TURNED], ids=["three", "two and rotation"])
+@given(st.lists(st.tuples(_SHARE, _SHARE, st.floats(-40.0, 40.0), st.floats(-100.0, 100.0), st.floats(0.0, 0.12)), max_size=12))
+def test_no_commands_lead_out_of_the_limits_and_the_gate_rejects_none_of_them(
+    servos: ServosConfig, commands: list[tuple[float, float, float, float, float]]
+) -> None:
+    now_s, state = 100.0, GateState()
+    at: tuple[float, ...] = tuple(0.3 if joint.is_tendon else 0.0 for joint in servos.joints)
+    for bend, pitch, speed, turn, pause_s in commands:
+        for _ in range(3):
+            now_s += max(0.001, pause_s)
+            command = Command(bend, pitch, speed, speed, turn)
+            wanted = joint_goals(command, state.sent, at, now_s, servos, SAFETY)
+            before = state.sent
+            request = GoalRequest(wanted.goals_mm, Source.OPERATOR, now_s)
+            step = gate_step(state, request, JointMeasurement(at, now_s), Source.OPERATOR, now_s, servos, SAFETY)
+            assert step.rejection is None, step.rejection
+            assert step.goals_mm is not None
+            for joint, goal, here in zip(servos.joints, step.goals_mm, at, strict=True):
+                assert joint.low_mm - 1e-9 <= goal <= joint.high_mm + 1e-9
+                assert abs(goal - here) <= joint.max_step_mm + 1e-9
+            if before is not None:
+                for joint, old, goal in zip(servos.joints, before.goals_mm, step.goals_mm, strict=True):
+                    assert abs(goal - old) <= joint.max_speed_mm_s * min(pause_s + 0.001, 0.1) + 1e-9
+            state, at = step.state, step.goals_mm
