@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes .venv ready to run LumenPilot: Python 3.11, system libraries, pinned packages. Does nothing when that is done already.
-# PYTHON=/path/to/python3.11 chooses the interpreter. With the argument `packages` nothing is compiled.
+# Makes .venv ready to run LumenPilot: Python, system libraries, pinned packages. Does nothing when that is done already.
+# PYTHON=/path/to/python chooses the interpreter: 3.11 (tested), 3.12 or 3.13. With the argument `packages` nothing is compiled.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -35,7 +35,7 @@ stop() {
     exit 1
 }
 
-is_python_311() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' </dev/null 2>/dev/null; }
+is_right_python() { "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' </dev/null 2>/dev/null; }
 
 # Whether a program lies in .venv, which may be activated: what is about to be deleted cannot make the next one.
 is_own() {
@@ -48,23 +48,24 @@ find_python() {
     if [[ -n ${PYTHON:-} ]]; then
         candidates=$(type -P "$PYTHON" || true)
     else
-        candidates=$(type -aP python3.11 python3 || true)
+        candidates=$(type -aP python3.11 python3.12 python3.13 python3 || true)
     fi
     while IFS= read -r candidate; do
-        if [[ -n $candidate ]] && ! is_own "$candidate" && is_python_311 "$candidate"; then
+        if [[ -n $candidate ]] && ! is_own "$candidate" && is_right_python "$candidate"; then
             echo "$candidate"
             return
         fi
     done <<<"$candidates"
-    stop "Python 3.11 is needed (the last RealSense library that knows the L515 camera has no build for 3.12), but
-  ${PYTHON:-python3.11 or python3} is not one outside $venv. Debian 12: sudo apt-get install python3.11 python3.11-venv
-  Elsewhere install it beside your own, then: make PYTHON=/path/to/python3.11 run"
+    stop "Python 3.11, 3.12 or 3.13 is needed, but ${PYTHON:-python3} is not one outside $venv.
+  Debian 12 and 13, Ubuntu 24.04: sudo apt-get install python3-venv
+  Ubuntu 22.04: sudo apt-get install python3.11 python3.11-venv    Fedora: sudo dnf install python3.11
+  Elsewhere: uv python install 3.11, then: make PYTHON=\$(uv python find 3.11) run"
 }
 
 # Debian packages that this machine lacks, one line.
 missing_packages() {
     local missing=()
-    "$1" -c 'import ensurepip, venv' 2>/dev/null || missing+=(python3.11-venv)
+    "$1" -c 'import ensurepip, venv' 2>/dev/null || missing+=("python$("$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])')-venv")
     # shellcheck disable=SC2086 # the table is meant to be split into words
     mapfile -t -O "${#missing[@]}" missing < <("$1" - $libraries <<'PYTHON_CODE'
 import ctypes
@@ -103,7 +104,7 @@ and run make again."
     [[ -z $missing ]] || stop "still missing after installation: $missing"
 }
 
-is_whole() { [[ ! -f $half ]] && is_python_311 "$venv/bin/python"; }
+is_whole() { [[ ! -f $half ]] && is_right_python "$venv/bin/python"; }
 
 # Installed packages that requirements.lock does not list, one line; nor does it list what installs them, nor the optional packages.
 unlisted_packages() {
@@ -120,12 +121,13 @@ def plain(name):
 with open("requirements.lock", encoding="utf-8") as lock:
     listed = {plain(name) for name in re.findall(r"^([\w.-]+)==", lock.read(), re.MULTILINE)}
 found = {plain(package.metadata["Name"]) for package in metadata.distributions(path=[sysconfig.get_path("purelib")])}
+found = {name for name in found if not name.startswith(("nvidia-", "cuda-", "triton"))}  # torch's own
 print(*sorted(found - listed - {"pip", "setuptools", "wheel", "pypylon"}))
 PYTHON_CODE
 }
 
 install_python_packages() {
-    local python=$1 unlisted
+    local python=$1 unlisted torch
     if ! is_whole; then
         say "set-up: making $venv with $python (the first time takes some minutes)"
         mkdir -p "$venv"
@@ -139,7 +141,10 @@ install_python_packages() {
     local compile=--no-compile
     [[ -z ${PYTHONDONTWRITEBYTECODE:-} && ($EUID != 0 || -n ${CI:-}) ]] || compile=--compile
     # Wheels only: nothing is compiled from sources, and a machine that has no wheel is told so at once.
-    "$venv/bin/python" -m pip install --no-input --disable-pip-version-check $compile --only-binary :all: --requirement requirements.lock
+    local install=(-m pip install --no-input --disable-pip-version-check $compile --only-binary :all:)
+    "$venv/bin/python" "${install[@]}" --requirement <(grep -v '^torch==' requirements.lock)
+    # By itself, since it has no hash: which build is taken, and what that needs, depends on the machine (see requirements.lock).
+    ! torch=$(grep '^torch==' requirements.lock) || "$venv/bin/python" "${install[@]}" "$torch"
     rm -f "$half"
     # openvino brings this package and reports every import with it; without it, openvino falls back to its own silent stub.
     "$venv/bin/python" -m pip uninstall --quiet --yes --disable-pip-version-check openvino-telemetry
@@ -167,12 +172,12 @@ compile_kernels() {
 install_all() {
     local wanted
     wanted=$(cat requirements.lock scripts/set_up.sh | sha256sum)
-    if [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && is_python_311 "$venv/bin/python"; then
+    if [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && is_right_python "$venv/bin/python"; then
         return
     fi
     exec 9<requirements.lock
     flock 9 # a second `make` waits here and then finds the work done
-    if [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && is_python_311 "$venv/bin/python"; then
+    if [[ -f $stamp && $(<"$stamp") == "$wanted" ]] && is_right_python "$venv/bin/python"; then
         return
     fi
     local python

@@ -10,6 +10,7 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 
+from packaging.markers import Marker
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -36,14 +37,16 @@ def tracked_text() -> list[Path]:
 
 
 def pins() -> dict[str, str]:
-    """Canonical package name -> version of every line in requirements.lock."""
+    """Canonical package name -> version of every line in requirements.lock that is for this Python."""
     found = {}
-    for line in (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines():
+    for line in (ROOT / "requirements.lock").read_text(encoding="utf-8").replace("\\\n", " ").splitlines():
         if line and not line.startswith("#"):
-            match = re.fullmatch(r"([A-Za-z0-9_.-]+)==([0-9][0-9a-z.]*)", line)
+            match = re.fullmatch(r"([\w.-]+)==([0-9][0-9a-z.]*)(?: ; ([^-]*?))?((?: +--hash=sha256:[0-9a-f]{64})*) *", line)
             assert match, f"not an exact pin: {line!r}"
-            assert canonicalize_name(match[1]) not in found, f"pinned twice: {line!r}"
-            found[canonicalize_name(match[1])] = match[2]
+            assert match[4] or match[1] == "torch", f"no hash: {line!r}"
+            if match[3] is None or Marker(match[3]).evaluate():
+                assert canonicalize_name(match[1]) not in found, f"pinned twice: {line!r}"
+                found[canonicalize_name(match[1])] = match[2]
     return found
 
 

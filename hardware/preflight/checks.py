@@ -162,7 +162,8 @@ def check_packages(lock: Path = LOCK, installed: Callable[[str], str] = metadata
         to_run = lock.read_text(encoding="utf-8").partition("# --- to test")[0]
     except OSError as error:
         return Check("packages", False, f"{lock.name}: cannot be read ({error.strerror})", "restore requirements.lock")
-    pins, wrong = dict(re.findall(r"^([A-Za-z0-9_.-]+)==(\S+)$", to_run, re.MULTILINE)), []
+    lines = re.findall(r"^([\w.-]+)==([^\s;]+)(?: ; ([^\\\n]+?))?(?: \\)?$", to_run, re.MULTILINE)
+    pins, wrong = {name: pin for name, pin, marker in lines if _applies(marker)}, []
     for name, pin in pins.items():
         try:
             found = installed(name).partition("+")[0]
@@ -173,6 +174,12 @@ def check_packages(lock: Path = LOCK, installed: Callable[[str], str] = metadata
     if wrong:
         return Check("packages", False, "; ".join(wrong), "rm -f .venv/.ready && make setup")
     return Check("packages", True, message("{a} as pinned", a=len(pins) - len(_REMOVED & set(pins))))
+
+
+def _applies(marker: str) -> bool:
+    """Whether a line of the lock is for this Python; all other markers hold here."""
+    found = re.fullmatch(r"python_full_version (<|>=) '3\.(\d+)'", marker)
+    return found is None or (sys.version_info < (3, int(found[2]))) == (found[1] == "<")
 
 
 def _check_required(requirements: Iterable[str], installed: Callable[[str], str] = metadata.version) -> Check:
