@@ -22,7 +22,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from app.commands.options import ConfigOption, RigOption, SourceOption
 from core.devices import UserError
-from core.program import CALLED, as_called, is_installed, missing_extra, program_commit, program_version
+from core.program import CALLED, as_called, import_problem, is_installed, program_commit, program_version
 from core.system import keep_freed_memory, limit_heaps, limit_pictures
 
 COMMANDS = {
@@ -187,7 +187,7 @@ def main() -> None:
         _print_error(as_called(f"error: {error}"))
         sys.exit(2)
     except ImportError as error:
-        if (line := missing_extra(error)) is None:
+        if (line := import_problem(error)) is None:
             raise
         _print_error(f"error: {line}")
         sys.exit(2)

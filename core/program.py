@@ -101,9 +101,16 @@ def _origin() -> str:
         return ""
 
 
-def missing_extra(error: ImportError) -> str | None:
-    """The line for a failed import of an optional package that is not installed: what is missing, and the command; else None."""
+_OF_LINUX = frozenset({"fcntl", "grp", "pty", "pwd", "resource", "termios", "tty"})
+"""Modules of Python that Windows lacks."""
+_NEEDS_LINUX = "this needs Linux, as all that drives does; annotate, evaluate, perceive, train, play and session run here, too"
+
+
+def import_problem(error: ImportError) -> str | None:
+    """The line for an import that fails because an optional package is not installed, or this is not Linux; None for all others."""
     package = (error.name or "").partition(".")[0]
+    if isinstance(error, ModuleNotFoundError) and package in _OF_LINUX:
+        return _NEEDS_LINUX
     if not isinstance(error, ModuleNotFoundError) or package not in EXTRAS:
         return None
     return f"this needs the package {package}, which is not installed: {how_to_install(package)}"
@@ -112,4 +119,4 @@ def missing_extra(error: ImportError) -> str | None:
 def need_package(package: str) -> None:
     """Raise UserError when an optional package is not installed; it is not imported."""
     if util.find_spec(package) is None:
-        raise UserError(str(missing_extra(ModuleNotFoundError(name=package))))
+        raise UserError(str(import_problem(ModuleNotFoundError(name=package))))

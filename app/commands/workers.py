@@ -19,7 +19,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from core.devices import UserError
-from core.program import ROOT, is_installed, missing_extra
+from core.program import ROOT, import_problem, is_installed
 from core.system import begin_as_worker
 
 Task = TypeVar("Task")
@@ -97,7 +97,7 @@ def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequen
     try:
         distributed = importlib.import_module("distributed")  # takes a second
     except ModuleNotFoundError as error:
-        raise ClusterError(f"--scheduler: {missing_extra(error) or error}") from None
+        raise ClusterError(f"--scheduler: {import_problem(error) or error}") from None
     try:
         client = distributed.Client(address, timeout=_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -6,17 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMainWindow, QMenu
 
-from app.operator.recording import Offers
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.i18n import tr, tr_text
 from app.widgets.messages import Offer, OfferButton
 from core.perception.model_file import MODELS, ModelError, ModelInfo, models_in, own_models, read_model_info
+
+if TYPE_CHECKING:  # the training dialog needs this file where there is no robot: not on Linux
+    from app.operator.recording import Offers
 
 
 @dataclass(frozen=True, slots=True)

@@ -280,7 +280,7 @@ class ChildProcess(QObject):
             why = f"cannot be started ({error.strerror or error})"
             self._callback.send(lambda it: it._on_over(NOT_STARTED, why))
             return
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, AttributeError):  # Windows has other priorities
             os.setpriority(os.PRIO_PROCESS, self._process.pid, os.getpriority(os.PRIO_PROCESS, 0) + self._priority)
         arguments = (self._process, errors, self._given, self._callback)
         threading.Thread(target=_read_child, args=arguments, name="child process", daemon=True).start()
@@ -290,7 +290,8 @@ class ChildProcess(QObject):
         self._signal(signal.SIGTERM)
 
     def kill(self) -> None:
-        self._signal(signal.SIGKILL)
+        if self.is_running and self._process is not None:
+            self._process.kill()
 
     def leave(self) -> None:
         """Report nothing more of it; the process goes on by itself."""

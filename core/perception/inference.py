@@ -30,7 +30,7 @@ from core.perception.model_file import (
 )
 from core.perception.out_of_distribution import signature_of
 from core.perception.segmentation import Probability, Segmentation, Segmenter
-from core.program import missing_extra
+from core.program import import_problem
 from core.types import Image
 
 _Result = TypeVar("_Result")
@@ -225,7 +225,7 @@ class TorchSegmenter(Segmenter):
         try:
             import torch
         except ModuleNotFoundError as error:
-            raise ModelError(missing_extra(error) or str(error)) from None
+            raise ModelError(import_problem(error) or str(error)) from None
 
         from core.perception.model_file import load_network
         from core.perception.unet import Probabilities

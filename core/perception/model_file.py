@@ -20,7 +20,7 @@ from core.config.models import RESOURCES
 from core.devices import UserError
 from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.quality import ConfidenceCalibration
-from core.program import missing_extra
+from core.program import import_problem
 
 if TYPE_CHECKING:
     from core.perception.unet import DualUNet
@@ -225,7 +225,7 @@ def _state_of_onnx(data: bytes) -> dict[str, Any]:
         from onnx import numpy_helper
     except ImportError as error:
         raise ModelError(
-            missing_extra(error)
+            import_problem(error)
             or f"networks are read with the package onnx, which does not load ({error}): make clean && make setup"
         ) from None
     try:

@@ -7,7 +7,6 @@ measurement. A line without one (made by hand) is taken as it is.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import re
@@ -25,6 +24,7 @@ from typing import TypeVar
 
 from core.config.models import RecordConfig
 from core.files import name_as_text
+from core.locks import lock_file
 from core.session.codec import InvalidRecord
 from core.session.manifest import (
     ADDED_LATER,
@@ -141,7 +141,7 @@ class LineFile:
         self._file = FileIO(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666), "wb")
         self._end = 0
         try:
-            fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(self._file.fileno())
         except BlockingIOError:
             self._file.close()
             raise
@@ -162,7 +162,7 @@ def is_being_written(folder: Path) -> bool:
     """Does a living process hold this session?"""
     try:
         with (folder / FRAMES).open("rb") as file:
-            fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+            lock_file(file.fileno(), is_shared=True)
             return False
     except BlockingIOError:
         return True
@@ -179,11 +179,14 @@ def alone_in(work: Path, busy: str) -> Iterator[None]:
 
     A closed window may leave a recovery running, and the next window offers it again. Raises SessionError (`busy`) and OSError.
     """
+    held: int | None = None
     while True:
         work.mkdir(parents=True, exist_ok=True)
+        if os.name == "nt":  # a folder cannot be opened there, and so not be locked
+            break
         held = os.open(work, os.O_RDONLY)
         try:
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(held)
         except BlockingIOError:
             os.close(held)
             raise SessionError(busy) from None
@@ -198,7 +201,8 @@ def alone_in(work: Path, busy: str) -> Iterator[None]:
         yield
     finally:
         shutil.rmtree(work, ignore_errors=True)
-        os.close(held)
+        if held is not None:
+            os.close(held)
 
 
 def add_event(session: Path, event: Event) -> Event:
@@ -214,7 +218,7 @@ def add_event(session: Path, event: Event) -> Event:
     try:
         with path.open("a+b", buffering=0) as file:
             with contextlib.suppress(OSError):  # a drive without locks
-                fcntl.flock(file.fileno(), fcntl.LOCK_EX)
+                lock_file(file.fileno(), waits=True)
             end = file.seek(0, os.SEEK_END)
             if end:
                 file.seek(end - 1)

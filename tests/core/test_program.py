@@ -10,7 +10,7 @@ import pytest
 
 from core import program
 from core.devices import UserError
-from core.program import as_called, how_to_install, missing_extra, need_package, program_commit, program_version
+from core.program import as_called, how_to_install, import_problem, need_package, program_commit, program_version
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def test_a_missing_package_is_one_command(
     assert how_to_install("torch") == "make setup"
 
 
-def test_other_import_errors_are_no_missing_extras() -> None:
-    assert missing_extra(ModuleNotFoundError("x", name="torch.nn")) is not None
-    assert missing_extra(ModuleNotFoundError("x", name="numpy")) is None
-    assert missing_extra(ImportError("libcudart.so", name="torch")) is None
+def test_other_import_errors_are_no_import_problems() -> None:
+    assert import_problem(ModuleNotFoundError("x", name="torch.nn")) is not None
+    assert import_problem(ModuleNotFoundError("x", name="numpy")) is None
+    assert import_problem(ImportError("libcudart.so", name="torch")) is None
