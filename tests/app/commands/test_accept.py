@@ -20,6 +20,7 @@ from core.devices import UserError
 from hardware.calibration import acceptance
 from hardware.calibration.acceptance import AcceptanceBench, ScalePull
 from hardware.twin.servos.bus import SoftServoBus
+from tests.core.robots import THREE
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("own_folder", "no_process_stays_behind")]
 
@@ -166,3 +167,11 @@ def test_a_rig_of_the_twin_has_nothing_to_accept() -> None:
     with pytest.raises(UserError, match="rig bench 1 has no servos of its own"):
         _run()
     assert accept.acceptance_lines(None, load_config()) == ["acceptance: none; main.py rig accept NAME"]
+
+
+def test_a_robot_of_another_shape_stays_advisory() -> None:
+    servos = THREE.model_copy(update={"port": "/dev/null"})
+    config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}}).model_copy(update={"servos": servos})
+    write_rig(make_rig(config, "bench 1", None))
+    with pytest.raises(UserError, match=r"rig bench 1 has other joints than the default robot, .* it stays advisory"):
+        _run()

@@ -29,6 +29,7 @@ from hardware.inputs.gamepad import GamepadState
 from hardware.rig import FoundDevices
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
 from tests.app.rig_wizard.test_wizard import StillCamera
+from tests.core.robots import THREE
 
 KNOWN = CalibrationConfig(
     made_utc=datetime.now(UTC).replace(microsecond=0),
@@ -133,6 +134,21 @@ def test_a_chosen_rig_is_opened_in_this_window_and_shows_millimetres(
     pixels, millimetres = (float(text.split()[0]) for text in window.panels.bars.texts[0].split(" = "))
     assert millimetres == pytest.approx(0.25 * pixels, abs=0.02)
     assert [action.isChecked() for action in desk._rigs] == [True]
+
+
+def test_the_wizard_is_refused_for_joints_that_it_does_not_know(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
+    write_rig(make_rig(load_config().model_copy(update={"servos": THREE}), "three tendons", None))
+    desk = _desk(window)
+    desk.choose("three tendons")
+    until(qtbot, lambda: len(opened) == 2)
+    assert opened[1].servos.names == THREE.names
+    said: list[str] = []
+    window.say = lambda text, **_: said.append(text)  # type: ignore[method-assign]
+    desk.calibrate()
+    assert desk.wizard is None
+    assert said == [
+        "The rig stays as it is: the wizard knows the default robot only: write the ids and signs of these joints into the rig file"
+    ]
 
 
 def test_a_rig_of_another_kind_is_opened_in_this_window(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:

@@ -5,6 +5,7 @@ import pytest
 from app.settings.draft import SettingsDraft, as_text, search, with_changes
 from core.config.models import Config, load_config
 from core.config.schema import Effect, schema
+from tests.core.robots import THREE
 
 D_ALLOW, THETA = "perception.pose.d_allow_px", "perception.pose.theta_allow_deg"
 SECTIONS = {section.key: section for section in schema().walk()}
@@ -167,3 +168,14 @@ def test_search_looks_at_name_meaning_unit_and_section(words: str, key: str) -> 
 
 def test_values_as_text() -> None:
     assert [as_text(value) for value in (6.0, 0.1, None, 7, "x", 1e-7)] == ["6", "0.1", "", "7", "x", "1e-07"]
+
+
+def test_a_rig_whose_robot_has_another_shape_is_shown_and_its_joints_stay(draft: SettingsDraft) -> None:
+    rig = {"name": "three", "camera": "twin", "robot": "twin", "file": "three.toml"}
+    running = Config.model_validate({**load_config().model_dump(), "rig": rig, "servos": THREE.model_dump()})
+    draft.show_rig(running)
+    assert draft.value("servos.joints.0.high_mm") == 2.8
+    assert draft.entry("servos.joints.6.high_mm") == "", "it has four joints"
+    after = Config.model_validate({**load_config().model_dump(), "hand": {"advance_mm_s": 5.0}})
+    changed = with_changes(running, load_config(), after, frozenset({Effect.RIG}))
+    assert (changed.hand.advance_mm_s, changed.servos) == (5.0, THREE)
