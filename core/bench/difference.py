@@ -27,6 +27,11 @@ _LEAST_HIGH, _LEAST_LOW = 14.0, 6.0
 """Least difference (grey levels of Lab, 0 to 255) of a robot's clearest parts, and of its faintest."""
 _HIGH_SIGMAS, _LOW_SIGMAS = 9.0, 4.0
 """The same in deviations of what the rest of the vessel differs by."""
+_NOISY_LEVELS, _NOISY = 3.0, 6.0
+"""Noise of the camera, and of the difference, above which it is smoothed: the thresholds would exceed a robot's contrast."""
+_SMOOTH_PX, _HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS = 1.0, 4.0, 2.3
+"""Standard deviation of that smoothing, and the thresholds then: noise alone has no long tail. In the noisiest `tank` the robot's
+Dice rises from 0 to .85."""
 _EDGE_SHARE = 0.4
 """The robot's edge lies at this share of its contrast there."""
 _CONTRAST_PX = 9
@@ -59,14 +64,16 @@ class Difference:
     unusable: Mask
 
 
-def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False) -> NDArray[np.float32]:
+def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False, smooth_px: float = 0.0) -> NDArray[np.float32]:
     """How much each pixel differs from the empty bench, float32 (h, w), in grey levels of Lab.
 
-    `with_gone`: also where something lay on the empty bench that is gone.
+    `with_gone`: also where something lay on the empty bench that is gone. `smooth_px`: standard deviation of a smoothing.
     """
     seen = lab_of(image)
     apart = np.asarray(cv2.subtract(seen, view.lab, dtype=cv2.CV_32F), np.float32)
     apart -= _light(apart)
+    if smooth_px:
+        apart = np.asarray(cv2.GaussianBlur(apart, (0, 0), smooth_px), np.float32)
     slack, drawn = view.gradient, gradient_of(seen[..., 0])
     brightness, red, yellow = cv2.split(apart)  # sums along an axis of three take ten times as long
     colored = cv2.magnitude(brightness, _COLOR * cv2.magnitude(red, yellow))
@@ -106,9 +113,11 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     unusable = _glare(image)
     box = np.s_[y : y + height, x : x + width]
     allowed = view.reachable[box] & view.known[box] & ~unusable[box]
-    inside = distance[box][::2, ::2][allowed[::2, ::2]]
-    noise = 1.4826 * float(np.median(inside)) if inside.size else 0.0
-    high, low = max(_LEAST_HIGH, _HIGH_SIGMAS * noise), max(_LEAST_LOW, _LOW_SIGMAS * noise)
+    noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SIGMAS, _LOW_SIGMAS)
+    if noise > _NOISY and float(np.median(view.noise[box][::4, ::4])) > _NOISY_LEVELS:
+        distance = distance_to_empty(image, view, smooth_px=_SMOOTH_PX)
+        noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS)
+    high, low = max(_LEAST_HIGH, sigmas[0] * noise), max(_LEAST_LOW, sigmas[1] * noise)
     strong = np.where(allowed, distance[box], np.float32(0.0))
     cut = np.maximum(_EDGE_SHARE * _contrast(strong), np.float32(low))
     if view.vessel is not None:
@@ -128,6 +137,12 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
     doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | unusable
     return Difference(probability, evidence, doubtful, unusable)
+
+
+def _deviation(distance: NDArray[np.float32], allowed: Mask) -> float:
+    """What pixels (h, w) where a robot may lie differ by, most of which show none: of a normal distribution, by the median."""
+    inside = distance[::2, ::2][allowed[::2, ::2]]
+    return 1.4826 * float(np.median(inside)) if inside.size else 0.0
 
 
 def _foreign(differs: Mask, reachable: Mask) -> Mask:

@@ -58,6 +58,8 @@ _CELL_PX, _KNOWN_SHARE = 40, 0.5
 """Side of a cell in which structure is compared, and the share of it that must be known."""
 _STRONG_SHARE, _LEAST_STRUCTURE = 0.9, 0.009
 """In a cell the strongest tenth of the pixels counts, where its structure is such a share of the brightness."""
+_NOISE_SHARE = 0.5
+"""And where it exceeds this share of the noise in brightness: the noise that is left in an empty picture is no structure."""
 _HIDDEN, _MOST_HIDDEN = 0.4, 0.12
 """A cell with less than this share of the focus is hidden; share of the cells: at most 0.06 in 80 frames of four benches with
 robots, glare, shadows and cables, above 0.2 with a hand in them."""
@@ -255,7 +257,7 @@ def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = 
         robot = cv2.morphologyEx((both & (view.known & ~difference.unusable)).view(np.uint8), cv2.MORPH_OPEN, core) > 0
     specks = _specks(robot)
     robot, doubtful = robot & ~specks, doubtful | _widened(specks, 2)
-    focus, hidden = structure_of(picture.image, view.placed, view.known)
+    focus, hidden = structure_of(picture.image, view.placed, view.known, view.noise)
     gone = distance_to_empty(picture.image, view, with_gone=True) > np.float32(_GONE_LEVELS)
     frame = TeachingFrame(picture, vessel, robot, doubtful, focus, hidden, differs=robot | (gone & view.known))
     if focus < _LEAST_FOCUS:
@@ -276,8 +278,10 @@ def _specks(robot: Mask) -> Mask:
     return np.asarray(small[labels]) if count > 1 else np.zeros_like(robot)
 
 
-def structure_of(image: Image, empty: Image, known: Mask) -> tuple[float, float]:
+def structure_of(image: Image, empty: Image, known: Mask, noise: NDArray[np.float32]) -> tuple[float, float]:
     """How much fine structure of the `empty` picture `image` shows, both (h, w, 3), where it is `known` (h, w).
+
+    `noise` : standard deviation of one picture's pixels, (h, w), grey levels.
 
     Returns
     -------
@@ -286,6 +290,7 @@ def structure_of(image: Image, empty: Image, known: Mask) -> tuple[float, float]
         show less than ``_HIDDEN`` of it.
     """
     seen, there = _fine_structure(image), _fine_structure(empty)
+    floor = np.float32(_NOISE_SHARE) * noise / (cv2.cvtColor(empty, cv2.COLOR_RGB2GRAY).astype(np.float32) + np.float32(_SHADE))
     shares = []
     for y in range(0, image.shape[0] - _CELL_PX + 1, _CELL_PX):
         for x in range(0, image.shape[1] - _CELL_PX + 1, _CELL_PX):
@@ -295,7 +300,7 @@ def structure_of(image: Image, empty: Image, known: Mask) -> tuple[float, float]
                 continue
             now, before = seen[cell][inside], there[cell][inside]
             strong = np.abs(before) >= np.quantile(np.abs(before), _STRONG_SHARE)
-            if np.abs(before[strong]).mean() >= _LEAST_STRUCTURE:
+            if np.abs(before[strong]).mean() >= max(_LEAST_STRUCTURE, float(floor[cell][inside].mean())):
                 shares.append(float(np.median(now[strong] / before[strong])))
     if not shares:
         return 1.0, 0.0
@@ -393,18 +398,17 @@ def _check_empty(frames: Sequence[TeachingFrame], bench: Bench) -> None:
         return
     common = np.mean([frame.robot if frame.differs is None else frame.differs for frame in frames], axis=0) >= _GHOST_SHARE
     count, labels, statistics, _ = cv2.connectedComponentsWithStats((common & vessel).view(np.uint8), connectivity=8)
-    usual: Image | None = None
+    pictures = [frame.picture.image for frame in frames]
     for index in range(1, count):
         if statistics[index, cv2.CC_STAT_AREA] < _GHOST_PX:
             continue
-        if usual is None:
-            usual = np.median([frame.picture.image for frame in frames], axis=0).astype(np.uint8)
         part = labels == index
         ring = _widened(part, 8) & ~_widened(part, 3) & vessel
         if ring.sum() < _GHOST_PX:
             continue
-        apart = [np.abs(image[part].mean(axis=0) - image[ring].mean(axis=0)).max() for image in (bench.empty, usual)]
-        if apart[0] > apart[1]:
+        # of each frame by itself: the bands of a robot are in other places in each
+        apart = [float(np.abs(image[part].mean(axis=0) - image[ring].mean(axis=0)).max()) for image in (bench.empty, *pictures)]
+        if apart[0] > np.median(apart[1:]):
             x, y = (int(statistics[index, key]) for key in (cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP))
             raise TeachingError(f"the empty picture shows the robot near ({x}, {y}): take it again without the robot")
 

@@ -48,6 +48,13 @@ def test_an_empty_bench_has_no_robot(bench: Bench) -> None:
         assert not (found(noisy(board(), sigma, 4, gain), bench).probability >= 0.5).any()
 
 
+def test_a_robot_is_found_in_the_noise_of_a_dark_room() -> None:
+    dark = bench_from_pictures([noisy(board(), 14.0, seed) for seed in range(8)], tube(), "b", 320)
+    image = noisy(with_line(board(), *ROBOT, (130, 130, 130)), 14.0, 9)
+    assert dice(found(image, dark).probability >= 0.5, line(*ROBOT)) > 0.9
+    assert not (found(noisy(board(), 14.0, 10), dark).probability >= 0.5).any()
+
+
 def test_a_shadow_across_the_vessel_is_no_robot(bench: Bench) -> None:
     shade = np.ones((SIZE[1], SIZE[0], 3), np.float32)
     shade[:, 150:] = 0.7
