@@ -13,6 +13,8 @@ from core.config.calibration import ZeroConfig
 from core.config.files import settings_folder
 from core.config.models import CameraConfig, Config, RigConfig, load_config, merge
 from core.config.rig_file import RESERVED, calibration_of, find_rig, with_rig
+from core.config.safety import ServosConfig
+from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import GuardedRobot
 from core.devices import Camera, DeviceError, UserError
 from hardware.cameras.registry import CAMERA_KINDS, FoundCamera
@@ -208,9 +210,16 @@ def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         robot = ServoRobot(servos, config.safety, name="bench twin with servos", truth=twin.status, process=loading.bus)
         undo.callback(robot.close)
         robot.connect()
-        robot.zero()  # its wires are slack, as nothing has pulled yet
+        robot.zero(_zero_of_twin(servos))
         undo.pop_all()
     return Rig(config.rig.name, RigKind.SIM, twin, robot)
+
+
+def _zero_of_twin(servos: ServosConfig) -> ZeroRequest:
+    """Its wires are slack, as nothing has pulled yet; the robot is inserted already, as far as its feed's envelope lets it be."""
+    advance = next(joint for joint in servos.joints if joint.name == "advance")
+    inserted_mm = max(advance.low_mm, min(advance.high_mm, START_INSERTION_MM))
+    return ZeroRequest(positions_mm={**ALL_AT_ZERO.positions_mm, "advance": inserted_mm})
 
 
 @dataclass(frozen=True, slots=True)

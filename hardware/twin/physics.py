@@ -137,6 +137,10 @@ DEFAULT_TENDONS_DEG = (0.0, 180.0, 90.0, 270.0)
 TIMESTEP_S = 0.002
 LUMEN_HALF_HEIGHT_MM = 6.0
 TENDON_OFFSET_MM = 1.0
+OUTSIDE_MM = 30.0
+"""Length of the straight robot behind the port in ``TwinPhysics.robot_points_mm``."""
+DRAWN_OUT_MM = OUTSIDE_MM + 2.0
+"""The tip can be drawn back so far behind the port: then no part of the robot is in the picture."""
 FEED_KP_MN_MM, FEED_KV = 2000.0, 200.0
 _MASS_KG_MM = 3e-5
 _TENDON_KP_MN_MM, _TENDON_KV, _TENDON_MAX_MN = 2000.0, 40.0, 4000.0
@@ -218,7 +222,7 @@ def build_model(
     <geom class="wall" type="plane" size="1 1 1" pos="0 0 -{LUMEN_HALF_HEIGHT_MM}"/>
     <geom class="wall" type="plane" size="1 1 1" pos="0 0 {LUMEN_HALF_HEIGHT_MM}" euler="{np.pi} 0 0"/>
     <body name="base" pos="{x:.6f} {y:.6f} 0" euler="0 0 {port.angle_rad:.9f}">
-      <joint name="feed" type="slide" axis="1 0 0" range="0 {lengths.sum()}" armature="0.05"/>
+      <joint name="feed" type="slide" axis="1 0 0" range="{-DRAWN_OUT_MM} {lengths.sum()}" armature="0.05"/>
       <inertial pos="0 0 0" mass="0.001" diaginertia="0.01 0.01 0.01"/>
       {_chain(lengths, specimen, tendons_deg)}
     </body>
@@ -457,8 +461,6 @@ class TendonDrive:
 
 
 STEERABLE_MM = STEERABLE_LINKS * LINK_MM
-OUTSIDE_MM = 30.0
-"""Length of the straight robot behind the port in ``robot_points_mm``."""
 _SPARE_MM = 24.0
 _CHAIN_STEP_LINKS = 20
 _SWAP_MM, _SWAP_BACK_MM = 8.0, 20.0
@@ -555,6 +557,11 @@ class TwinPhysics:
         return max(0.0, min(self.chain_mm, self._chain.insertion_mm))
 
     @property
+    def is_drawn_out(self) -> bool:
+        """Whether the tip is so far behind the port that no part of the robot is shown."""
+        return self._chain.insertion_mm < -OUTSIDE_MM
+
+    @property
     def delivery_mm(self) -> float:
         """Length of catheter sheath beyond the port."""
         return self._delivery_mm
@@ -593,7 +600,7 @@ class TwinPhysics:
         slip_mm, lag_s = self.specimen.feed_force_mn / FEED_KP_MN_MM, FEED_KV / FEED_KP_MN_MM
         moved = self._feed_mm + advance_mm_s * TIMESTEP_S
         moved = max(insertion_mm - slip_mm, min(insertion_mm + slip_mm, moved))
-        self._feed_mm = max(0.0, min(self.chain_mm, moved))
+        self._feed_mm = max(-DRAWN_OUT_MM, min(self.chain_mm, moved))
         # Velocity feed-forward cancels the drive's lag; none at the ends of the travel.
         goal = self._feed_mm + (lag_s * advance_mm_s if self._feed_mm == moved else 0.0)
         coasting = insertion_mm + lag_s * speed_mm_s

@@ -203,11 +203,15 @@ class TwinWorld:
     def frame(self, captured_s: float | None = None) -> Frame:
         """Render the present state; `captured_s` defaults to simulated time."""
         with self._lock:
-            points, sheath_mm, now = self.physics.robot_points_mm(), self.physics.delivery_mm, self.physics.time_s
+            points, sheath_mm, now = self._shown_points_mm(), self.physics.delivery_mm, self.physics.time_s
             index = self._frame_index
             self._frame_index += 1
         picture = self._renderer.render(points, sheath_mm, noise_seed=index)
         return Frame(index, now if captured_s is None else captured_s, picture.image)
+
+    def _shown_points_mm(self) -> Points | None:
+        """The robot's line (N, 2); None where it is drawn out of the picture."""
+        return None if self.physics.is_drawn_out else self.physics.robot_points_mm()
 
     def picture(self, robot_points_mm: Points, sheath_mm: float = 0.0) -> RenderedFrame:
         """Image and exact masks for a robot shape."""
@@ -216,9 +220,9 @@ class TwinWorld:
     def truth(self, target_px: Point | None = None) -> Truth:
         """The exact truth of the present state; with a target, its route decides at forks."""
         with self._lock:
-            points = self.physics.robot_points_mm()
+            points = self._shown_points_mm()
         route = None
-        if target_px is not None:
+        if target_px is not None and points is not None:
             scale = self._perception.working_size_px / max(self.view.size)
             graph = true_graph(self.phantom, self.view, scale)
             ends = (self.view.project(points[-1:])[0] + 0.5) * scale - 0.5, (np.array(target_px) + 0.5) * scale - 0.5

@@ -116,16 +116,21 @@ def test_only_the_pulled_tendon_carries_force(inserted: TwinPhysics) -> None:
     assert inserted.status().tendon_pull_mm[1] < -1.0
 
 
-def test_insertion_ends_at_the_chain_and_retraction_comes_back_clean() -> None:
+def test_insertion_ends_at_the_chain_and_the_robot_can_be_drawn_out_and_in_again() -> None:
     physics = TwinPhysics(channel((-1, 75), (60, 75), 5.0))
     physics.step(Command(bend=0.4, advance_mm_s=40.0), 4.0)
     assert 60.0 < physics.insertion_mm <= physics.chain_mm
     assert physics.status().wall_contact_n is not None and physics.status().wall_contact_n > 0.05
+    assert not physics.is_drawn_out
     physics.step(Command(advance_mm_s=-40.0), 4.0)
     physics.step(Command(), 0.5)
-    assert physics.insertion_mm == pytest.approx(0.0, abs=0.05)
+    assert physics.is_drawn_out
+    assert physics.insertion_mm == 0.0
     np.testing.assert_allclose(physics.robot_points_mm()[:, 1], 75.0, atol=0.1)
+    assert physics.head_mm[0] < -1.0 - OUTSIDE_MM + ROBOT_RADIUS_MM
     assert physics.status().wall_contact_n == pytest.approx(0.0, abs=0.01)
+    physics.step(Command(advance_mm_s=40.0), 1.8)
+    assert physics.insertion_mm == pytest.approx(40.0, abs=1.0)
 
 
 def test_a_stalled_feed_slips_instead_of_pushing_through() -> None:
