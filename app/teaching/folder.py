@@ -23,7 +23,7 @@ from core.bench.coverage import VesselBranch, VesselCoverage, missing
 from core.config.models import PerceptionConfig
 from core.config.section import first_problem
 from core.devices import UserError
-from core.files import read_image, write_atomic
+from core.files import FolderLock, read_image, write_atomic
 from core.learning import teaching
 from core.learning.dataset import WORKING_SIZE_PX, mask_png, png, read_mask
 from core.learning.teaching import TeachingFrame, TeachingPicture
@@ -53,6 +53,8 @@ _SAME_CELLS, _SAME_AREA = 1, 0.06
 """Robots are as far inserted when so many cells, at most, are covered by one alone, and their areas differ by this share."""
 _STILL_LEVELS, _STILL_SHARE = 10, 4e-4
 """Pictures of which, a quarter as large, a smaller share differs by more than these grey levels show the same."""
+_STILL_SIGMAS = 5.0
+"""In a noisy picture the difference must exceed so many standard deviations of the noise, too."""
 _BUSY_SHARE = 2e-3
 """Share of the picture that changes while an empty picture is taken, when a hand or the robot moves."""
 _LEAST_ROBOT_PX = 220
@@ -208,6 +210,8 @@ class _Record(BaseModel):
 class TeachingFolder:
     """The work on one bench. Its methods are called by one thread at a time, take up to seconds, and raise UserError.
 
+    Nothing is read or written while another program, or another window, has the folder.
+
     Parameters
     ----------
     folder : made when the first picture is taken.
@@ -219,7 +223,12 @@ class TeachingFolder:
         self.folder, self._name = folder, name
         self._open_segment = segment
         self._segment: Segment | None = None
+        self._lock = FolderLock()
         self._clear()
+
+    def release(self) -> None:
+        """Leave the folder to others."""
+        self._lock.release()
 
     def _clear(self) -> None:
         self._record = _Record()
@@ -235,8 +244,13 @@ class TeachingFolder:
     # ---- from disk
 
     def load(self) -> None:
-        """Read what was taken before; nothing where the folder is not there. Raises UserError for one that is damaged."""
+        """Read what was taken before; nothing where the folder is not there.
+
+        Raises UserError for one that is damaged, or that another program has.
+        """
         self._clear()
+        if self.folder.is_dir():
+            self._make_folder()
         path = self.folder / _STATE
         if not path.is_file():
             return
@@ -276,6 +290,7 @@ class TeachingFolder:
 
     def start_over(self) -> None:
         """Remove all that was taken. A model that was trained stays."""
+        self._make_folder()
         try:
             for name in (*_OURS, _BENCH, _SET):
                 shutil.rmtree(self.folder / name, ignore_errors=False) if (self.folder / name).is_dir() else None
@@ -568,12 +583,17 @@ class TeachingFolder:
         return self._segment
 
     def _make_folder(self) -> None:
+        """Have the folder, for this program alone."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
+            is_ours = self._lock.take(self.folder)
         except OSError as error:
             raise _not_written(self.folder, error) from None
+        if not is_ours:
+            raise BenchError("another LumenPilot teaches this bench now: close it there, then close this window and open it again")
 
     def _write(self, kind: str, stem: str, data: bytes) -> None:
+        self._make_folder()
         path = self.folder / kind / f"{stem}.png"
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -615,8 +635,9 @@ def _changed_share(one: Image, other: Image) -> float:
     small = [cv2.resize(image, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA) for image in (one, other)]
     first, second = (image.astype(np.int16) for image in small)
     apart = second - first
-    apart -= np.median(apart[::2, ::2], axis=(0, 1)).astype(np.int16)
-    return float(np.mean(np.abs(apart).max(axis=2) > _STILL_LEVELS))
+    apart = np.abs(apart - np.median(apart[::2, ::2], axis=(0, 1)).astype(np.int16))
+    noise = 1.4826 * np.median(apart[::2, ::2], axis=(0, 1))  # of a normal distribution by its median deviation
+    return float(np.mean((apart > np.maximum(_STILL_LEVELS, _STILL_SIGMAS * noise)).any(axis=2)))
 
 
 def _blurred(robot: Mask) -> NDArray[np.float32]:

@@ -116,6 +116,7 @@ class TeachingModel(QObject):
         self.busy = ""
         """The job that the window waits for, in words."""
         self.is_loaded = False
+        """What was taken before is read; where it cannot be, it is tried again when the window is opened."""
         self.training = TrainingState()
         self.result: TaughtResult | None = None
         self._count = self._busy_job = 0
@@ -153,11 +154,14 @@ class TeachingModel(QObject):
 
     def load(self) -> None:
         """Read what was taken before."""
-        self._run(tr("reading what was taken before"), self._folder.load)
+        self._run(tr("reading what was taken before"), self._folder.load, self._on_loaded)
 
     def start_over(self) -> None:
         """Remove what was taken; models stay."""
-        self._run(tr("removing what was taken"), self._folder.start_over)
+        self._run(tr("removing what was taken"), self._folder.start_over, self._on_loaded)
+
+    def _on_loaded(self, _nothing: object) -> None:
+        self.is_loaded = True
 
     def go(self, step: TeachingStep) -> None:
         """To another step, which is kept."""
@@ -219,7 +223,6 @@ class TeachingModel(QObject):
     def _ended_job(self, key: object) -> Callable[[object], None] | None:
         """What was to be done after the job that has ended."""
         then = self._then.pop(key, None)
-        self.is_loaded = True
         if key == self._busy_job:
             self.busy = ""
         return then
@@ -360,7 +363,8 @@ class TeachingModel(QObject):
             self._child.leave()
             self._child.ask_to_end()
         self._work.stop(finish=True)
-        self._work.wait(_END_WITHIN_MS)
+        if self._work.wait(_END_WITHIN_MS):
+            self._folder.release()
 
 
 def look_line(look: TakenLook, count: int) -> str:

@@ -46,6 +46,12 @@ def opened(path: Path) -> TeachingFolder:
     return work
 
 
+def reopened(before: TeachingFolder, path: Path) -> TeachingFolder:
+    """As another run of the program finds it."""
+    before.release()
+    return opened(path)
+
+
 @pytest.fixture
 def work(tmp_path: Path) -> TeachingFolder:
     """Empty bench and vessel are known."""
@@ -124,7 +130,7 @@ def test_everything_is_there_again_after_the_window_was_closed(work: TeachingFol
     mask = large(toy_robot(1, 0.5))
     work.correct(before.frames[3].stem, mask)
     work.go(TeachingStep.FRAMES)
-    again = opened(tmp_path).view()
+    again = reopened(work, tmp_path).view()
     assert again.step is TeachingStep.FRAMES
     assert np.array_equal(again.vessel, before.vessel)
     assert [taken.stem for taken in again.frames] == [taken.stem for taken in before.frames]
@@ -136,8 +142,9 @@ def test_everything_is_there_again_after_the_window_was_closed(work: TeachingFol
 
 
 def test_places_are_taken_up_again(tmp_path: Path) -> None:
-    opened(tmp_path).add_place(robot_picture(0, 0.5))
     work = opened(tmp_path)
+    work.add_place(robot_picture(0, 0.5))
+    work = reopened(work, tmp_path)
     assert len(work.view().places) == 1
     work.add_place(robot_picture(0, 0.95))
     work.add_place(robot_picture(1, 0.95))
@@ -159,7 +166,7 @@ def test_starting_over_removes_all_of_it(work: TeachingFolder, tmp_path: Path) -
     drive(work)
     work.start_over()
     assert work.view().empty is None
-    assert opened(tmp_path).view().frames == ()
+    assert reopened(work, tmp_path).view().frames == ()
 
 
 def test_what_was_trained_before_a_change_is_not_taken_for_the_present_frames(work: TeachingFolder) -> None:
@@ -178,6 +185,17 @@ def test_something_that_moves_while_the_empty_picture_is_taken(work: TeachingFol
     with pytest.raises(BenchError, match="something moved while the pictures were taken"):
         work.add_empty([toy_picture(seed=1), toy_picture(toy_robot(0, 0.9), seed=2)])
     assert work.view().empty is before
+
+
+def test_a_noisy_camera_is_no_motion(work: TeachingFolder) -> None:
+    rng = np.random.default_rng(5)
+    still = toy_picture(seed=1)
+    noise = [cv2.GaussianBlur(rng.normal(0, 40, still.shape), (0, 0), 1.2) for _ in range(8)]
+    noisy = [np.clip(still + grain, 0, 255).astype(np.uint8) for grain in noise]
+    work.add_empty(noisy)
+    assert work.view().empty is not None
+    with pytest.raises(BenchError, match="something moved"):
+        work.add_empty([noisy[0], np.where(toy_robot(0, 0.9)[:, :, None], np.uint8(40), noisy[1])])
 
 
 def test_a_blurred_empty_picture(work: TeachingFolder) -> None:
@@ -272,16 +290,17 @@ def test_a_full_disk_loses_nothing(work: TeachingFolder, monkeypatch: pytest.Mon
         with pytest.raises(BenchError, match="No space left on device"):
             work.look(toy_picture(np.roll(toy_robot(0, 0.55), 8, axis=0), seed=3))
     assert len(work.view().frames) == before
-    assert len(opened(tmp_path).view().frames) == before
+    assert len(reopened(work, tmp_path).view().frames) == before
 
 
 def test_a_damaged_record_is_one_line_and_can_be_started_over(work: TeachingFolder, tmp_path: Path) -> None:
     (tmp_path / "teaching" / "teaching.json").write_text("{")
+    work.release()
     again = TeachingFolder(tmp_path / "teaching", "toy", lambda: segment)
     with pytest.raises(BenchError, match=r"teaching\.json: damaged"):
         again.load()
     again.start_over()
-    assert opened(tmp_path).view().empty is None
+    assert reopened(again, tmp_path).view().empty is None
 
 
 def test_too_few_frames_are_said(work: TeachingFolder) -> None:
@@ -299,11 +318,11 @@ def test_a_vessel_that_is_half_drawn_is_there_in_the_next_run(tmp_path: Path) ->
     work.go(TeachingStep.VESSEL)
     drawn = large(toy_vessel())
     work.keep_drawn(drawn)
-    again = opened(tmp_path)
+    again = reopened(work, tmp_path)
     assert again.view().vessel is None
     assert (again.view().drawn == drawn).all()
     again.set_vessel(drawn)
-    assert opened(tmp_path).view().drawn is None
+    assert reopened(again, tmp_path).view().drawn is None
 
 
 def test_a_correction_that_is_undone_is_no_correction(work: TeachingFolder) -> None:
@@ -337,9 +356,9 @@ def test_a_frame_whose_picture_is_damaged_does_not_hide_the_others(work: Teachin
     drive(work, 3)
     count = len(work.view().frames)
     (tmp_path / "teaching" / "frames" / "0001.png").write_bytes(b"no picture")
-    assert len(opened(tmp_path).view().frames) == count - 1
+    assert len(reopened(work, tmp_path).view().frames) == count - 1
 
 
 def test_a_step_that_lacks_its_bench_is_not_opened(work: TeachingFolder, tmp_path: Path) -> None:
     shutil.rmtree(tmp_path / "teaching" / "bench")
-    assert opened(tmp_path).view().step is TeachingStep.EMPTY
+    assert reopened(work, tmp_path).view().step is TeachingStep.EMPTY
