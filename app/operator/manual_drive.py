@@ -303,12 +303,16 @@ class DrivePanels(Protocol):
 class DriveController(QObject):
     """Passes the operator's controls to the pilot of the running rig, and the pilot's view and alerts to panels and recorder.
 
+    ``reported`` carries each ``DriveNews`` of the pilot, for other windows that drive.
+
     Parameters
     ----------
     window : whose keys are listened to.
     panels : what shows driving; without a pilot (a recording) that there is nothing to drive.
     recorder : keeps alerts and destinations with the session.
     """
+
+    reported = Signal(object)
 
     def __init__(self, window: QWidget, rig: RigSession, panels: DrivePanels, recorder: Recorder) -> None:
         super().__init__(window)
@@ -470,6 +474,7 @@ class DriveController(QObject):
         self._panels.show_drive(news.view, self.bus)
         if news.alerts:
             self._panels.show_alerts(news.alerts)
+        self.reported.emit(news)
 
 
 class OperatorDevices(QObject):

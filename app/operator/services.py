@@ -265,9 +265,9 @@ class WindowServices(QObject):
             newest = partial(self._frame_of, bench)
             model = TeachingModel(teaching_folder(bench), bench, newest, partial(_open_proposals, window.rig.config.perception))
             model.trained.connect(self._on_taught)
-            driver = TeachingDriver(controls.drive, controls.stop, lambda: controls.can_move)
-            is_twin = window.rig.kind is RigKind.SIM
-            self.teaching = TeachingWindow(model, newest, driver, self._use_taught, is_twin, window)
+            driver = TeachingDriver(controls.drive, controls.stop, window.ask_step, lambda: controls.can_move)
+            self.teaching = TeachingWindow(model, newest, driver, self._use_taught, window)
+            controls.reported.connect(self.teaching.show_news)
             model.setParent(self.teaching)
         self.teaching.open()
 

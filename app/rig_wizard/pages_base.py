@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
@@ -21,11 +22,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.rig_wizard.model import RigWizardModel
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from core.types import Image, Point
-from hardware.calibration.rig_draft import RigDraft
+
+if TYPE_CHECKING:
+    from app.rig_wizard.model import RigWizardModel
+    from hardware.calibration.rig_draft import RigDraft
 
 _ARROW_HEAD_PX = 11.0
 

@@ -170,6 +170,8 @@ class TeachingPage(QWidget):
     name = ""
     hint = ""
     step = TeachingStep.EMPTY
+    is_live = False
+    """Whether the picture at the right is the live one."""
 
     def __init__(self, model: TeachingModel, right: QWidget) -> None:
         super().__init__()
@@ -198,11 +200,6 @@ class TeachingPage(QWidget):
     def may_leave(self) -> bool:
         return self.view.may_leave
 
-    @property
-    def is_live(self) -> bool:
-        """Whether the picture at the right is the live one."""
-        return False
-
     def enter(self) -> None:
         """The page comes to the front."""
 
@@ -226,12 +223,13 @@ class EmptyPage(TeachingPage):
 
     name = mark("Empty bench")
     hint = mark(
-        "Draw the robot back until none of it is in the vessel, and take your hands out of the picture. From here on camera and "
-        "phantom stay where they are."
+        "Draw the robot back until none of it is in the vessel: by hand, or hold Down with the servos on (F3); at the end of its "
+        "way let go, and hold it again. Take your hands out of the picture. From here on camera and phantom stay where they are."
     )
     step = TeachingStep.EMPTY
+    is_live = True
 
-    def __init__(self, model: TeachingModel, picture: BenchPicture, is_twin: bool) -> None:
+    def __init__(self, model: TeachingModel, picture: BenchPicture) -> None:
         super().__init__(model, picture)
         self._picture = picture
         self.take = self.main = button(tr("&Take picture"), model.take_empty, tr("Takes eight pictures within a second"))
@@ -241,13 +239,7 @@ class EmptyPage(TeachingPage):
         self.thumb.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.thumb.setAccessibleName(tr("The empty picture that was taken"))
         theme.set_sheet(self.thumb, "background: @WINDOW; color: @TEXT_FAINT; border: 1px solid @LINE; border-radius: 6px;")
-        self.found = note("")
-        self.found.setMinimumHeight(84)
-        self.found.setAlignment(Qt.AlignmentFlag.AlignTop)
-        if is_twin:
-            self.column.addWidget(
-                note(tr("Bench twin: its robot begins inside and cannot be drawn out. Lay it in three places, as below."))
-            )
+        self.found = _lines(84)
         self.column.addWidget(self.take)
         self.column.addWidget(self.thumb, 0, Qt.AlignmentFlag.AlignLeft)
         self.column.addWidget(self.found)
@@ -261,10 +253,6 @@ class EmptyPage(TeachingPage):
             )
         )
         self.column.addWidget(self.place)
-
-    @property
-    def is_live(self) -> bool:
-        return True
 
     @property
     def is_done(self) -> bool:
@@ -322,10 +310,8 @@ class VesselPage(TeachingPage):
         """The drawing with which the page was opened."""
         self.undo = button(tr("&Undo"), editor.undo)
         tip = tr("The model's proposal instead of what was drawn; Undo brings that back")
-        self.again = button(tr("Propose &again"), self._ask_proposal, tip)
-        self.words = note("")
-        self.words.setMinimumHeight(60)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.again = button(tr("Propose &again"), model.propose_vessel, tip)
+        self.words = _lines(60)
         for mode in (MaskMode.REGION, MaskMode.TUBE, MaskMode.BRUSH):
             self.column.addWidget(note(f"<b>{tr(mode.value.label)}</b> ({mode.value.key}): {tr(_MODE_TEXT[mode])}"))
         self.column.addLayout(line(self.undo, self.again))
@@ -351,7 +337,7 @@ class VesselPage(TeachingPage):
         self.editor.set_mode(MaskMode.REGION)
         self._begun = self._annotation
         if view.vessel is None and view.drawn is None:
-            self._ask_proposal()
+            self.model.propose_vessel()
 
     @property
     def _annotation(self) -> Annotation:
@@ -385,9 +371,6 @@ class VesselPage(TeachingPage):
         self.undo.setEnabled(not busy and outline is not None and bool(outline.undo_action))
         is_empty = outline is not None and not outline.annotation.masks and not busy
         self.words.setText(tr("The model sees no vessel here: drag a tube along the middle of each branch.") if is_empty else "")
-
-    def _ask_proposal(self) -> None:
-        self.model.propose_vessel()
 
     def _on_proposed(self, vessel: Mask) -> None:
         outline = self.editor.outline
@@ -428,10 +411,11 @@ class MovePage(TeachingPage):
 
     name = mark("Move the robot")
     hint = mark(
-        "Move the robot slowly through all branches, and bend its head both ways at some places; by hand, or with the keys here "
-        "once the servos are on (F3 in the operator window). Frames are taken by themselves, and the map fills where it has been."
+        "Move the robot slowly through all branches, and bend its head both ways at some places; by hand, or with the "
+        "arrow keys once the servos are on (F3). Frames are taken by themselves, and the map fills where it has been."
     )
     step = TeachingStep.MOVE
+    is_live = True
 
     def __init__(self, model: TeachingModel, picture: BenchPicture) -> None:
         super().__init__(model, picture)
@@ -442,9 +426,7 @@ class MovePage(TeachingPage):
         self.said.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
         self.said.setAccessibleName(tr("What became of the newest picture"))
         self.places, self.bends, self.frames = _Goal(tr("Vessel")), _Goal(tr("Bends")), _Goal(tr("Frames"))
-        self.lacks = note("")
-        self.lacks.setFixedHeight(58)
-        self.lacks.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.lacks = _lines(58)
         self.pause = button(tr("&Pause"), self._on_pause, tr("Take no frames for a while"))
         self.pause.setCheckable(True)
         self._thumbs = [QLabel() for _ in range(_STRIP)]
@@ -463,10 +445,6 @@ class MovePage(TeachingPage):
         self.column.addWidget(self.pause, 0, Qt.AlignmentFlag.AlignLeft)
         self._shown: tuple[str, ...] = ()
         model.looked.connect(self._on_looked)
-
-    @property
-    def is_live(self) -> bool:
-        return True
 
     @property
     def is_done(self) -> bool:
@@ -563,10 +541,6 @@ class FramesPage(TeachingPage):
         self.column.addLayout(line(self.out, self.undo))
         canvas.edited.connect(self._on_edited)
 
-    @property
-    def is_done(self) -> bool:
-        return self.view.step > self.step
-
     def enter(self) -> None:
         self._open = None
         self.list.clear()
@@ -595,7 +569,7 @@ class FramesPage(TeachingPage):
                 item.setToolTip(tr_text(taken.frame.reason) or words)
         taken_now = self._current
         enable(taken_now is not None, self.out)
-        self.undo.setEnabled(self._history.undo_action not in ("", "begin"))
+        self.undo.setEnabled(self._may_undo)
         if taken_now is not None:
             self.out.setText(tr("&Take in again") if taken_now.is_left_out else tr("&Leave out"))
             self.why.setText(tr("Rejected: {why}", why=tr_text(taken_now.frame.reason)) if taken_now.frame.reason else "")
@@ -628,21 +602,27 @@ class FramesPage(TeachingPage):
         if annotation is not None:
             self._history.edit(action, annotation)
             self._keep()
-        self.canvas.show_annotation(self._history.current)
-        self.refresh()
+        self._show_drawn()
 
     def _on_undo(self) -> None:
         self._history.undo()
         self._keep()
+        self._show_drawn()
+
+    def _show_drawn(self) -> None:
         self.canvas.show_annotation(self._history.current)
         self.refresh()
+
+    @property
+    def _may_undo(self) -> bool:
+        return self._history.undo_action not in ("", "begin")
 
     def _keep(self) -> None:
         """Keep the mask as it is drawn now; where all was undone, a frame that was not corrected before is not corrected."""
         taken = next((one for one in self.view.frames if one.stem == self._open), None)
         if taken is None:
             return
-        if self._history.undo_action in ("", "begin") and not self._was_corrected:
+        if not self._may_undo and not self._was_corrected:
             self.model.correct(taken.stem, None)
         else:
             height, width = taken.frame.robot.shape
@@ -766,9 +746,17 @@ class TrainPage(TeachingPage):
         self.model.train(self.model_name.text().strip(), self.minutes.value())
 
 
+def _lines(height_px: int) -> QLabel:
+    """Words that come and go, in a place that stays."""
+    words = note("")
+    words.setMinimumHeight(height_px)
+    words.setAlignment(Qt.AlignmentFlag.AlignTop)
+    return words
+
+
 def show_main(page: TeachingPage, next_button: QPushButton) -> None:
-    """One button stands out: that of the step, until it is done, else the one that leads on."""
+    """One button stands out: that of the step, until it is done, else the one that leads on; while the robot moves, none before."""
     done = page.is_done and page.may_leave
     if page.main is not None:
         set_main_button(page.main, not done)
-    set_main_button(next_button, done if page.main is not None else page.may_leave)
+    set_main_button(next_button, done if page.main is not None or page.is_live else page.may_leave)

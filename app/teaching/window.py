@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from PySide6.QtCore import QSize, Qt, QTimer, Slot
-from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QShortcut
 from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QStackedWidget, QWidget
 
 from app.annotator.canvas import AnnotationCanvas
@@ -28,9 +29,12 @@ from app.teaching.pages import (
 from app.training.dialog import BeforeAfter
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
+from app.ui.texts import OperatorStep
+from app.widgets.alerts import AlertStrip
 from app.widgets.basics import Card, StillWheel, column, line, takes_enter
 from app.widgets.messages import QuestionStrip
 from app.widgets.mode_bar import StopButton
+from core.control.drive_view import DriveNews
 from core.control.motion import Jog
 
 _SIZE = QSize(1440, 800)
@@ -43,10 +47,14 @@ _PICTURE_EVERY_MS = 50
 
 @dataclass(frozen=True, slots=True)
 class TeachingDriver:
-    """How the window moves the robot: ``drive`` does what held keys say, ``stop`` is STOP, ``can_move``: whether anything can."""
+    """How the window moves the robot.
+
+    ``drive`` does what held keys say, ``stop`` is STOP, ``ask`` a step of the operator, ``can_move``: whether anything can move.
+    """
 
     drive: Callable[[Jog], object]
     stop: Callable[[], object]
+    ask: Callable[[OperatorStep], object]
     can_move: Callable[[], bool]
 
 
@@ -59,7 +67,6 @@ class TeachingWindow(QDialog):
     newest : the live picture.
     driver : keys that move the robot while it is to be moved.
     use : puts a model of this name, with its bench, into force; returns why it cannot be done now, or "".
-    is_twin : whether the bench is the twin.
     """
 
     def __init__(
@@ -68,7 +75,6 @@ class TeachingWindow(QDialog):
         newest: NewestFrame,
         driver: TeachingDriver,
         use: Callable[[str], str],
-        is_twin: bool,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -81,9 +87,10 @@ class TeachingWindow(QDialog):
         self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.picture = BenchPicture()
         self.picture.show_text(tr("No live picture"))
+        self.alerts = AlertStrip(self.picture)
         vessel_editor, robot_canvas, self.before_after = VesselOutlineEditor(), AnnotationCanvas(), BeforeAfter(is_drawn=False)
         vessel_editor.said.connect(self.say)
-        self.empty_page = EmptyPage(model, self.picture, is_twin)
+        self.empty_page = EmptyPage(model, self.picture)
         self.vessel_page = VesselPage(model, vessel_editor)
         self.move_page = MovePage(model, self.picture)
         self.frames_page = FramesPage(model, robot_canvas)
@@ -98,6 +105,8 @@ class TeachingWindow(QDialog):
         self.steps, self.stack, self.right = QListWidget(), QStackedWidget(), QStackedWidget()
         self.stop_button = StopButton()
         self.stop_button.asked.connect(driver.stop)
+        for step in (OperatorStep.SERVOS_ON, OperatorStep.ACKNOWLEDGE):  # what moving the robot may ask for
+            QShortcut(step.value.key, self, partial(driver.ask, step))
         self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
         self.over_button = button(tr("Start &over"), self._ask_to_start_over, tr("Forget what was taken of this bench"))
         self.close_button = button(tr("&Close"), self.close, tr("What was taken is kept; the menu Model opens it again"))
@@ -266,6 +275,13 @@ class TeachingWindow(QDialog):
             self.say(f"{work[0].upper()}{work[1:]} ...")
         elif self.message.endswith(" ..."):
             self.say("")
+
+    @Slot(object)
+    def show_news(self, news: DriveNews) -> None:
+        """Show over the live picture why the robot does not move, or was stopped."""
+        if self.isVisible():
+            self.alerts.show_view(news.view)
+            self.alerts.show_alerts(news.alerts)
 
     @Slot(str, bool)
     def say(self, text: str, is_fault: bool = False) -> None:

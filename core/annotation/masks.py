@@ -15,7 +15,6 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from skimage.measure import approximate_polygon, find_contours
 
 from core.annotation.model import Line, MaskPolygon, MaskTarget
 from core.types import Mask, Points
@@ -198,6 +197,8 @@ def polygons_of_area(points: Points, target: MaskTarget, size: tuple[int, int]) 
 
 def area_polygon(mask: Mask) -> NDArray[np.float64] | None:
     """The polygon (N, 2) around a mask (H, W), whose ``area_of`` it is; None for several components or holes."""
+    from skimage.measure import approximate_polygon, find_contours  # loads statistics, which takes a second
+
     outlines = find_contours(np.pad(mask, 1).astype(np.float64), 0.5, fully_connected="high")
     if len(outlines) != 1:
         return None

@@ -13,6 +13,7 @@ from pytestqt.qtbot import QtBot
 from app.teaching.folder import Segment
 from app.teaching.model import TeachingModel
 from app.teaching.window import TeachingDriver, TeachingWindow
+from app.ui.texts import OperatorStep
 from core.types import Frame, Image
 
 LONG_MS = 120_000
@@ -41,8 +42,9 @@ class BenchHand:
         self._qtbot, self.feed = qtbot, feed
         self.model = TeachingModel(folder, "toy", feed, lambda: segment)
         self.model._watch.setInterval(10)
-        driver = TeachingDriver(lambda _jog: None, lambda: None, lambda: False)
-        self.window = TeachingWindow(self.model, feed, driver, self._use, True)
+        self.asked: list[OperatorStep] = []
+        driver = TeachingDriver(lambda _jog: None, lambda: None, self.asked.append, lambda: False)
+        self.window = TeachingWindow(self.model, feed, driver, self._use)
         qtbot.addWidget(self.window)
 
     def _use(self, name: str) -> str:

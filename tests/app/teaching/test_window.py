@@ -19,9 +19,13 @@ from app.teaching import model as model_module
 from app.teaching.folder import TeachingStep
 from app.teaching.model import TeachingModel, free_name, teaching_folder
 from app.training.model import TrainingPhase
+from app.ui.texts import OperatorStep
 from core import geometry
 from core.bench.bench import read_bench
 from core.config.models import PerceptionConfig
+from core.control.alerts import Alert, alert_of
+from core.control.drive_view import DriveNews, DriveView
+from core.control.modes import Hindrance
 from core.learning.model_writer import save_model
 from core.perception.inference import open_segmenter
 from core.perception.model_file import own_models
@@ -67,6 +71,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     work.set_vessel(work.proposed_vessel())
     drive(work, 6)
     work.go(TeachingStep.MOVE)
+    work.release()
     return folder / "teaching"
 
 
@@ -179,7 +184,30 @@ def test_starting_over_is_asked_first(open_hand: OpenHand, driven: Path) -> None
     assert hand.model.view.empty is None
 
 
+def test_another_program_that_has_the_folder_is_named_and_nothing_is_lost(open_hand: OpenHand, driven: Path) -> None:
+    hand = open_hand(driven)
+    count = len(hand.model.view.frames)
+    other = open_hand()
+    assert other.window.message.startswith("another LumenPilot teaches this bench now")
+    assert not other.model.view.frames
+    other.click(other.window.empty_page.take)
+    assert other.window.message.startswith("another LumenPilot teaches this bench now")
+    other.window.close()
+    hand.end()
+    other.open()
+    assert len(other.model.view.frames) == count
+
+
 # ---- the pages
+
+
+def test_the_servos_are_switched_on_and_alerts_are_seen_in_this_window(open_hand: OpenHand) -> None:
+    hand = open_hand()
+    QTest.keyClick(hand.window, Qt.Key.Key_F3)
+    assert hand.asked == [OperatorStep.SERVOS_ON]
+    alert = Alert(Hindrance.SERVOS_UNCHECKED, alert_of(Hindrance.SERVOS_UNCHECKED))
+    hand.window.show_news(DriveNews(DriveView(1.0), (alert,)))
+    assert "switch them on" in hand.window.alerts.texts[0]
 
 
 def test_three_places_make_an_empty_picture(open_hand: OpenHand) -> None:
