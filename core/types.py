@@ -287,7 +287,7 @@ class Command:
 
     ``bend`` and ``pitch`` are the head's bend in the image plane and out of it, each -1..1 of the tendons' full pull; positive bend
     = to the robot's right as seen on screen. ``advance_mm_s`` feeds the robot (negative retracts), ``delivery_mm_s`` the catheter
-    sheath. ``rotation_deg_s`` turns the shaft where it can be turned, and keeps the bend; with two tendons only without a bend.
+    sheath. ``rotation_deg_s`` turns the shaft where it can be turned, to the left as seen from behind, and keeps the bend.
     """
 
     bend: float = 0.0

@@ -145,7 +145,7 @@ class JogKeys(HeldInput):
             advance=_sign(held, Motion.ADVANCE, Motion.RETRACT),
             delivery=_sign(held, Motion.DELIVER, Motion.WITHDRAW),
             straighten=Motion.STRAIGHTEN in held,
-            rotation=_sign(held, Motion.TURN_RIGHT, Motion.TURN_LEFT),
+            rotation=_sign(held, Motion.TURN_LEFT, Motion.TURN_RIGHT),
         )
 
     def press(self, source: object, motion: Motion) -> None:

@@ -23,7 +23,10 @@ head turns by less than 10 degrees."""
 
 @dataclass(frozen=True, slots=True)
 class Jog:
-    """Deflection of the controls, each -1..1 of full speed; ``straighten`` brings bend and pitch back to the middle."""
+    """Deflection of the controls, each -1..1 of full speed; ``straighten`` brings bend and pitch back to the middle.
+
+    ``rotation`` is positive to the left as seen from behind: from the robot's right towards the camera.
+    """
 
     bend: float = 0.0
     pitch: float = 0.0

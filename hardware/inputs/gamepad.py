@@ -70,7 +70,7 @@ class Layout:
 class GamepadState:
     """How the controls are held, at ``time_s`` on the monotonic clock; each rate -1..1 of full speed.
 
-    Positive: bend to the robot's right as seen on screen, pitch up, advance and sheath forward, shaft to the right. ``deadman``:
+    Positive: bend to the robot's right as seen on screen, pitch up, advance and sheath forward, shaft to the left. ``deadman``:
     None when the configuration does not make the gamepad a deadman. ``stop``: the STOP button is down.
     """
 
@@ -154,7 +154,7 @@ class GamepadControls:
             deadman=held if self._config.deadman else None,
             stop=self._down.get(Button.STOP, False),
             time_s=now_s,
-            rotation=self._rate(Axis.RIGHT_X),
+            rotation=0.0 - self._rate(Axis.RIGHT_X),
         )
 
 

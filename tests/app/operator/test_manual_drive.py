@@ -368,6 +368,8 @@ def keyboard(qtbot: QtBot) -> Iterator[Keyboard]:
         (Key.Key_E, Jog(pitch=1.0)),
         (Key.Key_Q, Jog(pitch=-1.0)),
         (Key.Key_X, Jog(straighten=True)),
+        (Key.Key_Z, Jog(rotation=1.0)),
+        (Key.Key_C, Jog(rotation=-1.0)),
     ],
 )
 def test_a_motion_is_there_while_held_and_gone_after(keyboard: Keyboard, key: Qt.Key, jog: Jog) -> None:

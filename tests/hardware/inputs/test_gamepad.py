@@ -111,7 +111,7 @@ def test_the_curve_grows_without_a_step(first: float, second: float, dead_zone: 
         (axis(LY, -0.6), {"advance": 0.5}),  # the kernel counts downwards
         (axis(LY, 1.0), {"advance": -1.0}),
         (axis(RY, -1.0), {"pitch_rate": 1.0}),
-        (axis(RX, 1.0), {}),
+        (axis(RX, 1.0), {"rotation": -1.0}),  # to the right as seen from behind
         (axis(RT, 0.2), {"delivery": 0.5}),  # 0.6 of its way
         (axis(LT, 1.0), {"delivery": -1.0}),
         (axis(LT, 1.0) + axis(RT, 0.2), {"delivery": -0.5}),
@@ -128,7 +128,8 @@ def test_the_curve_grows_without_a_step(first: float, second: float, dead_zone: 
 def test_what_each_control_does(event: bytes, expected: dict[str, object]) -> None:
     pad = Pad()
     state = pad.send(event)
-    wanted = {"bend_rate": 0.0, "pitch_rate": 0.0, "advance": 0.0, "delivery": 0.0, "deadman": False, "stop": False, **expected}
+    wanted = {"bend_rate": 0.0, "pitch_rate": 0.0, "advance": 0.0, "delivery": 0.0, "rotation": 0.0, "deadman": False}
+    wanted |= {"stop": False, **expected}
     found = {name: getattr(state, name) for name in wanted}
     assert found == {name: pytest.approx(value, abs=1e-3) for name, value in wanted.items()}
     assert "-0.0" not in repr(state)
