@@ -90,6 +90,8 @@ _COLOR_TRIES = 12
 """Colours that are drawn until a robot stands out from what lies below it."""
 _FADING = 0.5
 """Share of the robots in X-rays whose body grows darker or fainter away from the tip."""
+_SHEATHED, _SHEATH_RADII, _SHEATH_BEGINS_PX = 0.35, (1.15, 2.4), (15.0, 400.0)
+"""Share of the robots that come out of a catheter, its radius over theirs, and the robot's length before it."""
 _STEP_PX = 0.4
 """Distance of the points on a robot's line."""
 _GRAINS = np.array([NormalDist().inv_cdf((level + 0.5) / 256) for level in range(256)], np.float32)
@@ -253,7 +255,8 @@ class PaintedBench:
 
         `pattern` is a key of ``PATTERNS``; None: drawn. A robot outside the picture leaves the mask empty.
         """
-        band = _Band.of(rng, line_px, radius_px, self.vessel.shape)
+        sheath_px = radius_px * _between(rng, _SHEATH_RADII) if rng.random() < _SHEATHED else 0.0
+        band = _Band.of(rng, line_px, radius_px, self.vessel.shape, max(radius_px, sheath_px) + 3)
         robot: Mask = np.zeros_like(self.vessel)
         scene = self._under.copy()
         if band is None:
@@ -274,6 +277,8 @@ class PaintedBench:
         cover = np.clip((band.radius_px - band.distance_px) * np.float32(1 / soft_px) + np.float32(0.5), 0, 1)
         opacity = float(rng.uniform(0.5, 1)) if is_xray or rng.random() < 0.25 else 1.0
         seen = under + (np.clip(body, 0, 1) - under) * (cover * np.float32(opacity))
+        if sheath_px:
+            _lay_sheath(rng, band, seen, sheath_px, is_xray=is_xray)
         if self._veil:
             veil = self._veil * self._surface.inside[band.rows, band.columns] * cover
             seen += (0.5 * (self._fill_color[:, :, 0] + under) - seen) * veil
@@ -369,8 +374,8 @@ class _Band:
     tangent_y: F32
 
     @classmethod
-    def of(cls, rng: Generator, line_px: Points, radius_px: float, size: Size) -> _Band | None:
-        """Measured on the line's points nearest to each pixel; None where the line does not meet the picture."""
+    def of(cls, rng: Generator, line_px: Points, radius_px: float, size: Size, reach_px: float) -> _Band | None:
+        """Measured on the line's points nearest to each pixel within `reach_px`; None where the line does not meet the picture."""
         steps = np.linalg.norm(np.diff(line_px, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
         wanted = np.linspace(0.0, along[-1], max(2, int(along[-1] / _STEP_PX)))
@@ -384,7 +389,7 @@ class _Band:
             radius[from_tip < tip_px] *= np.float32(rng.uniform(0.7, 1.2))
         if rng.random() < 0.3:  # a rounded or pointed end
             radius *= np.interp(from_tip, [0, 2.5 * radius_px], [rng.uniform(0.5, 1), 1]).astype(np.float32)
-        nearest = _nearest(points, size, radius_px + 3)
+        nearest = _nearest(points, size, reach_px)
         if nearest is None:
             return None
         rows, columns, place = nearest
@@ -470,6 +475,19 @@ def _robot_colors(rng: Generator, band: _Band, color: F32, pattern: str, *, is_x
     if rng.random() < 0.4:
         body[:, band.from_tip_px < band.tip_px] = other(0.4, 1.2)
     return body
+
+
+def _lay_sheath(rng: Generator, band: _Band, seen: F32, radius_px: float, *, is_xray: bool) -> None:
+    """The catheter that the robot comes out of, over `seen` (3, N), in place: of any opacity, in X-rays a soft shadow."""
+    soft_px = float(rng.uniform(1, 4)) if is_xray else 1.0
+    cover = np.clip((np.float32(radius_px) - band.distance_px) * np.float32(1 / soft_px) + np.float32(0.5), 0, 1)
+    cover *= np.clip((band.from_tip_px - np.float32(_between(rng, _SHEATH_BEGINS_PX))) * np.float32(0.5), 0, 1)
+    if is_xray:
+        seen *= 1 - float(rng.uniform(0.03, 0.5)) * cover
+        return
+    away = np.minimum(band.distance_px * np.float32(1 / radius_px), 1)
+    color = random_color(rng)[:, :, 0] * (1 - float(rng.uniform(0, 0.5)) * away * away)
+    seen += (color - seen) * (cover * float(rng.uniform(0.1, 1)))
 
 
 def _shade_robot(rng: Generator, band: _Band, body: F32, lamp: tuple[float, float]) -> None:
