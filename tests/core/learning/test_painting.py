@@ -63,7 +63,7 @@ def test_every_tube_is_painted_and_repeats_with_its_seed(tube: str) -> None:
         assert np.array_equal(pictures[0], pictures[2])
         assert np.array_equal(pictures[1], pictures[3])
         away = np.ones(SIZE, bool)
-        away[30:66, :100] = False  # the robot and its shadow
+        away[20:76, :110] = False  # the robot and its shadow
         assert np.array_equal(pictures[0][:, away], pictures[1][:, away])
         assert not np.array_equal(pictures[0], pictures[1])
 
