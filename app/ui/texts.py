@@ -608,10 +608,10 @@ def rig_line(rig: RigFile) -> str:
 
 def friction_note(servos: ServosConfig) -> str:
     """Which joints the gear's own friction may keep from moving; "" for none."""
-    weak = ", ".join(f"{tr_text(joint.name)} {least_n:g}" for joint, least_n in servos.weak_joints)
+    weak = ", ".join(f"{tr_text(joint.name)} {least_n:g} {joint.force_unit}" for joint, least_n in servos.weak_joints)
     if not weak:
         return ""
-    return tr("The gear's friction may take it all: larger drums, or max_force_n of at least {forces} N", forces=weak)
+    return tr("The gear's friction may take it all: larger drums, or max_force_n of at least {forces}", forces=weak)
 
 
 def joint_title(name: str) -> str:

@@ -368,8 +368,8 @@ def check_forces(config: ServosConfig) -> Check:
     if slow:
         fix = "raise the joint's max_force_n, or lower its max_speed_mm_s; or use a model that reports its current"
         return Check(name, False, f"with its force limit reaches at most: {', '.join(slow)}", fix)
-    weak = ", ".join(f"{joint.name} {least_n:g}" for joint, least_n in config.weak_joints)
-    friction = f"; the gear's friction may take it all: larger drums, or max_force_n of at least {weak} N" if weak else ""
+    weak = ", ".join(f"{joint.name} {least_n:g} {joint.force_unit}" for joint, least_n in config.weak_joints)
+    friction = f"; the gear's friction may take it all: larger drums, or max_force_n of at least {weak}" if weak else ""
     return Check(name, True, f"at most {', '.join(told)}{friction}")
 
 

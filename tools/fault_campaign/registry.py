@@ -99,7 +99,7 @@ FAULTS = {
         "one retry each, at most a short hold; more than 5 in a second: DISARM; nothing breaks", quick=False),
     23: FaultText("overload alert", "a servo raises its hardware error bit for overload", "register 70 is read: STOP", quick=False),
     24: FaultText("over-temperature, under-voltage",
-        "a servo is warmed up, then heated; on another bench the supply sags, then falls",
+        "a servo is warmed up, then heated; on another bench the supply sags, then falls at one servo",
         "first a warning, then DISARM, before the servo shuts itself down", quick=False),
     25: FaultText("tracking error, jam, slack wire",
         "the advance servo's horn is blocked while the program feeds; on another bench it is pulled back; on a third it "

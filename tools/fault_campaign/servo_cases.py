@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
-from core.config.safety import ServosConfig
+from core.config.safety import JointConfig, ServosConfig
 from core.control.alerts import Note
 from core.control.faults import Cause
 from core.control.modes import Act, Mode
@@ -111,17 +111,17 @@ def supply(kit: Kit) -> Observation:
         bench.bus.modify_servo(2, lambda servo: servo.heat(72.0))
         return _await_end(bench, Mode.ADVISORY)
 
-    def set_supply(bench: FaultBench, volts: float) -> None:
+    def set_supply(bench: FaultBench, volts: float, joints: Sequence[JointConfig]) -> None:
         def set_volts(servo: SoftServo) -> None:
             servo.supply_v = volts
 
-        for joint in bench.config.servos.joints:
+        for joint in joints:
             bench.bus.modify_servo(joint.id, set_volts)
 
     def sag(bench: FaultBench) -> list[str]:
-        set_supply(bench, 10.8)
+        set_supply(bench, 10.8, bench.config.servos.joints)
         await_warning(bench, Cause.VOLTAGE_SAGS)
-        set_supply(bench, 10.3)
+        set_supply(bench, 10.3, bench.config.servos.joints[-1:])  # at all of them it would be the E-stop
         return _await_end(bench, Mode.ADVISORY)
 
     return run_parts(

@@ -388,12 +388,13 @@ def _silent(state: ServoState) -> ServoReading:
         (_silent, Cause.SERVO_SILENT, False),
         (lambda s: replace(s, error=HardwareError.OVERLOAD, torque=False) if s.id == 2 else s, Cause.SERVO_ALERT, True),
         (lambda s: replace(s, temperature_c=70.0) if s.id == 5 else s, Cause.HOT, False),
-        (lambda s: replace(s, voltage_v=10.5), Cause.VOLTAGE_LOW, False),
+        (lambda s: replace(s, voltage_v=10.5) if s.id == 4 else s, Cause.VOLTAGE_LOW, False),
+        (lambda s: replace(s, voltage_v=10.5), Cause.SUPPLY_LOST, False),
         (lambda s: replace(s, torque=False) if s.id == 7 else s, Cause.TORQUE_TAKEN, False),
         (lambda s: MissingServo(s.name, s.id, s.time_s, 0, "", restarted=True) if s.id == 7 else s, Cause.REBOOTED, False),
         (lambda s: replace(s, watchdog_tripped=True) if s.id == 1 else s, Cause.WATCHDOG, False),
     ],
-    ids=["21 silent", "23 overload", "24 hot", "24 voltage", "29 torque off", "27 restarted", "watchdog"],
+    ids=["21 silent", "23 overload", "24 hot", "24 voltage", "E-stop", "29 torque off", "27 restarted", "watchdog"],
 )
 def test_faults_of_servos(bench: Bench, alter: Callable[[ServoState], ServoReading], cause: Cause, stops: bool) -> None:
     bench.cycle()
