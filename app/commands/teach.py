@@ -291,7 +291,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
     if left_s < _LEAST_S:
         needed = (clock.elapsed_s + reserved_s + _LEAST_S) / 60
         left = f"{max(0.0, left_s):.0f} s would be left for the training"
-        raise UserError(f"too short a time: {left}; give --minutes {math.ceil(needed)} or more")
+        raise UserError(f"too short a time: {left}; give it {math.ceil(needed)} minutes or more")
     samples = _shown_as_often(made.train, remembered)
     has_tip = second_look_of(model_folder(begin)) is not None
     plan = replace(_PLAN, steps=_MOST_STEPS, seconds=left_s * (1 - _TIP_SHARE if has_tip else 1.0))

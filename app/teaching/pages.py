@@ -690,8 +690,8 @@ class TrainPage(TeachingPage):
         name_label, minutes_label = QLabel(tr("New model")), QLabel(tr("for"))
         name_label.setBuddy(self.model_name)
         minutes_label.setBuddy(self.minutes)
-        self.column.addLayout(line(name_label, (self.model_name, 1), minutes_label, self.minutes))
-        self.column.addLayout(line(self.start, self.stop))
+        self.column.addLayout(line(name_label, (self.model_name, 1)))
+        self.column.addLayout(line((self.start, 1), minutes_label, self.minutes, (self.stop, 1)))
         self.column.addLayout(column(self.bar, self.words, (self.table, 1)))
 
     @property

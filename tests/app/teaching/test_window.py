@@ -205,7 +205,7 @@ def test_the_servos_are_switched_on_and_alerts_are_seen_in_this_window(open_hand
     hand = open_hand()
     QTest.keyClick(hand.window, Qt.Key.Key_F3)
     assert hand.asked == [OperatorStep.SERVOS_ON]
-    alert = Alert(Hindrance.SERVOS_UNCHECKED, alert_of(Hindrance.SERVOS_UNCHECKED))
+    alert = Alert(Hindrance.SERVOS_UNCHECKED, alert_of(Hindrance.SERVOS_UNCHECKED, simulated=True))
     hand.window.show_news(DriveNews(DriveView(1.0), (alert,)))
     assert "switch them on" in hand.window.alerts.texts[0]
 
