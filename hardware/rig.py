@@ -121,7 +121,7 @@ def _open_live(config: Config, zero: ZeroConfig | None) -> Rig:
     rig = config.rig
     if rig.robot == "twin":
         raise DeviceError(f'rig {rig.name}: a real camera does not see the twin\'s robot: set rig.robot to "servos" or "none"')
-    if rig.robot == "servos" and (config.servos.port is None or config.servos.driver != "dynamixel"):
+    if rig.robot == "servos" and (config.servos.port is None or config.servos.driver == "direct"):
         raise DeviceError(
             f'rig {rig.name}: set servos.port (ls /dev/serial/by-id) and leave servos.driver out, or rig.robot = "none"'
         )

@@ -59,8 +59,10 @@ def accept_rig(
         return
     if rig.robot != "servos":
         raise UserError(f"rig {rig.name} has no servos of its own: there is nothing to accept")
-    if not rig.servos.is_default:
-        raise UserError(f"rig {rig.name} has other joints than the default robot, which alone can be accepted: it stays advisory")
+    if not rig.servos.is_default or rig.servos.driver != "dynamixel":
+        raise UserError(
+            f"rig {rig.name} has other joints or another drive than the default robot: it cannot be accepted, and stays advisory"
+        )
     readings = _readings(force or [])
     accepted = _begin(path, rig, config, operator, anew=anew)
     _say(f"Ctrl-C stops the servos at any moment and keeps what was done; the E-stop is within reach of {accepted.operator}")

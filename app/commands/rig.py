@@ -204,6 +204,8 @@ def restore_servos(name: RigName) -> None:
     _, found = find_rig(name)
     if found.robot != "servos":
         raise UserError(f"rig {found.name} has no servos of its own")
+    if found.servos.driver != "dynamixel":
+        raise UserError(f"rig {found.name} has a {found.servos.driver}, which has no EEPROM to restore")
     restore_eeprom(found.servos, backups_folder(), lambda line: sys.stdout.write(f"{line}\n"))
 
 

@@ -252,7 +252,7 @@ class RigMenuController(QObject):
         why = self.hindrance()
         if kind_of(config.rig) is RigKind.PLAYBACK:
             why = tr("a recording is played: start with a camera or the twin")
-        elif not config.servos.is_default and config.rig.robot != "none":
+        elif (not config.servos.is_default or config.servos.driver == "stepper board") and config.rig.robot != "none":
             why = tr("the wizard knows the default robot only: write the ids and signs of these joints into the rig file")
         if why:
             self._refuse(why)

@@ -10,7 +10,7 @@ from enum import Enum
 from app.ui.i18n import ENGLISH, language_in_use, mark, tr, tr_text
 from core.config.models import PoseConfig
 from core.config.rig_file import RigFile
-from core.config.safety import ServosConfig
+from core.config.safety import LIMITS_FORCE, ServosConfig
 from core.control.alerts import AlertKey, alert_of
 from core.control.drive_view import DriveView
 from core.control.faults import Area, Cause
@@ -653,7 +653,10 @@ def calibration_lines(rig: RigFile) -> list[str]:
     else:
         lines.append(tr("way at one turn of the horn, as it is set and not measured: {ways} mm", ways=ways))
     forces = ", ".join(f"{tr_text(joint.name)} {rig.servos.force_limit(joint).force_n:.0f}" for joint in in_mm)
-    lines.append(tr("greatest force, limited in the servo, friction included: {forces} N", forces=forces))
+    if rig.servos.driver in LIMITS_FORCE:
+        lines.append(tr("greatest force, limited in the servo, friction included: {forces} N", forces=forces))
+    else:
+        lines.append(tr("this drive cannot limit its force"))
     if weak := friction_note(rig.servos):
         lines.append(weak)
     if known.assumed:

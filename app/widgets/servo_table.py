@@ -48,7 +48,7 @@ from app.widgets.painting import (
     text_width,
 )
 from app.widgets.zero_dialog import ZeroDialog, joint_zeros
-from core.config.safety import JointConfig, JointKind, JointName, SafetyConfig, ServosConfig
+from core.config.safety import LIMITS_FORCE, JointConfig, JointKind, JointName, SafetyConfig, ServosConfig
 from core.config.servo_models import PWM_FULL
 from core.control.joints import status_at
 from core.types import RobotStatus
@@ -181,7 +181,9 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
     heat = Tone.BAD if state.temperature_c >= hot else Tone.WARN if state.temperature_c >= warm else Tone.PLAIN
     volts = Tone.BAD if state.voltage_v <= low else Tone.WARN if state.voltage_v <= sags else Tone.PLAIN
     error, limit = _error(state), servos.force_limit(joint)
-    if state.current_ma is None or limit.current_ma is None or limit.strain_ma is None:
+    if servos.driver not in LIMITS_FORCE:
+        current = Cell(NONE, tip=tr("this drive cannot limit its force"))
+    elif state.current_ma is None or limit.current_ma is None or limit.strain_ma is None:
         duty = 100.0 * limit.units / PWM_FULL
         current = Cell(
             NONE,

@@ -68,6 +68,8 @@ class RigFile(ConfigSection):
             raise ValueError("robot servos needs a real camera and servos.port")
         if self.calibration is not None and (misfit := self.calibration.misfit(self.servos)):
             raise ValueError(f"{misfit}: calibrate again")
+        if self.kind == "twin" and self.servos.driver == "stepper board":
+            raise ValueError("servos.driver: the twin has DYNAMIXEL servos of its own: leave it out, or set it to direct")
         if self.robot == "servos" and self.servos.too_loose:
             raise ValueError(f"servos: {self.servos.too_loose}")
         return self

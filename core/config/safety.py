@@ -269,10 +269,16 @@ AtClose = Literal["ask", "hold", "relax", "torque off"]
 """What becomes of servos that hold when the program is closed."""
 
 
+Driver = Literal["dynamixel", "direct", "stepper board"]
+"""What drives the joints."""
+LIMITS_FORCE: frozenset[Driver] = frozenset({"dynamixel", "direct"})
+"""Drives that keep each joint's ``max_force_n`` themselves; with another one the program never drives a LIVE rig."""
+
+
 class ServosConfig(ConfigSection):
     """The bus and the robot's joints."""
 
-    driver: Literal["dynamixel", "direct"] = Field("dynamixel", description="direct: the twin without servos, a lighter load")
+    driver: Driver = Field("dynamixel", description="what is on the port; direct: the twin without servos, a lighter load")
     port: str | None = Field(None, min_length=1, description="serial device; empty: the twin's own pseudo-terminal")
     baud: int = Field(1_000_000, ge=9600, le=4_500_000, description="speed of the bus")
     model: int = Field(1020, ge=0, le=65535, description="model number of the servos (1020: XM430-W350); a joint may have another")

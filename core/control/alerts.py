@@ -97,6 +97,7 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
         "The servos' drums are not measured",
         "menu Rig, Calibrate: page Drums; until then ways and forces are assumed",
     ),
+    Hindrance.FORCE_UNLIMITED: ("The drive cannot limit its force", "by hand you can drive; the program needs other servos"),
     Hindrance.DIRECTIONS_UNKNOWN: (
         "The servos' directions are not learned",
         "menu Rig, Calibrate: page Wiggle and direction; by hand you can drive",

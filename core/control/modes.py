@@ -51,6 +51,7 @@ class Hindrance(StrEnum):
     DEADMAN_ON_KEYBOARD = "deadman on the keyboard only"
     OPERATOR_DRIVING = "controls in use"
     # of a LIVE rig (``readiness``)
+    FORCE_UNLIMITED = "drive cannot limit its force"
     DRUMS_UNKNOWN = "drums not measured"
     DIRECTIONS_UNKNOWN = "directions of the servos not learned"
     DIRECTIONS_ASSUMED = "up and down assumed"
@@ -66,6 +67,7 @@ class Hindrance(StrEnum):
 
 OF_THE_RIG = frozenset(
     {
+        Hindrance.FORCE_UNLIMITED,
         Hindrance.DRUMS_UNKNOWN,
         Hindrance.DIRECTIONS_UNKNOWN,
         Hindrance.DIRECTIONS_ASSUMED,

@@ -14,7 +14,7 @@ from pathlib import Path
 from core.config.acceptance import Acceptance, AcceptanceError, is_outdated, read_acceptance
 from core.config.models import Config, PolicyName, QualityConfig
 from core.config.rig_file import RigFile, rig_in_use
-from core.config.safety import wiring_of
+from core.config.safety import LIMITS_FORCE, wiring_of
 from core.control.modes import Hindrance
 from core.perception.model_file import ModelError, ModelInfo, model_folder, read_model_info
 
@@ -72,6 +72,8 @@ def readiness_of(
     changed = accepted is not None and is_outdated(accepted, config, firmware)
     is_accepted = accepted is not None and not accepted.missing and not changed
     known = rig.calibration if rig is not None else None
+    if config.servos.driver not in LIMITS_FORCE:
+        found.append(Hindrance.FORCE_UNLIMITED)
     if known is None or known.drums is None or not known.drums.fit(config.servos):
         found.append(Hindrance.DRUMS_UNKNOWN)
     if known is None or known.wiring != wiring_of(config.servos):

@@ -195,8 +195,10 @@ class RigDraft:
         """
         servos = self.servos
         assert servos.port is not None
-        if not servos.is_default:
-            raise DeviceError("only the default robot's joints can be told apart: write ids and signs of these into the rig file")
+        if not servos.is_default or servos.driver != "dynamixel":
+            raise DeviceError(
+                "only the default robot's DYNAMIXEL servos can be told apart: write ids and signs of these joints into the rig file"
+            )
         chosen = bauds if bauds is not None else (servos.baud, *(baud for baud in BAUDS if baud != servos.baud))
         found = find_servos(servos.port, chosen, self.say, self.bench.stop.check)
         listed = ", ".join(f"{servo.id} {model_name(servo.model)}" for servo in found.servos)

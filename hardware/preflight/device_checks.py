@@ -22,7 +22,7 @@ from pathlib import Path
 from core.config.acceptance import AcceptanceError, problems_of, read_acceptance
 from core.config.models import Config, GamepadConfig, PedalConfig
 from core.config.rig_file import RigFileError, as_calibrated, rig_in_use
-from core.config.safety import ServosConfig
+from core.config.safety import LIMITS_FORCE, ServosConfig
 from core.control.alerts import ALERTS
 from core.control.readiness import read_readiness
 from core.devices import Camera, DeviceError
@@ -243,10 +243,12 @@ def _group(path: Path) -> str:
 
 
 def check_servos(config: ServosConfig) -> Check:
-    """All seven answer, are the configured model, and report no trouble."""
+    """All servos answer, are the configured model, and report no trouble."""
     name = "servos"
     if config.port is None:
         return Check(name, True, NOT_CONFIGURED)
+    if config.driver != "dynamixel":
+        return Check(name, True, f"{config.driver}: its axes are asked when the rig is opened")
     try:
         from hardware.servos.dynamixel_bus import identify
         from hardware.servos.dynamixel_port import PortError, ServoError, ServoLine
@@ -292,7 +294,7 @@ def check_servos(config: ServosConfig) -> Check:
 def check_bus_speed(config: ServosConfig) -> Check:
     """Whether the configured speed leaves time for the cycles. Servos come from the factory at 57600 baud, which is too slow."""
     name = "bus speed"
-    if config.port is None:
+    if config.port is None or config.driver != "dynamixel":
         return Check(name, True, NOT_CONFIGURED)
     from hardware.servos.discovery import FASTER_BUS, slow_bus
 
@@ -356,6 +358,8 @@ def check_forces(config: ServosConfig) -> Check:
     name = "forces"
     if config.port is None:
         return Check(name, True, NOT_CONFIGURED)
+    if config.driver not in LIMITS_FORCE:
+        return Check(name, False, f"a {config.driver} cannot limit its force", "drive by hand only; the program does not drive")
     told, slow = [], []
     for joint in config.joints:
         limit, model = config.force_limit(joint), config.model_of(joint)

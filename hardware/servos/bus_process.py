@@ -45,6 +45,7 @@ from hardware.servos.bus_guard import (
     UnattendedWatch,
 )
 from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, PortSuccession, Request, ask_for_port
+from hardware.servos.drive import Drive, DriveBus
 from hardware.servos.dynamixel_bus import ServoBus
 from hardware.servos.dynamixel_port import (
     LATE_S,
@@ -57,6 +58,7 @@ from hardware.servos.dynamixel_port import (
     TorqueStillOn,
 )
 from hardware.servos.registers import MissingServo, ServoReading, ServoState
+from hardware.servos.stepper_board import StepperBoard
 from hardware.servos.zero_keeper import ZeroKeeper
 
 _log = logging.getLogger(__name__)
@@ -65,13 +67,27 @@ _PRIORITY = -10
 _NOT_PROVEN = "the torque is not proven to be off: cut the servos' power"
 
 
+Bus = ServoBus | DriveBus
+DRIVES: dict[str, Callable[[str, int], Drive]] = {"stepper board": StepperBoard}
+"""Drives by ``servos.driver``, besides DYNAMIXEL: made of port and speed."""
+
+
+def make_bus(servos: ServosConfig, backups: Path | None) -> Bus:
+    """The bus of the configured drive. Raises NotReady."""
+    if servos.driver not in DRIVES:
+        return ServoBus(servos, backups=backups)
+    if servos.port is None:
+        raise NotReady("no servo port is configured: set servos.port")
+    return DriveBus(servos, DRIVES[servos.driver](servos.port, servos.baud))
+
+
 class BusTorqueRelease:
     """A torque-off that was requested, until every servo has confirmed it, or arming cancels it.
 
     ``problem`` says why it is not confirmed yet; ``confirmed`` counts how often all servos have confirmed.
     """
 
-    def __init__(self, bus: ServoBus, guard: BusGuard, port: str | None) -> None:
+    def __init__(self, bus: Bus, guard: BusGuard, port: str | None) -> None:
         self._bus, self._guard, self._port = bus, guard, port
         self.is_requested = False
         self.problem = ""
@@ -183,7 +199,7 @@ class BusLoop:
     """Owns bus and guard. ``run`` returns when the application ends it, or is gone; the servos hold by then."""
 
     def __init__(
-        self, server: BusServer, bus: ServoBus, servos: ServosConfig, safety: SafetyConfig, keeper: ZeroKeeper | None = None
+        self, server: BusServer, bus: Bus, servos: ServosConfig, safety: SafetyConfig, keeper: ZeroKeeper | None = None
     ) -> None:
         self._server, self._bus, self._servos = server, bus, servos
         self._keeper = keeper or ZeroKeeper(servos, None)
@@ -730,7 +746,7 @@ def _serve(server: BusServer) -> int:
     servos, safety = ServosConfig.model_validate(message["servos"]), SafetyConfig.model_validate(message["safety"])
     backups = message.get("backups")
     try:
-        bus = ServoBus(servos, backups=None if backups is None else Path(backups))
+        bus = make_bus(servos, None if backups is None else Path(backups))
     except ServoError as error:
         server.send_fatal(str(error))
         return 1

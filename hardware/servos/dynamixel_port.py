@@ -235,6 +235,8 @@ _ERROR_TEXT = {
 _STATUS_BODY = 9
 """Where a status packet's data begin: header, id, length, instruction, error."""
 _ATTEMPTS = 3
+_LONGEST_LINE = 1024
+"""Bytes of a line of text; more without an end is noise."""
 _PAUSE_SLICE_S = 0.01
 """Longest sleep of the line between two looks for STOP."""
 
@@ -368,6 +370,20 @@ class ServoLine:
             ) from None
         finally:
             port.is_using = False
+
+    def ask(self, line: bytes, timeout_s: float) -> bytes | None:
+        """A line of text, and the one that comes back, for drives that talk in lines; None when none is whole in time."""
+        with self._exchange() as port:
+            port.ser.reset_input_buffer()
+            port.writePort(list(line))
+            until_s, answer = time.monotonic() + timeout_s, b""
+            while not answer.endswith(b"\n"):
+                if time.monotonic() > until_s and not port.ser.in_waiting:
+                    return None
+                answer += port.ser.read(max(1, min(_LONGEST_LINE, port.ser.in_waiting)))
+                if len(answer) > _LONGEST_LINE:
+                    return None
+            return answer
 
     def ping(self, servo_id: int) -> int | None:
         """Model number, or None without a (whole) answer."""

@@ -43,6 +43,7 @@ class ZeroKeeper:
 
     def __init__(self, servos: ServosConfig, path: Path | None, searched: ZeroConfig | None = None) -> None:
         self._joints = servos.joints
+        self._is_absolute = servos.driver == "dynamixel"  # else a restart begins at another place
         self._models = {joint.name: servos.model_of(joint).number for joint in servos.joints}
         self._path, self._searched, self._is_loaded = path, searched, False
         self._kept: dict[JointName, KeptJoint] = {}
@@ -83,6 +84,8 @@ class ZeroKeeper:
 
     def offers(self, readings: Sequence[ServoReading]) -> tuple[ZeroOffer, ...]:
         """Where the joints that told their position register stand by what is kept of them."""
+        if not self._is_absolute:
+            return ()
         found = (
             zero_offer(joint, self._models[joint.name], self._kept.get(joint.name), reading.ticks)
             for joint, reading in zip(self._joints, readings, strict=False)

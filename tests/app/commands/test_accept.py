@@ -173,5 +173,5 @@ def test_a_robot_of_another_shape_stays_advisory() -> None:
     servos = THREE.model_copy(update={"port": "/dev/null"})
     config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}}).model_copy(update={"servos": servos})
     write_rig(make_rig(config, "bench 1", None))
-    with pytest.raises(UserError, match=r"rig bench 1 has other joints than the default robot, .* it stays advisory"):
+    with pytest.raises(UserError, match=r"rig bench 1 has other joints or another drive .* and stays advisory"):
         _run()

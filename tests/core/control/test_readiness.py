@@ -78,6 +78,12 @@ def test_what_was_not_learnt_of_the_servos_is_named(calibration: dict[str, Any],
     assert _lacks(_rig(**calibration)) == {lack}
 
 
+def test_a_drive_that_cannot_limit_its_force_is_driven_by_hand_only() -> None:
+    config = _config(_rig())
+    steppers = config.model_copy(update={"servos": config.servos.model_copy(update={"driver": "stepper board"})})
+    assert set(readiness_of(steppers, _rig(), TAUGHT, ACCEPTED).hindrances) == {Hindrance.FORCE_UNLIMITED}
+
+
 def test_a_roll_of_45_degrees_is_the_most_and_a_model_that_cannot_be_read_is_another_checks_matter() -> None:
     assert _lacks(_rig(steering={**STEERING, "roll_deg": 45.0})) == set()
     assert _lacks(_rig(), None) == set()
