@@ -207,7 +207,7 @@ def test_the_servos_are_switched_on_and_alerts_are_seen_in_this_window(open_hand
     assert hand.asked == [OperatorStep.SERVOS_ON]
     alert = Alert(Hindrance.SERVOS_UNCHECKED, alert_of(Hindrance.SERVOS_UNCHECKED, simulated=True))
     hand.window.show_news(DriveNews(DriveView(1.0), (alert,)))
-    assert "switch them on" in hand.window.alerts.texts[0]
+    assert "Switch them on" in hand.window.alerts.texts[0]
 
 
 def test_three_places_make_an_empty_picture(open_hand: OpenHand) -> None:
