@@ -67,6 +67,7 @@ COMMANDS = {
         "app.commands.doctor",
         "Preflight: program, model, camera, servos, controls, disk, clock; what is wrong, and what to do. Nothing moves.",
     ),
+    "desktop": ("app.commands.desktop", "Put the program into the menu of your desktop, or take it out again."),
     "session": ("app.commands.session", "Recorded sessions: look at them, recover cut ones, export."),
     "rig": ("app.commands.rig", "Rigs: camera, servos and calibration of a bench, in one file."),
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Puts LumenPilot into the desktop's menu of this user, or takes it out again: desktop.sh install|uninstall
 # Writes three files below ~/.local (XDG_DATA_HOME where it is set): a launcher, a desktop entry and the icon. Each carries a mark, and
-# only files with the mark are ever replaced or removed.
+# only files with the mark are ever replaced or removed. An installed package has its launcher already: LUMENPILOT_COMMAND is its path.
 set -euo pipefail
 checkout=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 mark="made by LumenPilot's make install"
@@ -9,9 +9,11 @@ mark="made by LumenPilot's make install"
 : "${HOME:?desktop.sh: HOME is not set}"
 data=${XDG_DATA_HOME:-}
 [[ $data == /* ]] || data=$HOME/.local/share # the specification: a path that is not absolute does not count
-launcher=$HOME/.local/bin/lumenpilot
+launcher=${LUMENPILOT_COMMAND:-$HOME/.local/bin/lumenpilot}
 entry=$data/applications/lumenpilot.desktop
 icon=$data/icons/hicolor/scalable/apps/lumenpilot.svg
+files=("$entry" "$icon")
+[[ -n ${LUMENPILOT_COMMAND:-} ]] || files+=("$launcher")
 
 stop() {
     printf 'desktop.sh: %s\n' "$*" >&2
@@ -34,7 +36,6 @@ write_launcher() {
     cat <<LAUNCHER
 #!/usr/bin/env bash
 # $mark; make uninstall removes it
-$(printf '%s\n' "${made[@]/#/# folder }")
 checkout=$(printf '%q' "$checkout")
 if [[ ! -x \$checkout/.venv/bin/python ]]; then
     echo "lumenpilot: \$checkout is not set up (or was moved): run make install there again" >&2
@@ -51,6 +52,7 @@ write_entry() {
     cat <<ENTRY
 [Desktop Entry]
 # $mark; make uninstall removes it
+$(printf '%s\n' "${made[@]/#/# folder }")
 Type=Application
 Version=1.5
 Name=LumenPilot
@@ -77,12 +79,12 @@ write_icon() {
     printf '<!-- %s -->\n' "$mark"
 }
 
-# Folders that were not there before are remembered in the launcher, and taken away with it.
+# Folders that were not there before are remembered in the desktop entry, and taken away with it.
 made=()
 remember_folders() {
-    ! is_ours "$launcher" || mapfile -t made < <(sed -n 's/^# folder //p' "$launcher")
+    ! is_ours "$entry" || mapfile -t made < <(sed -n 's/^# folder //p' "$entry")
     local path folder
-    for path in "$launcher" "$icon" "$entry"; do
+    for path in "${files[@]}"; do
         folder=$(dirname "$path")
         while [[ ! -d $folder ]]; do
             made+=("$folder")
@@ -110,24 +112,24 @@ renew_menu() {
 
 install_all() {
     local path
-    for path in "$launcher" "$entry" "$icon"; do
+    for path in "${files[@]}"; do
         [[ ! -e $path && ! -L $path ]] || is_ours "$path" || stop "$path is there and is not ours: move it away, then run make install again"
     done
     remember_folders
-    put "$launcher" 755 write_launcher
+    [[ -n ${LUMENPILOT_COMMAND:-} ]] || put "$launcher" 755 write_launcher
     put "$icon" 644 write_icon
     put "$entry" 644 write_entry
     renew_menu
     case ":$PATH:" in
-    *":$HOME/.local/bin:"*) echo "start it from the desktop's menu, or with: lumenpilot" ;;
-    *) echo "start it from the desktop's menu, or with: $launcher (~/.local/bin is not in your PATH)" ;;
+    *":$(dirname "$launcher"):"*) echo "start it from the desktop's menu, or with: lumenpilot" ;;
+    *) echo "start it from the desktop's menu, or with: $launcher (its folder is not in your PATH)" ;;
     esac
 }
 
 uninstall_all() {
     local path found=
     remember_folders
-    for path in "$entry" "$icon" "$launcher"; do
+    for path in "${files[@]}"; do
         if is_ours "$path"; then
             rm -f "$path"
             echo "removed  $path"

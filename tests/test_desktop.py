@@ -100,6 +100,21 @@ def test_the_launcher_starts_this_checkout_with_what_it_is_given(home: Path) -> 
     assert "make install" in lost.stderr
 
 
+def test_a_package_brings_its_own_launcher(home: Path) -> None:
+    """It is neither written nor taken away."""
+    command = home / "tools" / "lumenpilot"
+    command.parent.mkdir()
+    command.write_text("of the package")
+    before = tree(home)
+    done = run("install", home, LUMENPILOT_COMMAND=str(command))
+    assert done.returncode == 0, done.stderr
+    entry = entry_of(home / ".local" / "share" / "applications" / "lumenpilot.desktop")
+    assert program_of(entry["Exec"]) == str(command)
+    assert not (home / ".local" / "bin").exists()
+    assert run("uninstall", home, LUMENPILOT_COMMAND=str(command)).returncode == 0
+    assert tree(home) == before
+
+
 def test_data_goes_where_xdg_says(tmp_path: Path) -> None:
     done = run("install", tmp_path, XDG_DATA_HOME=str(tmp_path / "data"))
     assert done.returncode == 0, done.stderr

@@ -73,7 +73,9 @@ _STATE = ("app/**/*.py", "core/**/*.py", "hardware/**/*.py", "resources/models/*
 _TIMEOUT = "10s"
 _WORKER = "-m dask worker {address} --nworkers 2 --nthreads 1"
 _START = f"python {_WORKER} --preload lumenpilot" if is_installed() else f"in LumenPilot's folder: .venv/bin/python {_WORKER}"
-_SCHEDULER = ("python" if is_installed() else ".venv/bin/python") + " -m dask scheduler"
+_SCHEDULER = "python -m dask scheduler --preload lumenpilot" if is_installed() else ".venv/bin/python -m dask scheduler"
+_GRAPH_UNREADABLE = "Error during deserialization"
+"""How the scheduler's error begins when it does not find what a task calls."""
 
 
 _PORT = re.compile(r":\d{1,5}/?$")
@@ -120,6 +122,11 @@ def over_cluster(address: str, function: Callable[[Task], Result], tasks: Sequen
         except (OSError, distributed.CancelledError) as error:
             why = str(error).partition("\n")[0]
             raise ClusterError(f"--scheduler {address}: the scheduler has gone ({why}); start it and its workers again") from None
+        except RuntimeError as error:
+            if not str(error).startswith(_GRAPH_UNREADABLE):
+                raise
+            where = "" if is_installed() else "in LumenPilot's folder: "
+            raise ClusterError(f"--scheduler {address}: does not find LumenPilot; start it {where}{_SCHEDULER}") from None
         finally:
             client.cancel(futures)
 

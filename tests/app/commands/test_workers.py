@@ -17,6 +17,7 @@ from app.commands.replay import ReplayOptions, replay_one, replay_session
 from app.commands.trial import run_one
 from app.commands.workers import ClusterError, code_of_worker, over_cluster
 from core.config.models import Config
+from core.program import as_called
 from hardware.twin.dataset import Episode, SynthPlan, write_set
 from hardware.twin.trial import TrialPlan
 from tests.app.golden_session import GOLDEN
@@ -38,9 +39,9 @@ def ended(*processes: subprocess.Popen[bytes]) -> None:
         process.wait(timeout=60)
 
 
-def scheduler(folder: Path) -> tuple[str, subprocess.Popen[bytes]]:
+def scheduler(folder: Path, where: Path = ROOT) -> tuple[str, subprocess.Popen[bytes]]:
     contact = folder / "scheduler.json"
-    process = started(folder, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(contact))
+    process = started(folder, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(contact), where=where)
     while not contact.is_file():
         assert process.poll() is None, (folder / "log.txt").read_text()
         time.sleep(0.05)
@@ -174,7 +175,7 @@ def test_no_scheduler_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_without_workers_that_can_do_it_nothing_waits(tmp_path: Path) -> None:
-    found, process = scheduler(tmp_path)
+    found, process = scheduler(tmp_path, where=tmp_path)
     with pytest.raises(ClusterError, match=rf"has no workers; start some, in LumenPilot's folder: .*dask worker {found}"):
         list(over_cluster(found, abs, [1]))
     stranger = worker(tmp_path, found, where=tmp_path)
@@ -182,6 +183,8 @@ def test_without_workers_that_can_do_it_nothing_waits(tmp_path: Path) -> None:
         list(over_cluster(found, abs, [1]))
     ended(stranger)
     hand = worker(tmp_path, found)
+    with pytest.raises(ClusterError, match=r"does not find LumenPilot; start it in LumenPilot's folder: .*dask scheduler$"):
+        list(over_cluster(found, as_called, ["a task of LumenPilot"]))
     ongoing = over_cluster(found, time.sleep, [0.0, 30.0])
     next(ongoing)
     process.kill()
