@@ -55,13 +55,14 @@ class Difference:
     ``probability``: of the robot, float32 (h, w). ``evidence``: how much a pixel differs, whatever is around it, float32 (h, w):
     0.5 at an edge of the robot. ``doubtful``: bool (h, w), places that count neither as robot nor as background
     when a network is trained. ``unusable``: bool (h, w), where a difference says nothing: around a lamp's reflection, and
-    over what goes on outside the drawn vessel, such as a cable or a hand.
+    over what goes on outside the drawn vessel, such as a cable or a hand. ``is_noisy``: it was smoothed, and its edges with it.
     """
 
     probability: NDArray[np.float32]
     evidence: NDArray[np.float32]
     doubtful: Mask
     unusable: Mask
+    is_noisy: bool = False
 
 
 def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False, smooth_px: float = 0.0) -> NDArray[np.float32]:
@@ -114,7 +115,8 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     box = np.s_[y : y + height, x : x + width]
     allowed = view.reachable[box] & view.known[box] & ~unusable[box]
     noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SIGMAS, _LOW_SIGMAS)
-    if noise > _NOISY and float(np.median(view.noise[box][::4, ::4])) > _NOISY_LEVELS:
+    is_noisy = noise > _NOISY and float(np.median(view.noise[box][::4, ::4])) > _NOISY_LEVELS
+    if is_noisy:
         distance = distance_to_empty(image, view, smooth_px=_SMOOTH_PX)
         noise, sigmas = _deviation(distance[box], allowed), (_HIGH_SMOOTH_SIGMAS, _LOW_SMOOTH_SIGMAS)
     high, low = max(_LEAST_HIGH, sigmas[0] * noise), max(_LEAST_LOW, sigmas[1] * noise)
@@ -136,7 +138,7 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
         _continue_to_border(probability, view.reachable)
     rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
     doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | unusable
-    return Difference(probability, evidence, doubtful, unusable)
+    return Difference(probability, evidence, doubtful, unusable, is_noisy)
 
 
 def _deviation(distance: NDArray[np.float32], allowed: Mask) -> float:
@@ -321,9 +323,13 @@ _LEAST_ROBOT_PX, _MOVED_SHARE = 400, 0.5
 def combined(network: Probability, difference: Difference, view: BenchView) -> Probability:
     """The robot's probability (h, w): what differs from the empty bench, and what the `network` (h, w) sees beside that.
 
-    Where the empty bench is not known, and where the difference is unusable, the network alone counts.
+    Where the empty bench is not known, and where the difference is unusable, the network alone counts. In noise the difference says
+    only where the robot is about; its outline is the network's.
     """
     differs = difference.probability >= np.float32(0.5)
+    if difference.is_noisy:
+        near = cv2.dilate(differs.view(np.uint8), _square(_NEAR_PX)) > 0
+        return np.asarray(np.where(near | ~view.known | difference.unusable, network, np.float32(0.0)), np.float32)
     beside = cv2.dilate(differs.view(np.uint8), _square(_BESIDE_PX)) > 0
     seen = np.where(network + difference.evidence >= np.float32(_BOTH), network, np.minimum(network, np.float32(0.49)))
     robot = np.where(differs, np.maximum(network, difference.probability), np.where(beside, seen, np.float32(0.0)))
@@ -332,6 +338,8 @@ def combined(network: Probability, difference: Difference, view: BenchView) -> P
 
 _BESIDE_PX = 9
 """Side of the square around what differs within which the network adds to the robot: a part that looks like the bench."""
+_NEAR_PX = 41
+"""In noise: side of the square around what differs in which the network is believed."""
 _BOTH = 1.0
 """There the network's probability and the difference's evidence add up to this at least; a blurred rim or a shadow is no robot."""
 

@@ -51,7 +51,11 @@ def test_an_empty_bench_has_no_robot(bench: Bench) -> None:
 def test_a_robot_is_found_in_the_noise_of_a_dark_room() -> None:
     dark = bench_from_pictures([noisy(board(), 14.0, seed) for seed in range(8)], tube(), "b", 320)
     image = noisy(with_line(board(), *ROBOT, (130, 130, 130)), 14.0, 9)
-    assert dice(found(image, dark).probability >= 0.5, line(*ROBOT)) > 0.9
+    difference, view = found(image, dark), register(image, dark)
+    assert dice(difference.probability >= 0.5, line(*ROBOT)) > 0.9
+    assert isinstance(view, BenchView)
+    network = np.where(line(*ROBOT) | line((280, 20), (300, 20)), np.float32(0.9), np.float32(0.1))
+    assert ((combined(network, difference, view) >= 0.5) == line(*ROBOT)).all(), "the network's outline, where the robot is"
     assert not (found(noisy(board(), 14.0, 10), dark).probability >= 0.5).any()
 
 
