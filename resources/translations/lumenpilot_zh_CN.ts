@@ -1643,6 +1643,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
+        <source>the wizard knows the default robot only: write the ids and signs of these joints into the rig file</source>
+        <translation>向导只支持默认机器人:请把这些关节的编号和方向写入台架文件</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rig_menu.py"/>
         <source>The rig was opened anew meanwhile; ask for the wizard again</source>
         <translation>期间装置已重新打开；请再次打开向导</translation>
     </message>
@@ -3191,6 +3196,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Greatest force, limited in the servos: {forces} N.</source>
+        <translation>最大力，在舵机内限制：{forces} N。</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Turn the servo of the chosen row both ways by 1.5 mm</source>
         <translation>把所选行的舵机来回转动 1.5 mm</translation>
     </message>
@@ -3243,11 +3253,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Catheter</source>
         <translation>导管</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Greatest force, limited in the servos: {forces} N.</source>
-        <translation>最大力，在舵机内限制：{forces} N。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4146,8 +4151,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
-        <source>Draw the robot back until none of it is in the vessel, and take your hands out of the picture. From here on camera and phantom stay where they are.</source>
-        <translation>把机器人退回到血管内看不到它为止，并把手移出画面。从现在起相机和体模保持原位。</translation>
+        <source>Draw the robot back until none of it is in the vessel: by hand, or hold Down with the servos on (F3); at the end of its way let go, and hold it again. Take your hands out of the picture. From here on camera and phantom stay where they are.</source>
+        <translation>把机器人退回,直到血管内完全看不到它:用手,或在舵机通电后(F3)按住向下键;到达行程末端时松开,再按住。把手移出画面。从此时起相机和模型保持不动。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -4161,8 +4166,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
-        <source>Move the robot slowly through all branches, and bend its head both ways at some places; by hand, or with the keys here once the servos are on (F3 in the operator window). Frames are taken by themselves, and the map fills where it has been.</source>
-        <translation>让机器人缓慢通过所有分支，并在若干位置向两侧弯曲头端；可用手，也可在舵机开启后（操作窗口中按 F3）用此处的按键。帧会自动取得，机器人到过之处在图上填充。</translation>
+        <source>Move the robot slowly through all branches, and bend its head both ways at some places; by hand, or with the arrow keys once the servos are on (F3). Frames are taken by themselves, and the map fills where it has been.</source>
+        <translation>让机器人缓慢走过所有分支,并在几处把头部向两侧弯曲;用手,或在舵机通电后(F3)用方向键。图像会自动采集,走过的地方会在图上填满。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -4483,11 +4488,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/teaching/pages.py"/>
         <source>What to expect on this bench</source>
         <translation>此台架上的预期结果</translation>
-    </message>
-    <message>
-        <location filename="../../app/teaching/pages.py"/>
-        <source>Bench twin: its robot begins inside and cannot be drawn out. Lay it in three places, as below.</source>
-        <translation>数字孪生台架：机器人起始时已在内部，无法取出。请按下方所示将其放在三个位置。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -4966,6 +4966,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>{camera}, {servos}; {calibrated}; made {made:%Y-%m-%d}</source>
         <translation>{camera}，{servos}；{calibrated}；制作于 {made:%Y-%m-%d}</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>The gear's friction may take it all: larger drums, or max_force_n of at least {forces}</source>
+        <translation>减速器的摩擦可能抵消全部力:请换更大的卷筒,或把 max_force_n 设为至少 {forces}</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -5704,11 +5709,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>greatest force, limited in the servo, friction included: {forces} N</source>
-        <translation>最大力，在舵机内限制，含摩擦：{forces} N</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>The program drives</source>
         <translation>程序正在驾驶</translation>
     </message>
@@ -5771,6 +5771,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>way at one turn of the horn, as it is set and not measured: {ways} mm</source>
         <translation>舵机输出盘每转一圈的行程（按设置，未测量）：{ways} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>greatest force, limited in the servo, friction included: {forces} N</source>
+        <translation>最大力，在舵机内限制，含摩擦：{forces} N</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>this drive cannot limit its force</source>
+        <translation>此驱动器无法限制其力</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6234,6 +6244,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
+        <source>{motion}: hold to move, release to stop; {speed:.3g} °/s</source>
+        <translation>{motion}:按住移动,松开停止;{speed:.3g} °/s</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
         <source>{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s</source>
         <translation>{motion}：按住移动，松开停止；驱动丝收放 {speed:.3g} mm/s</translation>
     </message>
@@ -6281,6 +6296,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/widgets/jog_panel.py"/>
         <source>straighten the head</source>
         <translation>头端回直</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
+        <source>turn the shaft left</source>
+        <translation>向左转动轴</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
+        <source>turn the shaft right</source>
+        <translation>向右转动轴</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
@@ -6341,6 +6366,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/widgets/jog_panel.py"/>
         <source>sheath −</source>
         <translation>鞘管 −</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
+        <source>turn left</source>
+        <translation>左转</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
+        <source>turn right</source>
+        <translation>右转</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
@@ -6823,11 +6858,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>the servo gives {force:.0f} N at most ({most:.0f} mA)</source>
-        <translation>舵机最多给出 {force:.0f} N（{most:.0f} mA）</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
         <source>{reason}, {misses} times in a row</source>
         <translation>{reason}，连续 {misses} 次</translation>
     </message>
@@ -6963,8 +6993,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)</source>
-        <translation>舵机最多给出 {force:.0f} N（占空比 {duty:.0f} %）</translation>
+        <source>the servo gives {force:.0f} N at most ({most:.0f} mA)</source>
+        <translation>舵机最多给出 {force:.0f} N（{most:.0f} mA）</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -7015,6 +7045,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/servo_table.py"/>
         <source>Switch all torque off</source>
         <translation>关闭所有力矩</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/servo_table.py"/>
+        <source>the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)</source>
+        <translation>舵机最多给出 {force:.0f} N（占空比 {duty:.0f} %）</translation>
     </message>
     <message>
         <location filename="../../app/widgets/shortcut_page.py"/>
@@ -7265,11 +7300,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/zero_dialog.py"/>
         <source>it is at</source>
         <translation>现位于</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/zero_dialog.py"/>
-        <source>? mm</source>
-        <translation>? mm</translation>
     </message>
     <message>
         <location filename="../../app/widgets/zero_dialog.py"/>
@@ -7638,8 +7668,18 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/control/gate.py"/>
+        <source>{joint} at {a} mm ({b} to {c} mm)</source>
+        <translation>{joint}在 {a} mm（{b} 至 {c} mm）</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/gate.py"/>
         <source>{joint} to {a} mm ({b} to {c} mm)</source>
         <translation>{joint}到 {a} mm（{b} 至 {c} mm）</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/gate.py"/>
+        <source>{joint} by {a} mm (at most {b} mm)</source>
+        <translation>{joint}相差 {a} mm（最多 {b} mm）</translation>
     </message>
     <message>
         <location filename="../../core/control/gate.py"/>
@@ -7652,14 +7692,9 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>测得位置：{what}</translation>
     </message>
     <message>
-        <location filename="../../core/control/gate.py"/>
-        <source>{joint} at {a} mm ({b} to {c} mm)</source>
-        <translation>{joint}在 {a} mm（{b} 至 {c} mm）</translation>
-    </message>
-    <message>
-        <location filename="../../core/control/gate.py"/>
-        <source>{joint} by {a} mm (at most {b} mm)</source>
-        <translation>{joint}相差 {a} mm（最多 {b} mm）</translation>
+        <location filename="../../core/control/kept_zero.py"/>
+        <source>{joint} is no joint of this robot: {names}</source>
+        <translation>{joint} 不是此机器人的关节:{names}</translation>
     </message>
     <message>
         <location filename="../../core/control/kept_zero.py"/>
@@ -8043,8 +8078,18 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/cameras/registry.py"/>
+        <source>RealSense cameras need the package pyrealsense2: {command}</source>
+        <translation>RealSense 相机需要软件包 pyrealsense2:{command}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
         <source>the library of RealSense cameras cannot be used: {problem}</source>
         <translation>无法使用 RealSense 相机的库：{problem}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
+        <source>RealSense cameras need the package pyrealsense2</source>
+        <translation>RealSense 相机需要软件包 pyrealsense2</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/registry.py"/>
@@ -8277,6 +8322,21 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>{baud} 波特：每秒约 {a} 个周期，而非 {b}</translation>
     </message>
     <message>
+        <location filename="../../hardware/servos/drive.py"/>
+        <source>torque of {names} is not proven to be off: cut the servos' power</source>
+        <translation>未能证实{names}的力矩已关闭：请切断舵机电源</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/servos/drive.py"/>
+        <source>{names}: no answer; check the drive's power, its cable and servos.baud</source>
+        <translation>{names}:没有应答;请检查驱动器的电源、线缆和 servos.baud</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/servos/drive.py"/>
+        <source>{joint} holds its wire: switch the torque off and see that it is slack</source>
+        <translation>{joint} 正拉着拉线:请断开扭矩,并确认拉线已松弛</translation>
+    </message>
+    <message>
         <location filename="../../hardware/servos/dynamixel_bus.py"/>
         <source>{joint} holds its wire: let the wizard search where it is taut (menu Rig, Calibrate), or switch the torque off and see that it is slack</source>
         <translation>{joint} 仍拉着拉线：让向导寻找绷紧点（“装置”菜单，标定），或断开扭矩并查看其是否松弛</translation>
@@ -8288,8 +8348,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/servos/dynamixel_bus.py"/>
-        <source>torque of {names} is not proven to be off: cut the servos' power</source>
-        <translation>未能证实{names}的力矩已关闭：请切断舵机电源</translation>
+        <source>{joint} holds with another {what}: close the program with Relax slowly, or switch the torque off (the wires go slack), then arm</source>
+        <translation>{joint} 正以不同的 {what} 保持:请用“缓慢放松”关闭程序,或断开扭矩(拉线会松弛),然后再就绪</translation>
     </message>
     <message>
         <location filename="../../hardware/servos/dynamixel_port.py"/>
@@ -8460,6 +8520,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>too much is wrong</source>
         <translation>错误过多</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>rotation</source>
+        <translation>旋转</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10068,6 +10133,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>drive cannot limit its force</source>
+        <translation>驱动器无法限制其力</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>drums not measured</source>
         <translation>未测量绕线轮</translation>
     </message>
@@ -10323,8 +10393,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>the wires were let out: free what blocks, let it cool, then acknowledge</source>
-        <translation>拉线已放松：排除阻碍，待其冷却，然后确认</translation>
+        <source>free what blocks, let it cool, then acknowledge</source>
+        <translation>排除卡阻,让它冷却,然后确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10433,8 +10503,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>the wires were let out: let it cool, lower the pretension, then acknowledge</source>
-        <translation>拉线已放松：待其冷却，减小预紧，然后确认</translation>
+        <source>let it cool, lower the pretension, then acknowledge</source>
+        <translation>让它冷却,降低预紧力,然后确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10853,6 +10923,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>The wires were let out slowly</source>
+        <translation>拉线已缓慢放松</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>find the cause before you pull them again</source>
+        <translation>再次拉紧之前先查明原因</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Wires may still be tight</source>
+        <translation>拉线可能仍然绷紧</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>look at them; let them go by Torque off (page Servos)</source>
+        <translation>请检查;用“断开扭矩”(舵机页)放松它们</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>A joint is at the end of its travel</source>
         <translation>有关节到达行程末端</translation>
     </message>
@@ -11025,6 +11115,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>menu Rig, Calibrate: page Drums; until then ways and forces are assumed</source>
         <translation>“装置”菜单，标定：“绕线轮”页；在此之前行程和力为假定值</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The drive cannot limit its force</source>
+        <translation>驱动器无法限制其力</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>by hand you can drive; the program needs other servos</source>
+        <translation>可以手动驱动;由程序驱动需要其他舵机</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -12683,8 +12783,18 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>The bus and its seven joints.</source>
-        <translation>总线及其七个关节。</translation>
+        <source>Rotation deg</source>
+        <translation>旋转角度(度)</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>of the shaft, where it can be turned</source>
+        <translation>轴的旋转角(如果可以转动)</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>The bus and the robot's joints.</source>
+        <translation>总线和机器人的关节。</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -12693,8 +12803,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>direct: the twin without servos, a lighter load</source>
-        <translation>direct：不带舵机的孪生，负荷较轻</translation>
+        <source>what is on the port; direct: the twin without servos, a lighter load</source>
+        <translation>端口上连接的设备;direct:不带舵机的孪生台架,负载更轻</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
