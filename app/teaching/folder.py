@@ -53,8 +53,8 @@ _SAME_CELLS, _SAME_AREA = 1, 0.06
 """Robots are as far inserted when so many cells, at most, are covered by one alone, and their areas differ by this share."""
 _STILL_LEVELS, _STILL_SHARE = 10, 4e-4
 """Pictures of which, a quarter as large, a smaller share differs by more than these grey levels show the same."""
-_STILL_SIGMAS = 5.0
-"""In a noisy picture the difference must exceed so many standard deviations of the noise, too."""
+_STILL_SIGMAS, _MOST_NOISE = 5.0, 6.0
+"""In a noisy picture the difference must exceed so many standard deviations of the noise, too; more noise is a moved camera."""
 _BUSY_SHARE = 2e-3
 """Share of the picture that changes while an empty picture is taken, when a hand or the robot moves."""
 _LEAST_ROBOT_PX = 220
@@ -637,7 +637,7 @@ def _changed_share(one: Image, other: Image) -> float:
     apart = second - first
     apart = np.abs(apart - np.median(apart[::2, ::2], axis=(0, 1)).astype(np.int16))
     noise = 1.4826 * np.median(apart[::2, ::2], axis=(0, 1))  # of a normal distribution by its median deviation
-    return float(np.mean((apart > np.maximum(_STILL_LEVELS, _STILL_SIGMAS * noise)).any(axis=2)))
+    return float(np.mean((apart > np.maximum(_STILL_LEVELS, _STILL_SIGMAS * np.minimum(noise, _MOST_NOISE))).any(axis=2)))
 
 
 def _blurred(robot: Mask) -> NDArray[np.float32]:

@@ -190,7 +190,7 @@ def test_something_that_moves_while_the_empty_picture_is_taken(work: TeachingFol
 def test_a_noisy_camera_is_no_motion(work: TeachingFolder) -> None:
     rng = np.random.default_rng(5)
     still = toy_picture(seed=1)
-    noise = [cv2.GaussianBlur(rng.normal(0, 40, still.shape), (0, 0), 1.2) for _ in range(8)]
+    noise = [cv2.GaussianBlur(rng.normal(0, 25, still.shape), (0, 0), 1.2) for _ in range(8)]
     noisy = [np.clip(still + grain, 0, 255).astype(np.uint8) for grain in noise]
     work.add_empty(noisy)
     assert work.view().empty is not None
