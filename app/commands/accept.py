@@ -88,7 +88,7 @@ def config_of(path: Path, rig: RigFile, config_path: Path | None = None) -> Conf
 
 
 def _begin(path: Path, rig: RigFile, config: Config, operator: str | None, *, anew: bool) -> Acceptance:
-    """The acceptance to go on with, or a new one where there is none, or something has changed since."""
+    """The acceptance to go on with, or a new one if it is missing or something has changed since."""
     before = None if anew else read_acceptance(path)
     if before is not None:
         changed = changes_since(before, config)

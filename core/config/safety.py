@@ -360,7 +360,7 @@ class ServosConfig(ConfigSection):
         return replace(limit, speed_mm_s=limit.speed_mm_s * joint.mm_per_turn / joint.drum_mm_per_turn)
 
     def astray_mm(self, joint: JointConfig) -> float:
-        """A joint that is farther from its goal is jammed, in its own unit."""
+        """A joint further away from its goal is jammed, in its own unit."""
         return self.tracking_error_mm * (_DEG_PER_MM if joint.kind is JointKind.ROTATION else 1.0)
 
     @property

@@ -40,7 +40,7 @@ READY = Readiness()
 
 @dataclass(frozen=True, slots=True)
 class RigRecords:
-    """What is recorded of a rig: its file, the manifest of its model, and its acceptance; None: there is none that can be read.
+    """What is recorded of a rig: its file, the manifest of its model, and its acceptance; None: missing or unreadable.
 
     ``firmware`` is that of the seven servos; empty: they were not asked.
     """
@@ -65,7 +65,7 @@ def readiness_of(
     config : as it drives.
     rig : its rig file; None: it has none, so nothing of it was learnt.
     model : the manifest of the model that perceives; None: it cannot be read, which another check reports.
-    accepted : the acceptance of the rig; None: there is none, or it cannot be read.
+    accepted : the acceptance of the rig; None: missing or unreadable.
     firmware : of the seven servos; empty: they were not asked.
     """
     found: list[Hindrance] = []

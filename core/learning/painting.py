@@ -77,7 +77,7 @@ WALL_STYLES = {"band": 0.35, "lines": 0.4, "inner": 0.25}
 PATTERNS = {"plain": 0.5, "rings": 0.2, "coil": 0.15, "bands": 0.15}
 """Share of the robots with each pattern. Rings may be near the tip alone; bands always are."""
 _REFLECTIONS = (0.25, 0.3, 0.2, 0.15, 0.1)
-"""Share of the benches with 0, 1, ... bright lines along the tube: they look like a robot, and are none."""
+"""Share of the benches with 0, 1, ... bright lines along the tube, which a network may take for a robot."""
 _CLIPS = (0.7, 0.22, 0.08)
 """Share of the benches with 0, 1, ... clips over the tube."""
 _CABLES = 0.3

@@ -198,7 +198,7 @@ def _at_vessel_end(points: Points, around: Surroundings) -> float:
 def _from_opening(points: Points, around: Surroundings) -> float:
     """Negative distance in px, along the vessel, from this end to the vessel's only opening: an end of it at the image border.
 
-    0 where there is none, or several.
+    0 without one, or with several.
     """
     graph = around.vessel
     if graph is None or not graph.edges:

@@ -188,7 +188,7 @@ SAMPLE_STEP = 4
 """Brightness is judged on every fourth pixel."""
 MAX_OFF_RADII, MAX_OFF_PX = 2.5, 4.0
 """Greatest distance of a head from the centerline of its own vessel, also in a junction's opening or where it bulges the wall: in
-919 right answers with true masks the distance was at most 1.4 radii. Farther off, the head lies in a vessel that was not found."""
+919 right answers with true masks the distance was at most 1.4 radii. Further off, the head lies in a vessel that was not found."""
 _LEAST_CONTRAST = 4.0
 _KNOWN_AGAIN_SHARE = 0.9
 """Of the limit: hysteresis. The kind of pictures belongs to the rig, and a rig at the limit must not stop and go with every

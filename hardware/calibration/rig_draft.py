@@ -346,7 +346,7 @@ class RigDraft:
     def _moving(self) -> Iterator[None]:
         """A step that turns servos, and turns them back. After one that was stopped half way the wires' places are unknown.
 
-        Raises DeviceError on a LIVE rig whose drums nobody has measured.
+        Raises DeviceError on a LIVE rig whose drums were not measured.
         """
         if self.bench.kind is RigKind.LIVE and self.drums is None:
             raise DeviceError(DRUMS_FIRST)

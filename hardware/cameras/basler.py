@@ -37,7 +37,7 @@ _NO_NUMBER = 1 << 63
 
 
 def load_pypylon() -> tuple[Any, Any]:
-    """The modules pylon and genicam; raises DeviceError when there are none."""
+    """The modules pylon and genicam; raises DeviceError when they are not installed."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of its bindings; made an error, they end the process
