@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import math
 import os
 import re
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.devices import UserError
+from core.locks import lock_file
 from core.system import MAX_PIXELS
 from core.types import Image
 
@@ -98,7 +98,7 @@ class FolderLock:
             return True
         handle = os.open(folder, os.O_RDONLY)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_file(handle)
         except BlockingIOError:
             os.close(handle)
             return False

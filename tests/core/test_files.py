@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 import pytest
 
-from core import files
 from core.files import FolderLock, ImageError, read_image, sweep_unfinished, to_rgb8, write_atomic
 
 
@@ -287,7 +286,7 @@ def test_a_drive_without_locks_refuses_no_one(tmp_path: Path, monkeypatch: pytes
     def no_locks(_file: int, _kind: int) -> None:
         raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(files.fcntl, "flock", no_locks)
+    monkeypatch.setattr("fcntl.flock", no_locks)
     first, second = FolderLock(), FolderLock()
     assert first.take(tmp_path)
     assert second.take(tmp_path)

@@ -662,7 +662,7 @@ def test_a_drive_without_locks_can_be_recorded_on(tmp_path: Path, monkeypatch: p
     def no_locks(_file: int, _kind: int) -> None:
         raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(session_files.fcntl, "flock", no_locks)
+    monkeypatch.setattr("fcntl.flock", no_locks)
     files = SessionFiles(tmp_path / "under way", ABOUT, QUICK, first_s=1000.0, now_s=1000.0)
     assert is_being_written(files.folder), "it has just been written to"
     with pytest.raises(SessionError, match="is being recorded"):
