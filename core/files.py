@@ -10,7 +10,6 @@ import secrets
 import shutil
 import struct
 import time
-import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.devices import UserError
-from core.locks import lock_file
 from core.system import MAX_PIXELS
 from core.types import Image
 
@@ -84,34 +82,6 @@ def sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-class FolderLock:
-    """A folder for one holder at a time, until ``release`` or the end of the process. A drive without locks refuses no one."""
-
-    def __init__(self) -> None:
-        self._close: weakref.finalize[[int], FolderLock] | None = None
-
-    def take(self, folder: Path) -> bool:
-        """Whether the folder is this holder's now; False while another one has it. Raises OSError where it cannot be opened."""
-        if self._close is not None:
-            return True
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            lock_file(handle)
-        except BlockingIOError:
-            os.close(handle)
-            return False
-        except OSError:
-            pass  # a drive without locks
-        self._close = weakref.finalize(self, os.close, handle)
-        return True
-
-    def release(self) -> None:
-        """Let another one take it; may be called twice."""
-        if self._close is not None:
-            self._close()
-            self._close = None
 
 
 def name_as_text(name: str | Path) -> str:

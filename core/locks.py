@@ -1,10 +1,12 @@
-"""Locks on files between processes, on every operating system."""
+"""Locks on files and folders between processes, on every operating system."""
 
 from __future__ import annotations
 
 import errno
 import importlib
 import os
+import weakref
+from pathlib import Path
 
 _LOCKED_BYTE = 0x7FFF_0000
 """On Windows a lock forbids reading and writing: it lies where no file of ours reaches."""
@@ -38,3 +40,31 @@ def _lock_on_windows(handle: int, *, waits: bool) -> None:
         raise
     finally:
         os.lseek(handle, place, os.SEEK_SET)
+
+
+class FolderLock:
+    """A folder for one holder at a time, until ``release`` or the end of the process. A drive without locks refuses no one."""
+
+    def __init__(self) -> None:
+        self._close: weakref.finalize[[int], FolderLock] | None = None
+
+    def take(self, folder: Path) -> bool:
+        """Whether the folder is this holder's now; False while another one has it. Raises OSError where it cannot be opened."""
+        if self._close is not None:
+            return True
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            lock_file(handle)
+        except BlockingIOError:
+            os.close(handle)
+            return False
+        except OSError:
+            pass  # a drive without locks
+        self._close = weakref.finalize(self, os.close, handle)
+        return True
+
+    def release(self) -> None:
+        """Let another one take it; may be called twice."""
+        if self._close is not None:
+            self._close()
+            self._close = None

@@ -23,10 +23,11 @@ from core.bench.coverage import VesselBranch, VesselCoverage, missing
 from core.config.models import PerceptionConfig
 from core.config.section import first_problem
 from core.devices import UserError
-from core.files import FolderLock, read_image, write_atomic
+from core.files import read_image, write_atomic
 from core.learning import teaching
 from core.learning.dataset import WORKING_SIZE_PX, mask_png, png, read_mask
 from core.learning.teaching import TeachingFrame, TeachingPicture
+from core.locks import FolderLock
 from core.messages import message
 from core.perception.segmentation import Probability, clean_mask, to_working
 from core.types import Image, Mask, Point, Reason

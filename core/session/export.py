@@ -25,6 +25,7 @@ import numpy as np
 from av.bitstream import BitStreamFilterContext
 from mcap.writer import Writer
 
+from core.config.safety import TENDONS
 from core.control.modes import Mode
 from core.session.codec import RecordedRow
 from core.session.manifest import EventKind, SessionError
@@ -95,8 +96,6 @@ def export_csv(reader: SessionReader, path: Path, on_row: Advance = lambda: None
     return written
 
 
-TENDON_NAMES = ("right", "left", "up", "down")
-"""Tendons of the default robot, in the order of a status; those of other robots are numbered."""
 _WHO = ("asked", "commanded", "sent")
 _MOTIONS = tuple(f"{who}_{name}" for who in _WHO for name in Command.__slots__ if name != "rotation_deg_s")
 _TURNING = (*(f"{who}_rotation_deg_s" for who in _WHO), "rotation_deg")
@@ -134,8 +133,8 @@ def _has_rotation(reader: SessionReader) -> bool:
 
 
 def tendon_names(count: int) -> tuple[str, ...]:
-    """Names for the tendons of a status."""
-    return TENDON_NAMES if count == len(TENDON_NAMES) else tuple(f"{number}" for number in range(1, count + 1))
+    """Names for the tendons of a status: those of the default robot, numbers for other robots."""
+    return TENDONS if count == len(TENDONS) else tuple(f"{number}" for number in range(1, count + 1))
 
 
 def _flat(row: RecordedRow) -> dict[str, Any]:
@@ -267,7 +266,7 @@ _POSE = {
     "refusal": _TEXT,
 }
 _PACE = {"frames_per_second": _NUMBER, "dropped_frames": _NUMBER, "dropped_rows": _NUMBER, "perception_ms": _MAYBE}
-_TENDONS = {f"tendon_{what}_{side}": _NUMBER for what in ("pull_mm", "force_mn") for side in TENDON_NAMES}
+_TENDONS = {f"tendon_{what}_{side}": _NUMBER for what in ("pull_mm", "force_mn") for side in TENDONS}
 _ROBOT = {"insertion_mm": _NUMBER, "delivery_mm": _NUMBER, "wall_contact_n": _MAYBE, "rotation_deg": _MAYBE, **_TENDONS}
 _MOTION = {"mode": _TEXT, "mode_number": _MAYBE, "sent_by": _TEXT, **dict.fromkeys((*_MOTIONS, *_TURNING[:3]), _MAYBE)}
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.files import FolderLock, ImageError, read_image, sweep_unfinished, to_rgb8, write_atomic
+from core.files import ImageError, read_image, sweep_unfinished, to_rgb8, write_atomic
 
 
 @pytest.mark.parametrize("durable", [False, True])
@@ -267,26 +267,3 @@ def test_a_damaged_file_leaves_no_log_lines_of_opencv(tmp_path: Path, capfd: pyt
     with pytest.raises(ImageError):
         read_image(tmp_path / "cut.tiff")
     assert capfd.readouterr().err == ""
-
-
-def test_a_folder_has_one_holder_until_it_is_released(tmp_path: Path) -> None:
-    first, second = FolderLock(), FolderLock()
-    assert first.take(tmp_path)
-    assert first.take(tmp_path)
-    assert not second.take(tmp_path)
-    first.release()
-    first.release()
-    assert second.take(tmp_path)
-    del second
-    assert first.take(tmp_path), "one that is gone holds nothing"
-    first.release()
-
-
-def test_a_drive_without_locks_refuses_no_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_locks(_file: int, _kind: int) -> None:
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setattr("fcntl.flock", no_locks)
-    first, second = FolderLock(), FolderLock()
-    assert first.take(tmp_path)
-    assert second.take(tmp_path)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from core.locks import lock_file
+from core.locks import FolderLock, lock_file
 
 
 def test_one_holds_it_several_share_it(tmp_path: Path) -> None:
@@ -55,3 +55,26 @@ def test_no_locks_at_all_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(sys.modules, "fcntl", None)
     with (tmp_path / "a").open("wb") as file, pytest.raises(OSError, match=os.strerror(errno.ENOLCK)):
         lock_file(file.fileno())
+
+
+def test_a_folder_has_one_holder_until_it_is_released(tmp_path: Path) -> None:
+    first, second = FolderLock(), FolderLock()
+    assert first.take(tmp_path)
+    assert first.take(tmp_path)
+    assert not second.take(tmp_path)
+    first.release()
+    first.release()
+    assert second.take(tmp_path)
+    del second
+    assert first.take(tmp_path), "one that is gone holds nothing"
+    first.release()
+
+
+def test_a_drive_without_locks_refuses_no_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_locks(_file: int, _kind: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", no_locks)
+    first, second = FolderLock(), FolderLock()
+    assert first.take(tmp_path)
+    assert second.take(tmp_path)
