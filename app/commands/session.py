@@ -6,6 +6,7 @@ import json
 import logging
 import sys
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -23,13 +24,11 @@ from core.config.files import own_config
 from core.config.models import Config
 from core.control.modes import Mode
 from core.devices import UserError
+from core.session.exporters import export_session, exporter_name, items_of
 from core.session.files import is_being_written
-from core.session.manifest import Manifest, SessionError, frames_lost
+from core.session.manifest import Manifest, frames_lost
 from core.session.reader import SessionReader, losses, rows_cut_off
 from core.types import Image, PoseState, Tick
-
-_UNITS = {".mp4": "pictures", ".csv": "rows", ".mcap": "messages"}
-"""Endings of exported files, and what is counted in them."""
 
 session = typer.Typer(help="Recorded sessions: look at them, recover cut ones, export.", no_args_is_help=True)
 
@@ -131,15 +130,13 @@ def recover_session(
 @session.command()
 def export(
     session: SessionArgument,
-    out: Annotated[list[Path], typer.Option(help="file.mp4, file.csv or file.mcap; may be repeated")],
+    out: Annotated[list[Path], typer.Option(help="file.mp4, .csv or .mcap, or what a plugin writes; may be repeated")],
     plain: Annotated[bool, typer.Option("--plain", help="MP4 without overlays")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """A session as video, table, or MCAP for Foxglove and PlotJuggler."""
-    for path in out:
-        if path.suffix.lower() not in _UNITS:
-            raise SessionError(f"{path}: unknown format; the file's ending must be one of {', '.join(_UNITS)}")
-    if not plain and any(path.suffix.lower() == ".mp4" for path in out):
+    names = {str(path): exporter_name(path) for path in out}
+    if not plain and "mp4" in names.values():
         check_qt("export it with --plain")
     written: dict[str, int] = {}
     with SessionReader(session) as reader:
@@ -160,20 +157,14 @@ def export(
     for problem in problems:
         sys.stderr.write(f"note: {problem}\n")
     for name, count in written.items():
-        sys.stdout.write(f"{name}: {count} {_UNITS[Path(name).suffix.lower()]}\n")
+        sys.stdout.write(f"{name}: {count} {items_of(names[name])}\n")
 
 
-def _export(reader: SessionReader, out: Path, plain: bool, on_row: Any) -> int:
-    from core.session.export import export_csv, export_mcap, export_mp4
-
-    match out.suffix.lower():
-        case ".csv":
-            return export_csv(reader, out, on_row)
-        case ".mcap":
-            return export_mcap(reader, out, on_row)
-    if plain:
-        return export_mp4(reader, out, None, on_row=on_row)
+def _export(reader: SessionReader, out: Path, plain: bool, on_row: Callable[[], None]) -> int:
+    if plain or exporter_name(out) != "mp4":
+        return export_session(reader, out, on_row)
     from app.widgets.overlay_image import draw_overlay
+    from core.session.export import export_mp4
 
     # The banner of an exported video says that a simulation is no real run.
     stamp = f"{reader.manifest.kind if reader.manifest else 'UNKNOWN'} PLAYBACK"
