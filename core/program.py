@@ -75,6 +75,10 @@ EXTRAS = {
     "dask": "cluster",
     "pyrealsense2": "realsense",
     "pypylon": "industrial",
+    "foxglove": "foxglove",
+    "mcap": "ros2",
+    "mcap_ros2": "ros2",
+    "pylsl": "lsl",
 }
 """Optional package -> the extra of pyproject.toml that brings it."""
 

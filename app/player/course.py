@@ -17,9 +17,9 @@ from app.ui.texts import refusal_text
 from app.widgets.painting import number
 from core.evaluation.replay import event_target
 from core.session.codec import RecordedRow
-from core.session.export import tendon_names
 from core.session.manifest import Event, EventKind
 from core.session.reader import Timeline
+from core.session.values import tendon_names
 from core.types import Point, Scene
 
 _GAP_FACTOR, _LEAST_GAP_S = 4.0, 0.25

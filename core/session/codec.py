@@ -15,6 +15,7 @@ from typing import Annotated, Any, TypeVar
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, PlainSerializer, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
@@ -54,7 +55,8 @@ _MAX_ITEMS = 20_000  # points of a line, lines of a mask
 _MAX_SIDE_PX, _MAX_MASK_PX = 16_384, 4096
 _LONGEST_S = 1e9  # thirty years: no monotonic clock shows more
 _LINE_PX = 0.3  # largest distance of a thinned line from the recorded one
-_VESSEL_PX, _ROBOT_PX = 1.0, 0.5  # the same for outlines of masks; the robot is thin
+VESSEL_LINE_PX, ROBOT_LINE_PX = 1.0, 0.5
+"""The same for outlines of masks; the robot is thin."""
 _NO_PIXELS = np.zeros((0, 0), np.float32)
 
 
@@ -164,7 +166,7 @@ def _array(pairs: list[_Pair]) -> Points:
     return np.array(pairs, np.float64).reshape(-1, 2)
 
 
-def _thinned(points: Points, digits: int = 2) -> list[list[float]]:
+def thinned(points: Points, digits: int = 2) -> list[list[float]]:
     """A polyline (N, 2), thinned and rounded; points that are not finite are left out."""
     line = points.astype(np.float32)
     if not np.isfinite(line).all():
@@ -180,7 +182,7 @@ def _vector(ends: tuple[Point, Point, Point]) -> Vector:
     return Vector(*ends)
 
 
-_Line = Annotated[Points, _As(_Pairs, _array, _thinned)]
+_Line = Annotated[Points, _As(_Pairs, _array, thinned)]
 _VectorField = Annotated[
     Vector, _As(tuple[_Point, _Point, _Point], _vector, lambda vector: (vector.start, vector.center, vector.end))
 ]
@@ -203,7 +205,7 @@ def _made(kind: type[Any]) -> Callable[[JsonLayout], Any]:
 
 
 class _PathLayout(JsonLayout):
-    points: Annotated[Points, _As(Annotated[_Pairs, Field(min_length=1)], _array, _thinned)]
+    points: Annotated[Points, _As(Annotated[_Pairs, Field(min_length=1)], _array, thinned)]
     score: _F5
     runner_up: _Maybe5 = None
     entry_on_border: bool
@@ -273,11 +275,15 @@ def _filled(flat_outlines: list[list[int]], size: tuple[int, int]) -> Mask:
 def _plain_masks(masks: Masks) -> Row:
     """Outlines of areas and holes as x, y, dx, dy, dx, dy, ...; filled by the even-odd rule they are the masks within a pixel."""
     record: Row = {"size": (masks.vessel.shape[1], masks.vessel.shape[0])}
-    for name, mask, leave_px in (("vessel", masks.vessel, _VESSEL_PX), ("robot", masks.robot, _ROBOT_PX)):
-        found, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-        outlines = (cv2.approxPolyDP(outline, leave_px, True)[:, 0] for outline in found)
-        record[name] = [np.diff(outline, axis=0, prepend=0).ravel().tolist() for outline in outlines]
+    for name, mask, leave_px in (("vessel", masks.vessel, VESSEL_LINE_PX), ("robot", masks.robot, ROBOT_LINE_PX)):
+        record[name] = [np.diff(outline, axis=0, prepend=0).ravel().tolist() for outline in mask_outlines(mask, leave_px)]
     return record
+
+
+def mask_outlines(mask: Mask, leave_px: float) -> list[NDArray[np.int32]]:
+    """Outlines (N, 2) of areas and holes, thinned by at most `leave_px`."""
+    found, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    return [np.asarray(cv2.approxPolyDP(outline, leave_px, True)[:, 0], np.int32) for outline in found]
 
 
 def _graph(layout: _GraphLayout) -> VesselGraph:
@@ -291,7 +297,7 @@ def _graph(layout: _GraphLayout) -> VesselGraph:
 
 def _plain_graph(graph: VesselGraph) -> Row:
     edges = [
-        (edge.start, edge.end, _thinned(edge.points, 1), float(edge.radius.mean()) if edge.radius.size else 0.0)
+        (edge.start, edge.end, thinned(edge.points, 1), float(edge.radius.mean()) if edge.radius.size else 0.0)
         for edge in graph.edges
     ]
     return {"nodes": np.round(graph.nodes, 1).tolist(), "edges": edges}

@@ -28,7 +28,8 @@ class Exporter(NamedTuple):
 EXPORTERS = {
     "mp4": Exporter("pictures", "core.session.export:export_mp4"),
     "csv": Exporter("rows", "core.session.export:export_csv"),
-    "mcap": Exporter("messages", "core.session.export:export_mcap"),
+    "mcap": Exporter("messages", "core.session.mcap_export:export_mcap"),
+    "ros2.mcap": Exporter("messages", "core.session.mcap_export:export_ros2"),
 }
 """The program's own exporters by ending, without its dot."""
 PLUGINS = PluginKind("exporters", tuple(EXPORTERS))

@@ -91,9 +91,9 @@ def test_info_is_one_object_and_a_table(recorded: tuple[Path, dict[str, object]]
     assert "ADVISORY" in table.stdout
 
 
-def test_export_writes_all_three(recorded: tuple[Path, dict[str, object]], tmp_path: Path) -> None:
+def test_export_writes_all_formats(recorded: tuple[Path, dict[str, object]], tmp_path: Path) -> None:
     session, result = recorded
-    outs = [tmp_path / f"x.{ending}" for ending in ("mp4", "csv", "mcap")]
+    outs = [tmp_path / f"x.{ending}" for ending in ("mp4", "csv", "mcap", "ros2.mcap")]
     done = run("session", "export", session, *(word for out in outs for word in ("--out", out)), "--json")
     assert done.returncode == 0, done.stderr
     written = json.loads(done.stdout)["written"]
@@ -105,8 +105,9 @@ def test_export_writes_all_three(recorded: tuple[Path, dict[str, object]], tmp_p
         assert frame.height > frame.width * 3 / 4
     with outs[1].open(newline="") as file:
         assert len(list(csv.DictReader(file))) == result["frames"]
-    with outs[2].open("rb") as mcap:
-        assert {channel.topic for _, channel, _ in make_reader(mcap).iter_messages()} >= {"/camera/video", "/pose", "/robot"}
+    for out, topics in ((outs[2], {"/camera/video", "/measured_js"}), (outs[3], {"/camera/image/compressed", "/measured_js"})):
+        with out.open("rb") as mcap:
+            assert {channel.topic for _, channel, _ in make_reader(mcap).iter_messages()} >= topics
     again = run("session", "export", session, "--out", outs[0])
     assert again.returncode == 2
     assert "there already" in again.stderr
@@ -162,7 +163,7 @@ def test_a_killed_recording_is_recovered_by_the_command(config: Path, tmp_path: 
         (("session", "info", "{folder}"), "not a session"),
         (("session", "info", "{file}"), "not a file"),
         (("session", "recover", "{folder}/nothing"), "no such session"),
-        (("session", "export", "{folder}", "--out", "{folder}/x.avi"), "must be one of .mp4, .csv, .mcap"),
+        (("session", "export", "{folder}", "--out", "{folder}/x.avi"), "must be one of .mp4, .csv, .mcap, .ros2.mcap"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path, arguments: tuple[object, ...], why: str) -> None:

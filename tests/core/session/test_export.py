@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import errno
-import json
 import os
 from pathlib import Path
 
 import av
-import cv2
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 
-from core.session.export import TOPICS, export_csv, export_mcap, export_mp4
-from core.session.manifest import SessionError, read_manifest
+from core.session.export import export_csv, export_mp4
+from core.session.manifest import SessionError
 from core.session.reader import SessionReader
 from core.session.recovery import recover
 from core.session.writer import SessionWriter
@@ -38,18 +34,6 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     saved = writer.status().saved
     assert saved is not None
     return saved
-
-
-def messages(path: Path) -> dict[str, list[tuple[int, dict[str, object]]]]:
-    """Content by topic, in the order of the file's index, by mcap's own reader."""
-    found: dict[str, list[tuple[int, dict[str, object]]]] = {}
-    with path.open("rb") as file:
-        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
-            assert schema is not None
-            assert schema.name == TOPICS[channel.topic]
-            assert channel.message_encoding == "json"
-            found.setdefault(channel.topic, []).append((message.log_time, json.loads(message.data)))
-    return found
 
 
 def test_csv_has_a_line_a_frame_and_blanks_where_something_is_missing(session: Path, tmp_path: Path) -> None:
@@ -91,79 +75,7 @@ def test_mp4_burns_in_what_is_drawn_and_takes_odd_sizes_and_a_clip(session: Path
     assert frame.to_ndarray(format="rgb24").mean() == pytest.approx(200, abs=3)
 
 
-def test_mcap_has_all_topics_in_order_of_time(session: Path, tmp_path: Path) -> None:
-    with SessionReader(session) as reader:
-        written = export_mcap(reader, tmp_path / "x.mcap")
-    with (tmp_path / "x.mcap").open("rb") as file:
-        (metadata,) = make_reader(file).iter_metadata()
-    assert (metadata.name, json.loads(metadata.metadata["kind"])) == ("session", "SIM")
-    found = messages(tmp_path / "x.mcap")
-    assert set(found) == set(TOPICS) - {"/camera/image"}
-    assert sum(map(len, found.values())) == written
-    start_ns = round(read_manifest(session).started_utc.timestamp() * 1e9)
-    for topic in ("/camera/video", "/camera/overlays", "/pose", "/motion"):
-        times = [at_ns - start_ns for at_ns, _ in found[topic]]
-        assert times == pytest.approx([i * 1e8 for i in range(COUNT)], abs=2e6), topic
-    poses = [content for _, content in found["/pose"]]
-    assert (poses[0]["state"], poses[0]["theta_signed_deg"], poses[0]["refusal"]) == (None, None, "no robot: 0 px")
-    assert (poses[30]["state"], poses[30]["theta_signed_deg"]) == ("D", -5.5)
-    motion = found["/motion"][30][1]
-    assert (motion["mode"], motion["asked_bend"], motion["commanded_advance_mm_s"]) == ("ARMED", 0.25, 2.0)
-    assert any(str(content["message"]).startswith("fault: ") for _, content in found["/events"])
-
-
-def test_mcap_video_decodes_message_by_message(session: Path, tmp_path: Path) -> None:
-    """As a viewer does: each message is one picture in Annex B form; key pictures bring their parameter sets."""
-    with SessionReader(session) as reader:
-        export_mcap(reader, tmp_path / "x.mcap")
-    decoder = av.CodecContext.create("h264", "r")
-    numbers = []
-    for place, (_, content) in enumerate(messages(tmp_path / "x.mcap")["/camera/video"]):
-        data = base64.b64decode(str(content["data"]), validate=True)
-        assert content["format"] == "h264"
-        assert data.startswith((b"\x00\x00\x00\x01", b"\x00\x00\x01"))
-        if place % 30 == 0:
-            assert any(unit and unit[0] & 0x1F == 7 for unit in data.split(b"\x00\x00\x01")), "no parameter set"
-        for frame in decoder.decode(av.Packet(data)):
-            numbers.append(number_in(frame.to_ndarray(format="rgb24")))
-    numbers += [number_in(frame.to_ndarray(format="rgb24")) for frame in decoder.decode(None)]
-    assert numbers == list(range(COUNT))
-
-
-def test_mcap_overlays_lie_on_the_picture_as_viewers_count_pixels(session: Path, tmp_path: Path) -> None:
-    with SessionReader(session) as reader:
-        export_mcap(reader, tmp_path / "x.mcap")
-    overlays = messages(tmp_path / "x.mcap")["/camera/overlays"][30][1]
-    lines = {json.dumps(line["points"]) for line in overlays["points"]}  # type: ignore[attr-defined]
-    # the robot vector from (0, 30) to (20, 32), pixel centres at integers: half a pixel more from the corner
-    assert json.dumps([{"x": 0.5, "y": 30.5}, {"x": 20.5, "y": 32.5}]) in lines
-
-
-def test_mcap_of_a_lossless_session_has_pictures(tmp_path: Path) -> None:
-    config = QUICK.model_copy(update={"codec": "lossless"})
-    session = record(tmp_path, (tick_of(i, 1000.0 + i / 30) for i in range(3)), config)
-    with SessionReader(session) as reader:
-        export_mcap(reader, tmp_path / "x.mcap")
-    images = messages(tmp_path / "x.mcap")["/camera/image"]
-    decoded = [cv2.imdecode(np.frombuffer(base64.b64decode(str(c["data"])), np.uint8), cv2.IMREAD_COLOR) for _, c in images]
-    assert [number_in(np.asarray(image, np.uint8)) for image in decoded] == [0, 1, 2]
-
-
-def test_mcap_has_the_pictures_of_all_videos_that_are_left(tmp_path: Path) -> None:
-    config = QUICK.model_copy(update={"split_s": 1.0})
-    session = record(tmp_path, (tick_of(i, 1000.0 + i / 30.0) for i in range(75)), config)
-    found = []
-    for name in ("whole.mcap", "left.mcap"):
-        with SessionReader(session) as reader:
-            export_mcap(reader, tmp_path / name)
-        found.append(messages(tmp_path / name)["/camera/video"])
-        (session / "video_0000.mkv").unlink(missing_ok=True)
-    whole, left = found
-    assert 30 < len(left) < len(whole) == 75
-    assert left == whole[-len(left) :]
-
-
-@pytest.mark.parametrize("export", [export_csv, export_mp4, export_mcap])
+@pytest.mark.parametrize("export", [export_csv, export_mp4])
 def test_nothing_is_overwritten_and_nothing_half_is_left(session: Path, tmp_path: Path, export: object) -> None:
     assert callable(export)
     there = tmp_path / "there.mp4"
