@@ -31,7 +31,7 @@ damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: wha
 	LUMENPILOT_KILLS=50 $(PY) -m pytest --timeout 3600 tests/core/session/test_recovery.py -k is_killed
 	LUMENPILOT_KILLS=100 $(PY) -m pytest --timeout 3600 tests/core/annotation/test_store.py -k kill_9
 
-mutation: setup  ## does a test fail for every small change of gate and supervisor? (a quarter to half an hour)
+mutation: setup  ## does a test fail for every small change of gate, supervisor, force limit and bus guard? (a quarter to half an hour)
 	@$(PY) -m tools.mutation $(ARGS)
 
 lint: packages  ## ruff and mypy only

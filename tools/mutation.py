@@ -1,6 +1,6 @@
 """``make mutation``: does a test fail for every small change of the code that safety rests on?
 
-A mutant of gate or supervisor differs from the code in one place: a comparison, an operator, a condition, a number, a returned
+A mutant of these modules differs from the code in one place: a comparison, an operator, a condition, a number, a returned
 value. Its unit tests run against it, then the long ones (state machines, pilot). A mutant that passes them all survives: a test is
 missing, or ``EXPLAINED`` says why the change has no effect. Exit code 1: a survivor is unexplained; 2: the tests fail without any
 mutant. Works on copies in a temporary folder; a quarter of an hour on two cores. ``python -m tools.mutation NAME ...`` does only
@@ -26,8 +26,8 @@ from queue import Queue
 from rich.progress import Progress
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDER = "core/control"
-TEST_FOLDER = "tests/core/control"
+FOLDERS = {"bus_guard": "hardware/servos", "servo_models": "core/config"}
+"""Where modules are that are not in core/control. Tests are below tests/ in the same folder."""
 TESTS = {  # module -> the tests that should find its mutants
     "gate": ("test_gate.py",),
     "joints": ("test_gate.py", "test_joints.py"),
@@ -38,6 +38,8 @@ TESTS = {  # module -> the tests that should find its mutants
     "direction_monitor": ("test_direction_monitor.py",),
     "readiness": ("test_readiness.py",),
     "kept_zero": ("test_kept_zero.py",),
+    "bus_guard": ("test_bus_guard.py", "test_bus_loop.py"),
+    "servo_models": ("test_servo_models.py",),
 }
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
 JOBS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -96,6 +98,18 @@ class Mutant:
     line: str
     change: str
     source: str
+
+
+def path_of(module: str) -> Path:
+    """From the project's root."""
+    return Path(FOLDERS.get(module, "core/control")) / f"{module}.py"
+
+
+def tests_of(module: str) -> tuple[list[str], list[str]]:
+    """Unit tests, and those that run only when these pass; from the project's root."""
+    folder = Path("tests") / path_of(module).parent
+    long = LONG_TESTS if module not in FOLDERS else ()
+    return [str(folder / name) for name in TESTS[module]], [str(folder / name) for name in long]
 
 
 def mutants(module: str, source: str) -> Iterator[Mutant]:
@@ -177,19 +191,18 @@ class Fate(Enum):
 
 def fate_of(mutant: Mutant, tree: Path) -> Fate:
     """Run the tests in `tree`, a copy of the project, with the mutant in it."""
-    path = tree / FOLDER / f"{mutant.module}.py"
-    path.write_text(mutant.source, encoding="utf-8")
+    path = path_of(mutant.module)
+    (tree / path).write_text(mutant.source, encoding="utf-8")
     try:
-        fates = (run_tests(tree, tests) for tests in (TESTS[mutant.module], LONG_TESTS))
+        fates = (run_tests(tree, tests) for tests in tests_of(mutant.module) if tests)
         return next((fate for fate in fates if fate is not Fate.SURVIVES), Fate.SURVIVES)
     finally:
-        path.write_bytes((ROOT / FOLDER / path.name).read_bytes())
+        (tree / path).write_bytes((ROOT / path).read_bytes())
 
 
-def run_tests(tree: Path, tests: tuple[str, ...]) -> Fate:
+def run_tests(tree: Path, tests: list[str]) -> Fate:
     """SURVIVES: they all pass."""
-    files = [f"{TEST_FOLDER}/{name}" for name in tests]
-    command = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *files]
+    command = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
     try:
         code = subprocess.run(command, cwd=tree, capture_output=True, timeout=TIMEOUT_S, check=False).returncode
     except subprocess.TimeoutExpired:
@@ -199,8 +212,8 @@ def run_tests(tree: Path, tests: tuple[str, ...]) -> Fate:
 
 def broken_tests(modules: list[str], tree: Path) -> list[str]:
     """The tests of the modules that do not pass on the code as it is."""
-    asked = {name for module in modules for name in TESTS[module]} | set(LONG_TESTS)
-    return [name for name in sorted(asked) if run_tests(tree, (name,)) is not Fate.SURVIVES]
+    asked = {name for module in modules for names in tests_of(module) for name in names}
+    return [name for name in sorted(asked) if run_tests(tree, [name]) is not Fate.SURVIVES]
 
 
 def copy_project(folder: Path) -> Path:
@@ -222,9 +235,7 @@ def main(modules: list[str]) -> int:
         sys.stderr.write(f"unknown: {', '.join(sorted(unknown))}; known are {', '.join(TESTS)}\n")
         return 2
     modules = modules or list(TESTS)
-    todo = [
-        mutant for module in modules for mutant in mutants(module, (ROOT / FOLDER / f"{module}.py").read_text(encoding="utf-8"))
-    ]
+    todo = [mutant for module in modules for mutant in mutants(module, (ROOT / path_of(module)).read_text(encoding="utf-8"))]
     with tempfile.TemporaryDirectory() as folder, Progress() as bar, ThreadPoolExecutor(JOBS) as pool:
         copies = [copy_project(Path(folder) / str(job)) for job in range(JOBS)]
         if broken := broken_tests(modules, copies[0]):
@@ -256,7 +267,7 @@ def report(fates: list[tuple[Mutant, Fate]]) -> int:
             continue
         why = EXPLAINED.get((mutant.module, mutant.line, mutant.change)) if fate is Fate.SURVIVES else "the tests stood still"
         unexplained += why is None
-        place = f"{FOLDER}/{mutant.module}.py:{mutant.number}"
+        place = f"{path_of(mutant.module)}:{mutant.number}"
         sys.stdout.write(f"{place}: {mutant.change}\n    {mutant.line}\n    {why or 'NOT EXPLAINED'}\n")
     sys.stdout.write(
         f"{len(fates)} mutants, {counts[Fate.FOUND]} found by tests, {counts[Fate.HANGS]} by tests that stand still, "

@@ -30,13 +30,13 @@ def test_a_small_module_has_all_its_mutants() -> None:
 
 def test_every_explained_survivor_is_a_change_of_todays_code() -> None:
     known: Counter[tuple[str, str, str]] = Counter()
-    for module, tests in mutation.TESTS.items():
-        source = (ROOT / mutation.FOLDER / f"{module}.py").read_text(encoding="utf-8")
+    for module in mutation.TESTS:
+        source = (ROOT / mutation.path_of(module)).read_text(encoding="utf-8")
         same = "\n".join(map(ast.unparse, ast.parse(source).body))
         for mutant in mutation.mutants(module, source):
             assert mutant.source != same, f"{module}:{mutant.number}: {mutant.change}"
             known[module, mutant.line, mutant.change] += 1
-        assert all((ROOT / mutation.TEST_FOLDER / name).exists() for name in (*tests, *mutation.LONG_TESTS))
+        assert all((ROOT / name).exists() for names in mutation.tests_of(module) for name in names)
     assert {key: known[key] for key in mutation.EXPLAINED} == dict.fromkeys(mutation.EXPLAINED, 1), "one change each"
 
 
