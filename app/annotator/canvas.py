@@ -33,12 +33,14 @@ from app.annotator.editing import (
     Measure,
     Tool,
     handle_lines,
+    short_words,
 )
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.theme import ON_PICTURE
 from app.ui.workers import Worker
 from app.widgets.image_canvas import ImageCanvas, Viewport, render
+from app.widgets.painting import draw_text
 from app.widgets.scene_overlay import foot
 from app.widgets.scene_painter import ScenePainter
 from core.annotation.model import ROBOT, VESSEL, Annotation, Line, MaskTarget, Readout, Touch, line_of
@@ -72,6 +74,8 @@ def draw(painter: QPainter, to_screen: QTransform, drawing: Drawing, label_px: i
     if len(drawing.draft) > 1:
         pencil.polylines((np.array(drawing.draft),), drawing.tool.value.colour, 2.0)
     _draw_readout(pencil, readout)
+    if readout.is_short and not is_loupe:
+        pencil.tag(annotation.robot[-1] if annotation.robot else (0.0, 0.0), short_words(readout), ON_PICTURE.ORANGE)
     if drawing.handles_shown:
         _draw_handles(painter, to_screen, drawing)
 
@@ -150,10 +154,16 @@ def _area(points: Line) -> float:
     return sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(points, (*points[1:], points[0]), strict=True))
 
 
+_HANDLES_APART_PX = 9.0
+"""Handles of an outline that would lie closer on the screen are left out."""
+
+
 def _draw_handles(painter: QPainter, to_screen: QTransform, drawing: Drawing) -> None:
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     room = painter.window().adjusted(-12, -12, 12, 12)
+    # Of an outline with many points those that can be told apart; closer ones appear when it is magnified.
     for line in handle_lines(drawing.annotation, drawing.tool):
+        last = QPointF(-1e9, 0.0)
         name = _LINE_COLOUR.get(line, drawing.tool.value.colour)
         radius = 5.0 if line < 0 else 3.0
         points = line_of(drawing.annotation, line)
@@ -162,6 +172,9 @@ def _draw_handles(painter: QPainter, to_screen: QTransform, drawing: Drawing) ->
             if not room.contains(at.toPoint()):
                 continue
             is_selected = drawing.selected == Touch(line, place)
+            if line >= 0 and not is_selected and (at - last).manhattanLength() < _HANDLES_APART_PX:
+                continue
+            last = at
             is_head = line == ROBOT and place == len(points) - 1
             grown = radius + (2.0 if is_selected else 0.0) + (1.5 if is_head else 0.0)
             painter.setBrush(Qt.BrushStyle.NoBrush)  # the place itself stays visible
@@ -222,6 +235,13 @@ class AnnotationLoupe:
         painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
+        draw_text(
+            painter,
+            QRectF(frame.left() + 8, frame.bottom() - 22, 60, 18),
+            f"{zoom:.0f}\N{MULTIPLICATION SIGN}",
+            theme.semi_bold(12),
+            ON_PICTURE.TEXT,
+        )
 
     def _place(self, side: int, room: tuple[int, int], keep_clear: list[Point]) -> QRectF:
         frames = [QRectF(x, y, side, side) for y in (10, room[1] - side - 10) for x in (room[0] - side - 10, 10)]
@@ -266,7 +286,7 @@ CANVAS_KEYS = (
     ("Del", mark("take the point out")),
     ("Shift+Del", mark("the whole line")),
     (mark("Space+drag"), mark("move the picture")),
-    ("Esc", mark("let go of the line or the point")),
+    ("Esc", mark("let go of the line or the point; a click goes on")),
 )
 """The keys that the picture handles itself; all others are in the menus."""
 
@@ -296,6 +316,8 @@ class AnnotationCanvas(ImageCanvas):
         self.setAccessibleName(tr("Picture to annotate"))
         self.setAccessibleDescription(tr("Click sets points; arrow keys move the selected point or the cross, Insert sets a point"))
         self.editor = AnnotationEditor()
+        self.keeps_zoom = True
+        """The next image of the same size is shown as this one is, not whole."""
         self._loupe = AnnotationLoupe()
         self._loupe_on = True
         self._mode = MaskMode.POINTS
@@ -317,7 +339,7 @@ class AnnotationCanvas(ImageCanvas):
     @property
     def is_moving(self) -> bool:
         """Whether a point moves or a line reaches to the cursor: the readout is not final."""
-        return self.editor.held is not None or bool(self.editor.drawing.rubber_band)
+        return not self.tool.is_mask and (self.editor.held is not None or bool(self.editor.drawing.rubber_band))
 
     @property
     def mask_mode(self) -> MaskMode:
@@ -330,7 +352,10 @@ class AnnotationCanvas(ImageCanvas):
         self.editor.set_image(size, annotation, measure)
         self._mode, self._cross_by_key = MaskMode.POINTS, False
         self._gestures.clear()
+        before = self.view
         self.show_levels(levels)
+        if self.keeps_zoom and before.size == self.view.size and before.room == self.view.room and before.zoom > self.view.zoom:
+            self._set_view(before)
 
     def blank(self) -> None:
         """Show no image."""
@@ -508,6 +533,7 @@ class AnnotationCanvas(ImageCanvas):
         """Escape: drop what is being drawn or selected; False when there was nothing."""
         was_held = self.editor.held is not None
         had = self.editor.cancel() or self.mask_mode is not MaskMode.POINTS
+        self._emit_preview()
         self._mode = MaskMode.POINTS
         if was_held:
             self.edited.emit("", None)

@@ -22,8 +22,9 @@ from core.annotation.agreement_report import (
     rater_notes,
     second_measure_notes,
 )
-from core.annotation.model import AnnotationError
+from core.annotation.model import AnnotationError, AngleProvenance
 from core.annotation.store import FoundImage, StoredAnnotation
+from core.annotation.study import angle_words
 from core.config.models import Config
 from core.evaluation.evaluation import Measurement
 from core.files import name_as_text, name_of
@@ -53,9 +54,14 @@ def print_agreement(report: Mapping[str, Any], *, within: bool = True) -> None:
             for quantity in columns[shown[0]]:
                 table.add_row(quantity, *(columns[column][quantity] for column in shown))
             console.print(table, "", sep="\n", highlight=False)
-    for words in (_within_words(report) if within else "", between_words(report)):
+    for words in (report_words(report), within_words(report) if within else "", between_words(report)):
         if words:
             console.print(words, highlight=False)
+
+
+def report_words(report: Mapping[str, Any]) -> str:
+    """Which way a study was done; empty outside studies."""
+    return angle_words(report["hides_angle"]) if "hides_angle" in report else ""
 
 
 def agreement_tables(report: Mapping[str, Any]) -> dict[str, dict[str, dict[str, str]]]:
@@ -66,6 +72,9 @@ def agreement_tables(report: Mapping[str, Any]) -> dict[str, dict[str, dict[str,
         raters[rater] = {
             "Answers": str(row["annotations"]),
             "of these can't tell": str(row["cannot_tell"]),
+            "of these no robot": str(row["no_robot"]),
+            "Angles by hand": _by_hand(row["provenance"]),
+            "on lines that are short": str(row["short_lines"]),
             "Median time an image": f"{_number(row['median_time_s'], 0)} s",
             "SD within an image": _degrees(row["sd_deg"]),
             **_comparison_texts(row),
@@ -73,7 +82,7 @@ def agreement_tables(report: Mapping[str, Any]) -> dict[str, dict[str, dict[str,
     return {"First against second": raters, "Rater against rater": pairs}
 
 
-def _within_words(report: Mapping[str, Any]) -> str:
+def within_words(report: Mapping[str, Any]) -> str:
     """The uncertainty of one measure, over all raters, in one line; empty where no image was measured twice by a rater."""
     within = report["within"]
     if not within["n"]:
@@ -104,7 +113,15 @@ def _comparison_texts(row: Mapping[str, Any]) -> dict[str, str]:
         "Cohen’s kappa": _number(state["kappa"], 3),
         "Only one can’t tell": str(state["one_cannot_tell"]),
         "Neither can tell": str(state["neither_can_tell"]),
+        "Only one sees no robot": str(state["one_no_robot"]),
+        "Both see no robot": str(state["both_no_robot"]),
     }
+
+
+def _by_hand(provenance: Mapping[str, int]) -> str:
+    """How many angles are manual, and how many came from elsewhere."""
+    others = ", ".join(f"{count} {word}" for word, count in provenance.items() if word != AngleProvenance.MANUAL)
+    return f"{provenance.get(AngleProvenance.MANUAL, 0)}{f' ({others})' if others else ''}"
 
 
 def _degrees(value: float | None) -> str:

@@ -58,7 +58,7 @@ class ToolText:
 
 
 _LINE_HINT = mark("Enter or double click ends it · drag a point, click the line to put one in, right click takes one out")
-_MASK_HINT = mark("click the outline to put one in · R region, T brush, Y tube · S simplify · G take the model's masks")
+_MASK_HINT = mark("then drag a point, click the outline to put one in · S fewer points · G the algorithm's mask of this tool")
 
 
 class Tool(Enum):
@@ -70,9 +70,21 @@ class Tool(Enum):
     VESSEL = ToolText(
         "2", mark("Vessel line"), "VESSEL", mark("Click along the vessel's centerline beside the head"), _LINE_HINT, line=VESSEL
     )
-    ROBOT_MASK = ToolText("3", mark("Robot mask"), "ROBOT", mark("Robot mask: drag points"), _MASK_HINT, target=MaskTarget.ROBOT)
+    ROBOT_MASK = ToolText(
+        "3",
+        mark("Robot mask"),
+        "ROBOT",
+        mark("Click around the robot, Enter closes the outline"),
+        _MASK_HINT,
+        target=MaskTarget.ROBOT,
+    )
     VESSEL_MASK = ToolText(
-        "4", mark("Vessel mask"), "VESSEL", mark("Vessel mask: drag points"), _MASK_HINT, target=MaskTarget.VESSEL
+        "4",
+        mark("Vessel mask"),
+        "VESSEL",
+        mark("Click around the vessel, Enter closes the outline"),
+        _MASK_HINT,
+        target=MaskTarget.VESSEL,
     )
 
     @property
@@ -172,6 +184,11 @@ class Drawing:
     handles_shown: bool = True
 
 
+def short_words(readout: Readout) -> str:
+    """The lengths of lines that are shorter than the fit wants: robot and vessel."""
+    return tr("short: {robot:.0f} + {vessel:.0f} px", robot=readout.robot_length_px, vessel=readout.vessel_length_px)
+
+
 def handle_lines(annotation: Annotation, tool: Tool) -> list[int]:
     """The lines whose points can be grabbed with a tool."""
     if not tool.is_mask:
@@ -254,7 +271,8 @@ class AnnotationEditor:
             self._hold(touch, "move a point", self.annotation, point)
         elif self.tool.is_mask:
             self._change(draft=(*self.drawing.draft, self._inside(point)), selected=None)
-        elif self._is_open:
+        elif self._is_open or self._is_unfinished:
+            self._is_open = True
             self._grow(point)
         else:
             self._change(selected=None)
@@ -407,10 +425,12 @@ class AnnotationEditor:
         return line_of(annotation, chosen.line)[chosen.place]
 
     def cancel(self) -> bool:
-        """Drop what is being drawn or selected; False when there was nothing."""
+        """Drop what is being drawn or selected, and let go of the line: a click goes on with one that has no end yet."""
         drawing = self.drawing
         had = self.held is not None or bool(self.stroke) or drawing.selected is not None or bool(drawing.draft)
+        had |= bool(drawing.rubber_band)
         self.held, self.stroke = None, []
+        self._is_open = self._is_reopened = False
         self._change(selected=None, draft=(), rubber_band=())
         return had
 
@@ -472,6 +492,12 @@ class AnnotationEditor:
         return self._done(f"simplify {target.value} mask", fewer)
 
     # ---- private
+
+    @property
+    def _is_unfinished(self) -> bool:
+        """Whether the line of the tool has too few points to be one."""
+        line = self.tool.value.line
+        return line is not None and len(line_of(self.annotation, line)) < 2
 
     def _change(self, **fields: object) -> None:
         self.drawing = replace(self.drawing, **fields)  # type: ignore[arg-type]

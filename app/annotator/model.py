@@ -6,21 +6,24 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, QTimer, Signal
 
 from app.ui.workers import Worker
 from app.widgets.image_canvas import halvings
 from core.annotation.carry import carried_masks
-from core.annotation.exchange import Proposal, proposal_of
+from core.annotation.exchange import Imported, Proposal, merged, proposal_of, read_files
 from core.annotation.model import (
+    ANSWERED,
     Annotation,
     AnnotationError,
     History,
     ImageView,
     JournalEntry,
     MaskTarget,
+    AngleProvenance,
     Readout,
     Status,
     measure_lines,
@@ -61,7 +64,8 @@ class AnnotationModel(QObject):
     """Queue, edits and proposals. Annotations go in and out as they lie in the view; the store has them in source pixels.
 
     ``opened`` comes when the chosen item is loaded; ``changed`` after every edit, undo and redo of it; ``status_changed`` with the
-    place of an item; ``saved`` when everything is on the disk; ``failed`` with one line and whether edits wait to be written;
+    place of an item; ``imported`` with the number of images that got something from other programs' files, and lines on what was
+    left out; ``saved`` when everything is on the disk; ``failed`` with one line and whether edits wait to be written;
     ``proposed`` when there is a proposal for the open item; ``carried`` with masks that another image's lead to, as an
     annotation of the open item, and that image's name.
 
@@ -69,6 +73,7 @@ class AnnotationModel(QObject):
     ----------
     store : its methods may be called from any thread.
     blind : a study in which the algorithm's answer and the names are hidden.
+    hides_angle : theta, and the state that the lines give, are shown only once an image is answered.
     """
 
     opened = Signal()
@@ -78,6 +83,7 @@ class AnnotationModel(QObject):
     failed = Signal(str, bool)
     proposed = Signal()
     carried = Signal(object, str)
+    imported = Signal(int, object)
 
     def __init__(
         self,
@@ -86,18 +92,21 @@ class AnnotationModel(QObject):
         config: PerceptionConfig,
         *,
         blind: bool,
+        hides_angle: bool = False,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self.store = store
         self.items = tuple(items)
         self.config = config
-        self.blind = blind
+        self.blind, self._hides_angle = blind, hides_angle
         self.index = -1
         self._levels: dict[int, tuple[Image, ...]] = {}
         self._histories: dict[int, History] = {}
         self._contents: dict[ItemKey, Annotation] = {}
         self._status: dict[ItemKey, Status] = {}
+        self._provenance: dict[ItemKey, AngleProvenance] = {}
+        self._short: dict[ItemKey, bool] = {}
         self._times: dict[ItemKey, float] = {}
         self._proposals: dict[str, Proposal] = {}
         self._seen_proposals: set[ItemKey] = set()
@@ -118,11 +127,15 @@ class AnnotationModel(QObject):
         self._carrying = Worker("carrying", self, latest_only=True)
         self._carrying.done.connect(self._on_carried)
         self._carrying.failed.connect(lambda _place, line: self.failed.emit(line, False))
+        self._importing = Worker("importing", self)
+        self._importing.done.connect(self._on_read)
+        self._importing.failed.connect(lambda _paths, line: self.failed.emit(line, False))
         if self.items:
             key = self.items[0].key
             for one in store.annotations(key.study, key.rater):
                 self._contents[one.key] = one.content
                 self._status[one.key] = status_of(one.content, measured=one.theta_deg is not None)
+                self._provenance[one.key] = one.provenance
                 self._times[one.key] = one.time_spent_s
 
     # ---- the open item
@@ -154,14 +167,25 @@ class AnnotationModel(QObject):
     def status(self, place: int) -> Status:
         return self._status.get(self.items[place].key, Status.NEW)
 
-    def has_masks(self, place: int) -> bool:
-        content = self._contents.get(self.items[place].key)
-        return content is not None and bool(content.masks)
+    def content(self, place: int) -> Annotation:
+        """What is kept of an item, in source pixels."""
+        return self._contents.get(self.items[place].key, Annotation())
+
+    def provenance(self, place: int) -> AngleProvenance:
+        """Where the lines of an item come from."""
+        return self._provenance.get(self.items[place].key, AngleProvenance.MANUAL)
+
+    def is_short(self, place: int) -> bool:
+        """Whether a line of an item is shorter than the fit wants; measured when it is first asked for."""
+        item = self.items[place]
+        if item.key not in self._short:
+            self._short[item.key] = measure_lines(self.content(place), item.image.record.size, self.config).is_short
+        return self._short[item.key]
 
     @property
     def finished(self) -> int:
         """How many items are answered."""
-        return sum(self.status(place) in (Status.DONE, Status.CANNOT_TELL) for place in range(len(self.items)))
+        return sum(self.status(place) in ANSWERED for place in range(len(self.items)))
 
     @property
     def unsaved(self) -> int:
@@ -172,6 +196,18 @@ class AnnotationModel(QObject):
         """The readout of an annotation as it lies in the view, in the view's own pixels."""
         item = self.item
         return measure_lines(shown, item.image.record.size, self.config) if item is not None else Readout()
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether the rater may not see theta and the state of the lines yet."""
+        return self._hides_angle and self.item is not None and self.status(self.index) not in ANSWERED
+
+    def shown_readout(self, shown: Annotation) -> Readout:
+        """``measure`` as the rater may see it."""
+        readout = self.measure(shown)
+        if not self.is_hidden:
+            return readout
+        return replace(readout, robot_vector=None, vessel_vector=None, pose=None, is_hidden=readout.pose is not None)
 
     def _in_view(self, annotation: Annotation) -> Annotation:
         """From source pixels into the view of the open item, or back: each view is its own inverse."""
@@ -251,6 +287,9 @@ class AnnotationModel(QObject):
         spent = self._times.get(item.key, 0.0)
         self._contents[item.key] = content
         self._status[item.key] = status_of(content, measured=readout.pose is not None)
+        self._short[item.key] = readout.is_short
+        if place in self._histories:
+            self._provenance[item.key] = self._histories[place].provenance
         self._to_write.append(lambda: store.save(item.key, item.view, entry, content, readout, spent))
         self._saving.submit("edit", self._write_all)
         self.status_changed.emit(place)
@@ -375,6 +414,36 @@ class AnnotationModel(QObject):
         if self.item is not None and self.item.key == key and self.is_open:
             self.carried.emit(self._in_view(found[0]), found[1])
 
+    # ---- other programs' files
+
+    def import_files(self, paths: Sequence[Path]) -> None:
+        """Put the lines and masks of other programs' files into the items; ``imported`` comes when it is done."""
+        store, loaded = self.store, set(self._histories)
+        # Of the showings of one image the first.
+        places = {item.image.sha256: place for place, item in reversed(list(enumerate(self.items)))}
+        images = [item.image for item in self.items]
+
+        def read() -> tuple[list[tuple[int, Imported]], list[str], dict[int, History]]:
+            found, problems = read_files(paths, {image.sha256: image for image in images}.values())
+            placed = [(places[one.image.sha256], one) for one in found]
+            return placed, problems, {k: store.history(self.items[k].key) for k in {k for k, _ in placed} - loaded}
+
+        self._importing.submit(tuple(paths), read)
+
+    def _on_read(self, _paths: object, read: tuple[list[tuple[int, Imported]], list[str], dict[int, History]]) -> None:
+        placed, problems, histories = read
+        changed = set()
+        for place, one in placed:
+            history = self._histories.get(place) or self._histories.setdefault(place, histories[place])
+            content = merged(self.content(place), one.content)
+            entry = history.edit(f"import {one.source.name}", content)
+            if entry is not None:
+                self._write(place, entry, content)
+                changed.add(place)
+        if self.index in changed:
+            self.changed.emit()
+        self.imported.emit(len(changed), problems)
+
     # ---- the end
 
     def settle(self) -> None:
@@ -396,7 +465,7 @@ class AnnotationModel(QObject):
         if self._to_write:
             self._saving.submit("edit", self._write_all)
         self._saving.stop(finish=True)
-        others = (self._loading, self._perceiving, self._carrying)
+        others = (self._loading, self._perceiving, self._carrying, self._importing)
         for thread in others:
             thread.stop(finish=False)
         running = [thread for thread in (self._saving, *others) if not thread.wait(_SAVE_WITHIN_MS)]

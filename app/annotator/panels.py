@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen
 from PySide6.QtWidgets import (
     QAbstractButton,
     QButtonGroup,
+    QComboBox,
     QLabel,
     QListView,
     QSizePolicy,
@@ -18,15 +22,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.annotator.editing import MaskMode, Tool
+from app.annotator.editing import MaskMode, Tool, short_words
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.ui.texts import STATE_TITLE, side, tip
+from app.ui.texts import STATE_MEANING, STATE_TITLE, side, tip
 from app.ui.theme import ON_PICTURE
-from app.widgets.basics import column, line
+from app.widgets.basics import column, line, name_list
 from app.widgets.painting import CENTER, NONE, Painted, PaintedWidget, draw_box, draw_text
 from app.widgets.state_badge import paint_state
-from core.annotation.model import Annotation, Readout, Status
+from core.annotation.model import ANSWERED, Annotation, MaskTarget, AngleProvenance, Readout, Status
+from core.types import PoseState
 
 _DRAWN = ("ROBOT", "VESSEL")
 """Roles that the picture shows in their own colours."""
@@ -39,9 +44,38 @@ _SWITCHES = (
 )
 
 
+@dataclass(frozen=True, slots=True)
+class AnswerText:
+    """An answer of the rater: its key, its name, what it means, and its state; None: no pose."""
+
+    key: str
+    label: str
+    meaning: str
+    state: PoseState | None = None
+
+
+class Answer(Enum):
+    """What a rater can say of a picture, in the order of the chips."""
+
+    A = AnswerText("A", STATE_TITLE[PoseState.A], STATE_MEANING[PoseState.A], PoseState.A)
+    B = AnswerText("B", STATE_TITLE[PoseState.B], STATE_MEANING[PoseState.B], PoseState.B)
+    C = AnswerText("C", STATE_TITLE[PoseState.C], STATE_MEANING[PoseState.C], PoseState.C)
+    D = AnswerText("D", STATE_TITLE[PoseState.D], STATE_MEANING[PoseState.D], PoseState.D)
+    CANNOT_TELL = AnswerText("X", mark("Can't tell"), mark("A robot may be there, but the picture does not show its pose"))
+    NO_ROBOT = AnswerText("O", mark("No robot"), mark("The picture shows no robot"))
+
+    @classmethod
+    def of(cls, annotation: Annotation) -> Answer | None:
+        """The answer that is given."""
+        if annotation.cannot_tell or annotation.no_robot:
+            return cls.CANNOT_TELL if annotation.cannot_tell else cls.NO_ROBOT
+        return next((one for one in cls if one.value.state is not None and one.value.state is annotation.state), None)
+
+
 class AnnotationBar(QWidget):
-    """``tool_chosen`` carries a tool; ``mode_chosen`` a mode of the mask tools, POINTS when the one that is on is left;
-    ``switched`` the key of a switch ("L", "K", "H") and whether it is on.
+    """``answered`` carries an answer; ``tool_chosen`` a tool; ``mode_chosen`` a mode of the mask tools, POINTS when the one that is
+    on is left; ``switched`` the key of a switch ("L", "K", "H") and whether it is on, ``shown`` the same also where the window has
+    set it.
 
     Parameters
     ----------
@@ -49,9 +83,11 @@ class AnnotationBar(QWidget):
     tools : the tools that are offered; without a line tool there is no switch for the algorithm.
     """
 
+    answered = Signal(object)
     tool_chosen = Signal(object)
     mode_chosen = Signal(object)
     switched = Signal(str, bool)
+    shown = Signal(str, bool)
 
     def __init__(self, *, blind: bool, tools: Sequence[Tool] = tuple(Tool)) -> None:
         super().__init__()
@@ -73,9 +109,19 @@ class AnnotationBar(QWidget):
                 continue
             chip = _Chip(key, tr(label), colour, tr("{meaning}  (key {key})", meaning=tr(meaning), key=key))
             chip.setChecked(key in "LK")
-            chip.toggled.connect(lambda on, which=key: self.switched.emit(which, on))
+            chip.toggled.connect(lambda on, which=key: (self.switched.emit(which, on), self.shown.emit(which, on)))
             row.addWidget(chip)
             self._switches[key] = chip
+        answers = line(spacing=5)
+        self._answers: dict[Answer, _Chip] = {}
+        for answer in Answer if any(not tool.is_mask for tool in tools) else ():
+            key, label = answer.value.key, tr(answer.value.label)
+            role = f"STATE_{key}" if answer.value.state is not None else "TEXT"
+            chip = _Chip(key, label, role, tr("{meaning}  (key {key})", meaning=tr(answer.value.meaning), key=key))
+            chip.clicked.connect(lambda _on=False, which=answer: self.answered.emit(which))
+            answers.addWidget(chip)
+            self._answers[answer] = chip
+        answers.addStretch(1)
         modes = line(spacing=5)
         self._modes: dict[MaskMode, _Chip] = {}
         for mode in MaskMode:
@@ -93,7 +139,7 @@ class AnnotationBar(QWidget):
         self._hint.setFixedHeight(_HINT_HEIGHT)
         modes.addSpacing(7)
         modes.addWidget(self._hint, 1)
-        self.setLayout(column(row, modes, spacing=5))
+        self.setLayout(column(row, answers, modes, spacing=5) if self._answers else column(row, modes, spacing=5))
         self.show_tool(next(iter(tools)), MaskMode.POINTS)
 
     @property
@@ -111,8 +157,22 @@ class AnnotationBar(QWidget):
             self._tools[tool].setChecked(True)
         for which, chip in self._modes.items():
             chip.setChecked(which is mode)
+            chip.setVisible(tool.is_mask)
+            chip.role = tool.value.role
         hint = tr(mode.value.hint) if mode is not MaskMode.POINTS else tool.value.hint
         self._hint.setText(hint if self._has_algorithm else hint.partition(" · G ")[0])
+
+    def show_hint(self, text: str) -> None:
+        """What comes next, instead of how the tool is used."""
+        self._hint.setText(text)
+
+    def show_answer(self, annotation: Annotation, readout: Readout) -> None:
+        """The answer that is given, and with an arrow the one that Enter would take."""
+        given = Answer.of(annotation)
+        proposed = readout.pose.state if readout.pose is not None and given is None else None
+        for answer, chip in self._answers.items():
+            chip.setChecked(answer is given)
+            chip.show_enter(proposed is not None and answer.value.state is proposed)
 
     def set_switch(self, key: str, on: bool) -> None:
         """Show a switch as on or off without ``switched``."""
@@ -121,6 +181,7 @@ class AnnotationBar(QWidget):
             chip.blockSignals(True)
             chip.setChecked(on)
             chip.blockSignals(False)
+            self.shown.emit(key, on)
 
     def is_on(self, key: str) -> bool:
         return self._switches[key].isChecked()
@@ -140,7 +201,8 @@ class _Chip(Painted, QAbstractButton):
 
     def __init__(self, key: str, label: str, role: str, tip: str) -> None:
         super().__init__()
-        self._key, self._role = key, role
+        self._key, self.role = key, role
+        self._is_next = False
         self.setCheckable(True)
         self.setText(label)
         self.setFixedHeight(30)
@@ -149,21 +211,34 @@ class _Chip(Painted, QAbstractButton):
         self.setToolTip(tip)
         self.setAccessibleName(label)
 
+    def show_enter(self, on: bool) -> None:
+        """Whether the Enter key does this now."""
+        self._is_next = on
+        self.update()
+
     def sizeHint(self) -> QSize:
-        return QSize(50 + QFontMetrics(theme.semi_bold(12)).horizontalAdvance(self.text()), 30)
+        return QSize(
+            (66 if self.role.startswith("STATE") else 50) + QFontMetrics(theme.semi_bold(12)).horizontalAdvance(self.text()), 30
+        )
 
     def paint(self, painter: QPainter) -> None:
         on, is_enabled = self.isChecked(), self.isEnabled()
-        edge = theme.SKY if on else theme.TEXT_FAINT if self.underMouse() and is_enabled else theme.LINE
+        edge = theme.SKY if on or self._is_next else theme.TEXT_FAINT if self.underMouse() and is_enabled else theme.LINE
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
         draw_box(painter, frame, 6, theme.RAISED if on else theme.WINDOW, edge, 1.4 if on else 1.0)
         painter.setOpacity(1.0 if is_enabled else 0.45)
         key_colour = theme.TEXT_DIM if on else theme.TEXT_FAINT
         draw_text(painter, QRectF(9, 0, 12, self.height()), self._key, theme.semi_bold(11), key_colour, CENTER)
-        name = getattr(ON_PICTURE, self._role) if self._role in _DRAWN else theme.of(self._role)
+        if self.role.startswith("STATE_"):
+            name = theme.STATE_COLOUR[PoseState(self.role[-1])]
+        else:
+            name = getattr(ON_PICTURE, self.role) if self.role in _DRAWN else theme.of(self.role)
         is_illegible = theme.contrast(name, theme.RAISED) < _LEGIBLE_CONTRAST  # a pale colour on a light chip
         swatch = QRectF(27, self.height() / 2 - 4, 8, 8)
         draw_box(painter, swatch, 2, name if on else None, theme.TEXT_FAINT if is_illegible else name, 1.5)
+        if self._is_next:
+            enter = QRectF(self.width() - 21, 0, 16, self.height())
+            draw_text(painter, enter, "\N{DOWNWARDS ARROW WITH CORNER LEFTWARDS}", theme.semi_bold(13), theme.SKY, CENTER)
         room = QRectF(41, 0, self.width() - 45, self.height())
         draw_text(painter, room, self.text(), theme.semi_bold(12), theme.TEXT if on else theme.TEXT_DIM)
 
@@ -207,9 +282,20 @@ class AnnotationHeader(QWidget):
 
 
 _ROW = 30
-_MARK = {Status.NEW: "", Status.BEGUN: "\N{HORIZONTAL ELLIPSIS}", Status.DONE: "\N{CHECK MARK}", Status.CANNOT_TELL: "?"}
-_WORD = {Status.NEW: mark("new"), Status.BEGUN: mark("begun"), Status.DONE: mark("done"), Status.CANNOT_TELL: mark("can't tell")}
-_ROLE = {Status.NEW: "TEXT_FAINT", Status.BEGUN: "ORANGE", Status.DONE: "ALLOWED", Status.CANNOT_TELL: "SKY"}
+_WORD = {
+    Status.NEW: mark("new"),
+    Status.BEGUN: mark("begun"),
+    Status.DONE: mark("done"),
+    Status.CANNOT_TELL: mark("can't tell"),
+    Status.NO_ROBOT: mark("no robot"),
+}
+_SHORT = mark("short lines")
+_FROM = {
+    AngleProvenance.ALGORITHM: mark("algorithm"),
+    AngleProvenance.FOLLOWED: mark("followed"),
+    AngleProvenance.CORRECTED: mark("corrected"),
+}
+"""What a row says of lines that were not drawn by hand."""
 _STYLE = """
 QListView { background: @PANEL; outline: none; }
 QScrollBar:vertical { background: transparent; width: 8px; margin: 0; }
@@ -220,12 +306,45 @@ QScrollBar::add-page:vertical, QScrollBar::sub-page:vertical { background: trans
 _Index = QModelIndex | QPersistentModelIndex
 
 
-class QueueModel(QAbstractListModel):
-    """Rows of name, status, and whether there are masks."""
+class Items(Protocol):
+    """What the list shows of each item."""
 
-    def __init__(self, names: list[str], status: Callable[[int], Status], has_masks: Callable[[int], bool]) -> None:
+    def status(self, place: int) -> Status: ...
+    def content(self, place: int) -> Annotation: ...
+    def provenance(self, place: int) -> AngleProvenance: ...
+    def is_short(self, place: int) -> bool: ...
+
+
+class Filter(Enum):
+    """Which items are listed."""
+
+    ALL = mark("All images")
+    OPEN = mark("Without an answer")
+    ANSWERED = mark("Answered")
+    MASKS = mark("With masks")
+    NOTE = mark("With a note")
+    SHORT = mark("With short lines")
+    NOT_BY_HAND = mark("Not drawn by hand")
+
+    def keeps(self, items: Items, place: int) -> bool:
+        """Whether an item is listed."""
+        status, content = items.status(place), items.content(place)
+        kept = {
+            Filter.OPEN: status in (Status.NEW, Status.BEGUN),
+            Filter.ANSWERED: status in ANSWERED,
+            Filter.MASKS: bool(content.masks),
+            Filter.NOTE: bool(content.note),
+            Filter.NOT_BY_HAND: items.provenance(place) is not AngleProvenance.MANUAL,
+        }
+        return items.is_short(place) if self is Filter.SHORT else kept.get(self, True)
+
+
+class QueueModel(QAbstractListModel):
+    """Rows of name, status, masks, and what is particular about the lines."""
+
+    def __init__(self, names: list[str], items: Items) -> None:
         super().__init__()
-        self._names, self._status, self._has_masks = names, status, has_masks
+        self._names, self.items = names, items
 
     def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
         return 0 if parent.isValid() else len(self._names)
@@ -236,14 +355,16 @@ class QueueModel(QAbstractListModel):
         row = index.row()
         if role == Qt.ItemDataRole.DisplayRole:
             return self._names[row]
-        if role == Qt.ItemDataRole.UserRole:
-            return self._status(row)
-        if role == Qt.ItemDataRole.UserRole + 1:
-            return self._has_masks(row)
         if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
-            masks = tr(", with masks") if self._has_masks(row) else ""
-            return f"{row + 1}: {self._names[row]}: {tr(_WORD[self._status(row)])}{masks}"
+            masks = tr(", with masks") if self.items.content(row).masks else ""
+            said = [tr(_WORD[self.items.status(row)]), *(tr(word) for word in self.particulars(row))]
+            return f"{row + 1}: {self._names[row]}: {', '.join(said)}{masks}"
         return None
+
+    def particulars(self, row: int) -> list[str]:
+        """Words on lines that are short, or were not drawn by hand."""
+        source = _FROM.get(self.items.provenance(row))
+        return [*([_SHORT] if self.items.is_short(row) else []), *([source] if source is not None else [])]
 
     def update_row(self, row: int) -> None:
         """The status of a row has changed."""
@@ -252,13 +373,15 @@ class QueueModel(QAbstractListModel):
 
 
 class _QueueRow(QStyledItemDelegate):
-    """Number, name, and the status as a sign in its colour."""
+    """Number, name, particulars of the lines, masks of vessel and robot, and the answer: a tick, or a word."""
 
     def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
         return QSize(120, _ROW)
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: _Index) -> None:
-        status, has_masks = index.data(Qt.ItemDataRole.UserRole), index.data(Qt.ItemDataRole.UserRole + 1)
+        model, row = index.model(), index.row()
+        assert isinstance(model, QueueModel)
+        status, content = model.items.status(row), model.items.content(row)
         box = QRectF(option.rect).adjusted(1, 1, -1, -1)  # type: ignore[attr-defined]
         is_current = bool(option.state & QStyle.StateFlag.State_Selected)  # type: ignore[attr-defined]
         painter.save()
@@ -268,12 +391,25 @@ class _QueueRow(QStyledItemDelegate):
         draw_text(painter, box.adjusted(6, 0, 0, 0), str(index.row() + 1), theme.font(12), theme.TEXT_FAINT)
         name_font = theme.semi_bold(13) if is_current else theme.font(13)
         name_colour = theme.TEXT if is_current or status is Status.NEW else theme.TEXT_DIM
-        draw_text(painter, box.adjusted(44, 0, -52, 0), index.data(), name_font, name_colour, elided=True)
         right = box.right() - 8
-        if has_masks:
-            draw_box(painter, QRectF(right - 36, box.center().y() - 5, 10, 10), 3, theme.colour(theme.VESSEL, 0.8))
-        sign = QRectF(right - 18, box.top(), 18, box.height())
-        draw_text(painter, sign, _MARK[status], theme.bold(14), theme.of(_ROLE[status]), CENTER)
+        words = [(tr(word), theme.ORANGE) for word in model.particulars(row)]
+        if status is Status.DONE:
+            letter = content.state.value if content.state is not None else ""
+            words.append((f"{letter} \N{CHECK MARK}", theme.ALLOWED))
+        elif status is not Status.NEW:
+            words.append((tr(_WORD[status]), theme.ORANGE if status is Status.BEGUN else theme.SKY))
+        small = theme.semi_bold(12)
+        for word, colour in reversed(words):
+            width = QFontMetrics(small).horizontalAdvance(word) + 2
+            draw_text(painter, QRectF(right - width, box.top(), width, box.height()), word, small, colour)
+            right -= width + 8
+        for target in (MaskTarget.ROBOT, MaskTarget.VESSEL):
+            if target in content.drawn:
+                colour = theme.ROBOT if target is MaskTarget.ROBOT else theme.VESSEL
+                draw_box(painter, QRectF(right - 10, box.center().y() - 5, 10, 10), 3, theme.colour(colour, 0.8))
+                right -= 14
+        name = QRectF(box.left() + 44, box.top(), max(0.0, right - box.left() - 48), box.height())
+        draw_text(painter, name, index.data(), name_font, name_colour, elided=True)
         painter.restore()
 
 
@@ -297,15 +433,28 @@ class QueueList(QWidget):
         self._view.setAccessibleName(tr("Images"))
         self._view.activated.connect(lambda index: self.chosen.emit(index.row()))
         self._view.clicked.connect(lambda index: self.chosen.emit(index.row()))
+        self._filter = QComboBox()
+        for kind in Filter:
+            self._filter.addItem(tr(kind.value), kind)
+        name_list(self._filter, tr("Which images are listed"))
+        self._filter.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self._filter.currentIndexChanged.connect(lambda _index: self._show_rows())
         self._progress = _ProgressBar()
         self.show_progress = self._progress.show_progress
-        self.setLayout(column(self._progress, (self._view, 1), spacing=6))
+        self.setLayout(column(self._progress, self._filter, (self._view, 1), spacing=6))
 
     @property
     def progress_text(self) -> str:
         return self._progress.text
 
+    def _show_rows(self) -> None:
+        chosen = self._filter.currentData()
+        for row in range(self._model.rowCount()):
+            self._view.setRowHidden(row, not chosen.keeps(self._model.items, row))
+
     def show_current(self, row: int) -> None:
+        if self._filter.currentData() is not Filter.ALL:
+            self._show_rows()
         index = self._model.index(row)
         self._view.setCurrentIndex(index)
         self._view.scrollTo(index)
@@ -349,28 +498,32 @@ class AnnotationReadout(PaintedWidget):
         self._annotation = Annotation()
         self._readout = Readout()
         self._is_preview = False
+        self._source = ""
 
     @property
     def angle_text(self) -> str:
         pose = self._readout.pose
-        return NONE if pose is None else f"{pose.theta_deg:.1f}°"
+        if pose is None:
+            return tr("hidden") if self._readout.is_hidden else NONE
+        return f"{pose.theta_deg:.1f}°"
 
     @property
     def state_text(self) -> str:
         """The line beside the badge."""
         annotation, pose = self._annotation, self._readout.pose
-        if annotation.cannot_tell:
-            return tr("Can't tell")
-        if annotation.state is not None:
-            return tr(STATE_TITLE[annotation.state])
-        return tr("No state yet") if pose is not None else tr("No state")
+        given = Answer.of(annotation)
+        if given is not None:
+            return tr(given.value.label)
+        return tr("No state yet") if pose is not None or self._readout.is_hidden else tr("No state")
 
     @property
     def advice_text(self) -> str:
         """What the lines say of the state, or what is missing."""
         annotation, pose = self._annotation, self._readout.pose
-        if annotation.cannot_tell:
-            return tr("X takes it back")
+        if annotation.without_pose:
+            return tr("{key} takes it back", key="X" if annotation.cannot_tell else "O")
+        if self._readout.is_hidden:
+            return tr("Blind: press A B C D; then theta is shown")
         if pose is None:
             missing = tr_text(self._readout.missing)
             return missing[:1].upper() + missing[1:]
@@ -380,10 +533,15 @@ class AnnotationReadout(PaintedWidget):
             return tr("The lines say {state}, by the rule", state=pose.state.value)
         return tr("The lines say the same")
 
-    def show_annotation(self, annotation: Annotation, readout: Readout, *, is_preview: bool = False) -> None:
-        """`is_preview`: a point is still moving."""
+    def show_annotation(
+        self, annotation: Annotation, readout: Readout, source: AngleProvenance = AngleProvenance.MANUAL, *, is_preview: bool = False
+    ) -> None:
+        """`source` is where the lines come from; `is_preview`: a point is still moving."""
         self._annotation, self._readout, self._is_preview = annotation, readout, is_preview
-        self.setAccessibleDescription(f"{tr('theta')} {self.angle_text}; {self.state_text}; {self.advice_text}")
+        self._source = _FROM.get(source, "")
+        words = [f"{tr('theta')} {self.angle_text}", self.state_text, self.advice_text]
+        words += [tr(self._source)] if self._source else []
+        self.setAccessibleDescription("; ".join([*words, *([short_words(readout)] if readout.is_short else [])]))
         self.update()
 
     def paint(self, painter: QPainter) -> None:
@@ -392,14 +550,16 @@ class AnnotationReadout(PaintedWidget):
         self._paint_state(painter)
 
     def _paint_angle(self, painter: QPainter) -> None:
-        pose, left, width = self._readout.pose, self.width() * 0.62, self.width() * 0.38
+        pose = self._readout.pose
+        draw_text(painter, QRectF(0, 0, 40, 72), "\N{GREEK SMALL LETTER THETA}", theme.semi_bold(34), theme.TEXT_DIM)
         angle_font, colour = theme.bold(58 if pose is not None else 34), theme.THETA if pose is not None else theme.TEXT_FAINT
-        draw_text(painter, QRectF(0, 0, left, 72), self.angle_text, angle_font, colour)
+        draw_text(painter, QRectF(40, 0, self.width() - 40, 72), self.angle_text, angle_font, colour)
+        left = 40.0 + QFontMetrics(angle_font).horizontalAdvance(self.angle_text) + 10.0
         turn = side(pose.theta_signed_deg) if pose is not None and pose.theta_deg >= 0.05 else ""
-        turn_colour, text = theme.TEXT if pose is not None else theme.TEXT_FAINT, f"\N{GREEK SMALL LETTER THETA} {turn}"
-        draw_text(painter, QRectF(left, 14, width, 20), text, theme.semi_bold(14), turn_colour)
-        moving = tr("moving") if self._is_preview else ""
-        draw_text(painter, QRectF(left, 36, width, 18), moving, theme.font(12), theme.TEXT_DIM)
+        draw_text(painter, QRectF(left, 12, self.width() - left, 24), turn, theme.semi_bold(20), theme.TEXT)
+        if self._is_preview or self._source:
+            word, colour = (tr("moving"), theme.TEXT_DIM) if self._is_preview else (tr(self._source), theme.ORANGE)
+            draw_text(painter, QRectF(left, 38, self.width() - left, 20), word, theme.semi_bold(14), colour)
 
     def _paint_distances(self, painter: QPainter) -> None:
         """Distances, and the arc lengths that the vectors are fitted to: shorter ones are less certain."""
@@ -410,8 +570,10 @@ class AnnotationReadout(PaintedWidget):
             ("d_head", f"{pose.d_head_px:.1f} px" if pose else NONE, theme.D_HEAD),
             ("d_tail", f"{pose.d_tail_px:.1f} px" if pose else NONE, theme.D_TAIL),
             (tr("crossed"), (tr("yes") if pose.crossed else tr("no")) if pose else NONE, theme.TEXT),
-            (tr("lines used"), lengths if readout.robot_vector is not None else NONE, theme.TEXT),
+            (tr("lines used"), lengths if readout.robot_length_px else NONE, theme.TEXT),
         )
+        if readout.is_short:
+            cells = (*cells[:3], (tr("short lines"), lengths, theme.ORANGE))
         width = self.width() / len(cells)
         for place, (name, value, colour) in enumerate(cells):
             value_font = theme.fitted(theme.semi_bold(15), value, int(width - 4))
@@ -423,16 +585,17 @@ class AnnotationReadout(PaintedWidget):
         annotation, pose = self._annotation, self._readout.pose
         painter.setPen(QPen(QColor(theme.LINE), 1))
         painter.drawLine(QPointF(0, 131), QPointF(self.width(), 131))
-        box, shown = QRectF(2, 146, 62, 62), None if annotation.cannot_tell else annotation.state
-        if annotation.cannot_tell:
+        box, shown = QRectF(2, 146, 62, 62), None if annotation.without_pose else annotation.state
+        if annotation.without_pose:
             painter.setPen(QPen(QColor(theme.TEXT_DIM), 2, Qt.PenStyle.DashLine))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawEllipse(box.adjusted(3, 3, -3, -3))
-            draw_text(painter, box, "?", theme.bold(30), theme.TEXT, CENTER)
+            sign = "?" if annotation.cannot_tell else "\N{EMPTY SET}"
+            draw_text(painter, box, sign, theme.bold(30), theme.TEXT, CENTER)
         else:
             paint_state(painter, box, shown)
         left, width = 80.0, self.width() - 80.0
-        colour = theme.TEXT if shown or annotation.cannot_tell else theme.TEXT_DIM
+        colour = theme.TEXT if shown or annotation.without_pose else theme.TEXT_DIM
         draw_text(painter, QRectF(left, 148, width, 26), self.state_text, theme.bold(20), colour)
         differs = shown is not None and pose is not None and pose.state is not shown
         painter.setFont(theme.font(13))

@@ -42,6 +42,7 @@ class StudyOptions:
     turn: bool = False
     seed: int | None = None
     order: str | None = None
+    show_angle: bool | None = None
 
     @property
     def name(self) -> str:

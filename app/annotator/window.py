@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject
-from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QMessageBox, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QInputDialog, QMainWindow, QMessageBox, QWidget
 
 from app.annotator.canvas import CANVAS_KEYS, AnnotationCanvas
 from app.annotator.editing import RADIUS_NOTCH, MaskMode, Tool
+from app.annotator.files import IMPORTED, AnnotationFiles
 from app.annotator.model import AnnotationModel
-from app.annotator.panels import AnnotationBar, AnnotationHeader, AnnotationReadout, QueueList, QueueModel
+from app.annotator.panels import AnnotationBar, AnnotationHeader, AnnotationReadout, Answer, QueueList, QueueModel
 from app.player.controls import NoteField
 from app.training.dialog import TrainingDialog
 from app.training.model import collect_from_store
@@ -23,11 +25,9 @@ from app.ui.texts import refusal_text
 from app.ui.window_base import WindowFrame
 from app.widgets.basics import Card, Columns, column, holder, set_window_margins, side
 from app.widgets.image_canvas import LightSliders
-from app.widgets.messages import Toast
+from app.widgets.messages import Offer, OfferButton, OfferStrip, Toast
 from app.widgets.shortcut_page import KeyPage
-from core.annotation.model import Annotation, Readout
-from core.annotation.store import TAKES_LINES
-from core.types import PoseState
+from core.annotation.model import TAKES_LINES, Annotation, Readout
 
 _ZOOM_STEP = 1.3
 
@@ -38,9 +38,16 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
     canvas, bar, light = panels.canvas, panels.bar, panels.light
     window.add_file_menu(
         [
-            MenuEntry(tr("Where is it &saved?"), window.show_where_saved, ("Ctrl+S",)),
+            MenuEntry(tr("&Open..."), window.files.ask_open, ("Ctrl+O",)),
+            MenuEntry(tr("&Import..."), window.files.ask_import, ("Ctrl+I",)),
+            MenuEntry(tr("&Export..."), window.files.ask_export, ("Ctrl+E",)),
+            MenuEntry(tr("&Report of the raters"), window.files.report, ("Ctrl+R",)),
+            MenuEntry(tr("Report of the &algorithm"), window.files.evaluate),
             None,
+            MenuEntry(tr("Next r&ater..."), window.ask_rater),
             MenuEntry(tr("&Train on my annotations..."), window.train),
+            None,
+            MenuEntry(tr("Show where it is &saved"), window.show_where_saved, ("Ctrl+S",)),
         ]
     )
     view = window.add_view_menu(
@@ -49,19 +56,24 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("Zoom &out"), partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
             MenuEntry(tr("&Close-up of the head"), canvas.close_up, ("Z",)),
             MenuEntry(tr("&Whole picture"), canvas.fit, ("F", "0")),
+            MenuEntry(tr("&Keep the zoom from picture to picture"), window.toggle_keeps_zoom, checked=True),
             None,
             MenuEntry(tr("More contrast"), partial(light.step, 1), (".",)),
             MenuEntry(tr("Less contrast"), partial(light.step, -1), (",",)),
             MenuEntry(tr("Brighter"), partial(light.step, 0, 1), (">",)),
             MenuEntry(tr("Darker"), partial(light.step, 0, -1), ("<",)),
-            MenuEntry(tr("Picture as it is"), light.reset, ("/",)),
+            MenuEntry(tr("Contrast and brightness as &recorded"), light.reset, ("/",)),
             None,
-            MenuEntry(tr("&Loupe"), partial(bar.toggle, "L"), ("L",)),
-            MenuEntry(tr("&Masks"), partial(bar.toggle, "K"), ("K",)),
-            MenuEntry(tr("&Algorithm"), window.toggle_proposal, ("H",)),
+            MenuEntry(tr("&Loupe"), partial(bar.toggle, "L"), ("L",), checked=True),
+            MenuEntry(tr("&Masks"), partial(bar.toggle, "K"), ("K",), checked=True),
+            MenuEntry(tr("&Algorithm"), window.toggle_proposal, ("H",), checked=False),
         ]
     )
-    states = [MenuEntry(tr("State {state}", state=s.value), partial(window.set_state, s), (s.value,)) for s in PoseState]
+    switches = dict(zip("LKH", view[-4:-1], strict=True))
+    bar.shown.connect(lambda key, on: switches[key].setChecked(on))
+    answers = [
+        MenuEntry(tr("Answer: {answer}", answer=tr(one.value.label)), partial(window.give, one), (one.value.key,)) for one in Answer
+    ]
     edits = add_menu(
         window,
         tr("&Edit"),
@@ -69,13 +81,12 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("&Undo"), window.undo, ("Ctrl+Z",)),
             MenuEntry(tr("&Redo"), window.redo, ("Ctrl+Shift+Z", "Ctrl+Y")),
             None,
-            *states,
-            MenuEntry(tr("Can't tell"), window.toggle_cannot_tell, ("X",)),
-            MenuEntry(tr("&Note"), window.edit_note, ("F2",)),
+            *answers,
+            MenuEntry(tr("&Note"), window.edit_note, ("M", "F2")),
             None,
-            MenuEntry(tr("Take the &algorithm's"), window.apply_proposal, ("G",)),
-            MenuEntry(tr("&Masks as in another image"), window.carry_masks, ("M",)),
-            MenuEntry(tr("&Simplify outlines"), window.simplify, ("S",)),
+            MenuEntry(tr("Take the &algorithm's lines, or mask"), window.apply_proposal, ("G",)),
+            MenuEntry(tr("&Masks as in another image"), window.carry_masks, ("V",)),
+            MenuEntry(tr("&Fewer points on outlines"), window.simplify, ("S",)),
         ],
     )
     for action in edits[:2]:
@@ -101,7 +112,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("Next &without an answer"), window.go_open, ("U",)),
             MenuEntry(tr("&First"), partial(window.open, 0), ("Home",)),
             MenuEntry(tr("&Last"), partial(window.open, len(window.model.items) - 1), ("End",)),
-            MenuEntry(tr("Lis&t"), panels.queue.focus_list, ("F6",)),
+            MenuEntry(tr("Lis&t of images"), panels.queue.focus_list, ("F6",)),
         ],
     )
     for action in (*go[:2], *view[:2], *view[4:8], *drawing[-2:]):
@@ -113,7 +124,7 @@ _MOUSE = (
     mark("In the picture, by mouse"),
     (
         (mark("Click, drag"), mark("set a point; move one")),
-        (mark("Double click"), mark("end the line, take the state, go on")),
+        (mark("Double click"), mark("end the line")),
         (mark("Right click"), mark("take a point out; brush, region, tube: take away")),
         (mark("Wheel"), mark("zoom at the cursor; brush, region, tube: size, with Ctrl zoom")),
     ),
@@ -147,8 +158,8 @@ class AnnotatorPanels(QWidget):
         self.bar = AnnotationBar(blind=model.blind)
         self.header = AnnotationHeader(who)
         self.light = LightSliders()
-        self.note = NoteField(tr("Note on this image  (F2)"))
-        self.queue = QueueList(QueueModel(names, model.status, model.has_masks))
+        self.note = NoteField(tr("Note on this image  (M)"))
+        self.queue = QueueList(QueueModel(names, model))
         left = column((self.header, 0), (self.canvas, 1), (self.bar, 0), spacing=_LEFT_GAP)
         right = column(
             (Card(tr("Angle to the vessel"), self.readout), 0),
@@ -162,9 +173,13 @@ class AnnotatorPanels(QWidget):
         room.addWidget(self.columns)
         self.help = KeyPage(self, annotation_keys)
         self.toast = Toast(self.canvas)
+        self.offers = OfferStrip(self.canvas)
+        self.offers.lifted.connect(self.toast.lift)
 
 
-_CANNOT_TELL = "can't tell"
+_DONE = "done"
+"""Key of the offer after the last image."""
+_TAKEN_BACK = {Answer.CANNOT_TELL: "can tell", Answer.NO_ROBOT: "there is a robot"}
 
 
 class AnnotatorWindow(WindowFrame):
@@ -174,9 +189,10 @@ class AnnotatorWindow(WindowFrame):
     ----------
     model : queue, edits, disk; the window shuts it down when it closes.
     who : study and rater, as they are shown.
+    paths : where the images are, for the commands that report and export.
     """
 
-    def __init__(self, model: AnnotationModel, who: str) -> None:
+    def __init__(self, model: AnnotationModel, who: str, paths: Sequence[Path] = ()) -> None:
         super().__init__()
         self.setMinimumWidth(theme.MIN_WIDE_PX)
         self.model = model
@@ -184,15 +200,20 @@ class AnnotatorWindow(WindowFrame):
         self._training: TrainingDialog | None = None
         self._carried: Annotation | None = None
         """Masks that another image's lead to: a proposal, until it is taken or hidden."""
+        self._takes_proposal = False
+        """The algorithm's answer is taken over as soon as it comes."""
+        self.next_rater = ""
+        """Who annotates these images next, once this window is closed."""
         # In a blind study no name tells that an image was there before.
         names = [item.image.path.name for item in model.items]
         if model.blind:
             names = [tr("image {place}", place=place) for place in range(1, len(model.items) + 1)]
         self.panels = AnnotatorPanels(model, who, names)
         self.setCentralWidget(self.panels)
+        self.files = AnnotationFiles(self, model, self.panels.offers, paths)
         add_annotator_menus(self)
         self._connect()
-        self.setWindowTitle(tr("LumenPilot \N{EM DASH} annotate"))
+        self.setWindowTitle(tr("LumenPilot \N{EM DASH} annotate {name}", name=model.store.path.absolute().parent.name))
 
     def _connect(self) -> None:
         model, panels, canvas = self.model, self.panels, self.panels.canvas
@@ -203,6 +224,9 @@ class AnnotatorWindow(WindowFrame):
         model.failed.connect(self._on_failed)
         model.proposed.connect(self._show_proposal)
         model.carried.connect(self._show_carried)
+        self.files.said.connect(self.show_message)
+        self.others.said.connect(self.show_message)
+        panels.bar.answered.connect(self.give)
         canvas.edited.connect(self._on_edited)
         canvas.previewed.connect(self._on_previewed)
         canvas.line_ended.connect(self._on_line_ended)
@@ -256,20 +280,46 @@ class AnnotatorWindow(WindowFrame):
         elif left:
             self.show_message(tr("The last image. {left} without an answer: U goes there", left=left))
         else:
-            self.show_message(tr("The last image. All are done"))
+            self._offer_end()
+
+    def _offer_end(self) -> None:
+        """All images are answered: what comes next."""
+        is_study = self.model.blind
+        report = OfferButton(tr("Report"), self.files.report, tr("How well the raters agree, with each other and themselves"))
+        rater = OfferButton(tr("Next rater..."), self.ask_rater, tr("The same images for somebody else"))
+        judged = OfferButton(tr("Evaluate"), self.files.evaluate, tr("The algorithm against these answers, as a report"))
+        export = OfferButton(tr("Export..."), self.files.ask_export, tr("Training set, table, or masks for other programs"))
+        answers = (rater, report, judged, export) if is_study else (judged, report, rater, export)
+        count = len(self.model.items)
+        self.panels.offers.offer(Offer(_DONE, tr("All {count} images have an answer", count=count), "", answers))
+
+    def ask_rater(self) -> None:
+        """Who annotates next; this window closes, and opens for them."""
+        rater = self.model.items[0].key.rater
+        dialog = QInputDialog(self)
+        dialog.setWindowTitle(tr("Next rater"))
+        dialog.setLabelText(tr("Who annotates next? Now it is {rater}.", rater=rater))
+        dialog.textValueSelected.connect(self._on_rater)
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
+
+    def _on_rater(self, text: str) -> None:
+        self.next_rater = text.strip()
+        if self.next_rater and not self.close():
+            self.next_rater = ""
 
     def go_open(self) -> None:
         """To the next item without an answer."""
         place = self.model.next_open(self.model.index)
         if place is None:
-            self.show_message(tr("All images have an answer"))
+            self._offer_end()
         else:
             self.open(place)
 
     def _on_opened(self) -> None:
         annotation, canvas = self.model.annotation, self.panels.canvas
         self.panels.note.setText(annotation.note)  # also while it has the focus: its text was the last picture's
-        canvas.show_image(self.model.levels, annotation, self.model.measure)
+        canvas.show_image(self.model.levels, annotation, self.model.shown_readout)
         canvas.set_mask_mode(MaskMode.POINTS)
         tool = Tool.VESSEL if len(annotation.robot) > 1 and len(annotation.vessel) < 2 else Tool.ROBOT
         if tool is not canvas.tool:
@@ -280,7 +330,9 @@ class AnnotatorWindow(WindowFrame):
 
     def _show_annotation(self) -> None:
         annotation = self.model.annotation
-        self.panels.readout.show_annotation(annotation, self.model.measure(annotation))
+        readout = self.model.shown_readout(annotation)
+        self.panels.readout.show_annotation(annotation, readout, self.model.history.provenance)
+        self.panels.bar.show_answer(annotation, readout)
         if not self.panels.note.hasFocus():
             self.panels.note.setText(annotation.note)
 
@@ -312,7 +364,9 @@ class AnnotatorWindow(WindowFrame):
             self.model.edit(action, annotation)
 
     def _on_previewed(self, annotation: Annotation, readout: Readout) -> None:
-        self.panels.readout.show_annotation(annotation, readout, is_preview=self.panels.canvas.is_moving)
+        source = self.model.history.provenance
+        self.panels.readout.show_annotation(annotation, readout, source, is_preview=self.panels.canvas.is_moving)
+        self.panels.bar.show_answer(annotation, readout)
 
     def _on_line_ended(self, tool: Tool) -> None:
         """From one line to the other, as long as one is missing."""
@@ -323,35 +377,42 @@ class AnnotatorWindow(WindowFrame):
             self.set_tool(Tool.ROBOT)
         else:
             self._show_annotation()
+        readout = self.model.shown_readout(annotation)
+        if annotation.state is None and readout.pose is not None:
+            self.panels.bar.show_hint(
+                tr("Enter takes {state}, as the lines say \N{MIDDLE DOT} or A B C D, X, O", state=readout.pose.state)
+            )
+        elif annotation.state is None and readout.is_hidden:
+            self.panels.bar.show_hint(tr("Now the state as you see it: A B C D, X or O"))
 
     def _on_ended(self) -> None:
-        """Enter with both lines drawn takes the state that they say; once more goes on."""
+        """Enter with both lines drawn takes the state that they say, where the rater may see it; once more goes on."""
         annotation = self.model.annotation
         readout = self.model.measure(annotation)
-        if readout.pose is not None and annotation.state is None and not annotation.cannot_tell:
-            self.set_state(readout.pose.state)
-        elif annotation.cannot_tell or (readout.pose is not None and annotation.state is not None):
+        if annotation.without_pose or (readout.pose is not None and annotation.state is not None):
             self.step(1)
+        elif readout.pose is None:
+            missing = tr_text(readout.missing)
+            self.show_message(tr("Not complete: {missing}; or X, can't tell; or O, no robot", missing=missing))
+        elif self.model.is_hidden:
+            self.show_message(tr("A blind study: choose the state yourself, A B C D"))
         else:
-            self.show_message(tr("Not complete: {missing}; or X, can't tell", missing=tr_text(readout.missing)))
+            self.give(next(one for one in Answer if one.value.state is readout.pose.state))
 
-    def set_state(self, state: PoseState) -> None:
-        """The rater's answer for the pose."""
+    def give(self, answer: Answer) -> None:
+        """The rater's answer. One without a pose is taken back by giving it again; at once, the state from before is back."""
         self.panels.canvas.complete()
         self.panels.canvas.close_line()
-        self.model.edit(f"state {state.value}", replace(self.model.annotation, state=state, cannot_tell=False))
-
-    def toggle_cannot_tell(self) -> None:
-        """Set or take back the answer "can't tell"; taken back at once, it restores the state from before."""
-        self.panels.canvas.complete()
-        annotation = self.model.annotation
-        self.panels.canvas.close_line()
-        if annotation.cannot_tell and self.model.history.undo_action == _CANNOT_TELL:
-            self.model.undo()
-        elif annotation.cannot_tell:
-            self.model.edit("can tell", replace(annotation, cannot_tell=False))
-        else:
-            self.model.edit(_CANNOT_TELL, replace(annotation, cannot_tell=True, state=None))
+        annotation, state = self.model.annotation, answer.value.state
+        action = f"state {state.value}" if state is not None else answer.value.label.lower()
+        if state is None and Answer.of(annotation) is answer:
+            if self.model.history.undo_action == action:
+                self.model.undo()
+                return
+            self.model.edit(_TAKEN_BACK[answer], replace(annotation, cannot_tell=False, no_robot=False))
+            return
+        flags = {"cannot_tell": answer is Answer.CANNOT_TELL, "no_robot": answer is Answer.NO_ROBOT}
+        self.model.edit(action, replace(annotation, state=state, **flags))
 
     def undo(self) -> None:
         """Back one edit, and say which; while an outline is drawn, its last point."""
@@ -391,7 +452,7 @@ class AnnotatorWindow(WindowFrame):
         if self.panels.canvas.tool.is_mask:
             self.panels.canvas.simplify_masks()
         else:
-            self.show_message(tr("Simplify is for masks: 3 or 4 first"))
+            self.show_message(tr("Fewer points are for masks: 3 or 4 first"))
 
     # ---- tools and switches
 
@@ -430,6 +491,10 @@ class AnnotatorWindow(WindowFrame):
             canvas.show_proposal(None)
         canvas.setFocus()
 
+    def toggle_keeps_zoom(self) -> None:
+        """Whether the next picture is shown as magnified as this one."""
+        self.panels.canvas.keeps_zoom = not self.panels.canvas.keeps_zoom
+
     # ---- the algorithm
 
     def toggle_proposal(self) -> None:
@@ -445,12 +510,17 @@ class AnnotatorWindow(WindowFrame):
         if proposal is None or not self.model.is_open or not self.panels.bar.is_on("H"):
             return
         self.model.record_proposal_seen()
-        self.panels.canvas.show_proposal(self.model.proposed_annotation)
-        if proposal.pose is not None:
+        proposed = self.model.proposed_annotation
+        self.panels.canvas.show_proposal(proposed)
+        pose = self.model.measure(proposed).pose or proposal.pose
+        if self._takes_proposal:
+            self.apply_proposal()
+            return
+        if pose is not None:
             text = tr(
                 "Algorithm: θ {theta:.1f}°, state {state}, confidence {confidence:.2f}. G takes it over",
-                theta=proposal.pose.theta_deg,
-                state=proposal.pose.state.value,
+                theta=pose.theta_deg,
+                state=pose.state.value,
                 confidence=proposal.confidence,
             )
         else:
@@ -460,7 +530,7 @@ class AnnotatorWindow(WindowFrame):
 
     def _hide_proposal(self) -> None:
         self.panels.bar.set_switch("H", False)
-        self._carried = None
+        self._carried, self._takes_proposal = None, False
         self.panels.canvas.show_proposal(None)
 
     def carry_masks(self) -> None:
@@ -480,7 +550,7 @@ class AnnotatorWindow(WindowFrame):
         self._hide_proposal()
         self._carried = proposal
         self.panels.canvas.show_proposal(proposal)
-        self.show_message(tr("Proposed from {name}, dotted: G takes the masks over, M hides them", name=name))
+        self.show_message(tr("Proposed from {name}, dotted: G takes the masks over, V hides them", name=name))
 
     def _apply_carried(self, proposal: Annotation) -> None:
         """The masks of the mask tool, or with a line tool both."""
@@ -500,7 +570,8 @@ class AnnotatorWindow(WindowFrame):
         if self._carried is not None:
             self._apply_carried(self._carried)
             return
-        if self.model.proposal is None:
+        if self.model.proposal is None or not self.panels.bar.is_on("H"):
+            self._takes_proposal = True
             if self.model.blind or not self.panels.bar.is_on("H"):  # else the answer is waited for
                 self.toggle_proposal()
             return
@@ -514,7 +585,9 @@ class AnnotatorWindow(WindowFrame):
                 self.show_message(tr("The algorithm found no {what}", what=tr_text(target.value)))
         elif proposed.robot or proposed.vessel:
             self.panels.canvas.close_line()
-            self.model.edit(TAKES_LINES, replace(annotation, robot=proposed.robot, vessel=proposed.vessel, cannot_tell=False))
+            taken_over = {"robot": proposed.robot, "vessel": proposed.vessel}
+            self.model.edit(TAKES_LINES, replace(annotation, **taken_over, cannot_tell=False, no_robot=False))
+            self.show_message(tr("The algorithm's lines are yours now: correct them, Enter goes on, Ctrl+Z takes them back"))
         else:
             self.show_message(tr("The algorithm has no lines here"))
         self._hide_proposal()
@@ -575,7 +648,16 @@ class AnnotatorWindow(WindowFrame):
         box.exec()
         return box.clickedButton() is not stay
 
+    def open_path(self, path: Path) -> None:
+        """A file of another program is imported; everything else opens in a window of its own."""
+        if path.suffix.lower() in IMPORTED:
+            self.model.import_files([path])
+        else:
+            self.others.open_path(path, "--rater", self.model.items[0].key.rater)
+
     def _let_go(self) -> None:
+        self.others.leave()
+        self.files.close()
         if self._training is not None:
             self._training.end()
         self.panels.canvas.removeEventFilter(self)

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -33,10 +33,13 @@ from core.annotation.study import QueueOrder, StudySettings, Task, queue_order, 
 from core.config.files import own_config
 from core.config.models import Config, choose_model, load_config
 from core.devices import UserError
+from core.files import write_atomic
 from core.perception import compiled
 from core.types import Frame
 
 if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
     from app.annotator.model import QueueEntry
 
 
@@ -68,8 +71,8 @@ def queue_of(
         if not queue:
             raise AnnotationError(f"study {options.name!r}: none of its {len(settings.images)} images is here")
     else:
-        if options.repeats not in (None, 1) or options.mirror or options.turn:
-            raise AnnotationError("--repeats, --mirror and --turn belong to a study: give it a name with --study")
+        if options.repeats not in (None, 1) or options.mirror or options.turn or options.show_angle is not None:
+            raise AnnotationError("--repeats, --mirror, --turn and --show-angle belong to a study: give it a name with --study")
         order = _order(options.order, QueueOrder.LISTED)
         listed = [image.sha256 for image in images]
         if order is QueueOrder.RANDOM:
@@ -95,7 +98,7 @@ def _settings(store: AnnotationStore, images: Sequence[FoundImage], options: Stu
         order = _order(options.order, QueueOrder.RANDOM)
         views = repeat_views(options.repeats or 2, mirror=options.mirror, turn=options.turn)
         listed = queue_order([image.sha256 for image in images], order, _certainty(store, images, order, config))
-        settings = StudySettings(listed, views, order, options.seed or 0)
+        settings = StudySettings(listed, views, order, options.seed or 0, hides_angle=not options.show_angle)
         store.begin_study(options.name, settings.to_json())
         return settings
     settings = settings_from(kept, f"study {options.name!r}")
@@ -106,11 +109,12 @@ def _settings(store: AnnotationStore, images: Sequence[FoundImage], options: Stu
         (given and asked_views != settings.views)
         or (options.seed is not None and options.seed != settings.seed)
         or (options.order is not None and _order(options.order, settings.order) is not settings.order)
+        or (options.show_angle is not None and options.show_angle is settings.hides_angle)
     )
     if differs:
-        shown = ", ".join(view.value for view in settings.views)
-        was = f"shown {settings.repeats} times ({shown}), order {settings.order.value}, seed {settings.seed}"
-        raise AnnotationError(f"study {options.name!r} was begun otherwise: {was}; leave these options out, or choose another name")
+        raise AnnotationError(
+            f"study {options.name!r} was begun otherwise: {settings.words}; leave these options out, or choose another name"
+        )
     return settings
 
 
@@ -122,7 +126,7 @@ def _certainty(store: AnnotationStore, images: Sequence[FoundImage], order: Queu
     from core.perception.pipeline import open_pipeline
 
     measured = {
-        one.key.sha256: one.theta_deg for one in store.annotations() if one.theta_deg is not None and not one.content.cannot_tell
+        one.key.sha256: one.theta_deg for one in store.annotations() if one.theta_deg is not None and not one.content.without_pose
     }
     pipeline = open_pipeline(config.perception)
     certainty = {}
@@ -160,10 +164,11 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
             drawn, measured = of_rater(of_all, options.study.rater), finished(annotations)
         count, problems = export_training_set(drawn, images, options.out, measured=measured)
         print_warnings(problems)
-        sys.stderr.write(f"{count} frames with both masks in {options.out}: train --data {options.out}\n")
+        said = f"{count} image{'s' if count != 1 else ''} with both masks in {options.out}"
+        sys.stderr.write(f"{said}; next: python main.py train --data {options.out} --init default --out MODEL\n")
     elif options.export == "coco":
         count = export_coco(annotations, images, options.out)
-        sys.stderr.write(f"masks of {count} images in {options.out}\n")
+        sys.stderr.write(f"masks of {count} image{'s' if count != 1 else ''} in {options.out}\n")
     else:
         from app.annotator.comparison import comparable_answers, compare_with_algorithm
 
@@ -177,7 +182,12 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
             write_measurements(options.out, rows)
         except OSError as error:
             raise AnnotationError(f"{options.out}: cannot be written ({error.strerror}); choose another --out") from None
-        sys.stderr.write(f"{len(rows)} images in {options.out}: evaluate --csv {options.out} --out DIR\n")
+        said = f"{len(rows)} image{'s' if len(rows) != 1 else ''} in {options.out}"
+        sys.stderr.write(f"{said}; next: python main.py evaluate --csv {options.out} --out DIR\n")
+        unfinished = {one.key.sha256 for one in annotations} - {one.key.sha256 for one in finished(annotations)}
+        begun = sorted(image.path.name for image in images if image.sha256 in unfinished)
+        if begun:
+            print_warnings([f"{name}: begun only, not answered; left out" for name in begun])
         if missed:
             raise KeyboardInterrupt
     return 0
@@ -271,6 +281,10 @@ def annotate(
     turn: Annotated[bool, typer.Option("--turn", help="repeats of a study are shown turned by 180 degrees")] = False,
     order: Annotated[str | None, typer.Option(help="listed, random, worst (least sure first) or even (evenly over time)")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="of the shuffled order")] = None,
+    show_angle: Annotated[
+        bool | None,
+        typer.Option("--show-angle/--hide-angle", help="a study shows theta while the lines are drawn; default: after the answer"),
+    ] = None,
     frames: Annotated[
         int | None,
         typer.Option(min=1, max=100_000, help="pictures taken of each video, evenly; default: those taken before, or 48"),
@@ -299,7 +313,7 @@ def annotate(
     options = AnnotateOptions(
         paths=tuple(paths or ()),
         store=store,
-        study=StudyOptions(study, rater, repeats, mirror, turn, seed, order),
+        study=StudyOptions(study, rater, repeats, mirror, turn, seed, order, show_angle),
         frames=frames,
         rows=rows,
         report=report,
@@ -363,36 +377,55 @@ def _window(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, c
     from app.ui.display import check_display
 
     check_display()
-    from app.ui.window_base import make_application, run_until_closed
+    from app.ui.window_base import make_application
 
     rater = rater_name(options.study)
     files = session_rows(paths[0], options.rows) if options.rows is not None else image_files(paths, options.frames)
-    with AnnotationStore(store_path) as store:
-        images = listed_images(files, store)
-        items = queue_of(store, images, rater, options.study, config)
-        compiled.load()  # drawing uses them, and may not wait
-        application = make_application(own_config().window)
+    application = None
+    while True:
+        with AnnotationStore(store_path) as store:
+            images = listed_images(files, store)
+            items = queue_of(store, images, rater, options.study, config)
+            compiled.load()  # drawing uses them, and may not wait
+            application = application or make_application(own_config().window)
+            sys.stderr.write(f"{len(items)} images for rater {rater}; every edit is saved at once, in {store_path}\n")
+            code, next_rater = _rater_window(application, store, items, rater, paths, options, config)
+        if code or not next_rater:
+            return code
+        rater = next_rater
 
-        from app.annotator.model import AnnotationModel
-        from app.annotator.window import AnnotatorWindow
-        from app.ui.layout_state import LayoutState, Parts, Switch, toggling
 
-        model = AnnotationModel(store, items, config.perception, blind=bool(options.study.name))
-        print_warnings(store.problems)
-        who = (
-            tr("study {name}, rater {rater}, blind", name=options.study.name, rater=rater)
-            if options.study.name
-            else tr("rater {rater}", rater=rater)
-        )
-        window = AnnotatorWindow(model, who)
-        bar = window.panels.bar
-        switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
-        LayoutState(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
-        return run_until_closed(application, window, window.show_message)
+def _rater_window(
+    application: QApplication,
+    store: AnnotationStore,
+    items: Sequence[QueueEntry],
+    rater: str,
+    paths: Sequence[Path],
+    options: AnnotateOptions,
+    config: Config,
+) -> tuple[int, str]:
+    """One rater's window until it is closed; the exit code, and who annotates next."""
+    from app.annotator.model import AnnotationModel
+    from app.annotator.window import AnnotatorWindow
+    from app.ui.layout_state import LayoutState, Parts, Switch, toggling
+    from app.ui.window_base import run_until_closed
+
+    name = options.study.name
+    kept = store.study_settings(name) if name else None
+    hides_angle = kept is not None and settings_from(kept, f"study {name!r}").hides_angle
+    model = AnnotationModel(store, items, config.perception, blind=bool(name), hides_angle=hides_angle)
+    print_warnings(store.problems)
+    who = tr("study {name}, rater {rater}, blind", name=name, rater=rater) if name else tr("rater {rater}", rater=rater)
+    window = AnnotatorWindow(model, who, paths)
+    bar = window.panels.bar
+    switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
+    LayoutState(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
+    return run_until_closed(application, window, window.show_message), window.next_rater
 
 
 def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
     from app.annotator.comparison import groups_of_answered
+    from app.commands.evaluation_report import agreement_page
     from core.annotation.agreement_report import (
         agreement_report,
         choose_study,
@@ -407,16 +440,20 @@ def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
         images = store.images()
         annotations, notes = measured_alike(of_rater(annotations, options.study.rater), images, config.perception)
         names = {sha256: image.name for sha256, image in images.items()}
+        chosen = annotations[0].key.study
+        kept = store.study_settings(chosen) if chosen else None
         groups = groups_of_answered(annotations, {sha256: store_path.parent / name for sha256, name in names.items()})
         print_warnings([*store.problems, *rater_notes(annotations), *group_notes(annotations, groups), *notes])
-    study = annotations[0].key.study
-    report = {"study": study} | agreement_report(annotations, names, options.study.seed or 0, groups)
+    report: dict[str, Any] = {"study": chosen} | agreement_report(annotations, names, options.study.seed or 0, groups)
+    if chosen:
+        report["hides_angle"] = kept is not None and settings_from(kept, f"study {chosen!r}").hides_angle
     if options.out is not None:
         try:
             options.out.mkdir(parents=True, exist_ok=True)
             text = json.dumps(report, indent=1, ensure_ascii=False, allow_nan=False)
             (options.out / "agreement.json").write_text(text + "\n", encoding="utf-8")
             write_measures(options.out / "measures.csv", report["measures"])
+            write_atomic(options.out / "report.html", agreement_page(report).encode())
         except OSError as error:
             raise AnnotationError(
                 f"{error.filename or options.out}: cannot be written ({error.strerror}); choose another --out"
@@ -428,5 +465,5 @@ def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
 
         print_agreement(report)
         if options.out is not None:
-            sys.stderr.write(f"agreement.json and measures.csv are in {options.out}\n")
+            sys.stderr.write(f"report.html, agreement.json and measures.csv are in {options.out}\n")
     return 0

@@ -18,6 +18,7 @@ from app.commands.evaluation_report import print_tables, render_report
 from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption, ProgressOption
 from app.commands.progress import LeftOut, check_no_input, progress_bar, progress_writer, report_progress
 from core.annotation.agreement_report import write_measures
+from core.annotation.model import AngleProvenance
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.config.models import Config, choose_model, load_config
 from core.devices import UserError
@@ -202,8 +203,6 @@ def _perceive_annotated(annotations: Path, config: Config, study: str | None, se
     source: dict[str, Any] = {"kind": "annotated by hand", "name": name_as_text(name_of(annotations.parent))}
     source |= {"model": config.perception.segmentation.model, "preset": None, "engine": engine, "refused": reasons, "study": study}
     notes += more
-    unclear = sum(row.manual_angle_deg is None and row.state is None for row in rows)
-    notes += [f"Nobody could tell the pose on {unclear} images; they are in none of the figures."] if unclear else []
     notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
     return _Study(rows, source, notes, rater_agreement(done, images, seed), interrupted=missed > 0)
 
@@ -226,28 +225,28 @@ def _answer_notes(
     """Notes on manual answers that are not among the figures, or that know the algorithm's own."""
     from core.annotation.agreement_report import choose_study, undecided
     from core.annotation.store import AnnotationStore
+    from core.annotation.study import angle_words, settings_from
 
     done, here = choose_study(answers, study, str(annotations)), {image.sha256 for image in images}
     gone = len({one.key.sha256 for one in done} - here)
     with AnnotationStore(annotations, read_only=True) as store:
-        taken_over, after_look = store.taken_over(), store.given_after_look()
-    taken = sum(one.key.sha256 in here and one.key in taken_over for one in done)
+        after_look = store.given_after_look()
+        chosen = done[0].key.study
+        kept = store.study_settings(chosen) if chosen else None
     notes = [f"Of the annotated images {gone} are not where they were; they are in none of the figures."] if gone else []
+    if kept is not None:
+        notes.append(angle_words(settings_from(kept, f"study {chosen!r}").hides_angle))
     if tied := undecided(one for one in done if one.key.sha256 in here):
         notes.append(
-            f"On {tied} images no state was given most often (two raters of different minds, for one); that of the rater whose "
-            "name comes first counts there."
+            f"On {tied} images no state was given most often (two raters who disagree, for example); there the state of the rater "
+            "whose name comes first counts."
         )
-    if taken:
-        notes.append(
-            f"Of the manual answers {taken} began with the algorithm's own lines (key G): they agree with it the more for that. "
-            "A blind study (annotate --study NAME) hides them."
-        )
-    looked = sum(one.key.sha256 in here and one.key in after_look - taken_over for one in done)
+    manual = [one for one in done if one.provenance is AngleProvenance.MANUAL]
+    looked = sum(one.key.sha256 in here and one.key in after_look for one in manual)
     if looked:
         notes.append(
-            f"Of the manual answers {looked} were given, or changed, after the algorithm's lines had been shown (key H): they may "
-            "agree with it the more for that."
+            f"Of the manual answers {looked} were given, or changed, after the algorithm's lines had been shown (key H), and may "
+            "agree with it better than independent ones. A blind study (annotate --study NAME) hides them."
         )
     return notes
 

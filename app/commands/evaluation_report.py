@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from app.annotator.comparison import agreement_tables, between_words
+from app.annotator.comparison import agreement_tables, between_words, report_words, within_words
 from core.config.models import RESOURCES
 from core.evaluation.metrics import RESAMPLES
 from core.evaluation.paper import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureFormat, FigureKind, Verdict, verdict
@@ -137,6 +137,17 @@ def render_report(metrics: Mapping[str, Any], figures: Mapping[str, bytes]) -> s
     )
 
 
+def agreement_page(report: Mapping[str, Any]) -> str:
+    """The report of raters alone, as one HTML page."""
+    return render_page(
+        "agreement.html.j2",
+        title=f"Raters of study {report['study']}" if report["study"] else "Raters, outside studies",
+        lead=f"{report['annotations']} answers on {report['images']} images, {time.strftime('%Y-%m-%d', time.gmtime())}",
+        notes=[words for words in (report_words(report), within_words(report), between_words(report)) if words],
+        agreement=_agreement(report),
+    )
+
+
 def render_page(template: str, **values: Any) -> str:
     """One of ``resources/report`` filled in, without empty lines."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -163,7 +174,7 @@ def _agreement(report: Mapping[str, Any] | None) -> list[dict[str, Any]]:
     if report is None:
         return []
     captions = {
-        "First against second": "Each rater’s second measure of an image against his first.",
+        "First against second": "Each rater’s second measure of an image against their first.",
         "Rater against rater": " ".join(["Two raters’ first measures of the same images.", between_words(report)]).strip(),
     }
     return [

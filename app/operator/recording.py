@@ -18,6 +18,7 @@ from PySide6.QtGui import QDesktopServices
 from app.annotator.sources import REFUSED
 from app.operator.rig_session import RigSession
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.opening import OtherWindows
 from app.ui.workers import NOT_STARTED, ChildProcess, Worker, command_of
 from app.widgets.messages import Offer, OfferButton
 from core.annotation.store import DEFAULT_NAME
@@ -420,7 +421,8 @@ class AfterSession(QObject):
         self.session: Path | None = None
         """The newest one, until there is another."""
         self._evaluation: ChildProcess | None = None
-        self._windows: list[ChildProcess] = []
+        self._windows = OtherWindows(self)
+        self._windows.said.connect(self.said)
 
     def offer(self, session: Path, text: str = mark("Session saved")) -> None:
         """A session has ended, or was recovered; `text` says which."""
@@ -428,8 +430,8 @@ class AfterSession(QObject):
         report = tr("The algorithm against angles measured by hand, as a report")
         measure = tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES)
         answers = (
-            OfferButton(tr("Evaluate"), partial(self.evaluate, session), report),
             OfferButton(tr("Annotate"), partial(self.annotate, session), measure),
+            OfferButton(tr("Evaluate"), partial(self.evaluate, session), report),
             OfferButton(tr("Play"), partial(self.play, session), tr("The player, with everything as it was understood")),
         )
         detail = tr("{name}, in {parent}", name=session.name, parent=session.parent)
@@ -441,8 +443,7 @@ class AfterSession(QObject):
 
     def close(self) -> None:
         """Windows that people work in stay open; an evaluation ends."""
-        for window in self._windows:
-            window.leave()
+        self._windows.leave()
         if self._evaluation is not None:
             self._evaluation.leave()
             self._evaluation.kill()
@@ -452,15 +453,15 @@ class AfterSession(QObject):
     def annotate(self, session: Path) -> None:
         """The annotation tool on pictures evenly over the session."""
         options = ("--frames", str(FRAMES), "--order", "even")
-        self._open(tr("Opening the annotation tool: {name}", name=session.name), "annotate", str(session), *options)
+        self._windows.open(tr("Opening the annotator: {name}", name=session.name), "annotate", str(session), *options)
 
     def annotate_refused(self, session: Path) -> None:
         """The annotation tool on pictures without a pose."""
-        self._open(tr("Opening the annotation tool: {name}", name=session.name), "annotate", str(session), "--rows", REFUSED)
+        self._windows.open(tr("Opening the annotator: {name}", name=session.name), "annotate", str(session), "--rows", REFUSED)
 
     def play(self, session: Path) -> None:
         """The player."""
-        self._open(tr("Opening the player: {name}", name=session.name), "play", str(session))
+        self._windows.open(tr("Opening the player: {name}", name=session.name), "play", str(session))
 
     def evaluate(self, session: Path) -> None:
         """The report; without anything measured by hand yet, the annotation tool, for that comes first."""
@@ -512,25 +513,14 @@ class AfterSession(QObject):
             else:
                 self.said.emit(tr("Evaluated: {judged}. The report is: {report}", judged=judged, report=report), False)
         elif "no finished annotation" in line:
-            self._needs_annotations(session, tr("No picture is measured to the end yet: both lines and a state, or can't tell"))
+            self._needs_annotations(
+                session, tr("No picture is measured to the end yet: both lines and a state, can't tell, or no robot")
+            )
         else:
             self.said.emit(tr("Not evaluated: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
 
     def _needs_annotations(self, session: Path, why: str) -> None:
         pictures = tr("{frames} pictures, evenly over the session", frames=FRAMES)
         measure = OfferButton(tr("Annotate"), partial(self.annotate, session), pictures)
-        detail = tr("The annotation tool takes {frames} pictures, evenly over the session. Then evaluate again.", frames=FRAMES)
+        detail = tr("The annotator takes {frames} pictures, evenly over the session. Then evaluate again.", frames=FRAMES)
         self._offers.offer(Offer(_OFFER, why, detail, (measure,)))
-
-    def _open(self, words: str, *arguments: str) -> None:
-        child = ChildProcess(command_of(*arguments), self, priority=0)
-        child.ended.connect(lambda code, line, one=child: self._on_closed(one, code, line))
-        self._windows.append(child)
-        self.said.emit(words, False)
-        child.start()
-
-    def _on_closed(self, child: ChildProcess, code: int, line: str) -> None:
-        self._windows.remove(child)
-        child.deleteLater()
-        if code != 0:
-            self.said.emit(tr_text(line) or tr("That window ended with exit code {code}", code=code), True)

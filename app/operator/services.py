@@ -120,9 +120,9 @@ class WindowServices(QObject):
     def _add_menus(self) -> None:
         window = self._window
         session = [
-            MenuEntry(tr("&Evaluate the newest session"), partial(self._with_newest, self.after.evaluate)),
             MenuEntry(tr("&Annotate the newest session"), partial(self._with_newest, self.after.annotate)),
             MenuEntry(tr("Annotate its &refused frames"), partial(self._with_newest, self.after.annotate_refused)),
+            MenuEntry(tr("&Evaluate the newest session"), partial(self._with_newest, self.after.evaluate)),
             MenuEntry(tr("&Play the newest session"), partial(self._with_newest, self.after.play)),
             MenuEntry(tr("&Open another session..."), self._choose_session),
             None,

@@ -41,7 +41,7 @@ from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.widgets.basics import column, line, name_list
 from app.widgets.painting import CENTER, RIGHT, PaintedWidget, draw_box, draw_text
-from core.session.manifest import Event, Manifest
+from core.session.manifest import Event, EventKind, Manifest
 
 _TYPED = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:[.,]\d*)?|[.,]\d+)(?: *(ms|s))?")
 _UNFINISHED = re.compile(r"[\d:., ms]*")
@@ -145,7 +145,7 @@ class PlayerBar(QWidget):
         clip_tip = tr("Save the selection as a video, without one the session  (E)")
         self.clip = self._button(tr("Clip"), clip_tip, self.clip_requested.emit)
         self.note = self._button(tr("Note"), tr("Add a note at this time  (M)"), self.note_requested.emit)
-        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (S)"), self.snapshot_requested.emit)
+        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (Ctrl+S)"), self.snapshot_requested.emit)
         self.progress = QProgressBar()
         self.progress.setFixedHeight(24)
         self.progress.setAccessibleName(tr("Clip being written"))
@@ -218,8 +218,12 @@ class PlayerBar(QWidget):
         step, jump = self.step_requested.emit, self.jump_requested.emit
         before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), partial(step, -1))
         after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), partial(step, 1))
-        previous = self._button("P", tr("Previous of the kind beside  (P)"), partial(jump, -1))
-        following = self._button("N", tr("Next of the kind beside  (N)"), partial(jump, 1))
+        previous = self._button(
+            "\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}", tr("To the previous one of the kind beside  (P)"), partial(jump, -1)
+        )
+        following = self._button(
+            "\N{RIGHT-POINTING DOUBLE ANGLE QUOTATION MARK}", tr("To the next one of the kind beside  (N)"), partial(jump, 1)
+        )
         for group in ((before, self.play, after), (previous, self.kind, following)):
             for widget in group:
                 row.addWidget(widget)
@@ -235,6 +239,7 @@ class PlayerBar(QWidget):
         self.frame.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
 
 
+_RAISED = (EventKind.FAULT, EventKind.ALERT)
 _ROW_HEIGHT = 24
 _TIME_WIDTH = 86
 
@@ -267,7 +272,10 @@ class SessionEvents(QListView):
 
     def show_events(self, events: Sequence[Event], first_s: float) -> None:
         """All events; times count from `first_s`."""
-        self._model.show(tuple(event for event in events if event.kind in LISTED), first_s)
+        listed = tuple(event for event in events if event.kind in LISTED)
+        raised = min((event.time_s for event in listed if event.kind in _RAISED), default=float("inf"))
+        # What ended before anything began here was raised before the recording.
+        self._model.show(tuple(e for e in listed if e.kind is not EventKind.CLEARED or e.time_s > raised), first_s)
 
     def show_time(self, time_s: float) -> None:
         """Mark the last one that had happened at a time of the recorded clock."""

@@ -44,7 +44,7 @@ class PlayedSession(QObject):
     ``changed``: course or events; ``polled``: the reader was asked; ``emptied``: why there is nothing to play;
     ``problems_found``: all problems; ``is_written``: whether the session is still being recorded; ``compared``: the results of a
     replay have been read; ``note_refused``: a note that could not be written; ``clip_progressed``: the share of the clip that is
-    written, None when none is; ``message``: a line for people and whether it is a fault.
+    written, None when none is; ``clip_saved``: its path and a line; ``message``: a line for people and whether it is a fault.
 
     Parameters
     ----------
@@ -60,6 +60,7 @@ class PlayedSession(QObject):
     compared = Signal()
     note_refused = Signal(object)
     clip_progressed = Signal(object)
+    clip_saved = Signal(object, str)
     message = Signal(str, bool)
 
     def __init__(self, reader: SessionReader, folder: Path, parent: QObject | None = None) -> None:
@@ -223,10 +224,13 @@ class PlayedSession(QObject):
         if self._clip_cancelled is not None:
             self._clip_cancelled.set()
 
-    def _on_clip_ended(self, _clip: object, outcome: tuple[str, bool]) -> None:
+    def _on_clip_ended(self, clip: object, outcome: tuple[str, bool]) -> None:
         self._clip_cancelled = None
         self.clip_progressed.emit(None)
-        self.message.emit(*outcome)
+        if isinstance(clip, Path) and clip.is_file():
+            self.clip_saved.emit(clip, outcome[0])
+        else:
+            self.message.emit(*outcome)
 
     def shut_down(self) -> bool:
         """Finish notes and snapshots, cancel the clip; False when the disk does not answer."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Slot
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMainWindow, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QMainWindow, QPlainTextEdit, QVBoxLayout, QWidget
 
+from app.operator.recording import AfterSession, open_file
 from app.player.controls import NoteField, PlayerBar, RecordedPlate, SessionEvents
 from app.player.course import Course, JumpKind, PlayClock, neighbour, places_of, target_at, value_lines
 from app.player.decoder import Decoded, FrameDecoder
@@ -27,11 +28,10 @@ from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import pictures_folder
 from app.ui.theme import ON_PICTURE
 from app.ui.window_base import WindowFrame
-from app.ui.workers import ChildProcess, command_of
 from app.widgets.basics import Card, card_note, column, holder, line
 from app.widgets.command_panel import Provenance, ProvenanceTable
 from app.widgets.live_view import HeadLoupe, LiveView
-from app.widgets.messages import Notice, NoticeKind, Toast
+from app.widgets.messages import Notice, NoticeKind, Offer, OfferButton, OfferStrip, Toast
 from app.widgets.scene_overlay import Layer
 from app.widgets.scene_panels import ScenePanels, add_scene_view_menu
 from app.widgets.shortcut_page import KeyPage
@@ -39,6 +39,7 @@ from app.widgets.sim_banner import SimBanner
 from core.config.models import Config
 from core.config.rig_file import scaled
 from core.session.codec import RecordedRow
+from core.session.exporters import PLUGINS
 from core.session.manifest import Event, EventKind, Manifest
 from core.session.reader import SessionReader
 from core.types import Point, Scene, Tick
@@ -53,14 +54,17 @@ def add_player_menus(window: PlayerWindow) -> None:
     panels = window.panels
     window.add_file_menu(
         [
-            MenuEntry(tr("&Snapshot"), window.save_snapshot, ("S", "Ctrl+S")),
-            None,
+            MenuEntry(tr("&Open..."), window.ask_open, ("Ctrl+O",)),
+            MenuEntry(tr("E&xport..."), window.ask_export, ("Ctrl+E",)),
             MenuEntry(tr("Selection as &video"), window.export_clip, ("E",)),
+            MenuEntry(tr("&Snapshot"), window.save_snapshot, ("Ctrl+S",)),
             MenuEntry(tr("&Note"), window.begin_note, ("M",)),
             None,
             MenuEntry(tr("&Annotate this frame"), window.annotate_frame, ("A",)),
             MenuEntry(tr("Annotate &refused frames"), window.annotate_refused),
             *([MenuEntry(tr("Annotate the &differences"), window.annotate_differences)] if window.has_replay else []),
+            MenuEntry(tr("Annotate frames evenly over the session"), window.annotate_session),
+            MenuEntry(tr("Report of the algorithm"), window.evaluate, ("Ctrl+R",)),
         ]
     )
     view = add_scene_view_menu(
@@ -90,7 +94,7 @@ def add_player_menus(window: PlayerWindow) -> None:
             None,
             MenuEntry(tr("Slower"), partial(window.change_speed, -1), ("[",)),
             MenuEntry(tr("Faster"), partial(window.change_speed, 1), ("]",)),
-            MenuEntry(tr("As &recorded"), partial(window.set_speed, 1.0), ("R",)),
+            MenuEntry(tr("Speed as &recorded"), partial(window.set_speed, 1.0), ("R",)),
         ],
     )
     kinds = [
@@ -102,7 +106,7 @@ def add_player_menus(window: PlayerWindow) -> None:
         [
             MenuEntry(tr("&Next"), partial(window.jump, 1), ("N",)),
             MenuEntry(tr("&Previous"), partial(window.jump, -1), ("P",)),
-            MenuEntry(tr("Another &kind"), window.next_jump_kind, ("K",)),
+            MenuEntry(tr("Jump to the next &kind of thing"), window.next_jump_kind, ("K",)),
             None,
             *kinds,
             None,
@@ -164,7 +168,7 @@ class PlayerPanels(ScenePanels):
         self.bar = PlayerBar()
         self.note = NoteField(tr("Note at this time; Enter keeps it, Esc does not"), "SKY")
         self.note.hide()
-        self._mode_note = card_note(tr("mode then"))
+        self._mode_note = card_note(tr("mode when it was recorded"))
         for view in (self.live, self.other):
             if view is not None:
                 _mark_as_playback(view)
@@ -180,6 +184,8 @@ class PlayerPanels(ScenePanels):
         self.help = KeyPage(self._lay_out(self._header(), holder(left), self._right_side()), player_keys)
         self.notice = Notice(self.live)
         self.toast = Toast(self.live)
+        self.offers = OfferStrip(self.live)
+        self.offers.lifted.connect(self.toast.lift)
 
     def _header(self) -> QHBoxLayout:
         return line(self.banner, (self.plate, 1), self._mode_note, self.mode, spacing=14)
@@ -312,7 +318,9 @@ class _CornerLabel(QLabel):
 
 
 _MOST_ANNOTATED = 48
-"""Frames that are annotated at once, as the annotation tool takes of a whole session."""
+"""Frames that are annotated at once, as the annotator takes of a whole session."""
+_CLIP = "clip"
+"""Key of the offer after a clip was saved."""
 _TURN_MS = 15
 _STOP_WITHIN_MS = 10_000
 
@@ -343,12 +351,12 @@ class PlayerWindow(WindowFrame):
         self._shown: Decoded | None = None
         self._note_s = 0.0
         self._refused_notes: deque[Event] = deque()
-        self._annotators: list[ChildProcess] = []
         self._decoder = FrameDecoder(reader, self)
         self.session = PlayedSession(reader, pictures_folder(config.window.pictures_folder), self)
         self._turn = QTimer(self, interval=_TURN_MS, timerType=Qt.TimerType.PreciseTimer)
         self.panels = PlayerPanels(config, reader.manifest, reader.folder.name, with_other=against is not None)
         self.setCentralWidget(self.panels)
+        self.after = AfterSession(self.panels.offers, parent=self)
         add_player_menus(self)
         self._connect()
         self.setWindowTitle(tr("LumenPilot \N{EM DASH} PLAYBACK of {name}", name=reader.folder.name))
@@ -368,6 +376,9 @@ class PlayerWindow(WindowFrame):
         self._decoder.decoded.connect(self._on_decoded)
         self._decoder.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
         session.message.connect(self.show_message)
+        session.clip_saved.connect(self._on_clip_saved)
+        self.after.said.connect(self.show_message)
+        self.others.said.connect(self.show_message)
         session.changed.connect(self._show_course)
         session.polled.connect(self._on_polled)
         session.emptied.connect(lambda why: panels.show_nothing(tr("Nothing to play"), why, NoticeKind.WARNING))
@@ -590,6 +601,34 @@ class PlayerWindow(WindowFrame):
         else:
             self.session.save_snapshot(tick)
 
+    def _on_clip_saved(self, path: Path, text: str) -> None:
+        folder = OfferButton(tr("Open its folder"), partial(open_file, path.parent), str(path.parent))
+        play = OfferButton(tr("Open the clip"), partial(open_file, path))
+        self.panels.offers.offer(Offer(_CLIP, text, "", (folder, play)))
+
+    def ask_open(self) -> None:
+        """Another session, or a folder of pictures, in a window of its own."""
+        self._ask(tr("A session, or a folder of pictures"), QFileDialog.FileMode.Directory, self.open_path)
+
+    def ask_export(self) -> None:
+        """The whole session in another form, by the ending of the file's name."""
+        endings = " ".join(f"*.{ending}" for ending in PLUGINS.names)
+        self._ask(tr("Export the session as"), QFileDialog.FileMode.AnyFile, self._export, endings)
+
+    def _ask(self, title: str, mode: QFileDialog.FileMode, then: Callable[[Path], None], endings: str = "") -> None:
+        dialog = QFileDialog(self, title, str(self._reader.folder.parent))
+        dialog.setFileMode(mode)
+        if endings:
+            dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+            dialog.setNameFilter(endings)
+            dialog.selectFile(f"{self._reader.folder.name}.mp4")
+        dialog.fileSelected.connect(lambda path: then(Path(path)))
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
+
+    def _export(self, out: Path) -> None:
+        self.others.open(tr("Exporting {name}", name=out.name), "session", "export", str(self._reader.folder), "--out", str(out))
+
     # ---- annotation, in a window of its own
 
     def annotate_frame(self) -> None:
@@ -607,6 +646,14 @@ class PlayerWindow(WindowFrame):
         differs = self.course.differs
         self._annotate(self._selected(differs) if differs is not None else np.zeros(0, np.int64), tr("No difference here"))
 
+    def annotate_session(self) -> None:
+        """Frames evenly over the session."""
+        self.after.annotate(self._reader.folder)
+
+    def evaluate(self) -> None:
+        """The algorithm against what was annotated, as a report; without that the annotator is offered."""
+        self.after.evaluate(self._reader.folder)
+
     def _selected(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
         if self.selection is None:
             return places
@@ -614,24 +661,15 @@ class PlayerWindow(WindowFrame):
         return places[(times_s >= self.selection[0]) & (times_s <= self.selection[1])]
 
     def _annotate(self, places: NDArray[np.int64], why_none: str) -> None:
-        """Open the annotation tool on these places of the course, on so many evenly among them where there are more."""
+        """Open the annotator on these places of the course, on so many evenly among them where there are more."""
         if not len(places):
             self.show_message(why_none)
             return
         if len(places) > _MOST_ANNOTATED:
             places = places[np.unique(np.round(np.linspace(0, len(places) - 1, _MOST_ANNOTATED)).astype(int))]
         rows = ",".join(str(row) for row in self.course.rows[places].tolist())
-        child = ChildProcess(command_of("annotate", str(self._reader.folder), "--rows", rows), self, priority=0)
-        child.ended.connect(lambda code, line, one=child: self._on_annotated(one, code, line))
-        self._annotators.append(child)
-        self.show_message(tr("Opening the annotation tool: {count} frames", count=len(places)))
-        child.start()
-
-    def _on_annotated(self, child: ChildProcess, code: int, line: str) -> None:
-        self._annotators.remove(child)
-        child.deleteLater()
-        if code != 0:
-            self.show_message(tr_text(line) or tr("That window ended with exit code {code}", code=code), is_fault=True)
+        words = tr("Opening the annotator: {count} frames", count=len(places))
+        self.others.open(words, "annotate", str(self._reader.folder), "--rows", rows)
 
     # ---- notes
 
@@ -717,8 +755,8 @@ class PlayerWindow(WindowFrame):
         return super()._may_close()
 
     def _let_go(self) -> None:
-        for child in self._annotators:
-            child.leave()  # people work in these windows
+        self.others.leave()  # people work in these windows
+        self.after.close()
         self._turn.stop()
         self.session.stop_polling()
         self.panels.notice.clear()

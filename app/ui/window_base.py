@@ -8,15 +8,17 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Slot
-from PySide6.QtGui import QAction, QCloseEvent, QKeyEvent, QKeySequence
+from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QAbstractButton, QLabel, QMainWindow
 
 from app.ui import theme
 from app.ui.actions import MenuEntry, action_of, add_menu
 from app.ui.i18n import tr
+from app.ui.opening import OtherWindows, dropped_paths
 from app.widgets.basics import takes_enter
 from core.config.models import WindowConfig
 
@@ -65,6 +67,8 @@ class GuiLatencyMonitor(QObject):
         self._last_s = now
 
 
+_MOST_DROPPED = 4
+"""So many windows are opened by one drop at most."""
 _FULL_SCREEN_KEY = "F11"
 _HINT_MARGIN_PX, _HINT_DOWN_PX = 14, 5
 
@@ -84,6 +88,8 @@ class WindowFrame(QMainWindow):
         hint.setObjectName("card_note")
         hint.setContentsMargins(0, _HINT_DOWN_PX, _HINT_MARGIN_PX, 0)
         self.menuBar().setCornerWidget(hint)
+        self.others = OtherWindows(self)
+        self.setAcceptDrops(True)
         self.setMinimumSize(*theme.MIN_WINDOW)
         self.resize(theme.start_size(self.screen()))
 
@@ -107,6 +113,21 @@ class WindowFrame(QMainWindow):
         keys = (_FULL_SCREEN_KEY, f"Shift+{_FULL_SCREEN_KEY}")
         full_screen = MenuEntry(tr("&Full screen"), self.toggle_full_screen, keys, checked=False)
         return add_menu(self, tr("&View"), [*entries, None, full_screen])
+
+    # ---- files that are dropped on it
+
+    def open_path(self, path: Path) -> None:
+        """Open a session, a folder, a picture, a video or an annotation file, in a window of its own."""
+        self.others.open_path(path)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        if dropped_paths(event.mimeData()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        for path in dropped_paths(event.mimeData())[:_MOST_DROPPED]:
+            self.open_path(path)
+        event.acceptProposedAction()
 
     # ---- keys
 

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.annotation.merge import raters_alike
-from core.annotation.model import AnnotationError, Status, measure_lines, status_of
+from core.annotation.model import ANSWERED, AnnotationError, Status, measure_lines, status_of
 from core.annotation.store import ImageRecord, StoredAnnotation
 from core.config.models import PerceptionConfig
-from core.evaluation.evaluation import Measurement
+from core.evaluation.evaluation import Measurement, short_number
 from core.evaluation.metrics import (
     LIMITS_SD,
     are_too_few,
@@ -36,9 +36,8 @@ _Table = Mapping[tuple[str, str, int], StoredAnnotation]
 
 
 def finished(annotations: Iterable[StoredAnnotation]) -> list[StoredAnnotation]:
-    """Those with both lines and a state, and those with "can't tell"."""
-    is_done = (Status.DONE, Status.CANNOT_TELL)
-    return [one for one in annotations if status_of(one.content, measured=one.theta_deg is not None) in is_done]
+    """Those with both lines and a state, and the answers without a pose."""
+    return [one for one in annotations if status_of(one.content, measured=one.theta_deg is not None) in ANSWERED]
 
 
 def studies_of(annotations: Iterable[StoredAnnotation]) -> list[str]:
@@ -55,7 +54,7 @@ def choose_study(annotations: Sequence[StoredAnnotation], study: str | None, whe
     chosen = [one for one in done if study is None or one.key.study == study]
     if not chosen:
         of_study = f" of study {study!r}" if study else ""
-        raise AnnotationError(f"{where}: no finished annotation{of_study} (both lines and a state, or can't tell)")
+        raise AnnotationError(f"{where}: no finished annotation{of_study} (both lines and a state, can't tell, or no robot)")
     return chosen
 
 
@@ -111,6 +110,9 @@ def _within(table: _Table, rater: str, draw: _Draw) -> dict[str, Any]:
     return {
         "annotations": len(own),
         "cannot_tell": sum(one.content.cannot_tell for one in own.values()),
+        "no_robot": sum(one.content.no_robot for one in own.values()),
+        "short_lines": sum(one.is_short for one in own.values()),
+        "provenance": dict(Counter(one.provenance.value for one in own.values() if not one.content.without_pose)),
         "median_time_s": median(times) if times else None,
         "sd_deg": _pooled_sd(list(_angles_by_image(table, rater).values())),
     } | _compare(both, draw)
@@ -119,7 +121,7 @@ def _within(table: _Table, rater: str, draw: _Draw) -> dict[str, Any]:
 def _angles_by_image(table: _Table, rater: str) -> dict[str, list[float]]:
     angles: dict[str, list[float]] = {}
     for (who, image, _), one in table.items():
-        if who == rater and one.theta_deg is not None and not one.content.cannot_tell:
+        if who == rater and one.theta_deg is not None and not one.content.without_pose:
             angles.setdefault(image, []).append(one.theta_deg)
     return angles
 
@@ -128,7 +130,7 @@ def _all_within(table: _Table, draw: _Draw) -> dict[str, Any]:
     """Over all raters: what one measure of one of them is uncertain by."""
     measures: dict[str, dict[str, list[float]]] = {}
     for (who, image, _), one in table.items():
-        if one.theta_deg is not None and not one.content.cannot_tell:
+        if one.theta_deg is not None and not one.content.without_pose:
             measures.setdefault(image, {}).setdefault(who, []).append(one.theta_deg)
     return within_subject([list(raters.values()) for raters in measures.values()], draw.seed, draw.members(list(measures)))
 
@@ -146,8 +148,8 @@ def _pair(table: _Table, first: str, second: str, draw: _Draw) -> dict[str, Any]
 
 
 def _compare(both: Sequence[tuple[StoredAnnotation, StoredAnnotation]], draw: _Draw) -> dict[str, Any]:
-    """Two answers about the same images: angles and states where both have one, and how often one or both are "can't tell"."""
-    telling = [(a, b) for a, b in both if not a.content.cannot_tell and not b.content.cannot_tell]
+    """Two answers about the same images: angles and states where both have one, and how often one or both give none."""
+    telling = [(a, b) for a, b in both if not a.content.without_pose and not b.content.without_pose]
     measured = [(a, b) for a, b in telling if a.theta_deg is not None and b.theta_deg is not None]
     known = np.array([(a.theta_deg, b.theta_deg) for a, b in measured], np.float64).reshape(-1, 2)
     angle = repeat_metrics(known[:, 0], known[:, 1], draw.seed, draw.members([a.key.sha256 for a, _ in measured]))
@@ -159,23 +161,26 @@ def _compare(both: Sequence[tuple[StoredAnnotation, StoredAnnotation]], draw: _D
         difference = known[:, 1] - known[:, 0]
         mean, reach = float(difference.mean()), LIMITS_SD * float(difference.std(ddof=1))
         angle |= {"loa_low_deg": mean - reach, "loa_high_deg": mean + reach}
-    # "Can't tell" is no state: to say it of the same images is no agreement about a state.
+    # An answer without a pose is no state: to give it for the same images is no agreement about a state.
     given = [(str(a.content.state), str(b.content.state)) for a, b in telling if a.content.state and b.content.state]
     first, second = [a for a, _ in given], [b for _, b in given]
-    neither = sum(a.content.cannot_tell and b.content.cannot_tell for a, b in both)
+    unclear = Counter(a.content.cannot_tell + b.content.cannot_tell for a, b in both)
+    empty = Counter(a.content.no_robot + b.content.no_robot for a, b in both)
     state = {
         "n": len(given),
         "equal": sum(a == b for a, b in given) / len(given) if given else None,
         "kappa": kappa(first, second) if given else None,
-        "one_cannot_tell": len(both) - len(telling) - neither,
-        "neither_can_tell": neither,
+        "one_cannot_tell": unclear[1],
+        "neither_can_tell": unclear[2],
+        "one_no_robot": empty[1],
+        "both_no_robot": empty[2],
     }
     return {"angle": angle, "state": state}
 
 
 def _between(table: _Table, raters: Sequence[str]) -> dict[str, Any]:
     first = {
-        (who, image): one.theta_deg for (who, image, repeat), one in table.items() if repeat == 1 and not one.content.cannot_tell
+        (who, image): one.theta_deg for (who, image, repeat), one in table.items() if repeat == 1 and not one.content.without_pose
     }
     images = sorted({image for _, image in first})
     groups = [[angle for who in raters if (angle := first.get((who, image))) is not None] for image in images]
@@ -196,6 +201,9 @@ def _measure_row(one: StoredAnnotation, names: Mapping[str, str]) -> dict[str, A
         "crossed": one.crossed,
         "state": one.content.state.value if one.content.state else None,
         "cannot_tell": one.content.cannot_tell,
+        "no_robot": one.content.no_robot,
+        "short_lines": one.is_short,
+        "provenance": one.provenance.value if one.theta_deg is not None else None,
         "time_spent_s": round(one.time_spent_s, 1),
         "note": one.content.note,
     }
@@ -206,7 +214,7 @@ def write_measures(path: Path, measures: Sequence[Mapping[str, Any]]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, list(measures[0]), lineterminator="\n")
         table.writeheader()
-        table.writerows(measures)
+        table.writerows({name: short_number(value) for name, value in row.items()} for row in measures)
 
 
 def manual_measurements(annotations: Iterable[StoredAnnotation], names: Mapping[str, str]) -> list[Measurement]:
@@ -214,7 +222,7 @@ def manual_measurements(annotations: Iterable[StoredAnnotation], names: Mapping[
 
     ``angle_1`` is the mean of the raters' first measures, ``angle_2`` that of their later ones. Where no rater measured twice but
     several raters did, they are the first rater's and the mean of the others'. The state is the one given most often, of equals the
-    first rater's. "Can't tell" does not count here.
+    first rater's. Answers without a pose count where there is no other: the one given most often is the row's ``answer``.
     """
     by_image: dict[str, list[StoredAnnotation]] = {}
     for one in sorted(annotations, key=lambda one: (one.key.rater, one.key.repeat)):
@@ -239,7 +247,7 @@ def second_measure_notes(annotations: Iterable[StoredAnnotation]) -> list[str]:
     """Where the second of ``manual_measurements`` is a rater's own on some images and another rater's on others."""
     by_image: dict[str, list[int]] = {}
     for one in annotations:
-        if one.theta_deg is not None and not one.content.cannot_tell:
+        if one.theta_deg is not None and not one.content.without_pose:
             by_image.setdefault(one.key.sha256, []).append(one.key.repeat)
     kinds: Counter[str] = Counter()
     for repeats in by_image.values():
@@ -260,21 +268,32 @@ def undecided(annotations: Iterable[StoredAnnotation]) -> int:
     """On how many images no state was given most often: two raters of different minds, for one."""
     states: dict[str, Counter[PoseState]] = {}
     for one in annotations:
-        if one.content.state is not None and not one.content.cannot_tell:
+        if one.content.state is not None and not one.content.without_pose:
             states.setdefault(one.key.sha256, Counter())[one.content.state] += 1
     return sum(len(most) > 1 and most[0][1] == most[1][1] for most in (found.most_common(2) for found in states.values()))
 
 
 def _common(name: str, group: Sequence[StoredAnnotation]) -> Measurement:
-    telling = [one for one in group if not one.content.cannot_tell]
+    telling = [one for one in group if not one.content.without_pose]
     measured = [(one.key.repeat, one.theta_deg) for one in telling if one.theta_deg is not None]
     first, later = ([angle for k, angle in measured if (k == 1) is is_first] for is_first in (True, False))
     if not later:
         first, later = first[:1], first[1:]
     states = [one.content.state.value for one in telling if one.content.state is not None]
     state = Counter(states).most_common(1)[0][0] if states else None
-    counts = max(len(first), 1), max(len(later), 1)
-    return Measurement(name, fmean(first) if first else None, fmean(later) if later else None, state, None, None, counts=counts)
+    answers = [(Status.NO_ROBOT if one.content.no_robot else Status.CANNOT_TELL).value for one in group]
+    return Measurement(
+        name,
+        fmean(first) if first else None,
+        fmean(later) if later else None,
+        state,
+        None,
+        None,
+        counts=(max(len(first), 1), max(len(later), 1)),
+        answer=None if telling else Counter(answers).most_common(1)[0][0],
+        provenance="+".join(sorted({one.provenance.value for one in telling if one.theta_deg is not None})) or None,
+        short_lines="yes" if any(one.is_short for one in telling) else None,
+    )
 
 
 _SAME_DEG = 0.005  # angles are shown no finer
@@ -308,11 +327,13 @@ def measured_alike(
 
 
 def _measured(one: StoredAnnotation, size: tuple[int, int], config: PerceptionConfig) -> StoredAnnotation:
-    pose = measure_lines(one.content, size, config).pose
+    readout = measure_lines(one.content, size, config)
+    pose = readout.pose
     if pose is None:
         return replace(one, theta_deg=None, theta_signed_deg=None, d_head_px=None, d_tail_px=None, crossed=None)
     return replace(
         one,
+        is_short=readout.is_short,
         theta_deg=pose.theta_deg,
         theta_signed_deg=pose.theta_signed_deg,
         d_head_px=pose.d_head_px,

@@ -308,7 +308,7 @@ def _truth_rows(
         manual = common.get(sha256)
         theta = manual.manual_angle_deg if manual is not None else None
         lines = next(
-            (a for a in measured if a.key.sha256 == sha256 and a.theta_deg is not None and not a.content.cannot_tell), None
+            (a for a in measured if a.key.sha256 == sha256 and a.theta_deg is not None and not a.content.without_pose), None
         )
         row: dict[str, Any] = {"stem": stems[sha256], "source": "annotated by hand", "reason": None}
         if lines is None or theta is None or manual is None or manual.state is None:

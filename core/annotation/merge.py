@@ -14,13 +14,13 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from core.annotation.model import AnnotationError
 from core.annotation.store import ADD_LOOK, ADDED, DEFAULT_NAME, AnnotationStore, KeptAnnotation, check_sum, read_kept
-from core.annotation.study import StudySettings, settings_from
+from core.annotation.study import settings_from
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,15 +180,10 @@ def _join_study(database: sqlite3.Connection, theirs: sqlite3.Connection, name: 
         except ValueError:
             raise AnnotationError(f"{which}: the settings of the study are damaged") from None
     there, here = sides
-    if (there.views, there.order, there.seed) != (here.views, here.order, here.seed):
-        raise AnnotationError(f"{where}: study {name!r} was begun otherwise there: {_said(there)}; here: {_said(here)}")
+    if replace(there, images=here.images) != here:
+        raise AnnotationError(f"{where}: study {name!r} was begun otherwise there: {there.words}; here: {here.words}")
     if others := len(set(there.images) ^ set(here.images)):
         raise AnnotationError(f"{where}: study {name!r} was begun with other pictures there: {others} are in one of the two only")
-
-
-def _said(settings: StudySettings) -> str:
-    shown = ", ".join(view.value for view in settings.views)
-    return f"shown {settings.repeats} times ({shown}), order {settings.order.value}, seed {settings.seed}"
 
 
 def _join_images(database: sqlite3.Connection, theirs: sqlite3.Connection, wanted: set[str], where: Path) -> None:

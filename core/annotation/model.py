@@ -61,7 +61,7 @@ class MaskPolygon:
 class Annotation:
     """What one rater drew on one image: ``robot`` from tail to head, ``vessel`` beside the head, both source pixels.
 
-    ``cannot_tell`` is an answer: the image does not show what is asked.
+    ``cannot_tell`` and ``no_robot`` are answers: the image does not show what is asked, or it shows that there is no robot.
     """
 
     robot: Line = ()
@@ -70,6 +70,12 @@ class Annotation:
     cannot_tell: bool = False
     masks: tuple[MaskPolygon, ...] = ()
     note: str = ""
+    no_robot: bool = False
+
+    @property
+    def without_pose(self) -> bool:
+        """Whether it is answered without an angle and a state."""
+        return self.cannot_tell or self.no_robot
 
     @property
     def drawn(self) -> frozenset[MaskTarget]:
@@ -106,7 +112,8 @@ class Readout:
     """What follows from the two lines. Points and vectors are source pixels, ``pose`` is in working pixels.
 
     ``robot_piece`` and ``vessel_piece`` are the parts of the drawn lines that the vectors are fitted to; ``robot_length_px`` and
-    ``vessel_length_px`` are their arc lengths in working pixels. Without a pose ``missing`` says what is still to be drawn.
+    ``vessel_length_px`` are their arc lengths in working pixels; ``is_short`` where one of them is shorter than perception fits to.
+    Without a pose ``missing`` says what is still to be drawn; ``is_hidden`` is one that the rater may not see yet.
     """
 
     robot_piece: Points | None = None
@@ -115,8 +122,14 @@ class Readout:
     vessel_vector: Vector | None = None
     robot_length_px: float = 0.0
     vessel_length_px: float = 0.0
+    is_short: bool = False
+    is_hidden: bool = False
     pose: Pose | None = None
     missing: str = ""
+
+
+_SHORT_PX = 0.5
+"""A line that lacks less than this of its length is shown as long enough: lengths are shown in whole pixels."""
 
 
 def working_scale(size: tuple[int, int], working_size_px: int) -> tuple[float, float]:
@@ -168,11 +181,14 @@ def measure_lines(annotation: Annotation, size: tuple[int, int], config: Percept
     vessel_vector = fit_vessel_vector(beside, vectors.line_fit) if beside is not None else None
     if beside is None or vessel_vector is None:
         return replace(found, missing="the vessel line ends too soon beside the head: draw it farther")
+    vessel_px = float(geometry.arc_length(beside.piece)[-1])
+    lacking_px = max(vectors.robot_length_px - found.robot_length_px, 2.0 * vectors.vessel_half_length_px - vessel_px)
     return replace(
         found,
         vessel_piece=to_source(beside.piece),
         vessel_vector=vector_to_source(vessel_vector),
-        vessel_length_px=float(geometry.arc_length(beside.piece)[-1]),
+        vessel_length_px=vessel_px,
+        is_short=lacking_px >= _SHORT_PX,
         pose=measure_pose(robot_vector, vessel_vector, config.pose),
     )
 
@@ -219,14 +235,37 @@ class Status(StrEnum):
     BEGUN = "begun"
     DONE = "done"
     CANNOT_TELL = "can't tell"
+    NO_ROBOT = "no robot"
+
+
+ANSWERED = (Status.DONE, Status.CANNOT_TELL, Status.NO_ROBOT)
+
+
+class AngleProvenance(StrEnum):
+    """Where the lines of an annotation come from, and its angle with them. Lists, reports and tables use these words."""
+
+    MANUAL = "manual"
+    ALGORITHM = "algorithm"
+    """Taken over from the algorithm, and not changed."""
+    FOLLOWED = "followed"
+    """Carried over from another frame of the same recording, and not changed."""
+    CORRECTED = "corrected"
+    """Taken over or followed, then changed by hand."""
+
+
+TAKES_LINES, FOLLOWS_LINES = "take the algorithm's lines", "follow the lines"
+"""Actions of the edits that bring lines which were not drawn by hand."""
+PROVENANCE = {TAKES_LINES: AngleProvenance.ALGORITHM, FOLLOWS_LINES: AngleProvenance.FOLLOWED}
 
 
 def status_of(annotation: Annotation | None, *, measured: bool) -> Status:
-    """Done is an image with both lines, so that an angle is `measured`, and a state; "can't tell" is an answer too."""
+    """Done is an image with both lines, so that an angle is `measured`, and a state; the answers without a pose count, too."""
     if annotation is None or annotation == Annotation():
         return Status.NEW
     if annotation.cannot_tell:
         return Status.CANNOT_TELL
+    if annotation.no_robot:
+        return Status.NO_ROBOT
     return Status.DONE if measured and annotation.state is not None else Status.BEGUN
 
 
@@ -255,15 +294,15 @@ def line_of(annotation: Annotation, line: int) -> Line:
 
 
 def with_line(annotation: Annotation, line: int, points: Line) -> Annotation:
-    """The annotation with other points on a line, which takes "can't tell" back.
+    """The annotation with other points on a line, which takes an answer without a pose back.
 
     A polygon of fewer than three points is removed, an outline with the holes in it: those that follow before the next outline of
     the same mask.
     """
     if line == ROBOT:
-        return replace(annotation, robot=points, cannot_tell=False)
+        return replace(annotation, robot=points, cannot_tell=False, no_robot=False)
     if line == VESSEL:
-        return replace(annotation, vessel=points, cannot_tell=False)
+        return replace(annotation, vessel=points, cannot_tell=False, no_robot=False)
     masks: list[MaskPolygon] = list(annotation.masks)
     if len(points) >= 3:
         masks[line] = replace(masks[line], points=points)
@@ -382,6 +421,16 @@ class History:
     def undo_action(self) -> str:
         """What undo takes back, in words; "" for nothing."""
         return self._actions[self._now]
+
+    @property
+    def provenance(self) -> AngleProvenance:
+        """Of the lines in force: the last edit that brought them, unless they were cleared since."""
+        step, now = self._now, self.current
+        while step and (lines := (self._contents[step].robot, self._contents[step].vessel)) != ((), ()):
+            if (brought := PROVENANCE.get(self._actions[step])) is not None:
+                return brought if lines == (now.robot, now.vessel) else AngleProvenance.CORRECTED
+            step = self._bases[step]
+        return AngleProvenance.MANUAL
 
     def edit(self, action: str, content: Annotation) -> JournalEntry | None:
         """Put `content` in force; None when it changes nothing."""

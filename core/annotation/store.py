@@ -17,12 +17,22 @@ import threading
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from core.annotation.model import Annotation, AnnotationError, History, ImageView, JournalEntry, Readout, annotation_from_json
+from core.annotation.model import (
+    PROVENANCE,
+    Annotation,
+    AnnotationError,
+    History,
+    ImageView,
+    JournalEntry,
+    AngleProvenance,
+    Readout,
+    annotation_from_json,
+)
 from core.files import ImageError, name_as_text, read_image
 
 SCHEMA_VERSION = 1
@@ -82,13 +92,12 @@ class ItemKey:
     repeat: int = 1
 
 
-TAKES_LINES = "take the algorithm's lines"
-"""Action of the edit by which a rater begins with the algorithm's answer."""
-
-
 @dataclass(frozen=True, slots=True)
 class StoredAnnotation:
-    """An annotation as it was kept, with what was measured from it at that time."""
+    """An annotation as it was kept, with what was measured from it at that time.
+
+    ``is_short`` (a line shorter than the fit wants) is known once ``measured_alike`` has measured the lines again.
+    """
 
     key: ItemKey
     view: ImageView
@@ -100,6 +109,8 @@ class StoredAnnotation:
     crossed: bool | None
     time_spent_s: float
     changed_utc: str
+    provenance: AngleProvenance = AngleProvenance.MANUAL
+    is_short: bool = False
 
 
 def stored_from(row: Any) -> StoredAnnotation:
@@ -276,6 +287,11 @@ class AnnotationStore:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def copy_to(self, path: Path) -> None:
+        """Write a copy for other processes, which cannot read a file that is open here."""
+        with self._lock, self._named_errors():
+            self._database.execute("VACUUM INTO ?", (str(path),))
+
     # ---- images and studies
 
     def add_image(self, record: ImageRecord, file_size: int, modified_ns: int) -> None:
@@ -387,9 +403,11 @@ class AnnotationStore:
             tuple(value for _, value in wanted),
         )
         found = []
+        brought = self._keys("journal j JOIN annotations a ON a.id = j.annotation_id AND j.action IN (?, ?)", *PROVENANCE)
         for row in rows:
             try:
-                found.append(stored_from(row))
+                one = stored_from(row)
+                found.append(replace(one, provenance=self.history(one.key).provenance) if one.key in brought else one)
             except (ValueError, TypeError) as error:
                 self._note(
                     f"{self.path.name}: image {str(row[0])[:12]}, rater {row[2]}, repeat {row[3]}: damaged ({error}); left out"
@@ -411,10 +429,6 @@ class AnnotationStore:
             except (ValueError, TypeError) as error:
                 self._note(f"{self.path.name}: edit {row[0]} of image {key.sha256[:12]} is damaged ({error}); left out")
         return History(entries, last=max((row[0] for row in rows if isinstance(row[0], int)), default=0))
-
-    def taken_over(self) -> set[ItemKey]:
-        """Annotations whose lines were the algorithm's at some time, which makes them agree with it more."""
-        return self._keys("journal j JOIN annotations a ON a.id = j.annotation_id AND j.action = ?", TAKES_LINES)
 
     def keep_look(self, key: ItemKey, after: int) -> None:
         """Keep that the rater was shown the algorithm's answer, after their own edit of that number (0: before all).

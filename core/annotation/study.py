@@ -28,20 +28,34 @@ class StudySettings:
     """What all raters of a study share; it is fixed when the study begins.
 
     ``images`` are SHA-256 in the order of the queue; with ``QueueOrder.RANDOM`` each rater gets another order.
-    ``views`` are those of the first, second, ... repeat.
+    ``views`` are those of the first, second, ... repeat. ``hides_angle``: theta, and the state that the lines give, are shown only
+    once an image is answered; studies of versions that always showed them do not say it.
     """
 
     images: Annotated[tuple[str, ...], Field(min_length=1)]
     views: Annotated[tuple[ImageView, ...], Field(min_length=1)] = (ImageView.AS_IS,)
     order: QueueOrder = QueueOrder.RANDOM
     seed: int = 0
+    hides_angle: bool = False
 
     @property
     def repeats(self) -> int:
         return len(self.views)
 
+    @property
+    def words(self) -> str:
+        """All but the images, as messages say it."""
+        shown, angle = ", ".join(view.value for view in self.views), "hidden until the answer" if self.hides_angle else "shown"
+        return f"shown {self.repeats} times ({shown}), order {self.order.value}, seed {self.seed}, theta {angle}"
+
     def to_json(self) -> dict[str, Any]:
         return _SETTINGS.dump_python(self, mode="json")  # type: ignore[no-any-return]
+
+
+def angle_words(hides_angle: bool) -> str:
+    """Which way a study was done, as reports say it."""
+    when = "only after the answer" if hides_angle else "while the lines were drawn"
+    return f"Theta and the state of the lines were shown to the raters {when}."
 
 
 _SETTINGS = TypeAdapter(StudySettings)

@@ -8,6 +8,7 @@ import difflib
 import io
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -74,7 +75,9 @@ class Measurement:
     """One image, measured by hand (once or twice) and by the algorithm; None = not measured. Field names are the CSV's columns.
 
     ``group`` is the session or phantom that the image is of; images of one group are alike. None: not known. ``counts``: of how
-    many single measures ``angle_1`` and ``angle_2`` are the means.
+    many single measures ``angle_1`` and ``angle_2`` are the means. ``answer`` is what was said instead of a pose: "can't tell" or
+    "no robot". ``provenance`` is where the manual angle comes from, several with "+" between; ``short_lines`` is "yes" where a line
+    was shorter than the fit wants.
     """
 
     image: str
@@ -85,6 +88,9 @@ class Measurement:
     algorithm_state: str | None
     group: str | None = None
     counts: tuple[int, int] = (1, 1)
+    answer: str | None = None
+    provenance: str | None = None
+    short_lines: str | None = None
 
     @property
     def manual_angle_deg(self) -> float | None:
@@ -95,12 +101,15 @@ class Measurement:
 
 GROUP = "group"
 COUNTS = ("count_1", "count_2")
-COLUMNS = tuple(column.name for column in fields(Measurement) if column.name not in (GROUP, "counts"))
-_MAY_BE = (GROUP, *COUNTS)
+TEXTS = (GROUP, "answer", "provenance", "short_lines")
+COLUMNS = tuple(column.name for column in fields(Measurement) if column.name not in (*TEXTS, "counts"))
+_MAY_BE = (*TEXTS, *COUNTS)
+NO_ROBOT = "no robot"
+"""The ``answer`` to a picture without a robot."""
 
 
 def read_measurements(path: Path) -> list[Measurement]:
-    """Rows of a CSV file with the columns ``COLUMNS`` in any order, and ``group``, ``count_1`` and ``count_2`` if there are such.
+    """Rows of a CSV file with the columns ``COLUMNS`` in any order, and those of ``TEXTS`` and ``COUNTS`` that there are.
 
     Others are ignored, blank cells mean "not measured". Headings may be spelt with capitals, spaces and units.
 
@@ -196,22 +205,27 @@ def _measurement(where: str, text: Mapping[str, str], *, has_decimal_comma: bool
         state("state"),
         angle("algorithm_angle"),
         state("algorithm_state"),
-        text.get(GROUP) or None,
-        (count("count_1"), count("count_2")),
+        counts=(count("count_1"), count("count_2")),
+        **{name: text.get(name) or None for name in TEXTS},
     )
 
 
 def write_measurements(path: Path, rows: Iterable[Measurement]) -> None:
-    """The rows as a CSV file that ``read_measurements`` reads, with groups and counts where they say something; raises OSError."""
+    """The rows as a CSV file that ``read_measurements`` reads, with ``TEXTS`` and counts that say something; raises OSError."""
     rows = list(rows)
-    columns = (*COLUMNS, GROUP) if any(row.group is not None for row in rows) else COLUMNS
+    columns = (*COLUMNS, *(name for name in TEXTS if any(getattr(row, name) is not None for row in rows)))
     counts = COUNTS if any(row.counts != (1, 1) for row in rows) else ()
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow((*columns, *counts))
         for row in rows:
             values = (*(getattr(row, name) for name in columns), *(row.counts if counts else ()))
-            table.writerow(["" if value is None else value for value in values])
+            table.writerow(["" if value is None else short_number(value) for value in values])
+
+
+def short_number(value: object) -> object:
+    """An angle or a distance with four decimals: finer than any of them is measured."""
+    return round(value, 4) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -240,7 +254,8 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``images``, ``intervals`` (what the bootstrap draws), ``angle``, ``state``, ``manual`` (the two manual measures against
+        ``no_robot`` (images without one, and on how many of them the algorithm gave a pose), ``images``, ``intervals`` (what the
+        bootstrap draws), ``angle``, ``state``, ``manual`` (the two manual measures against
         each other) and ``notes``: one sentence for each thing that a reader should know. Undefined figures: None, and a note
         says why.
     """
@@ -257,7 +272,9 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     answered = sum(row.algorithm_angle is not None or row.algorithm_state is not None for row in by_hand)
     drawn = group["angle" if measured else "state"]
     known_groups = {row.group for row in measured or labelled if row.group is not None}
+    empty = [row for row in rows if (row.answer or "").casefold() == NO_ROBOT]
     metrics: dict[str, Any] = {
+        "no_robot": {"n": len(empty), "pose_given": sum(row.algorithm_state is not None for row in empty)},
         "images": {"n": len(rows), "measured": len(by_hand), "answered": answered, "unanswered": len(by_hand) - answered},
         "intervals": {
             "drawn": "images" if drawn is None else "nothing" if are_too_few(drawn) else "groups",
@@ -273,7 +290,7 @@ def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
         words = [_OF[name] for name in without]
         what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
         notes.append(too_few_words(f"intervals of {what}", known))
-    notes += missing_notes(rows) + other_side_notes(rows)
+    notes += answer_notes(rows, metrics["no_robot"]) + missing_notes(rows) + other_side_notes(rows)
     return metrics | {"notes": notes + _angle_notes(metrics, rows) + _state_notes(metrics["state"])}
 
 
@@ -281,6 +298,32 @@ _OF = {"angle": "angles", "state": "states", "manual": "manual measures"}
 _APART_DEG = 15.0  # angles further apart may have been measured to different sides
 _ALIKE_DEG = SHARE_EDGES_PERCENT[1] / 100 * RANGE_DEG  # if they are so near once one is turned
 _NAMED = 5  # images named in a note
+
+
+def answer_notes(rows: Sequence[Measurement], no_robot: Mapping[str, int]) -> list[str]:
+    """Images without a pose, and manual angles that were not drawn by hand alone, or on short lines."""
+    notes = []
+    if no_robot["n"]:
+        given = no_robot["pose_given"]
+        notes.append(f"Images without a robot, by hand: {no_robot['n']}; the algorithm gave a pose on {given} of them, wrongly.")
+    unclear = sum(row.answer is not None for row in rows) - no_robot["n"]
+    if unclear:
+        notes.append(f"Images on which the raters could not tell the pose: {unclear}; they are in none of the figures.")
+    sources = Counter(source for row in rows for source in (row.provenance or "").split("+"))
+    taken = {word: sources[word] for word in _NOT_BY_HAND if sources[word]}
+    if taken:
+        told = ", ".join(f"{word}: {count}" for word, count in taken.items())
+        notes.append(
+            f"Manual angles that were not drawn by hand from the start ({told}); with these the algorithm agrees too well."
+        )
+    short = sum(row.short_lines is not None for row in rows)
+    if short:
+        notes.append(f"Manual angles on lines shorter than the fit wants: {short}; they are less certain.")
+    return notes
+
+
+_NOT_BY_HAND = ("algorithm", "followed", "corrected")
+"""Values of ``provenance`` beside "manual"."""
 
 
 def missing_notes(rows: Sequence[Measurement]) -> list[str]:
@@ -294,12 +337,12 @@ def missing_notes(rows: Sequence[Measurement]) -> list[str]:
         both = having.count((True, True))
         if 0 < both < len(rows):
             lacks = {
-                "the algorithmic one": having.count((True, False)),
-                "the manual one": having.count((False, True)),
-                "both": having.count((False, False)),
+                "by hand only": having.count((True, False)),
+                "by the algorithm only": having.count((False, True)),
+                "by neither": having.count((False, False)),
             }
-            told = ", ".join(f"{which}: {count}" for which, count in lacks.items() if count)
-            notes.append(f"Rows with a manual and an algorithmic {what}: {both} of {len(rows)}; without {told}.")
+            told = ", ".join(f"{count} {which}" for which, count in lacks.items() if count)
+            notes.append(f"The {what} was given by hand and by the algorithm on {both} of {len(rows)} images ({told}).")
     once = sum((row.angle_1 is None) is not (row.angle_2 is None) for row in rows)
     if once and any(row.angle_1 is not None and row.angle_2 is not None for row in rows):
         notes.append(f"Images that were measured once by hand, and not twice: {once}.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from core.annotation.agreement_report import (
     undecided,
     write_measures,
 )
-from core.annotation.model import Annotation, AnnotationError, ImageView, measure_lines
+from core.annotation.model import Annotation, AnnotationError, ImageView, AngleProvenance, measure_lines
 from core.annotation.store import ImageRecord, ItemKey, StoredAnnotation
 from core.config.models import PerceptionConfig
 from core.evaluation.evaluation import EvaluationError, evaluate, read_measurements, write_measurements
@@ -75,9 +76,40 @@ def test_kappa_is_of_states_and_who_cannot_tell_gives_none() -> None:
     half = [answer(f"dim {k}", "ann", 1, None, None) for k in (1, 2)]
     half += [answer(f"dim {k}", "bob", 1, 5.0, PoseState.B) for k in (1, 2)]
     (pair,) = agreement_report(ann + bob + dark + half, {})["pairs"]
-    assert pair["state"] == {"n": 4, "equal": 0.75, "kappa": pytest.approx(0.5), "one_cannot_tell": 2, "neither_can_tell": 5}
+    none = {"one_cannot_tell": 0, "neither_can_tell": 0, "one_no_robot": 0, "both_no_robot": 0}
+    unclear = none | {"one_cannot_tell": 2, "neither_can_tell": 5}
+    assert pair["state"] == unclear | {"n": 4, "equal": 0.75, "kappa": pytest.approx(0.5)}
     (pair,) = agreement_report(dark, {})["pairs"]
-    assert pair["state"] == {"n": 0, "equal": None, "kappa": None, "one_cannot_tell": 0, "neither_can_tell": 5}
+    assert pair["state"] == none | {"n": 0, "equal": None, "kappa": None, "neither_can_tell": 5}
+    empty = [replace(one, content=replace(one.content, cannot_tell=False, no_robot=True)) for one in dark[:5]]
+    report = agreement_report(empty + dark[5:], {})
+    states, ann = report["pairs"][0]["state"], report["raters"]["ann"]
+    assert states == none | {"n": 0, "equal": None, "kappa": None, "neither_can_tell": 2, "both_no_robot": 2} | {
+        "one_cannot_tell": 1,
+        "one_no_robot": 1,
+    }
+    assert (ann["no_robot"], ann["cannot_tell"]) == (3, 2)
+
+
+def test_a_picture_without_a_robot_is_an_answer_of_its_own(tmp_path: Path) -> None:
+    """In the table, and among the figures: the algorithm may give no pose there."""
+    seen = answer("1", "ann", 1, 4.0, PoseState.B)
+    empty = [replace(answer(name, "ann", 1, None, None), content=Annotation(no_robot=True)) for name in "23"]
+    taken = replace(answer("4", "ann", 1, 5.0, PoseState.B), provenance=AngleProvenance.CORRECTED, is_short=True)
+    rows = manual_measurements([seen, *empty, taken, answer("5", "ann", 1, None, None)], {})
+    rows = [replace(row, algorithm_angle=3.0, algorithm_state="B") if row.image in "124" else row for row in rows]
+    write_measurements(tmp_path / "m.csv", rows)
+    assert read_measurements(tmp_path / "m.csv") == rows
+    assert [row.answer for row in rows] == [None, "no robot", "no robot", None, "can't tell"]
+    assert [row.provenance for row in rows] == ["manual", None, None, "corrected", None]
+    metrics = evaluate(rows)
+    assert metrics["no_robot"] == {"n": 2, "pose_given": 1}
+    assert metrics["angle"]["n"] == 2
+    told = " ".join(metrics["notes"])
+    assert "Images without a robot, by hand: 2; the algorithm gave a pose on 1 of them, wrongly." in told
+    assert "could not tell the pose: 1;" in told
+    assert "(corrected: 1)" in told
+    assert "shorter than the fit wants: 1;" in told
 
 
 def test_one_rater_alone_has_no_pairs(tmp_path) -> None:

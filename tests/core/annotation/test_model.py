@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from core.annotation.model import (
+    FOLLOWS_LINES,
     ROBOT,
+    TAKES_LINES,
     VESSEL,
     Annotation,
     History,
@@ -17,6 +20,7 @@ from core.annotation.model import (
     JournalEntry,
     MaskPolygon,
     MaskTarget,
+    AngleProvenance,
     Status,
     Touch,
     annotation_from_json,
@@ -173,6 +177,32 @@ def test_status() -> None:
     assert status_of(lines, measured=False) is Status.BEGUN
     assert status_of(Annotation(state=PoseState.A), measured=True) is Status.DONE
     assert status_of(Annotation(cannot_tell=True), measured=False) is Status.CANNOT_TELL
+    assert status_of(Annotation(no_robot=True), measured=False) is Status.NO_ROBOT
+
+
+def test_where_lines_come_from_follows_undo_and_ends_with_cleared_lines() -> None:
+    taken = Annotation(((1.0, 1.0), (50.0, 1.0)), ((1.0, 5.0), (60.0, 5.0)))
+    history = History()
+    history.edit("add a point", Annotation(taken.robot))
+    assert history.provenance is AngleProvenance.MANUAL
+    history.edit(TAKES_LINES, taken)
+    history.edit("state B", replace(taken, state=PoseState.B))
+    assert history.provenance is AngleProvenance.ALGORITHM
+    history.edit("move a point", move(taken, ROBOT, 0, (2.0, 2.0)))
+    assert history.provenance is AngleProvenance.CORRECTED
+    history.undo()
+    assert history.provenance is AngleProvenance.ALGORITHM
+    history.edit("clear the robot line", Annotation())
+    history.edit("add a point", Annotation(taken.robot))
+    assert history.provenance is AngleProvenance.MANUAL
+    history.edit(FOLLOWS_LINES, taken)
+    assert history.provenance is AngleProvenance.FOLLOWED
+
+
+@pytest.mark.parametrize(("robot_px", "vessel_px", "is_short"), [(60.0, 60.0, False), (39.7, 60.0, False), (39.0, 60.0, True)])
+def test_lines_shorter_than_the_fit_wants_are_known(robot_px: float, vessel_px: float, is_short: bool) -> None:
+    lines = Annotation(((300.0 - robot_px, 200.0), (300.0, 200.0)), ((300.0 - vessel_px, 210.0), (300.0 + vessel_px, 210.0)))
+    assert measure_lines(lines, (512, 512), PerceptionConfig()).is_short is is_short
 
 
 VESSEL_BOX = MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (50.0, 10.0), (50.0, 30.0), (10.0, 30.0)))

@@ -197,12 +197,11 @@ def test_what_is_missing_is_counted() -> None:
         (None, None, None, None, None),
     )
     notes = evaluate(rows)["notes"]
-    lacking = "without the algorithmic one: 2, the manual one: 1, both: 1."
-    assert f"Rows with a manual and an algorithmic angle: 2 of 6; {lacking}" in notes
-    lacking = "without the algorithmic one: 1, the manual one: 1, both: 1."
-    assert f"Rows with a manual and an algorithmic state: 3 of 6; {lacking}" in notes
+    lacking = "by hand only, 1 by the algorithm only, 1 by neither"
+    assert f"The angle was given by hand and by the algorithm on 2 of 6 images (2 {lacking})." in notes
+    assert f"The state was given by hand and by the algorithm on 3 of 6 images (1 {lacking})." in notes
     assert "Images that were measured once by hand, and not twice: 1." in notes
-    assert not any("without" in note or "once" in note for note in evaluate(rows[:1] * 2)["notes"])
+    assert not any("only" in note or "once" in note for note in evaluate(rows[:1] * 2)["notes"])
     nameless = "Rows that name no image: 1; whether one is there twice cannot be seen."
     assert nameless in evaluate([replace(rows[0], image="")])["notes"]
 
