@@ -33,6 +33,8 @@ def is_installed() -> bool:
 
 CALLED = _NAME if is_installed() else "main.py"
 """How users call the program."""
+COMMAND = _NAME if is_installed() else "python main.py"
+"""The beginning of a command line that can be copied."""
 
 
 def as_called(text: str) -> str:

@@ -31,6 +31,7 @@ from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 from app.annotator.model import AnnotationModel, QueueEntry
+from app.annotator.panels import Answer
 from app.annotator.window import AnnotatorWindow
 from app.commands.evaluate import evaluate
 from app.commands.options import ConfigOption
@@ -679,7 +680,7 @@ def _annotate(job: PictureJob, window: AnnotatorWindow) -> None:
     pose = model.measure(model.annotation).pose
     if pose is None:
         raise UserError("the algorithm had no lines for the annotator's picture; is the model the default one?")
-    window.set_state(pose.state)
+    window.give(Answer[pose.state.value])
     job.wait(0.1)
 
 

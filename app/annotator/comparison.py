@@ -22,7 +22,7 @@ from core.annotation.agreement_report import (
     rater_notes,
     second_measure_notes,
 )
-from core.annotation.model import AnnotationError, AngleProvenance
+from core.annotation.model import AngleProvenance, AnnotationError
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.annotation.study import angle_words
 from core.config.models import Config

@@ -17,13 +17,13 @@ from core.annotation.carry import carried_masks
 from core.annotation.exchange import Imported, Proposal, merged, proposal_of, read_files
 from core.annotation.model import (
     ANSWERED,
+    AngleProvenance,
     Annotation,
     AnnotationError,
     History,
     ImageView,
     JournalEntry,
     MaskTarget,
-    AngleProvenance,
     Readout,
     Status,
     measure_lines,

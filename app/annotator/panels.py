@@ -30,7 +30,7 @@ from app.ui.theme import ON_PICTURE
 from app.widgets.basics import column, line, name_list
 from app.widgets.painting import CENTER, NONE, Painted, PaintedWidget, draw_box, draw_text
 from app.widgets.state_badge import paint_state
-from core.annotation.model import ANSWERED, Annotation, MaskTarget, AngleProvenance, Readout, Status
+from core.annotation.model import ANSWERED, AngleProvenance, Annotation, MaskTarget, Readout, Status
 from core.types import PoseState
 
 _DRAWN = ("ROBOT", "VESSEL")
@@ -109,7 +109,8 @@ class AnnotationBar(QWidget):
                 continue
             chip = _Chip(key, tr(label), colour, tr("{meaning}  (key {key})", meaning=tr(meaning), key=key))
             chip.setChecked(key in "LK")
-            chip.toggled.connect(lambda on, which=key: (self.switched.emit(which, on), self.shown.emit(which, on)))
+            for signal in (self.switched, self.shown):
+                chip.toggled.connect(lambda on, which=key, signal=signal: signal.emit(which, on))
             row.addWidget(chip)
             self._switches[key] = chip
         answers = line(spacing=5)
@@ -289,7 +290,7 @@ _WORD = {
     Status.CANNOT_TELL: mark("can't tell"),
     Status.NO_ROBOT: mark("no robot"),
 }
-_SHORT = mark("short lines")
+_SHORT = mark("short")
 _FROM = {
     AngleProvenance.ALGORITHM: mark("algorithm"),
     AngleProvenance.FOLLOWED: mark("followed"),
@@ -534,7 +535,12 @@ class AnnotationReadout(PaintedWidget):
         return tr("The lines say the same")
 
     def show_annotation(
-        self, annotation: Annotation, readout: Readout, source: AngleProvenance = AngleProvenance.MANUAL, *, is_preview: bool = False
+        self,
+        annotation: Annotation,
+        readout: Readout,
+        source: AngleProvenance = AngleProvenance.MANUAL,
+        *,
+        is_preview: bool = False,
     ) -> None:
         """`source` is where the lines come from; `is_preview`: a point is still moving."""
         self._annotation, self._readout, self._is_preview = annotation, readout, is_preview

@@ -411,8 +411,8 @@ class AnnotatorWindow(WindowFrame):
                 return
             self.model.edit(_TAKEN_BACK[answer], replace(annotation, cannot_tell=False, no_robot=False))
             return
-        flags = {"cannot_tell": answer is Answer.CANNOT_TELL, "no_robot": answer is Answer.NO_ROBOT}
-        self.model.edit(action, replace(annotation, state=state, **flags))
+        cannot_tell, no_robot = answer is Answer.CANNOT_TELL, answer is Answer.NO_ROBOT
+        self.model.edit(action, replace(annotation, state=state, cannot_tell=cannot_tell, no_robot=no_robot))
 
     def undo(self) -> None:
         """Back one edit, and say which; while an outline is drawn, its last point."""
@@ -488,6 +488,7 @@ class AnnotatorWindow(WindowFrame):
                 self.show_message(tr("Asking the algorithm"))
             self.model.propose()
         else:
+            self._takes_proposal = False
             canvas.show_proposal(None)
         canvas.setFocus()
 
@@ -585,8 +586,8 @@ class AnnotatorWindow(WindowFrame):
                 self.show_message(tr("The algorithm found no {what}", what=tr_text(target.value)))
         elif proposed.robot or proposed.vessel:
             self.panels.canvas.close_line()
-            taken_over = {"robot": proposed.robot, "vessel": proposed.vessel}
-            self.model.edit(TAKES_LINES, replace(annotation, **taken_over, cannot_tell=False, no_robot=False))
+            taken_over = replace(proposed, state=annotation.state, masks=annotation.masks, note=annotation.note)
+            self.model.edit(TAKES_LINES, taken_over)
             self.show_message(tr("The algorithm's lines are yours now: correct them, Enter goes on, Ctrl+Z takes them back"))
         else:
             self.show_message(tr("The algorithm has no lines here"))

@@ -35,6 +35,7 @@ from core.config.models import Config, choose_model, load_config
 from core.devices import UserError
 from core.files import write_atomic
 from core.perception import compiled
+from core.program import COMMAND
 from core.types import Frame
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         count, problems = export_training_set(drawn, images, options.out, measured=measured)
         print_warnings(problems)
         said = f"{count} image{'s' if count != 1 else ''} with both masks in {options.out}"
-        sys.stderr.write(f"{said}; next: python main.py train --data {options.out} --init default --out MODEL\n")
+        sys.stderr.write(f"{said}; next: {COMMAND} train --data {options.out} --init default --out MODEL\n")
     elif options.export == "coco":
         count = export_coco(annotations, images, options.out)
         sys.stderr.write(f"masks of {count} image{'s' if count != 1 else ''} in {options.out}\n")
@@ -183,7 +184,7 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         except OSError as error:
             raise AnnotationError(f"{options.out}: cannot be written ({error.strerror}); choose another --out") from None
         said = f"{len(rows)} image{'s' if len(rows) != 1 else ''} in {options.out}"
-        sys.stderr.write(f"{said}; next: python main.py evaluate --csv {options.out} --out DIR\n")
+        sys.stderr.write(f"{said}; next: {COMMAND} evaluate --csv {options.out} --out DIR\n")
         unfinished = {one.key.sha256 for one in annotations} - {one.key.sha256 for one in finished(annotations)}
         begun = sorted(image.path.name for image in images if image.sha256 in unfinished)
         if begun:

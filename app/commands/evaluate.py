@@ -26,6 +26,7 @@ from core.evaluation import evaluation
 from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, read_measurements, write_measurements
 from core.evaluation.paper import PAPER, against_paper, choose_images, measure_twice, wanted_images
 from core.files import name_as_text, name_of, write_atomic
+from core.program import COMMAND
 from core.types import Frame
 
 
@@ -89,7 +90,9 @@ def evaluate(
         if annotations is not None and like_paper:
             raise EvaluationError("--like-paper needs a labelled set with its truth, not annotations by hand")
         if annotations is None and study is not None:
-            raise EvaluationError(f"{labelled}: has no annotation file; begin the study with: annotate {labelled} --study {study}")
+            raise EvaluationError(
+                f"{labelled}: has no annotation file; begin the study with: {COMMAND} annotate {labelled} --study {study}"
+            )
         truth = _read_set(labelled) if annotations is None else []
         _make_out(out)
         settings = load_config(config, preset, choose_model(model))

@@ -21,6 +21,7 @@ from core.config.safety import AtClose
 from core.devices import DeviceError, EndOfStream
 from core.perception.model_file import check_model
 from core.perception.pipeline import configured_bench
+from core.program import COMMAND
 from core.session.files import check_parent
 from core.session.manifest import SessionError, about_rig, event_of_alert
 from core.session.writer import SessionWriter
@@ -242,4 +243,5 @@ def _print(result: dict[str, Any], config: Config) -> None:
         f"{result['camera_dropped']} skipped for newer ones, {result['camera_lost']} lost by the camera, "
         f"{result['bytes'] / 1e6:.1f} MB "
         f"({result['bytes'] / 1e6 / minutes:.1f} MB a minute, {config.record.codec})\n"
+        f"next: {COMMAND} play {result['session']}, or annotate it\n"
     )

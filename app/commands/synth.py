@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -78,4 +80,9 @@ def make_set(
         task = bar.add_task(f"{'scenes' if scenes else 'frames'} -> {out}", total=count)
         write_set(plan, workers=workers, remote=remote, on_progress=lambda frames: bar.advance(task, frames))
     kind = "scenes" if scenes else "labelled frames"
-    console.print(f"{count} {kind} of phantom seeds {seed} to {seed + plan.episodes - 1} in {out}", soft_wrap=True)
+    seeds = f"seeds {seed} to {seed + plan.episodes - 1}" if plan.episodes > 1 else f"seed {seed}"
+    console.print(f"{count} {kind if count > 1 else kind[:-1]} of phantom {seeds} in {out}", soft_wrap=True)
+    if not scenes:
+        rows = (out / "truth.jsonl").read_text(encoding="utf-8").splitlines()
+        looks = Counter(json.loads(row)["family"] for row in rows)
+        console.print(f"looks: {', '.join(f'{name} ({n})' for name, n in looks.most_common())}", soft_wrap=True)

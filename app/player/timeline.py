@@ -29,6 +29,7 @@ from app.ui import theme
 from app.ui.i18n import tr
 from app.ui.texts import signed_degrees, tip
 from app.widgets.mode_bar import MODE_LOOK
+from app.widgets.painting import LEFT, RIGHT, draw_text
 from core.control.modes import Mode
 from core.session.manifest import Event
 from core.types import PoseState
@@ -397,6 +398,13 @@ class TimelineView(QWidget):
         painter.setBrush(QColor(theme.TEXT))
         top = lanes.ruler.bottom() - 6
         painter.drawPolygon(QPolygonF([QPointF(x - 6, top), QPointF(x + 6, top), QPointF(x, top + 8)]))
+        course = self._course
+        theta_deg = course.theta_deg[course.place_at(self._time_s)] if course is not None and len(course) else float("nan")
+        if np.isfinite(theta_deg):
+            room = QRectF(x + 6, lanes.theta.top(), 60, 16)
+            room.moveRight(min(room.right(), lanes.theta.right()) if room.right() < lanes.theta.right() else x - 6)
+            align = RIGHT if room.right() < x else LEFT
+            draw_text(painter, room, f"{theta_deg:.1f}°", theme.semi_bold(12), theme.TEXT, align)
 
     # ---- the pointer
 

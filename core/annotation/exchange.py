@@ -262,7 +262,7 @@ def export_training_set(
         elif sha256 in here:
             complete[sha256] = one
     if not complete:
-        raise AnnotationError("no image has both a vessel and a robot mask; draw them, or take the model's over, in annotate")
+        raise AnnotationError("no image has both a vessel and a robot mask; draw them, or take the algorithm's over, in annotate")
     measured = [one for one in (finished(annotations) if measured is None else measured) if one.key.sha256 in complete]
     if len(studies := studies_of(measured)) > 1:
         raise AnnotationError(f"the images were measured in several studies ({', '.join(studies)}); choose one with --study NAME")
@@ -361,7 +361,7 @@ def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundI
             ids = {"id": len(content["annotations"]) + 1, "image_id": number, "category_id": categories[piece[0].target]}
             content["annotations"].append(ids | _coco_piece(piece, image.record.size))
     if not content["images"]:
-        raise AnnotationError("no image has a mask; draw them, or take the model's over, in annotate")
+        raise AnnotationError("no image has a mask; draw them, or take the algorithm's over, in annotate")
     if out.exists():
         raise AnnotationError(f"{out}: is there already; choose another --out")
     try:
@@ -434,7 +434,7 @@ def split_own_frames(
     if len(complete) < FEWEST:
         missing = FEWEST - len(complete)
         have = f"{len(complete)} {'image has' if len(complete) == 1 else 'images have'} both a vessel and a robot mask"
-        how = "draw them with keys 3 and 4, or take over and correct the model's with G"
+        how = "draw them with keys 3 and 4, or take over and correct the algorithm's with G"
         raise AnnotationError(f"{have}, and training needs {FEWEST}: {missing} more ({how})")
     count = max(_FEWEST_HELD_OUT, len(complete) // _HELD_OUT_SHARE)
     begin = (len(complete) - count) // 2

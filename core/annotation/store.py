@@ -24,12 +24,12 @@ from typing import Any
 
 from core.annotation.model import (
     PROVENANCE,
+    AngleProvenance,
     Annotation,
     AnnotationError,
     History,
     ImageView,
     JournalEntry,
-    AngleProvenance,
     Readout,
     annotation_from_json,
 )

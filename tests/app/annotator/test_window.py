@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 import sqlite3
@@ -12,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QKeyEvent, QWheelEvent
+from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent, QKeyEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -21,10 +22,20 @@ from pytestqt.qtbot import QtBot
 from app.annotator.canvas import AnnotationCanvas
 from app.annotator.editing import RADIUS_NOTCH, MaskMode, Tool
 from app.annotator.model import AnnotationModel, QueueEntry
+from app.annotator.panels import Answer
 from app.annotator.window import AnnotatorWindow
 from core.annotation.exchange import Proposal, proposal_of
 from core.annotation.masks import fill
-from core.annotation.model import Annotation, AnnotationError, ImageView, MaskPolygon, MaskTarget, measure_lines
+from core.annotation.model import (
+    TAKES_LINES,
+    AngleProvenance,
+    Annotation,
+    AnnotationError,
+    ImageView,
+    MaskPolygon,
+    MaskTarget,
+    measure_lines,
+)
 from core.annotation.store import AnnotationStore, ItemKey, StoredAnnotation, find_images
 from core.config.models import PerceptionConfig
 from core.evaluation.accuracy import TrueMasks
@@ -45,7 +56,7 @@ _DIAGONAL = tuple((float(at), float(at)) for at in (80, 120, 200, 290, 350, 420)
 class Rater:
     """A window over some pictures; sends it real events and counts them."""
 
-    def __init__(self, qtbot: QtBot, folder: Path, views: tuple[ImageView, ...], blind: bool) -> None:
+    def __init__(self, qtbot: QtBot, folder: Path, views: tuple[ImageView, ...], blind: bool, hides_angle: bool) -> None:
         self.store_path = folder / "a.sqlite"
         paths = [folder / f"{k}.png" for k in range(3)]
         for k, path in enumerate(paths):
@@ -57,7 +68,8 @@ class Rater:
         items = [
             QueueEntry(image, ItemKey(image.sha256, study, "ann", k), view) for k, view in enumerate(views, 1) for image in images
         ]
-        self.window = AnnotatorWindow(AnnotationModel(store, items, PerceptionConfig(), blind=blind), "rater ann")
+        model = AnnotationModel(store, items, PerceptionConfig(), blind=blind, hides_angle=hides_angle)
+        self.window = AnnotatorWindow(model, "rater ann")
         self.events = 0
         self.qtbot = qtbot
         qtbot.addWidget(self.window)
@@ -124,8 +136,8 @@ MakeRater = Callable[..., Rater]
 def make(qtbot: QtBot, tmp_path: Path) -> Iterator[MakeRater]:
     raters = []
 
-    def made(views: tuple[ImageView, ...] = (ImageView.AS_IS,), blind: bool = False) -> Rater:
-        raters.append(Rater(qtbot, tmp_path, views, blind))
+    def made(views: tuple[ImageView, ...] = (ImageView.AS_IS,), blind: bool = False, hides_angle: bool = False) -> Rater:
+        raters.append(Rater(qtbot, tmp_path, views, blind, hides_angle))
         return raters[-1]
 
     yield made
@@ -152,6 +164,112 @@ def test_an_image_in_at_most_twelve_events_with_the_angle_of_the_method(rater: R
     # clicks lie on whole screen pixels, up to 0.45 image pixels off: 40 px turn by about a degree then
     assert one.theta_deg == pytest.approx(asked.theta_deg, abs=math.degrees(2 * 0.45 / 40))
     assert one.content.state is asked.state
+
+
+def test_an_angle_with_its_state_takes_at_most_eight_events_and_from_the_proposal_four(rater: Rater) -> None:
+    """Clicks and keys, up to the next image: two points a line; Enter ends the first, the state ends the second."""
+    rater.click(ROBOT[0], ROBOT[-1])
+    rater.press(Key.Key_Return)
+    rater.click(*VESSEL)
+    rater.press(Key.Key_B, Key.Key_Return)
+    assert (rater.model.index, rater.model.finished, rater.events) == (1, 1, 7)
+    assert rater.events <= 8
+    rater.events = 0
+    pose = measure_lines(Annotation(ROBOT, VESSEL), SIZE, PerceptionConfig()).pose
+    rater.model._proposals[rater.model.item.image.sha256] = Proposal(Annotation(ROBOT, VESSEL, PoseState.B), pose, 0.8)
+    rater.press(Key.Key_G, Key.Key_Return, Key.Key_Return)
+    assert (rater.model.index, rater.model.finished, rater.events) == (2, 2, 3)
+    assert rater.events <= 4
+    first, second = sorted(rater.kept(), key=lambda one: one.changed_utc)
+    assert (first.provenance, second.provenance) == (AngleProvenance.MANUAL, AngleProvenance.ALGORITHM)
+
+
+def test_answers_are_chips_and_no_robot_is_one_of_its_own(rater: Rater) -> None:
+    chips = rater.window.panels.bar._answers
+    assert [chip.text() for chip in chips.values()] == [
+        "On the centerline",
+        "Coming back",
+        "Moving away",
+        "Crossed",
+        "Can't tell",
+        "No robot",
+    ]
+    QTest.mouseClick(chips[Answer.NO_ROBOT], Qt.MouseButton.LeftButton)
+    assert rater.drawn == Annotation(no_robot=True)
+    assert chips[Answer.NO_ROBOT].isChecked()
+    assert rater.window.panels.readout.state_text == "No robot"
+    rater.press(Key.Key_O)
+    assert rater.drawn == Annotation(), "given again it is taken back"
+    rater.press(Key.Key_O, Key.Key_C)
+    assert (rater.drawn.no_robot, rater.drawn.state) == (False, PoseState.C)
+    rater.press(Key.Key_O, Key.Key_Return)
+    assert rater.model.index == 1, "it is an answer: Enter goes on"
+    (one,) = rater.kept()
+    assert one.content == Annotation(no_robot=True)
+
+
+def test_a_blind_study_hides_theta_and_the_state_of_the_lines_until_the_answer(make: MakeRater) -> None:
+    rater = make(blind=True, hides_angle=True)
+    readout, chips = rater.window.panels.readout, rater.window.panels.bar._answers
+    rater.click(ROBOT[0], ROBOT[-1])
+    rater.press(Key.Key_Return)
+    rater.click(VESSEL[0])
+    QTest.mouseMove(rater.canvas, rater.at(VESSEL[1]))
+    assert readout.angle_text == "hidden"
+    rater.click(VESSEL[1])
+    assert rater.canvas.editor.drawing.readout.robot_vector is None, "nor as an arrow in the picture"
+    assert "The lines say" not in readout.advice_text
+    assert not any(chip._is_next for chip in chips.values())
+    rater.press(Key.Key_Return, Key.Key_Return)
+    assert rater.drawn.state is None, "Enter takes no state that is not seen"
+    assert "choose the state yourself" in rater.message
+    rater.press(Key.Key_D)
+    assert readout.angle_text.endswith("°")
+    assert rater.canvas.editor.drawing.readout.pose is not None
+
+
+def test_short_lines_and_what_the_algorithm_drew_are_marked_in_the_list(rater: Rater) -> None:
+    queue = rater.window.panels.queue._model
+    rater.click((300.0, 210.0), (320.0, 210.0))
+    rater.press(Key.Key_Return)
+    rater.click(*VESSEL)
+    assert queue.particulars(0) == ["short"]
+    assert "short: 20 + 40 px" in rater.window.panels.readout.accessibleDescription()
+    rater.model.edit(TAKES_LINES, Annotation(ROBOT, VESSEL))
+    assert queue.particulars(0) == ["algorithm"]
+    rater.drag(ROBOT[0], (190.0, 170.0))
+    assert queue.particulars(0) == ["corrected"]
+    listed = rater.window.panels.queue
+    listed._filter.setCurrentIndex(listed._filter.findText("Not drawn by hand"))
+    assert [listed._view.isRowHidden(row) for row in range(3)] == [False, True, True]
+
+
+def test_escape_lets_go_of_a_line_and_a_click_goes_on(rater: Rater) -> None:
+    rater.click(ROBOT[0])
+    QTest.mouseMove(rater.canvas, rater.at(ROBOT[1]))
+    assert rater.canvas.editor.drawing.rubber_band
+    rater.press(Key.Key_Escape)
+    QTest.mouseMove(rater.canvas, rater.at(ROBOT[2]))
+    assert not rater.canvas.editor.drawing.rubber_band
+    rater.click(ROBOT[2])
+    assert len(rater.drawn.robot) == 2
+
+
+def test_a_file_of_another_program_that_is_dropped_is_imported(rater: Rater, tmp_path: Path) -> None:
+    shapes = [{"label": "robot", "shape_type": "linestrip", "points": [[10.5, 10.5], [90.5, 10.5]]}]
+    path = tmp_path / "1.json"
+    path.write_text(json.dumps({"imagePath": "1.png", "imageWidth": 640, "imageHeight": 480, "shapes": shapes}))
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    at = QPointF(50, 50)
+    buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    with rater.qtbot.waitSignal(rater.model.imported) as said:
+        QApplication.sendEvent(rater.window, QDropEvent(at, Qt.DropAction.CopyAction, data, buttons, keys))
+    assert said.args == [1, []]
+    rater.press(Key.Key_N)
+    assert rater.drawn.robot == ((10.0, 10.0), (90.0, 10.0))
+    rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
+    assert rater.drawn == Annotation(), "an import can be undone"
 
 
 def test_an_enter_that_is_held_ends_one_thing(rater: Rater) -> None:
@@ -353,7 +471,8 @@ def test_progress_and_status(rater: Rater) -> None:
     rater.press(Key.Key_N, Key.Key_U)
     assert rater.model.index == 1, "the next without an answer, around the end"
     rater.press(Key.Key_X, Key.Key_End, Key.Key_X, Key.Key_N)
-    assert rater.message == "The last image. All are done"
+    assert rater.window.panels.offers.text == "All 3 images have an answer"
+    assert list(rater.window.panels.offers.answers)[:3] == ["Evaluate", "Report", "Next rater..."]
     assert [one.content.cannot_tell for one in rater.kept()] == [True] * 3
 
 
@@ -538,7 +657,7 @@ def moving_rater(make: MakeRater, tmp_path: Path) -> Rater:
 
 
 def test_masks_of_the_image_before_are_proposed_and_taken(moving_rater: Rater) -> None:
-    moving_rater.press(Key.Key_N, Key.Key_M)
+    moving_rater.press(Key.Key_N, Key.Key_V)
     moving_rater.qtbot.waitUntil(lambda: moving_rater.canvas.editor.drawing.proposal is not None, timeout=60_000)
     assert not moving_rater.drawn.masks, "a proposal is no answer"
     assert moving_rater.message == "Proposed from 0.png, dotted: G takes the masks over, M hides them"
@@ -551,11 +670,11 @@ def test_masks_of_the_image_before_are_proposed_and_taken(moving_rater: Rater) -
 
 
 def test_a_carried_proposal_is_hidden_by_its_key_and_by_another_image(moving_rater: Rater) -> None:
-    moving_rater.press(Key.Key_N, Key.Key_M)
+    moving_rater.press(Key.Key_N, Key.Key_V)
     moving_rater.qtbot.waitUntil(lambda: moving_rater.canvas.editor.drawing.proposal is not None, timeout=60_000)
-    moving_rater.press(Key.Key_M)
+    moving_rater.press(Key.Key_V)
     assert moving_rater.canvas.editor.drawing.proposal is None
-    moving_rater.press(Key.Key_M)
+    moving_rater.press(Key.Key_V)
     moving_rater.qtbot.waitUntil(lambda: moving_rater.canvas.editor.drawing.proposal is not None, timeout=60_000)
     moving_rater.press(Key.Key_N)
     assert moving_rater.canvas.editor.drawing.proposal is None
@@ -563,13 +682,13 @@ def test_a_carried_proposal_is_hidden_by_its_key_and_by_another_image(moving_rat
 
 def test_without_another_mask_there_is_nothing_to_carry(make: MakeRater) -> None:
     rater = make()
-    rater.press(Key.Key_M)
+    rater.press(Key.Key_V)
     assert rater.message == "No other image of this folder and size has a robot mask"
 
 
 def test_in_a_blind_study_nothing_is_carried(make: MakeRater) -> None:
     rater = make(blind=True)
-    rater.press(Key.Key_M)
+    rater.press(Key.Key_V)
     assert rater.message == "A blind study: masks are drawn outside it"
 
 

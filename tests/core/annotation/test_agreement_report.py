@@ -20,7 +20,7 @@ from core.annotation.agreement_report import (
     undecided,
     write_measures,
 )
-from core.annotation.model import Annotation, AnnotationError, ImageView, AngleProvenance, measure_lines
+from core.annotation.model import AngleProvenance, Annotation, AnnotationError, ImageView, measure_lines
 from core.annotation.store import ImageRecord, ItemKey, StoredAnnotation
 from core.config.models import PerceptionConfig
 from core.evaluation.evaluation import EvaluationError, evaluate, read_measurements, write_measurements
