@@ -16,19 +16,16 @@ from app.annotator.model import AnnotationModel
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.workers import ChildProcess, Worker, command_of
 from app.widgets.messages import Offer, OfferButton, OfferStrip
+from core.annotation.formats import FORMATS
 
 if TYPE_CHECKING:
     from app.ui.window_base import WindowFrame
 
-IMPORTED = (".json",)
-"""Endings of files that are imported when they are dropped."""
-_EXPORTS = {
-    "dataset": mark("Training set (a folder)"),
-    "csv": mark("Table for evaluate (*.csv)"),
-    "coco": mark("COCO masks (*.json)"),
-}
-"""What can be exported, as the file dialog lists it."""
-_ENDING = {"csv": ".csv", "coco": ".json"}
+IMPORTED = tuple({one.ending for one in FORMATS.values()} - {".png"})
+"""Endings of files that are imported when they are dropped; a dropped picture is opened."""
+_EXPORTS = {"dataset": mark("Training set (a folder)"), "csv": mark("Table for evaluate (*.csv)")}
+"""What can be exported besides ``FORMATS``, as the file dialog lists it."""
+_ENDING = {"csv": ".csv"} | {one.name: one.ending for one in FORMATS.values() if one.writes_file}
 _WORK = "work"
 """Key of the offer that shows the work that goes on."""
 
@@ -95,6 +92,7 @@ class AnnotationFiles(QObject):
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)  # nothing is written over
         filters = {tr(text): name for name, text in _EXPORTS.items()}
+        filters |= {f"{one.title} (*{_ENDING.get(one.name, '')})": one.name for one in FORMATS.values() if one.write is not None}
         dialog.setNameFilters(list(filters))
         dialog.fileSelected.connect(lambda path: self.export(filters[dialog.selectedNameFilter()], Path(path)))
         dialog.finished.connect(dialog.deleteLater)

@@ -14,7 +14,8 @@ from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, QTimer, Signal
 from app.ui.workers import Worker
 from app.widgets.image_canvas import halvings
 from core.annotation.carry import carried_masks
-from core.annotation.exchange import Imported, Proposal, merged, proposal_of, read_files
+from core.annotation.exchange import Proposal, merged, proposal_of
+from core.annotation.formats import Imported, read_files
 from core.annotation.model import (
     ANSWERED,
     AngleProvenance,

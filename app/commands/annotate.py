@@ -27,6 +27,7 @@ from app.annotator.sources import (
 from app.commands.options import ConfigOption, JsonOption, ModelOption
 from app.commands.progress import check_can_write, progress_bar
 from app.ui.i18n import tr
+from core.annotation.formats import FORMATS, export_as, read_files
 from core.annotation.model import AnnotationError, ImageView, measure_lines
 from core.annotation.store import AnnotationStore, FoundImage, ItemKey
 from core.annotation.study import QueueOrder, StudySettings, Task, queue_order, repeat_views, settings_from, tasks
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     from app.annotator.model import QueueEntry
 
 
-EXPORTS = ("dataset", "csv", "coco")
+EXPORTS = ("dataset", "csv", *(one.name for one in FORMATS.values() if one.write is not None))
 _DISAGREEMENT_DEG = 30.0
 """A disagreement of so much takes all certainty from an image, half as much half of it."""
 _KEPT = (("loupe", "L"), ("masks", "K"))
@@ -142,12 +143,12 @@ def _certainty(store: AnnotationStore, images: Sequence[FoundImage], order: Queu
 
 
 def export_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
-    """``--export``: a training set, COCO masks, or the table that ``evaluate --csv`` reads, as far as it was interrupted.
+    """``--export``: a training set, another program's files, or the table for ``evaluate --csv``, as far as it came.
 
     Raises AnnotationError, and KeyboardInterrupt after an interrupted table was written.
     """
     from core.annotation.agreement_report import finished
-    from core.annotation.exchange import export_coco, export_training_set
+    from core.annotation.exchange import export_training_set
     from core.evaluation.evaluation import write_measurements
 
     assert options.out is not None
@@ -167,9 +168,9 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         print_warnings(problems)
         said = f"{count} image{'s' if count != 1 else ''} with both masks in {options.out}"
         sys.stderr.write(f"{said}; next: {COMMAND} train --data {options.out} --init default --out MODEL\n")
-    elif options.export == "coco":
-        count = export_coco(annotations, images, options.out)
-        sys.stderr.write(f"masks of {count} image{'s' if count != 1 else ''} in {options.out}\n")
+    elif options.export in FORMATS:
+        count = export_as(FORMATS[options.export], annotations, images, options.out)
+        sys.stderr.write(f"{options.export} of {count} image{'s' if count != 1 else ''} in {options.out}\n")
     else:
         from app.annotator.comparison import comparable_answers, compare_with_algorithm
 
@@ -196,11 +197,14 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
 def import_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
     """``--import``: the lines and masks of other programs' files, for one rater. Raises AnnotationError if they hold nothing."""
-    from core.annotation.exchange import merged, read_files
+    from core.annotation.exchange import merged
 
-    sources = [file for path in options.imports for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
+    endings = {one.ending for one in FORMATS.values()}
+    sources = []
+    for path in options.imports:
+        sources += [file for file in sorted(path.rglob("*")) if file.suffix.lower() in endings] if path.is_dir() else [path]
     if not sources:
-        raise AnnotationError(f"{options.imports[0]}: no .json file in it")
+        raise AnnotationError(f"{options.imports[0]}: no {', '.join(sorted(endings))} file in it")
     if not any(source.is_file() for source in sources):  # before an annotation file is made for them
         raise AnnotationError(f"{sources[0]}: no such file; nothing was imported")
     rater = rater_name(options.study)
@@ -208,7 +212,8 @@ def import_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
     counts: Counter[str] = Counter()
     with AnnotationStore(store_path) as store:
         images = listed_images(files, store)
-        imported, problems = read_files(sources, images)
+        pictures = {image.path.resolve() for image in images}
+        imported, problems = read_files([file for file in sources if file.resolve() not in pictures], images)
         existing = {one.key: one.content for one in store.annotations(options.study.name, rater)}
         for one in imported:
             key = ItemKey(one.image.sha256, options.study.name, rater)
@@ -294,8 +299,10 @@ def annotate(
         str | None, typer.Option(help="of one session: row numbers such as 12,40, or refused: those without a pose")
     ] = None,
     report: Annotated[bool, typer.Option("--report", help="agreement within and between raters, instead of the window")] = False,
-    export: Annotated[str | None, typer.Option(help="dataset (for train), csv (for evaluate) or coco, to --out")] = None,
-    import_: Annotated[list[Path] | None, typer.Option("--import", help="labelme or COCO file or folder; may be repeated")] = None,
+    export: Annotated[str | None, typer.Option(help=f"to --out: {', '.join(EXPORTS)}")] = None,
+    import_: Annotated[
+        list[Path] | None, typer.Option("--import", help=f"file or folder of {', '.join(FORMATS)}; may be repeated")
+    ] = None,
     join: Annotated[
         list[Path] | None, typer.Option("--join", help="take in the answers of another annotation file; may be repeated")
     ] = None,
@@ -342,7 +349,7 @@ def run_annotate(options: AnnotateOptions) -> int:
     if options.joins and options.study.rater is not None:
         raise AnnotationError("--join takes all raters of a file; --as THERE=HERE says what one of them is called here")
     if options.export is not None and options.out is None:
-        raise AnnotationError("--export needs --out: a folder for dataset, a file for csv and coco")
+        raise AnnotationError("--export needs --out: a file for csv and coco, else a folder")
     if options.as_json and not options.report:
         raise AnnotationError("--json is for --report; leave it out")
     if options.rows is not None:

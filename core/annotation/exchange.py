@@ -1,15 +1,11 @@
-"""Annotations out of and into other forms: labelme and COCO files, training sets, and the algorithm's proposal.
-
-A damaged file or shape is named in one line, and the others are read.
-"""
+"""Annotations become training sets, and the algorithm's answer becomes an annotation. Other programs' files: ``formats.py``."""
 
 from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,205 +15,20 @@ import numpy as np
 
 from core import geometry
 from core.annotation.agreement_report import finished, manual_measurements, measured_alike, studies_of
-from core.annotation.masks import area_polygon, fill, polygons_of, polygons_of_area
-from core.annotation.model import Annotation, AnnotationError, Line, MaskPolygon, MaskTarget, line_from, measure_lines
+from core.annotation.formats import mask_source
+from core.annotation.masks import fill, polygons_of
+from core.annotation.model import Annotation, AnnotationError, Line, MaskPolygon, MaskTarget, measure_lines
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.config.models import PerceptionConfig
-from core.files import ImageError, read_image, write_atomic
+from core.files import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS, UNMEASURED, write_mask, write_png
 from core.types import Mask, Points, Pose, Refusal, Scene, Vector
-
-_MAX_BYTES = 500_000_000
-# Labels that are understood, in lower case.
-_LABELS = {
-    **dict.fromkeys(("vessel", "vessels", "lumen", "blood vessel", "artery"), MaskTarget.VESSEL),
-    **dict.fromkeys(("robot", "interventional robot", "catheter", "guidewire", "device"), MaskTarget.ROBOT),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Imported:
-    """The annotation of one image in a file."""
-
-    image: FoundImage
-    content: Annotation
-    source: Path
-
-
-def read_files(paths: Iterable[Path], images: Iterable[FoundImage]) -> tuple[list[Imported], list[str]]:
-    """Read labelme and COCO files (told apart by their content).
-
-    Parameters
-    ----------
-    paths : files.
-    images : those that the annotations may belong to; a file's image is found among them by its name.
-
-    Returns
-    -------
-    tuple
-        What was read, and one line for each thing that was not.
-    """
-    by_name: dict[str, list[FoundImage]] = {}
-    for image in images:
-        by_name.setdefault(image.path.name, []).append(image)
-    found: list[Imported] = []
-    problems: list[str] = []
-    for path in paths:
-        try:
-            if path.stat().st_size > _MAX_BYTES:
-                raise AnnotationError(f"{path}: larger than {_MAX_BYTES // 1_000_000} MB; left out")
-            content = json.loads(path.read_text(encoding="utf-8-sig"))
-            if not isinstance(content, dict):
-                raise AnnotationError(f"{path}: neither labelme nor COCO; left out")
-            if "shapes" in content:
-                found += _labelme(path, content, by_name, problems)
-            elif "annotations" in content and "images" in content:
-                found += _coco(path, content, by_name, problems)
-            else:
-                problems.append(f"{path}: neither labelme (shapes) nor COCO (images, annotations); left out")
-        except OSError as error:
-            problems.append(f"{path}: cannot be read ({error.strerror}); left out")
-        except AnnotationError as error:
-            problems.append(str(error))
-        except (ValueError, RecursionError):
-            problems.append(f"{path}: damaged, not valid JSON; left out")
-    return found, problems
-
-
-def _image_of(
-    path: Path, name: Any, width: Any, height: Any, by_name: Mapping[str, list[FoundImage]], problems: list[str]
-) -> FoundImage | None:
-    """The image that a file means, by its file name; None, and why, when it is not there or of another size."""
-    told = str(name).replace("\\", "/")
-    base = told.rpartition("/")[2]
-    candidates = by_name.get(base, [])
-    if len(candidates) > 1:  # in several folders: the name may include one
-        ending = "/" + told.lstrip("./")
-        candidates = [one for one in candidates if one.path.absolute().as_posix().endswith(ending)] or candidates
-    if not candidates:
-        problems.append(f"{path}: its image {base!r} is not among the given ones; left out")
-        return None
-    if len(candidates) > 1:
-        problems.append(f"{path}: {len(candidates)} images are called {base!r}; left out")
-        return None
-    size = candidates[0].record.size
-    if (width, height) != (None, None) and (width, height) != size:
-        problems.append(f"{path}: says that {base} is {width}x{height}, but it is {size[0]}x{size[1]}; left out")
-        return None
-    return candidates[0]
-
-
-def _labelme(path: Path, content: dict[str, Any], by_name: Mapping[str, list[FoundImage]], problems: list[str]) -> list[Imported]:
-    image = _image_of(path, content.get("imagePath"), content.get("imageWidth"), content.get("imageHeight"), by_name, problems)
-    if image is None:
-        return []
-    shapes = content["shapes"]
-    if not isinstance(shapes, list):
-        raise AnnotationError(f"{path}: its shapes are damaged; left out")
-    masks: list[MaskPolygon] = []
-    lines: dict[str, Line] = {}
-    for number, shape in enumerate(shapes, 1):
-        where = f"{path}: shape {number}"
-        try:
-            target = _target(where, shape["label"], problems)
-            points = line_from(shape["points"])
-            kind = shape.get("shape_type", "polygon")
-        except (TypeError, KeyError, ValueError, AttributeError):
-            problems.append(f"{where} is damaged; left out")
-            continue
-        if target is None:
-            continue
-        if kind == "rectangle" and len(points) == 2:
-            (x0, y0), (x1, y1) = points
-            kind, points = "polygon", ((x0, y0), (x1, y0), (x1, y1), (x0, y1))
-        if kind == "polygon" and len(points) >= 3:
-            found = polygons_of_area(np.array(points), target, image.record.size)
-            if not found:
-                problems.append(f"{where} covers no pixel; left out")
-            masks += found
-        elif kind in ("linestrip", "line") and len(points) >= 2 and target.value not in lines:
-            # labelme counts from pixel corners, we from pixel centres
-            lines[target.value] = tuple((x - 0.5, y - 0.5) for x, y in points)
-        else:
-            problems.append(f"{where} is a {kind} of {len(points)} points, not a polygon or the one line of its label; left out")
-    if not masks and not lines:
-        problems.append(f"{path}: nothing of use in it; left out")
-        return []
-    return [Imported(image, Annotation(lines.get("robot", ()), lines.get("vessel", ()), masks=tuple(masks)), path)]
-
-
-def _coco(path: Path, content: dict[str, Any], by_name: Mapping[str, list[FoundImage]], problems: list[str]) -> list[Imported]:
-    try:
-        names = {row["id"]: row["name"] for row in content["categories"]}
-        listed = {row["id"]: (row["file_name"], row.get("width"), row.get("height")) for row in content["images"]}
-        rows = list(content["annotations"])
-    except (TypeError, KeyError, AttributeError):
-        raise AnnotationError(f"{path}: its images or categories are damaged; left out") from None
-    images: dict[Any, FoundImage | None] = {}
-    masks: dict[Any, list[MaskPolygon]] = {}
-    for number, row in enumerate(rows, 1):
-        where = f"{path}: annotation {number}"
-        try:
-            image_id, label, segmentation = row["image_id"], names[row["category_id"]], row["segmentation"]
-            if image_id not in images:
-                images[image_id] = _image_of(path, *listed[image_id], by_name, problems)
-            image, target = images[image_id], _target(where, label, problems)
-            if image is not None and target is not None:
-                masks.setdefault(image_id, []).extend(_segmentation(segmentation, target, image.record.size))
-        except (TypeError, KeyError, ValueError, AttributeError, OverflowError, MemoryError) as error:
-            reason = f" ({error})" if isinstance(error, ValueError) else ""
-            problems.append(f"{where} is damaged{reason}; left out")
-    read = []
-    for image_id, polygons in masks.items():
-        image = images[image_id]
-        if image is not None and polygons:
-            read.append(Imported(image, Annotation(masks=tuple(polygons)), path))
-    return read
-
-
-def _segmentation(segmentation: Any, target: MaskTarget, size: tuple[int, int]) -> list[MaskPolygon]:
-    if isinstance(segmentation, dict):
-        if not isinstance(segmentation.get("counts"), list):
-            raise ValueError("compressed run lengths are not read: write polygons or plain run lengths")
-        width, height = size
-        counts = np.array(segmentation["counts"], np.int64)
-        if list(segmentation["size"]) != [height, width] or counts.min(initial=0) < 0 or int(counts.sum()) != width * height:
-            raise ValueError("run lengths of another size")
-        mask = np.repeat(np.arange(len(counts)) % 2 == 1, counts).reshape((height, width), order="F")
-        return list(polygons_of(mask, target, 0.0))
-    polygons: list[MaskPolygon] = []
-    for flat in segmentation:
-        points = line_from(list(zip(flat[::2], flat[1::2], strict=True)))
-        if len(points) < 3:
-            raise ValueError("a polygon of fewer than three points")
-        polygons += polygons_of_area(np.array(points), target, size)
-    if not polygons:
-        raise ValueError("covers no pixel")
-    return polygons
-
-
-def _target(where: str, label: Any, problems: list[str]) -> MaskTarget | None:
-    known = _LABELS.get(str(label).strip().lower())
-    if known is None:
-        problems.append(f"{where}: unknown label {str(label)[:40]!r} (known: {', '.join(sorted(_LABELS))}); left out")
-    return known
 
 
 def merged(old: Annotation, new: Annotation) -> Annotation:
     """The imported parts put into what is there: only where there was nothing, so that no work by hand is lost."""
     masks = old.masks + tuple(mask for mask in new.masks if mask.target not in old.drawn)
     return replace(old, robot=old.robot or new.robot, vessel=old.vessel or new.vessel, masks=masks)
-
-
-def mask_source(annotations: Iterable[StoredAnnotation]) -> dict[str, StoredAnnotation]:
-    """By image, the annotation whose masks count: of those with both of them, or else with any, the one changed last."""
-    best: dict[str, tuple[int, str]] = {}
-    chosen: dict[str, StoredAnnotation] = {}
-    for one in annotations:
-        worth = len(one.content.drawn), one.changed_utc
-        if one.content.drawn and worth >= best.get(one.key.sha256, worth):
-            best[one.key.sha256], chosen[one.key.sha256] = worth, one
-    return chosen
 
 
 def export_training_set(
@@ -326,70 +137,6 @@ def _truth_rows(
 
 def _vector(vector: Vector | None) -> dict[str, list[float]] | None:
     return None if vector is None else {name: list(getattr(vector, name)) for name in ("start", "center", "end")}
-
-
-def export_coco(annotations: Iterable[StoredAnnotation], images: Sequence[FoundImage], out: Path) -> int:
-    """Write the masks as a COCO file; returns the number of images in it. Pieces with holes are run lengths, others polygons.
-
-    Raises AnnotationError when there is nothing to write or the file cannot be written; one that is there is not overwritten.
-    """
-    categories = {target: number for number, target in enumerate(MaskTarget, 1)}
-    here = {image.sha256: image for image in images}
-    # Files name the images; where several have one name, by their places below the folder that has all of them.
-    names = {image.path: image.path.name for image in images}
-    if len(set(names.values())) < len(images):
-        common = Path(os.path.commonpath([image.path.absolute().parent for image in images]))
-        names = {image.path: image.path.absolute().relative_to(common).as_posix() for image in images}
-    content: dict[str, list[dict[str, Any]]] = {
-        "images": [],
-        "annotations": [],
-        "categories": [{"id": number, "name": target.value, "supercategory": ""} for target, number in categories.items()],
-    }
-    for sha256, one in mask_source(annotations).items():
-        if sha256 not in here:
-            continue
-        image, number = here[sha256], len(content["images"]) + 1
-        width, height = image.record.size
-        content["images"].append({"id": number, "file_name": names[image.path], "width": width, "height": height})
-        pieces: list[list[MaskPolygon]] = []  # each outer polygon with the holes that follow it
-        for polygon in one.content.masks:
-            if not polygon.is_hole:
-                pieces.append([polygon])
-            elif pieces and pieces[-1][0].target is polygon.target:
-                pieces[-1].append(polygon)
-        for piece in pieces:
-            ids = {"id": len(content["annotations"]) + 1, "image_id": number, "category_id": categories[piece[0].target]}
-            content["annotations"].append(ids | _coco_piece(piece, image.record.size))
-    if not content["images"]:
-        raise AnnotationError("no image has a mask; draw them, or take the algorithm's over, in annotate")
-    if out.exists():
-        raise AnnotationError(f"{out}: is there already; choose another --out")
-    try:
-        write_atomic(out, json.dumps(content, allow_nan=False).encode())
-    except OSError as error:
-        raise AnnotationError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
-    return len(content["images"])
-
-
-def _coco_piece(piece: Sequence[MaskPolygon], size: tuple[int, int]) -> dict[str, Any]:
-    mask = fill(piece, piece[0].target, size)
-    rows, columns = np.nonzero(mask)
-    box = [0, 0, 0, 0]
-    if len(rows):
-        box = [int(columns.min()), int(rows.min()), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1]
-    polygon = area_polygon(mask)
-    whole = {"size": [size[1], size[0]], "counts": run_lengths(mask)}
-    segmentation = whole if polygon is None else [[round(value, 3) for point in polygon.tolist() for value in point]]
-    return {"segmentation": segmentation, "bbox": box, "area": int(mask.sum()), "iscrowd": 0}
-
-
-def run_lengths(mask: Mask) -> list[int]:
-    """COCO's uncompressed run lengths: column by column, beginning with the number of zeros."""
-    flat = np.concatenate([[False], mask.ravel(order="F"), [False]])
-    changes = np.flatnonzero(flat[1:] != flat[:-1])
-    edges = np.concatenate([[0], changes, [mask.size]])
-    counts: list[int] = np.diff(edges).tolist()
-    return counts[:-1] if counts[-1] == 0 else counts
 
 
 FEWEST = 6

@@ -197,10 +197,14 @@ def polygons_of_area(points: Points, target: MaskTarget, size: tuple[int, int]) 
 
 def area_polygon(mask: Mask) -> NDArray[np.float64] | None:
     """The polygon (N, 2) around a mask (H, W), whose ``area_of`` it is; None for several components or holes."""
+    rings = area_rings(mask)
+    return rings[0] if len(rings) == 1 else None
+
+
+def area_rings(mask: Mask) -> list[NDArray[np.float64]]:
+    """The polygons (N, 2) around the components and holes of a mask (H, W): inside is what an odd number of them encloses."""
     from skimage.measure import approximate_polygon, find_contours  # loads statistics, which takes a second
 
     outlines = find_contours(np.pad(mask, 1).astype(np.float64), 0.5, fully_connected="high")
-    if len(outlines) != 1:
-        return None
     # From the padded picture's pixel centres (row, column) to corners (x, y); the last point is the first one again.
-    return np.asarray(approximate_polygon(outlines[0], _TOLERANCE_PX)[:-1, ::-1] - 0.5)
+    return [np.asarray(approximate_polygon(outline, _TOLERANCE_PX)[:-1, ::-1] - 0.5) for outline in outlines]

@@ -320,7 +320,7 @@ def test_an_empty_name_is_no_model() -> None:
     ("options", "message"),
     [
         ({"report": True}, "no such annotation file; annotate the images first"),
-        ({"export": "xml", "out": Path("x")}, "--export xml: must be one of dataset, csv, coco"),
+        ({"export": "xml", "out": Path("x")}, "--export xml: must be one of dataset, csv, labelme, coco"),
         ({"export": "csv"}, "--export needs --out"),
         ({"report": True, "salvage": True}, "give one of them"),
         ({"imports": (Path("nowhere.json"),)}, "nothing was imported"),

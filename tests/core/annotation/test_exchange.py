@@ -1,21 +1,18 @@
-"""Export and import: training sets, COCO both ways, labelme, and one line for each damaged part."""
+"""Training sets out of annotations, and imported annotations put into what is there."""
 
 from __future__ import annotations
 
-import json
 import math
-import random
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from core.annotation.exchange import FEWEST, export_coco, export_training_set, merged, read_files, split_own_frames
-from core.annotation.masks import fill, polygons_of
+from core.annotation.exchange import FEWEST, export_training_set, merged, split_own_frames
+from core.annotation.masks import fill
 from core.annotation.model import (
     Annotation,
     AnnotationError,
@@ -98,113 +95,6 @@ def test_truth_is_of_finished_answers_of_one_study(image: FoundImage, tmp_path: 
     ):
         export_training_set([done, other], [image], tmp_path / "set2")
     assert not (tmp_path / "set2").exists()
-
-
-def test_coco_goes_out_and_comes_back(image: FoundImage, tmp_path: Path) -> None:
-    hole = np.zeros((48, 64), bool)
-    hole[5:40, 5:60] = True
-    hole[15:25, 20:40] = False
-    masks = (*polygons_of(hole, MaskTarget.VESSEL, 0.0), ROBOT_BOX)
-    out = tmp_path / "coco.json"
-    assert export_coco([stored(with_masks(*masks))], [image], out) == 1
-    content = json.loads(out.read_text())
-    first, second = content["annotations"]
-    assert (first["bbox"], first["area"]) == ([5, 5, 55, 35], int(hole.sum()))
-    (flat,) = second["segmentation"]
-    assert shoelace(np.reshape(flat, (-1, 2))) == pytest.approx(second["area"], abs=0.6), "an area, but for its four corners"
-    assert (min(flat[::2]), max(flat[::2]), min(flat[1::2]), max(flat[1::2])) == (20.0, 41.0, 18.0, 23.0)
-    (back,), problems = read_files([out], [image])
-    assert problems == []
-    for target in MaskTarget:
-        assert np.array_equal(fill(back.content.masks, target, SIZE), fill(masks, target, SIZE))
-    with pytest.raises(AnnotationError, match="is there already"):
-        export_coco([stored(with_masks(*masks))], [image], out)
-
-
-def test_coco_tells_images_of_one_name_apart(image: FoundImage, tmp_path: Path) -> None:
-    images = []
-    for number, folder in enumerate(("monday", "tuesday")):
-        (tmp_path / folder).mkdir()
-        path = tmp_path / folder / "frame.png"
-        cv2.imwrite(str(path), np.full((48, 64, 3), 90 + number, np.uint8))
-        images.append(FoundImage(path, ImageRecord(f"{number}" * 64, path.name, *SIZE)))
-    answers = [replace(stored(with_masks(VESSEL_BOX)), key=ItemKey(one.sha256, "", "a", 1)) for one in images]
-    assert export_coco(answers, images, tmp_path / "coco.json") == 2
-    content = json.loads((tmp_path / "coco.json").read_text())
-    assert [one["file_name"] for one in content["images"]] == ["monday/frame.png", "tuesday/frame.png"]
-    back, problems = read_files([tmp_path / "coco.json"], images)
-    assert problems == []
-    assert [one.image for one in back] == images
-
-
-def shoelace(points: np.ndarray) -> float:
-    """The area of a polygon (N, 2)."""
-    (x0, y0), (x1, y1) = points.T, np.roll(points, -1, axis=0).T
-    return abs(float(np.sum(x0 * y1 - x1 * y0))) / 2.0
-
-
-def labelme(**more: Any) -> dict[str, Any]:
-    shape = {"label": "Vessel", "shape_type": "polygon", "points": [[10, 10], [51, 10], [51, 31], [10, 31]]}
-    line = {"label": "robot", "shape_type": "linestrip", "points": [[1.5, 1.5], [9.5, 1.5]]}
-    return {"imagePath": "..\\frames\\frame.png", "imageWidth": 64, "imageHeight": 48, "shapes": [shape, line]} | more
-
-
-def read(tmp_path: Path, image: FoundImage, content: object) -> tuple[list[Annotation], list[str]]:
-    path = tmp_path / "in.json"
-    path.write_text(content if isinstance(content, str) else json.dumps(content))
-    found, problems = read_files([path], [image])
-    return [one.content for one in found], [line.removeprefix(f"{path}: ") for line in problems]
-
-
-def test_labelme_polygons_and_lines(tmp_path: Path, image: FoundImage) -> None:
-    (content,), problems = read(tmp_path, image, labelme())
-    assert problems == []
-    assert content.robot == ((1.0, 1.0), (9.0, 1.0))
-    for target in MaskTarget:
-        assert np.array_equal(fill(content.masks, target, SIZE), fill([VESSEL_BOX], target, SIZE))
-
-
-@pytest.mark.parametrize(
-    ("content", "line"),
-    [
-        ("{", "damaged, not valid JSON; left out"),
-        ("[" * 100_000, "damaged, not valid JSON; left out"),
-        ("[]", "neither labelme nor COCO; left out"),
-        ({"version": 3}, "neither labelme (shapes) nor COCO (images, annotations); left out"),
-        (labelme(imagePath="other.png"), "its image 'other.png' is not among the given ones; left out"),
-        (labelme(imageWidth=640), "says that frame.png is 640x48, but it is 64x48; left out"),
-        (labelme(shapes=5), "its shapes are damaged; left out"),
-        (labelme(shapes=[{"label": "bone", "points": []}]), "shape 1: unknown label 'bone'"),
-        (labelme(shapes=[{"label": "robot", "points": [[1, "x"]]}]), "shape 1 is damaged; left out"),
-        (labelme(shapes=[{"label": "robot", "points": [[1, 1]]}]), "shape 1 is a polygon of 1 points"),
-        (labelme(shapes=[{"label": "robot", "points": [[1, 1], [1.2, 1], [1.2, 9]]}]), "shape 1 covers no pixel; left out"),
-        ({"images": [], "annotations": []}, "its images or categories are damaged; left out"),
-    ],
-)
-def test_what_is_damaged_or_unknown_is_named(tmp_path: Path, image: FoundImage, content: object, line: str) -> None:
-    found, problems = read(tmp_path, image, content)
-    assert found == []
-    assert problems[0].startswith(line)
-
-
-def test_one_bad_shape_leaves_the_others(tmp_path: Path, image: FoundImage) -> None:
-    content = labelme()
-    content["shapes"].insert(0, {"label": "robot", "points": None})
-    (found,), problems = read(tmp_path, image, content)
-    assert np.array_equal(fill(found.masks, MaskTarget.VESSEL, SIZE), fill([VESSEL_BOX], MaskTarget.VESSEL, SIZE))
-    assert problems == ["shape 1 is damaged; left out"]
-
-
-def test_files_damaged_at_random_never_raise(tmp_path: Path, image: FoundImage) -> None:
-    coco = tmp_path / "coco.json"
-    export_coco([stored(with_masks(VESSEL_BOX, ROBOT_BOX))], [image], coco)
-    rng, path = random.Random(4), tmp_path / "damaged.json"
-    for text in (coco.read_text(), json.dumps(labelme())):
-        for _ in range(300):
-            place = rng.randrange(len(text))
-            piece = rng.choice(("", "null", "-1e999", '"x"', "[]", "{}", "}", "9"))
-            path.write_text(text[:place] + piece + text[place + rng.randrange(4) :])
-            read_files([path], [image])
 
 
 def test_a_hole_alone_is_no_mask(image: FoundImage, tmp_path: Path) -> None:
