@@ -53,7 +53,7 @@ _SILENCE_S = 0.06
 
 
 class PedalConfig(ConfigSection):
-    """Foot pedal: deadman and STOP over a serial line. Its protocol and wiring: docs/bench.md."""
+    """Foot pedal: deadman and STOP over a serial line. Wiring: docs/bench.md."""
 
     port: str | None = Field(None, min_length=1, description="stable path in /dev/serial/by-id; empty: no pedal")
     baud: int = Field(115_200, ge=9600, le=1_000_000, description="speed of the line")

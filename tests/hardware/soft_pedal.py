@@ -15,7 +15,7 @@ from pathlib import Path
 from hardware.inputs.pedal import NUMBERS, PERIOD_S, PedalLine, line_bytes
 
 _STOP_REPORTS = 5
-"""Number of reports with STOP after even the shortest press, as in the firmware (docs/bench.md)."""
+"""Number of reports with STOP after even the shortest press, as in the firmware (resources/pedal)."""
 
 
 class SoftPedal:
