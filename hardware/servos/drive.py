@@ -9,18 +9,17 @@ rig with it.
 from __future__ import annotations
 
 import contextlib
-import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from core.config.safety import JointName, ServosConfig
 from core.control.kept_zero import KeptJoint, ZeroBasis
 from core.messages import message
-from hardware.servos.dynamixel_bus import ServoIdentity
-from hardware.servos.dynamixel_port import LineCounts, NoAnswer, NotReady, ServoError, TorqueStillOn, WriteRefused
-from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, to_mm, to_ticks
+from hardware.servos.dynamixel_bus import JointBus, JointLine
+from hardware.servos.dynamixel_port import NoAnswer, NotReady, ServoError, TorqueStillOn, WriteRefused
+from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, to_mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,86 +35,53 @@ class AxisState:
     boot: int
 
 
-class Drive(Protocol):
+class Drive(JointLine, Protocol):
     """One line with all axes, which are known by the ids of the joints. One thread uses it; every method may raise PortLost.
 
     ``read`` leaves out axes without a usable answer. ``stop`` holds all axes where they are, or takes their current off. ``write``
     and ``stop`` tell whether the drive has confirmed.
     """
 
-    @property
-    def is_open(self) -> bool: ...
-    @property
-    def counts(self) -> LineCounts: ...
     def open(self) -> None: ...
     def read(self) -> Mapping[int, AxisState]: ...
     def write(self, goals: Mapping[int, int]) -> bool: ...
     def hold(self) -> bool: ...
     def stop(self, *, release: bool) -> bool: ...
     def close(self) -> None: ...
-    def interruptible(self, check: Callable[[], None]) -> contextlib.AbstractContextManager[None]: ...
-    def pause(self, seconds: float) -> None: ...
 
 
 _TRIES = 3
 """A torque-off is sent so often until it is proven."""
-_ROUNDING_MM = 1e-9
 
 
-class DriveBus:
-    """The axes of a drive, in the order of the configuration's joints; methods, errors and notes are those of ``ServoBus``."""
+class DriveBus(JointBus[Drive]):
+    """The axes of a drive; methods, errors and notes are those of ``ServoBus``."""
 
     def __init__(self, config: ServosConfig, drive: Drive) -> None:
-        self.config, self._joints, self._drive = config, config.joints, drive
-        self.identities: tuple[ServoIdentity, ...] = ()
+        super().__init__(config, drive)
         self._reset()
 
     def _reset(self) -> None:
-        self._armed = False
-        self._zeros: dict[int, int] = {}
+        self._armed, self._zeros = False, {}
         self._boots: dict[int, int] = {}
         self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
 
-    @property
-    def is_open(self) -> bool:
-        return self._drive.is_open
-
-    @property
-    def is_armed(self) -> bool:
-        return self._armed and self.is_open
-
-    @property
-    def zero_ticks(self) -> tuple[int | None, ...]:
-        return tuple(self._zeros.get(joint.id) for joint in self._joints)
-
-    @property
-    def counts(self) -> LineCounts:
-        return self._drive.counts
-
-    @contextlib.contextmanager
-    def interruptible(self, check: Callable[[], None]) -> Iterator[None]:
-        with self._drive.interruptible(check):
-            yield
-
-    def pause(self, seconds: float) -> None:
-        self._drive.pause(seconds)
-
     def open(self) -> None:
         """Open the port, and make sure that all axes are there. Nothing moves, none lets go. Raises PortError, NoAnswer."""
-        self._drive.open()
+        self._line.open()
         self._reset()
         try:
             self._states()
         except NoAnswer:
-            self._drive.close()
+            self._line.close()
             raise
 
     def close(self) -> None:
         if self.is_armed:
             with contextlib.suppress(ServoError):  # the drive's own watchdog holds the axes
-                self._drive.stop(release=False)
+                self._line.stop(release=False)
         self._armed = False
-        self._drive.close()
+        self._line.close()
 
     def set_zero(
         self,
@@ -142,15 +108,14 @@ class DriveBus:
         self._armed = False
         states = self._states()
         self._note_boots(states)
-        if names := ", ".join(joint.name for joint in self._joints if joint.id not in self._zeros):
-            raise NotReady(f"not zeroed: {names} (or restarted since then): page Servos, Zero")
+        self._check_zeroed()
         if bad := ", ".join(joint.name for joint in self._joints if states[joint.id].error):
             raise NotReady(f"{bad} reports an error: find the cause, then switch the drive off and on")
         was_off = not any(state.is_on for state in states.values())
         if not was_off and not all(state.is_on for state in states.values()):
             raise NotReady("some axes hold and others do not: switch the torque off, see that the wires are slack, then arm")
         try:
-            is_on = self._drive.hold() and all(state.is_on and state.goal == state.position for state in self._states().values())
+            is_on = self._line.hold() and all(state.is_on and state.goal == state.position for state in self._states().values())
             if not is_on:
                 raise WriteRefused("the drive did not switch on where it stands: switch it off and on")
         except ServoError:  # STOP, a lost port and a refusal alike
@@ -164,7 +129,7 @@ class DriveBus:
         self.hold()
 
     def read(self) -> tuple[ServoReading, ...]:
-        states, now_s = self._drive.read(), time.monotonic()
+        states, now_s = self._line.read(), time.monotonic()
         restarted = self._note_boots(states)
         readings: list[ServoReading] = []
         for joint in self._joints:
@@ -209,57 +174,43 @@ class DriveBus:
 
     def write(self, goals_mm: Sequence[float]) -> tuple[float, ...]:
         """Send the goals; one that was not taken shows in the next reading. Raises NotReady, ValueError."""
-        if not self.is_armed:
-            raise NotReady("the servos are not armed: zero and arm them first")
-        if not all(map(math.isfinite, goals_mm)):
-            raise ValueError("a goal is not finite")
-        goals = {
-            joint.id: to_ticks(joint, goal_mm, self._zeros[joint.id]) for joint, goal_mm in zip(self._joints, goals_mm, strict=True)
-        }
-        self._drive.write(goals)
-        return tuple(to_mm(joint, goals[joint.id], self._zeros[joint.id]) for joint in self._joints)
+        goals = self._goal_ticks(goals_mm)
+        self._line.write(goals)
+        return self._as_counted(goals)
 
     def hold(self) -> tuple[ServoReading, ...]:
-        self._drive.stop(release=False)
+        self._line.stop(release=False)
         return self.read()
 
     def slacken(self, goals_mm: Sequence[float | None], readings: Sequence[ServoReading]) -> None:
-        goals: dict[int, int] = {}
-        for joint, goal_mm, reading in zip(self._joints, goals_mm, readings, strict=True):
-            if goal_mm is None or not isinstance(reading, ServoState) or reading.position_mm is None or not reading.torque:
-                continue
-            lowest_mm = reading.position_mm - joint.max_step_mm - _ROUNDING_MM
-            if not joint.is_tendon or not lowest_mm <= goal_mm <= reading.position_mm:
-                raise ValueError(f"joint {joint.name}: from {reading.position_mm:g} mm it cannot be slackened to {goal_mm:g} mm")
-            goals[joint.id] = to_ticks(joint, goal_mm, self._zeros[joint.id])
-        if goals:
-            self._drive.write(goals)
+        if goals := self._slack_ticks(goals_mm, readings):
+            self._line.write(goals)
 
     def torque_off(self) -> None:
         """Take all current off, read back. Raises TorqueStillOn."""
         self._armed = False
         doubtful: list[str] = []
         for _ in range(_TRIES):
-            self._drive.stop(release=True)
-            states = self._drive.read()
+            self._line.stop(release=True)
+            states = self._line.read()
             doubtful = [joint.name for joint in self._joints if joint.id not in states or states[joint.id].is_on]
             if not doubtful:
                 return
         raise TorqueStillOn(message("torque of {names} is not proven to be off: cut the servos' power", names=", ".join(doubtful)))
 
     def let_go(self) -> None:
-        self._drive.open()
+        self._line.open()
         try:
             self.torque_off()
         finally:
-            self._drive.close()
+            self._line.close()
 
     def reboot(self, servo_id: int) -> None:
         raise NotReady("this drive cannot be restarted from here: switch it off and on, then zero its joints")
 
     def _states(self) -> Mapping[int, AxisState]:
         """Of all axes. Raises NoAnswer."""
-        states = self._drive.read()
+        states = self._line.read()
         if silent := ", ".join(f"{joint.name} (id {joint.id})" for joint in self._joints if joint.id not in states):
             raise NoAnswer(message("{names}: no answer; check the drive's power, its cable and servos.baud", names=silent))
         return states

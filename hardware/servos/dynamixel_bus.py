@@ -6,9 +6,10 @@ import contextlib
 import logging
 import secrets
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 from core.config.safety import JointConfig, JointName, ServosConfig
 from core.config.servo_models import GOAL_CURRENT, GOAL_PWM, ServoModel, model_name
@@ -183,42 +184,28 @@ def _blocks(config: ServosConfig) -> tuple[tuple[int, int, tuple[int, ...]], ...
     return tuple((address, length, ids) for (address, length), ids in members.items())
 
 
-class ServoBus:
-    """The servos on one line, in the order of the configuration's joints. One thread opens, uses and closes it.
+class JointLine(Protocol):
+    """The line behind a ``JointBus``."""
 
-    Parameters
-    ----------
-    config : identities, conversion and speeds. Envelope and step limits are the gate's business, not the driver's.
-    port : serial device; default is the configuration's.
-    backups : folder that keeps what the EEPROM of a servo was before it is changed; None: it is not kept.
+    @property
+    def is_open(self) -> bool: ...
+    @property
+    def counts(self) -> LineCounts: ...
+    def interruptible(self, check: Callable[[], None]) -> contextlib.AbstractContextManager[None]: ...
+    def pause(self, seconds: float) -> None: ...
 
-    Notes
-    -----
-    Positions are joint millimetres from the zeros of ``set_zero``. Every method but ``close`` may raise ``PortLost``; then the bus
-    is closed, and ``open`` starts again: disarmed, without zeros.
-    """
 
-    def __init__(self, config: ServosConfig, port: str | None = None, backups: Path | None = None) -> None:
-        chosen = port or config.port
-        if chosen is None:
-            raise NotReady("no servo port is configured: set servos.port")
-        self.config = config
-        self._joints = config.joints
-        self._line = ServoLine(chosen, config.baud)
-        self._backups = backups
-        self._blocks = _blocks(config)
-        self._reset()
+Line = TypeVar("Line", bound=JointLine)
 
-    def _reset(self) -> None:
-        self._armed = False
+
+class JointBus(Generic[Line]):
+    """What the buses of all drives have in common: joints in the order of the configuration, zeros, and whether goals are taken."""
+
+    def __init__(self, config: ServosConfig, line: Line) -> None:
+        self.config, self._joints, self._line = config, config.joints, line
         self.identities: tuple[ServoIdentity, ...] = ()
+        self._armed = False
         self._zeros: dict[int, int] = {}
-        self._put_off: set[int] = set()
-        self._marks: dict[int, int] = {}
-        self._limits: dict[int, int] = {}
-        self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
-        self._silences = dict(self._misses)
-        self._turns = dict.fromkeys((address for address, _, _ in self._blocks), 0)
 
     @property
     def is_open(self) -> bool:
@@ -239,18 +226,79 @@ class ServoBus:
         """Silent, damaged, late answers and retries since ``open``."""
         return self._line.counts
 
-    @contextlib.contextmanager
-    def interruptible(self, check: Callable[[], None]) -> Iterator[None]:
+    def interruptible(self, check: Callable[[], None]) -> contextlib.AbstractContextManager[None]:
         """While inside, `check` is called between all transactions, and may raise.
 
         ``arm`` then switches off what it had switched on; what held before holds.
         """
-        with self._line.interruptible(check):
-            yield
+        return self._line.interruptible(check)
 
     def pause(self, seconds: float) -> None:
         """Sleep; inside ``interruptible`` with checks."""
         self._line.pause(seconds)
+
+    def _check_zeroed(self) -> None:
+        if names := ", ".join(joint.name for joint in self._joints if joint.id not in self._zeros):
+            raise NotReady(f"not zeroed: {names} (or restarted since then): page Servos, Zero")
+
+    def _goal_ticks(self, goals_mm: Sequence[float]) -> dict[int, int]:
+        """Goal registers by id. Raises NotReady, and ValueError for a goal that is not finite or beyond what a servo counts."""
+        if not self.is_armed:
+            raise NotReady("the servos are not armed: zero and arm them first")
+        return {
+            joint.id: registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
+            for joint, goal_mm in zip(self._joints, goals_mm, strict=True)
+        }
+
+    def _as_counted(self, goals: Mapping[int, int]) -> tuple[float, ...]:
+        """The goals in mm."""
+        return tuple(registers.to_mm(joint, goals[joint.id], self._zeros[joint.id]) for joint in self._joints)
+
+    def _slack_ticks(self, goals_mm: Sequence[float | None], readings: Sequence[ServoReading]) -> dict[int, int]:
+        """Goal registers by id of tendons let go by a step. Raises ValueError: one would tighten, is no tendon, or goes too far."""
+        goals: dict[int, int] = {}
+        for joint, goal_mm, reading in zip(self._joints, goals_mm, readings, strict=True):
+            if goal_mm is None or not isinstance(reading, ServoState) or reading.position_mm is None or not reading.torque:
+                continue
+            lowest_mm = reading.position_mm - joint.max_step_mm - _ROUNDING_MM
+            if not joint.is_tendon or not lowest_mm <= goal_mm <= reading.position_mm:
+                raise ValueError(f"joint {joint.name}: from {reading.position_mm:g} mm it cannot be slackened to {goal_mm:g} mm")
+            goals[joint.id] = registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
+        return goals
+
+
+class ServoBus(JointBus[ServoLine]):
+    """The servos on one line, in the order of the configuration's joints. One thread opens, uses and closes it.
+
+    Parameters
+    ----------
+    config : identities, conversion and speeds. Envelope and step limits are the gate's business, not the driver's.
+    port : serial device; default is the configuration's.
+    backups : folder that keeps what the EEPROM of a servo was before it is changed; None: it is not kept.
+
+    Notes
+    -----
+    Positions are joint millimetres from the zeros of ``set_zero``. Every method but ``close`` may raise ``PortLost``; then the bus
+    is closed, and ``open`` starts again: disarmed, without zeros.
+    """
+
+    def __init__(self, config: ServosConfig, port: str | None = None, backups: Path | None = None) -> None:
+        chosen = port or config.port
+        if chosen is None:
+            raise NotReady("no servo port is configured: set servos.port")
+        super().__init__(config, ServoLine(chosen, config.baud))
+        self._backups = backups
+        self._blocks = _blocks(config)
+        self._reset()
+
+    def _reset(self) -> None:
+        self._armed, self.identities, self._zeros = False, (), {}
+        self._put_off: set[int] = set()
+        self._marks: dict[int, int] = {}
+        self._limits: dict[int, int] = {}
+        self._misses = dict.fromkeys((joint.id for joint in self._joints), 0)
+        self._silences = dict(self._misses)
+        self._turns = dict.fromkeys((address for address, _, _ in self._blocks), 0)
 
     def open(self) -> None:
         """Open and lock the port, and make sure that the servos are those of the configuration. Nothing moves, none lets go.
@@ -443,14 +491,9 @@ class ServoBus:
 
         Raises NotReady: when not armed; ValueError: when a goal is not finite or beyond what a servo counts; nothing is sent.
         """
-        if not self.is_armed:
-            raise NotReady("the servos are not armed: zero and arm them first")
-        goals = {
-            joint.id: registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
-            for joint, goal_mm in zip(self._joints, goals_mm, strict=True)
-        }
+        goals = self._goal_ticks(goals_mm)
         self._send_goals(goals)
-        return tuple(registers.to_mm(joint, goals[joint.id], self._zeros[joint.id]) for joint in self._joints)
+        return self._as_counted(goals)
 
     def hold(self) -> tuple[ServoReading, ...]:
         """Goal = present position, of every servo that tells its own; returns the readings. Needs no arming."""
@@ -468,14 +511,7 @@ class ServoBus:
         Raises ValueError, and sends nothing: a goal that would tighten, is more than a step away, or is that of no tendon. Raises
         NoAnswer, WriteRefused: of one servo; the others were sent their goals.
         """
-        goals: dict[int, int] = {}
-        for joint, goal_mm, reading in zip(self._joints, goals_mm, readings, strict=True):
-            if goal_mm is None or not isinstance(reading, ServoState) or reading.position_mm is None or not reading.torque:
-                continue
-            lowest_mm = reading.position_mm - joint.max_step_mm - _ROUNDING_MM
-            if not joint.is_tendon or not lowest_mm <= goal_mm <= reading.position_mm:
-                raise ValueError(f"joint {joint.name}: from {reading.position_mm:g} mm it cannot be slackened to {goal_mm:g} mm")
-            goals[joint.id] = registers.to_ticks(joint, goal_mm, self._zeros[joint.id])
+        goals = self._slack_ticks(goals_mm, readings)
         tripped = [r.id for r in readings if isinstance(r, ServoState) and r.watchdog_tripped]
         failed: NoAnswer | WriteRefused | None = None
         for joint in self._joints:
@@ -570,11 +606,6 @@ class ServoBus:
                     what=", ".join(CHANGED[address][0] for address in differences),
                 )
             )
-
-    def _check_zeroed(self) -> None:
-        names = ", ".join(joint.name for joint in self._joints if joint.id not in self._zeros)
-        if names:
-            raise NotReady(f"not zeroed: {names} (or restarted since then): page Servos, Zero")
 
     def _holds(self, joint: JointConfig) -> bool:
         """Whether its torque is on: then it may hold a wire under tension, which only the operator lets go."""
