@@ -10,6 +10,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
 from app.operator.engine_thread import EnginePhase
+from app.operator.record_bar import RecordBar
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import Undriven
@@ -23,7 +24,6 @@ from app.widgets.messages import Notice, NoticeKind, OfferStrip, Toast
 from app.widgets.mode_bar import ModeBar
 from app.widgets.performance_panel import PerformancePanel
 from app.widgets.phantom_picker import PhantomPicker
-from app.widgets.record_bar import RecordBar
 from app.widgets.scene_panels import ScenePanels
 from app.widgets.servo_table import ServoTable, known_joints, status_by_servos
 from app.widgets.shortcut_page import operator_help

@@ -14,8 +14,7 @@ from app.ui import theme
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.i18n import tr
 from app.widgets.basics import Columns
-from app.widgets.overlay_bar import OverlayBar
-from app.widgets.scene_overlay import Layer
+from app.widgets.scene_overlay import Layer, OverlayBar
 
 _NAME = "LumenPilot"
 

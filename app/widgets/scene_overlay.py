@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QPainter, QTransform
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QPainter, QResizeEvent, QTransform
+from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QWidget
 
-from app.ui.i18n import mark
+from app.ui import theme
+from app.ui.i18n import mark, tr
 from app.ui.texts import signed_degrees
 from app.ui.theme import ON_PICTURE
+from app.widgets.painting import CENTER, Painted, draw_box, draw_text, text_width
 from app.widgets.scene_painter import ScenePainter
 from core.types import Point, Points, Pose, Scene, Vector
 
@@ -227,3 +230,114 @@ class Marks:
 def _steady_side(side: float, offset_px: float) -> float:
     """Side of the vessel line that a label is on; it changes only when the offset is clear, or labels would flicker at zero."""
     return side if abs(offset_px) < _CLEAR_OFFSET_PX else (1.0 if offset_px > 0 else -1.0)
+
+
+_SEEN = 3.0  # contrast from which on a swatch is seen
+_CHIP_HEIGHT, _CHIP_NARROW, _CHIP_GAP = 30, 54, 5
+_SWATCH = {
+    Layer.MASKS: ON_PICTURE.VESSEL,
+    Layer.VESSEL: ON_PICTURE.VESSEL,
+    Layer.ROBOT: ON_PICTURE.ROBOT,
+    Layer.HEAD: ON_PICTURE.HEAD,
+    Layer.VECTORS: ON_PICTURE.ROBOT_VECTOR,
+    Layer.NEAREST: ON_PICTURE.NEAREST,
+    Layer.DISTANCES: ON_PICTURE.D_HEAD,
+    Layer.ROUTE: ON_PICTURE.ROUTE,
+    Layer.LOUPE: ON_PICTURE.TEXT,
+    Layer.GHOST: ON_PICTURE.GHOST,
+}
+
+
+class OverlayBar(QWidget):
+    """``toggled`` carries a layer and whether it is on."""
+
+    toggled = Signal(object, bool)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._chips = {layer: _Chip(layer, self) for layer in Layer}
+        for layer, chip in self._chips.items():
+            chip.toggled.connect(lambda on, which=layer: self.toggled.emit(which, on))
+        policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+        self.setAccessibleName(tr("Overlays"))
+
+    def sizeHint(self) -> QSize:
+        return QSize(_full_width(list(self._chips.values())), _CHIP_HEIGHT)
+
+    def minimumSizeHint(self) -> QSize:
+        widest = (len(self._chips) + 1) // 2
+        return QSize(widest * (_CHIP_NARROW + _CHIP_GAP) - _CHIP_GAP, _CHIP_HEIGHT)
+
+    def heightForWidth(self, width: int) -> int:
+        return len(self._rows(width)) * (_CHIP_HEIGHT + _CHIP_GAP) - _CHIP_GAP
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        top = 0
+        for row in self._rows(self.width()):
+            left = 0.0
+            # each gets as much more, or less, as its name is long
+            share = (self.width() + _CHIP_GAP) / (_full_width(row) + _CHIP_GAP)
+            for chip in row:
+                step = (chip.sizeHint().width() + _CHIP_GAP) * share
+                chip.setGeometry(round(left), top, round(left + step) - _CHIP_GAP - round(left), _CHIP_HEIGHT)
+                left += step
+            top += _CHIP_HEIGHT + _CHIP_GAP
+
+    def _rows(self, width: int) -> list[list[_Chip]]:
+        chips = list(self._chips.values())
+        if width >= _full_width(chips):
+            return [chips]
+        half = (len(chips) + 1) // 2
+        return [chips[:half], chips[half:]]
+
+    def is_on(self, layer: Layer) -> bool:
+        return self._chips[layer].isChecked()
+
+    def toggle(self, layer: Layer) -> None:
+        self._chips[layer].toggle()
+
+    def set_all(self, on: bool) -> None:
+        for chip in self._chips.values():
+            chip.setChecked(on)
+
+
+def _full_width(row: list[_Chip]) -> int:
+    """The width that shows all of their names and colours."""
+    return sum(chip.sizeHint().width() + _CHIP_GAP for chip in row) - _CHIP_GAP
+
+
+class _Chip(Painted, QAbstractButton):
+    """Key cap, colour and name; filled when on, outlined when off."""
+
+    def __init__(self, layer: Layer, bar: OverlayBar) -> None:
+        super().__init__(bar)
+        self._layer = layer
+        self.setCheckable(True)
+        self.setChecked(True)
+        self.setText(tr(layer.value.label))
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setToolTip(tr("{meaning}  (key {key})", meaning=tr(layer.value.meaning), key=layer.value.key))
+        self.setAccessibleName(tr("Overlay {label}", label=tr(layer.value.label)))
+
+    def sizeHint(self) -> QSize:
+        return QSize(40 + text_width(theme.font(12), self.text()), _CHIP_HEIGHT)
+
+    def paint(self, painter: QPainter) -> None:
+        on, height = self.isChecked(), self.height()
+        edge = theme.SKY if self.hasFocus() else theme.TEXT_FAINT if self.underMouse() else theme.LINE
+        draw_box(painter, QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), 6, theme.RAISED if on else theme.WINDOW, edge)
+        key_colour = theme.TEXT_DIM if on else theme.TEXT_FAINT
+        draw_text(painter, QRectF(8, 0, 10, height), self._layer.value.key, theme.semi_bold(11), key_colour, CENTER)
+        left, swatch = 22.0, _SWATCH[self._layer]
+        if self.width() >= self.sizeHint().width():  # no room for the colour in a narrow window
+            is_lost = theme.contrast(swatch, theme.RAISED) < _SEEN  # a pale colour on a light chip
+            box = QRectF(left, height / 2 - 4, 8, 8)
+            draw_box(painter, box, 2, swatch if on else None, theme.TEXT_FAINT if is_lost else swatch, 1.5)
+            left = 35.0
+        room = QRectF(left, 0, self.width() - left - 4, height)
+        colour = theme.TEXT if on else theme.TEXT_FAINT
+        draw_text(painter, room, self.text(), theme.font(12), colour, smallest_px=10, elided=True)

@@ -15,11 +15,11 @@ from pytestqt.qtbot import QtBot
 
 from app.annotator.sources import image_files
 from app.operator import recording
+from app.operator.record_bar import RecordBar
 from app.operator.recording import AfterSession, Declined, RecoveryController, loss_words
 from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.widgets.messages import OfferStrip
-from app.widgets.record_bar import RecordBar
 from core.annotation.store import DEFAULT_NAME
 from core.config.models import Config
 from core.control.alerts import ALERTS, Alert

@@ -16,13 +16,13 @@ from PySide6.QtWidgets import QApplication, QDialogButtonBox, QMenu
 from pytestqt.qtbot import QtBot
 
 from app.annotator.panels import QueueModel
+from app.operator.record_bar import RecordBar
 from app.operator.window import OperatorWindow
 from app.settings.apply import SettingsController
 from app.ui import i18n
 from app.ui.actions import LanguageMenu, plain
 from app.ui.i18n import AUTO, CHINESE, ENGLISH, LOCALE, english_texts, language_in_use, tr, tr_text, use_language
 from app.ui.texts import QUANTITY, advice_headline, tip
-from app.widgets.record_bar import RecordBar
 from core.annotation.model import Status
 from core.config.files import Profiles, read_settings
 from core.config.models import Config, QualityConfig

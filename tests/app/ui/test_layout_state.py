@@ -13,8 +13,7 @@ from app.operator.window import OperatorWindow
 from app.ui.actions import action_of, plain
 from app.ui.layout_state import LayoutState, Parts, Switch, layout_settings, overlay_switches
 from app.widgets.basics import Columns
-from app.widgets.overlay_bar import OverlayBar
-from app.widgets.scene_overlay import Layer
+from app.widgets.scene_overlay import Layer, OverlayBar
 from tests.app.conftest import MakeWindow
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QAbstractButton
 
-from app.widgets.scene_overlay import foot, scene_shapes
+from app.widgets.scene_overlay import Layer, OverlayBar, foot, scene_shapes
 from core.types import Pose, PoseState, RobotPath, Scene, Vector
+from tests.app.widgets.conftest import Own
 
 VESSEL = Vector((0.0, 10.0), (20.0, 10.0), (40.0, 10.0))
 ROBOT = Vector((0.0, 14.0), (15.0, 27.0), (30.0, 40.0))
@@ -80,3 +82,33 @@ def test_ghost_is_mapped_to_source_pixels_with_the_robots_thickness() -> None:
     np.testing.assert_allclose(shapes.ghost, [[20.5, 0.5], [40.5, 10.5]])
     assert shapes.robot_width == pytest.approx(12.0)
     assert scene_shapes(scene(0.5, path=path)).ghost is None
+
+
+def test_chips_switch_their_layer(own: Own) -> None:
+    bar = own(OverlayBar())
+    seen: list[tuple[Layer, bool]] = []
+    bar.toggled.connect(lambda layer, on: seen.append((layer, on)))
+    bar.toggle(Layer.VECTORS)
+    assert seen == [(Layer.VECTORS, False)]
+    assert not bar.is_on(Layer.VECTORS)
+    bar.set_all(True)
+    assert seen[-1] == (Layer.VECTORS, True)
+
+
+@pytest.mark.parametrize(("width", "rows"), [(1200, 1), (600, 2), (420, 2)])
+def test_chips_go_in_two_rows_where_one_would_cut_their_names(own: Own, width: int, rows: int) -> None:
+    bar = own(OverlayBar())
+    bar.resize(width, bar.heightForWidth(width))
+    bar.grab()
+    chips = bar.findChildren(QAbstractButton)
+    assert len({chip.y() for chip in chips}) == rows
+    assert all(chip.width() >= chip.sizeHint().width() for chip in chips) is (width > 420)
+    for chip in chips:
+        assert bar.rect().contains(chip.geometry())
+        assert not any(chip.geometry().intersects(other.geometry()) for other in chips if other is not chip)
+    in_order = sorted(chips, key=lambda chip: (chip.y(), chip.x()))
+    assert [chip.text() for chip in in_order] == [layer.value.label for layer in Layer]
+
+
+def test_layers_have_keys_of_their_own() -> None:
+    assert [layer.value.key for layer in Layer] == [*"123456789", "G"]

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QRect
 from PySide6.QtGui import QImage
 
-from app.widgets.advice_line import AdviceLine
+from app.widgets.scene_panels import AdviceLine
 from app.widgets.state_badge import StateBadge
 from core.config.models import PoseConfig
 from core.types import Advice, PoseState, Speed
