@@ -8,9 +8,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -37,11 +34,11 @@ from core.config.models import Config, RigConfig
 from core.devices import UserError
 from core.evaluation.replay import Change, FrameResult, ReplayTally
 from core.files import name_of
+from core.session.codec import scene_to_json
 from core.session.manifest import MANIFEST, read_manifest
 from core.session.reader import SessionReader, check_is_session
 from core.types import Frame, Point, PoseState, Reason, Refusal, Scene
 from tests.app.golden_session import COUNT, GOLDEN, TRUTH
-from tests.app.program import MAIN, run_apart
 from tests.app.program import run as main
 from tests.core.session_data import record, tick_of
 
@@ -50,7 +47,7 @@ from tests.core.session_data import record, tick_of
 def replayed(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, object], Path]:
     """The golden session perceived again in its recorded configuration: what ``--json`` said, and the folder of all files."""
     out = tmp_path_factory.mktemp("replay")
-    done = run_apart("replay", GOLDEN, "--json", "--diff", "--jsonl", out / "new.jsonl", "--out", out / "out")
+    done = main("replay", GOLDEN, "--json", "--diff", "--jsonl", out / "new.jsonl", "--out", out / "out")
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout), out
 
@@ -240,23 +237,20 @@ def test_a_session_without_pictures_is_refused_by_name(tmp_path: Path) -> None:
         run_replay(options(session))
 
 
-def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
-    session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(900)])
-    out = tmp_path / "new.jsonl"
-    command = [sys.executable, str(MAIN), "replay", str(session), "--json", "--jsonl", str(out)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    until_s = time.monotonic() + 60.0
-    while not (out.exists() and out.stat().st_size):
-        assert process.poll() is None
-        assert time.monotonic() < until_s
-        time.sleep(0.005)
-    process.send_signal(signal.SIGINT)
-    said, errors = process.communicate(timeout=60.0)
-    assert (process.returncode, errors.splitlines()[-1]) == (130, "interrupted")
-    result = json.loads(said)
-    assert result["ended"].startswith("interrupted after")
-    assert 0 < result["frames"] < 900
-    assert len(out.read_text().splitlines()) == result["frames"]
+def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session, out = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(5)]), tmp_path / "new.jsonl"
+
+    def interrupt(name: str, scene: Scene) -> dict[str, Any]:
+        if name.endswith("#2"):
+            signal.raise_signal(signal.SIGINT)
+        return scene_to_json(name, scene)
+
+    monkeypatch.setattr(replay, "scene_to_json", interrupt)
+    done = main("replay", session, "--json", "--jsonl", out)
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (130, "interrupted")
+    result = json.loads(done.stdout)
+    assert (result["ended"], result["frames"]) == ("interrupted after 3 of 5 frames", 3)
+    assert len(out.read_text().splitlines()) == 3
 
 
 def test_a_session_whose_name_is_no_utf8_is_replayed(tmp_path: Path) -> None:
@@ -410,23 +404,19 @@ def test_none_that_can_be_perceived_is_an_error(folder: Path, tmp_path: Path) ->
         run_replays([folder / "blind", tmp_path / "blind2"], ReplayOptions(folder), None, workers=1, scheduler=None, as_json=True)
 
 
-def test_ctrl_c_tells_what_is_done(folder: Path, tmp_path: Path) -> None:
-    record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(900)]).rename(tmp_path / "zlong")
-    out = tmp_path / "out"
-    command = [sys.executable, str(MAIN), "replay", str(folder / "small"), str(tmp_path / "zlong"), "--json", "--out", str(out)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    until_s = time.monotonic() + 60.0
-    while not (out / "small" / "replay.svg").exists():
-        assert process.poll() is None
-        assert time.monotonic() < until_s
-        time.sleep(0.005)
-    process.send_signal(signal.SIGINT)
-    said, errors = process.communicate(timeout=60.0)
-    assert (process.returncode, errors.splitlines()[-1]) == (130, "interrupted")
-    total = json.loads(said.splitlines()[-1])
-    assert total["ended"] in {"ended after 1 of 2 sessions", "ended after 2 of 2 sessions"}
-    assert 3 <= total["frames"] < 900
-    assert json.loads((out / "replays.json").read_text())["all"] == total
+def test_ctrl_c_tells_what_is_done(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write = replay.write_replay
+
+    def interrupt(*written: Any) -> None:
+        write(*written)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(replay, "write_replay", interrupt)
+    done = main("replay", folder / "small", folder / "golden", "--json", "--out", tmp_path / "out")
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (130, "interrupted")
+    total = json.loads(done.stdout.splitlines()[-1])
+    assert (total["ended"], total["frames"]) == ("ended after 1 of 2 sessions", 3)
+    assert json.loads((tmp_path / "out" / "replays.json").read_text())["all"] == total
 
 
 def test_what_was_done_is_told_when_a_worker_is_killed(
