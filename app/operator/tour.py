@@ -12,8 +12,6 @@ from app.widgets.tour_overlay import TourStop
 
 def operator_stops(panels: OperatorPanels, *, has_robot: bool) -> tuple[TourStop, ...]:
     """The stops of a window; without a robot nothing is said of moving it."""
-    keys = {motion: tr(" or ").join(key_name(key) for key in KEYS[motion]) for motion in Motion}
-    arm, hand_over, take_back = (step.value.key for step in (OperatorStep.ARM, OperatorStep.HAND_OVER, OperatorStep.TAKE_BACK))
     watching = (
         TourStop(
             tr("The picture"),
@@ -28,9 +26,8 @@ def operator_stops(panels: OperatorPanels, *, has_robot: bool) -> tuple[TourStop
             tr("How the head lies in the vessel"),
             tr(
                 "A on course, B coming back to the centerline, C moving away from it, D crossed; the numbers that decided it stand "
-                "beside it. Rest the mouse on a dial: it says what it means. When the program cannot tell, there is no letter but "
-                "a "
-                "reason."
+                "beside it. Rest the mouse on a dial: it says what it means. When the program cannot tell, there is no letter "
+                "but a reason."
             ),
             (panels.badge, panels.gauge, panels.bars),
         ),
@@ -38,13 +35,28 @@ def operator_stops(panels: OperatorPanels, *, has_robot: bool) -> tuple[TourStop
             tr("What to do next"),
             tr(
                 "How fast to advance and how far to turn, and why. It only advises: you steer. The purple ghost in the picture "
-                "shows "
-                "where the advice leads."
+                "shows where the advice leads."
             ),
             (panels.advice,),
         ),
     )
-    moving = (
+    keeping = (
+        TourStop(
+            tr("Keep it"),
+            tr(
+                "F9 records a session: every picture and all that was understood, advised, asked and sent. M marks a moment, F10 "
+                "keeps the last seconds without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again."
+            ),
+            (panels.record_bar,),
+        ),
+    )
+    return (*watching, *(_moving_stops(panels) if has_robot else ()), *keeping)
+
+
+def _moving_stops(panels: OperatorPanels) -> tuple[TourStop, ...]:
+    keys = {motion: tr(" or ").join(key_name(key) for key in KEYS[motion]) for motion in Motion}
+    arm, hand_over, take_back = (step.value.key for step in (OperatorStep.ARM, OperatorStep.HAND_OVER, OperatorStep.TAKE_BACK))
+    return (
         TourStop(
             tr("Move it yourself"),
             tr(
@@ -83,14 +95,3 @@ def operator_stops(panels: OperatorPanels, *, has_robot: bool) -> tuple[TourStop
             (panels.mode_bar.stop,),
         ),
     )
-    keeping = (
-        TourStop(
-            tr("Keep it"),
-            tr(
-                "F9 records a session: every picture and all that was understood, advised, asked and sent. M marks a moment, F10 "
-                "keeps the last seconds without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again."
-            ),
-            (panels.record_bar,),
-        ),
-    )
-    return (*watching, *(moving if has_robot else ()), *keeping)

@@ -195,7 +195,6 @@ def train(
             if isinstance(module, torch.nn.BatchNorm2d):
                 module.eval()
     average = copy.deepcopy(network).eval()
-    in_bf16 = computes_in_bf16(device)
     optimizers = make_optimizers(network, plan.learning_rate, plan.weight_decay)
     groups = [(group, group["lr"] / plan.learning_rate) for optimizer in optimizers for group in optimizer.param_groups]
     averaged = list(zip(average.state_dict().values(), network.state_dict().values(), strict=True))
@@ -207,19 +206,7 @@ def train(
         rate = plan.learning_rate_at(done, time.monotonic() - began)
         for group, share in groups:
             group["lr"] = share * rate
-        batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
-        with torch.autocast(device.type, torch.bfloat16, enabled=in_bf16):
-            logits = network(batch)
-        labels = target.to(device).float()
-        if labels.shape[1] > 2:
-            labels[:, 2] /= 255
-        loss, dice = loss_of(logits.float(), labels, plan.robot_weight, plan.end_weight)
-        for optimizer in optimizers:
-            optimizer.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        for optimizer in optimizers:
-            optimizer.step()
+        loss, dice = _step(network, optimizers, image, target, plan)
         _average(averaged, min(plan.average_decay, (1 + done) / (10 + done)))
         # Kept on the device: read after every step, a GPU would wait for the processor.
         blend = max(0.02, 1 / (done + 1))
@@ -244,6 +231,27 @@ def train(
             on_last(average.to("cpu"), done)
         raise failed[0]
     return average.to("cpu"), done
+
+
+def _step(
+    network: DualUNet, optimizers: Sequence[torch.optim.Optimizer], image: Tensor, target: Tensor, plan: TrainingPlan
+) -> tuple[Tensor, Tensor]:
+    """Learn from one batch; its loss, and the Dice of vessel and robot (2,)."""
+    device = next(network.parameters()).device
+    batch = (image.to(device).float() / 255).contiguous(memory_format=torch.channels_last)
+    with torch.autocast(device.type, torch.bfloat16, enabled=computes_in_bf16(device)):
+        logits = network(batch)
+    labels = target.to(device).float()
+    if labels.shape[1] > 2:
+        labels[:, 2] /= 255
+    loss, dice = loss_of(logits.float(), labels, plan.robot_weight, plan.end_weight)
+    for optimizer in optimizers:
+        optimizer.zero_grad(set_to_none=True)
+    loss.backward()  # type: ignore[no-untyped-call]
+    torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
+    for optimizer in optimizers:
+        optimizer.step()
+    return loss, dice
 
 
 @torch.no_grad()
