@@ -16,11 +16,12 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba import boolean, float32, float64, int64, types, uint8
+from numba import boolean, float32, float64, int32, int64, types, uint8
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Pixels = NDArray[np.int32]
 Bytes = NDArray[np.uint8]
 FloatMap = NDArray[np.float32]
 BoolMap = NDArray[np.bool_]
@@ -667,11 +668,10 @@ def thin(framed: Bytes, stride: int, outer: Ints, table: Bytes) -> None:
 
 
 @kernel((int64[:], int64))
-def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Ints]:
-    """The graph of a skeleton's pixels, given by their sorted flat indices in a picture of `width` columns.
+def _link_pixels(flat: Ints, width: int) -> tuple[Floats, Floats, Pixels, Ints, Ints]:
+    """Of a skeleton's pixels, counted from 1 (0 stands for none): x, y, their neighbours (N, 8), how many, and ``both``.
 
-    Nodes (K, 2); the first and the last node of each chain (C,), (C,); the chains' consecutive points (N, 2), and their starts
-    (C + 1,).
+    ``both`` is, of a chain's pixel, the XOR of its neighbours: with one of them it gives the other; -1 of a junction's.
     """
     count = len(flat)
     left, right = width, 0
@@ -681,7 +681,6 @@ def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Int
     top = flat[0] // width if count else 0
     stride = max(right - left, 0) + 3
     size = ((flat[count - 1] // width - top if count else 0) + 3) * stride
-    # Pixels are counted from 1; 0 stands for none.
     is_set, index = np.zeros(size, np.bool_), np.empty(size, np.int32)
     place, x, y = np.empty(count + 1, np.int64), np.zeros(count + 1), np.zeros(count + 1)
     for i in range(count):
@@ -694,7 +693,7 @@ def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Int
     step_x, step_y = (0, -1, 1, 0, -1, 1, -1, 1), (-1, 0, 0, 1, -1, -1, 1, 1)
     near = np.zeros((count + 1, 8), np.int32)
     links = np.zeros(count + 1, np.int64)
-    both = np.full(count + 1, -1, np.int64)  # of a chain's pixel: XOR with one neighbour gives the other
+    both = np.full(count + 1, -1, np.int64)
     for i in range(1, count + 1):
         pair = 0
         for k in range(8):
@@ -708,11 +707,16 @@ def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Int
             links[i] += 1
         if links[i] < 3:
             both[i] = pair
-    # Junction pixels that touch are one node.
-    nodes = np.empty((count + 1, 2))
-    node_of = np.full(count + 1, -1, np.int64)
-    many, pending = 0, np.empty(count + 1, np.int64)
-    for i in range(1, count + 1):
+    return x, y, near, links, both
+
+
+@kernel((float64[::1], float64[::1], int32[:, ::1], int64[::1]))
+def _junction_nodes(x: Floats, y: Floats, near: Pixels, links: Ints) -> tuple[Floats, Ints, int]:
+    """Junction pixels that touch are one node: room for all nodes (N, 2), the node of each pixel or -1, and how many there are."""
+    nodes = np.empty((len(links), 2))
+    node_of = np.full(len(links), -1, np.int64)
+    many, pending = 0, np.empty(len(links), np.int64)
+    for i in range(1, len(links)):
         if links[i] < 3 or node_of[i] >= 0:
             continue
         members, waiting = 0, 1
@@ -731,6 +735,19 @@ def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Int
                     waiting += 1
         nodes[many, 0], nodes[many, 1] = across / members, down / members
         many += 1
+    return nodes, node_of, many
+
+
+@kernel((int64[:], int64))
+def trace_graph(flat: Ints, width: int) -> tuple[Floats, Ints, Ints, Floats, Ints]:
+    """The graph of a skeleton's pixels, given by their sorted flat indices in a picture of `width` columns.
+
+    Nodes (K, 2); the first and the last node of each chain (C,), (C,); the chains' consecutive points (N, 2), and their starts
+    (C + 1,).
+    """
+    count = len(flat)
+    x, y, near, links, both = _link_pixels(flat, width)
+    nodes, node_of, many = _junction_nodes(x, y, near, links)
     # First the chains that hang on a junction, then those between two ends, then rings.
     points = np.empty((3 * count + 3, 2))
     starts, ends, marks = np.empty(count + 1, np.int64), np.empty(count + 1, np.int64), np.zeros(count + 2, np.int64)
