@@ -11,12 +11,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from core.devices import UserError
+from core.devices import DeviceError, UserError
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler
+    from pydantic_core import CoreSchema
 
 
-class PluginError(UserError):
+class PluginError(DeviceError):
     """A plugin cannot be used; the message names its package."""
 
 
@@ -28,7 +32,7 @@ def _found(group: str, _path: tuple[str, ...]) -> dict[str, EntryPoint]:
 
 @dataclass(frozen=True, slots=True)
 class PluginKind:
-    """What can be added of one kind.
+    """What can be added of one kind. ``Annotated[str, kind]`` is a setting that holds one of its names.
 
     Attributes
     ----------
@@ -41,24 +45,34 @@ class PluginKind:
     own: tuple[str, ...]
     needs: tuple[str, ...] = ()
 
-    def _plugins(self) -> dict[str, EntryPoint]:
+    def _entries(self) -> dict[str, EntryPoint]:
         return {name: entry for name, entry in _found(f"lumenpilot.{self.group}", tuple(sys.path)).items() if name not in self.own}
+
+    @property
+    def plugins(self) -> tuple[str, ...]:
+        """Names of plugins."""
+        return tuple(sorted(self._entries()))
 
     @property
     def names(self) -> tuple[str, ...]:
         """The program's own names, then those of plugins."""
-        return (*self.own, *sorted(self._plugins()))
+        return (*self.own, *self.plugins)
 
     def check(self, name: str) -> str:
         """Return `name`. Raises ValueError: one line with all names that there are."""
-        if name not in self.own and name not in self._plugins():
+        if name not in self.own and name not in self._entries():
             raise ValueError(f"must be one of {', '.join(self.names)}; others come with the package of a plugin")
         return name
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
 
     def load(self, name: str) -> Any:
         """Import what a plugin's entry point names. Raises PluginError."""
         with self.blame(name):
-            return self._plugins()[name].load()
+            return self._entries()[name].load()
 
     def make(self, name: str, *values: Any) -> Any:
         """Call what a plugin's entry point names, and check that the result has the methods ``needs``. Raises UserError."""
@@ -72,7 +86,7 @@ class PluginKind:
     @contextmanager
     def blame(self, name: str) -> Iterator[None]:
         """Turn whatever a plugin's code raises, besides UserError, into PluginError."""
-        entry = self._plugins().get(name)
+        entry = self._entries().get(name)
         if entry is None:
             raise PluginError(f"{name}: no such plugin among {self.group}; there are: {', '.join(self.names)}")
         try:

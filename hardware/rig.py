@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from core.config.calibration import ZeroConfig
 from core.config.files import settings_folder
-from core.config.models import CameraConfig, Config, RigConfig, load_config, merge
-from core.config.rig_file import RESERVED, calibration_of, find_rig, with_rig
+from core.config.models import CAMERAS, CameraConfig, Config, RigConfig, load_config, merge
+from core.config.rig_file import RESERVED, calibration_of, find_rig, has_rig, with_rig
 from core.config.safety import ServosConfig
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import GuardedRobot
 from core.devices import Camera, DeviceError, UserError
-from hardware.cameras.registry import CAMERA_KINDS, FoundCamera
+from hardware.cameras.registry import CAMERA_KINDS, FoundCamera, camera_kind
 from hardware.cameras.undistorted import UndistortedCamera
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def kind_of(rig: RigConfig) -> RigKind:
     """What a configured rig is, without opening it."""
     if rig.camera == "twin":
         return RigKind.SIM
-    return RigKind.LIVE if CAMERA_KINDS[rig.camera].live is not None and rig.source is None else RigKind.PLAYBACK
+    return RigKind.LIVE if camera_kind(rig.camera).live is not None and rig.source is None else RigKind.PLAYBACK
 
 
 def start_ahead(config: Config) -> PrestartedProcesses | None:
@@ -107,7 +107,7 @@ def _open_playback(config: Config) -> Rig:
     rig = config.rig
     if rig.source is None:
         raise DeviceError(f"rig {rig.name}: camera {rig.camera} needs rig.source, the path of the video or folder")
-    play = CAMERA_KINDS[rig.camera].recorded
+    play = camera_kind(rig.camera).recorded
     if play is None:
         raise DeviceError(f"rig {rig.name}: a {rig.camera} plays no files: leave rig.source out, or set rig.camera to video_file")
     source = Path(rig.source)
@@ -155,7 +155,7 @@ def kept_zeros_file(rig: RigConfig) -> Path:
 
 def real_camera(config: Config) -> Camera:
     """The camera of a live rig, not open yet."""
-    live = CAMERA_KINDS[config.rig.camera].live
+    live = camera_kind(config.rig.camera).live
     assert live is not None
     return live(config.camera)
 
@@ -243,6 +243,7 @@ def find_devices() -> FoundDevices:
             cameras += [c for c in kind.find() if not (cameras and c.kind == "webcam" and "RealSense" in c.title)]
         except (ImportError, DeviceError) as error:
             problems.append(f"{kind.title}: {' '.join(str(error).split())}")
+    cameras += [FoundCamera(name, name) for name in CAMERAS.plugins]  # whether they are plugged in is not known
     return FoundDevices((*cameras, FoundCamera("twin", TWIN_TITLE)), find_ports(), tuple(problems))
 
 
@@ -287,7 +288,7 @@ def rig_config(
         config = load_config(config_path, overrides=own)
         if rig is None:
             return config, kind_of(config.rig)
-        if rig in RESERVED:
+        if rig in RESERVED or (rig in CAMERAS.plugins and not has_rig(rig)):
             config = _built_in_rig(config, rig)
         else:
             path, found = find_rig(rig)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -21,9 +21,8 @@ from rich.table import Table
 from app.commands.options import ConfigOption, ModelOption, SchedulerOption, check_masks
 from app.commands.progress import console, progress_bar
 from app.commands.workers import over_cluster, over_processes
-from core.config.models import PolicyName, choose_model, load_config
+from core.config.models import POLICIES, choose_model, load_config
 from core.config.rig_file import find_rig, read_rig
-from core.control.policies import POLICY_NAMES
 from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
 from core.files import write_atomic
@@ -32,7 +31,7 @@ from hardware.twin.catalog import BENCH_LOOK, RANDOM_LOOK, TRIAL_LOOKS
 if TYPE_CHECKING:
     from hardware.twin.trial import TrialPlan
 
-Job = tuple[PolicyName, int]
+Job = tuple[str, int]
 """A policy and a seed."""
 Rows = Sequence[Mapping[str, Any]]
 _KEYS = trial_row(TrialLog(), seed=0, policy="", phantom="", outcome="", way_mm=0.0, target_mm=(0.0, 0.0)).keys()
@@ -51,7 +50,7 @@ def trial(
     seeds: Annotated[str, typer.Option(help="A:B, phantoms, looks, robots and targets A to B - 1")],
     policy: Annotated[
         list[str] | None,
-        typer.Option(help="pursuit, table, push or random; may be repeated to compare; default: the configured one"),
+        typer.Option(help="pursuit, table, push, random or a plugin's; may be repeated to compare; default: the configured one"),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, max=256, help="processes")] = 1,
     as_json: Annotated[
@@ -129,12 +128,12 @@ def parse_seeds(text: str) -> range:
     return range(first, last)
 
 
-def parse_policies(names: Sequence[str]) -> tuple[PolicyName, ...]:
+def parse_policies(names: Sequence[str]) -> tuple[str, ...]:
     """Known names, each once, in order. Raises TrialError."""
     for name in names:
-        if name not in POLICY_NAMES:
-            raise TrialError(f"unknown policy {name!r}; known: {', '.join(POLICY_NAMES)}")
-    return cast("tuple[PolicyName, ...]", tuple(dict.fromkeys(names)))
+        if name not in POLICIES.names:
+            raise TrialError(f"unknown policy {name!r}; known: {', '.join(POLICIES.names)}")
+    return tuple(dict.fromkeys(names))
 
 
 class KeptTrials:

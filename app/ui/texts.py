@@ -599,7 +599,7 @@ def rig_line(rig: RigFile) -> str:
     parts = calibrated_parts(rig)
     return tr(
         "{camera}, {servos}; {calibrated}; made {made:%Y-%m-%d}",
-        camera=camera[rig.kind].strip(),
+        camera=camera.get(rig.kind, rig.kind).strip(),
         servos=servos[rig.robot],
         calibrated=tr("calibrated: {parts}", parts=", ".join(map(tr, parts))) if parts else tr("not calibrated"),
         made=rig.made_utc,

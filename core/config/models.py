@@ -16,8 +16,9 @@ import platformdirs
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from core.config.safety import SafetyConfig, ServosConfig
-from core.config.section import ConfigSection
+from core.config.section import ConfigSection, plain_message
 from core.devices import UserError
+from core.plugins import PluginKind
 
 
 class CameraConfig(ConfigSection):
@@ -67,7 +68,14 @@ class PedalConfig(ConfigSection):
     reconnect_s: float = Field(0.5, ge=0.05, le=10.0, description="pause between two attempts to open the port")
 
 
-PolicyName = Literal["pursuit", "table", "push", "random"]
+POLICIES = PluginKind("policies", ("pursuit", "table", "push", "random"), ("__call__", "reset"))
+"""Policies; a plugin's entry point is called with configuration and seed (``core/control/policies.py``)."""
+PolicyName = Annotated[str, POLICIES]
+RECORDED = ("video_file", "image_folder")
+"""Kinds of ``rig.camera`` that are no camera."""
+CAMERAS = PluginKind("cameras", ("twin", "realsense", "webcam", "basler", *RECORDED), ("open", "read", "close"))
+"""Kinds of cameras; a plugin's entry point is called with the camera's settings (``hardware/cameras/registry.py``)."""
+CameraName = Annotated[str, CAMERAS]
 
 
 class PursuitConfig(ConfigSection):
@@ -385,9 +393,7 @@ class RigConfig(ConfigSection):
     """Which camera and robot are used."""
 
     name: str = Field("twin", min_length=1, description="as it stands in sessions and messages")
-    camera: Literal["twin", "realsense", "webcam", "basler", "video_file", "image_folder"] = Field(
-        "twin", description="where pictures come from"
-    )
+    camera: CameraName = Field("twin", description="where pictures come from")
     robot: Literal["twin", "servos", "none"] = Field("twin", description="what moves; servos = real ones, see section Servos")
     source: str | None = Field(None, description="path of the video, folder, or RealSense recording (.bag)")
     file: str | None = Field(
@@ -484,7 +490,7 @@ def _one_line(path: str, error: ValidationError) -> str:
     key = ".".join(str(part) for part in first["loc"])
     is_unknown = first["type"] == "extra_forbidden"
     bounds = _field_range(first["loc"])
-    what = "unknown key" if is_unknown else f"must be {bounds}" if bounds else str(first["msg"])
+    what = "unknown key" if is_unknown else f"must be {bounds}" if bounds else plain_message(first)
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
     says_no_value = not key or is_unknown or isinstance(first["input"], dict | BaseModel)
     got = "" if says_no_value else f", got {first['input']!r}"

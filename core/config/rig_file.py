@@ -21,16 +21,16 @@ from pydantic import Field, ValidationError, model_validator
 
 from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.files import settings_folder
-from core.config.models import CameraConfig, Config, RigConfig, SegmentationConfig, TwinConfig
-from core.config.safety import AtClose, ServosConfig
+from core.config.models import CAMERAS, RECORDED, CameraConfig, CameraName, Config, RigConfig, SegmentationConfig, TwinConfig
+from core.config.safety import OF_SERVOS, AtClose, ServosConfig
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError
 from core.files import write_atomic
 from core.messages import message
 
 FORMAT = 1
-RESERVED = ("twin", "realsense", "webcam", "basler")
-"""What ``--rig`` means without a rig file."""
+RESERVED = tuple(name for name in CAMERAS.own if name not in RECORDED)
+"""What ``--rig`` means without a rig file; plugins' cameras besides."""
 _NAME = re.compile(r"^[\w][\w .()+-]{0,59}$")
 _ENDING, _OLDER = ".toml", ".older.toml"
 _MAX_BYTES = 200_000
@@ -47,7 +47,7 @@ class RigFile(ConfigSection):
     format: int = Field(FORMAT, ge=1)
     name: str = Field(min_length=1, max_length=60)
     made_utc: datetime
-    kind: Literal["twin", "realsense", "webcam", "basler"]
+    kind: CameraName
     robot: Literal["twin", "servos", "none"]
     camera: CameraConfig = CameraConfig()
     twin: TwinConfig | None = None
@@ -60,6 +60,8 @@ class RigFile(ConfigSection):
     @model_validator(mode="after")
     def _check_parts(self) -> Self:
         check_rig_name(self.name)
+        if self.kind in RECORDED:
+            raise ValueError("kind must be that of a camera")
         if (self.kind == "twin") is not (self.twin is not None):
             raise ValueError("a twin needs the section twin, and no other rig has one")
         if (self.robot == "twin") and self.kind != "twin":
@@ -68,7 +70,7 @@ class RigFile(ConfigSection):
             raise ValueError("robot servos needs a real camera and servos.port")
         if self.calibration is not None and (misfit := self.calibration.misfit(self.servos)):
             raise ValueError(f"{misfit}: calibrate again")
-        if self.kind == "twin" and self.servos.driver == "stepper board":
+        if self.kind == "twin" and self.servos.driver not in OF_SERVOS:
             raise ValueError("servos.driver: the twin has DYNAMIXEL servos of its own: leave it out, or set it to direct")
         if self.robot == "servos" and self.servos.too_loose:
             raise ValueError(f"servos: {self.servos.too_loose}")
@@ -216,7 +218,7 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
     A recording, and a bad name, are refused.
     """
     kind = config.rig.camera
-    if kind not in RESERVED or config.rig.source is not None:
+    if kind in RECORDED or config.rig.source is not None:
         raise RigFileError(f"rig {config.rig.name} plays a recording: it cannot be saved as a rig")
     port = None if kind == "twin" or config.rig.robot == "none" else config.servos.port
     before = None
@@ -294,7 +296,7 @@ def read_again(running: Config, settings: Config) -> Config:
 
 def rig_in_use(config: Config) -> tuple[Path, RigFile] | None:
     """The rig file of the configured rig; None without one, and for recordings. Raises RigFileError."""
-    if config.rig.file is None or config.rig.source is not None or config.rig.camera not in RESERVED:
+    if config.rig.file is None or config.rig.source is not None or config.rig.camera in RECORDED:
         return None
     path = Path(config.rig.file)
     return path, read_rig(path)

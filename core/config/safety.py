@@ -21,6 +21,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, mo
 
 from core.config.section import ConfigSection
 from core.config.servo_models import SERVO_MODELS, ForceLimit, ServoModel, force_limit, unsupported
+from core.plugins import PluginKind
 
 _REPEATED_S = 0.05
 """1.5 times the repeat period of a held key (33 ms), twice that of a held deadman (25 ms)."""
@@ -269,16 +270,20 @@ AtClose = Literal["ask", "hold", "relax", "torque off"]
 """What becomes of servos that hold when the program is closed."""
 
 
-Driver = Literal["dynamixel", "direct", "stepper board"]
-"""What drives the joints."""
-LIMITS_FORCE: frozenset[Driver] = frozenset({"dynamixel", "direct"})
+_DRIVE_METHODS = ("open", "read", "write", "hold", "stop", "close", "interruptible", "pause")
+DRIVES = PluginKind("drives", ("dynamixel", "direct", "stepper board"), _DRIVE_METHODS)
+"""What drives the joints; a plugin's entry point is called with port and speed (``hardware/servos/drive.py``)."""
+DriveName = Annotated[str, DRIVES]
+OF_SERVOS = ("dynamixel", "direct")
+"""Drives with DYNAMIXEL servos, or like them."""
+LIMITS_FORCE = frozenset(OF_SERVOS)
 """Drives that keep each joint's ``max_force_n`` themselves; with another one the program never drives a LIVE rig."""
 
 
 class ServosConfig(ConfigSection):
     """The bus and the robot's joints."""
 
-    driver: Driver = Field("dynamixel", description="what is on the port; direct: the twin without servos, a lighter load")
+    driver: DriveName = Field("dynamixel", description="what is on the port; direct: the twin without servos, a lighter load")
     port: str | None = Field(None, min_length=1, description="serial device; empty: the twin's own pseudo-terminal")
     baud: int = Field(1_000_000, ge=9600, le=4_500_000, description="speed of the bus")
     model: int = Field(1020, ge=0, le=65535, description="model number of the servos (1020: XM430-W350); a joint may have another")

@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 from core.config.models import Config
 from core.config.safety import JOINT_NAMES
 from core.messages import message
+from core.plugins import PluginKind
 
 # Ends of names, longest first where one ends in the other.
 _UNITS = (
@@ -124,7 +125,7 @@ class Setting:
     unit: str = ""
     description: str = ""
     bounds: Bounds = Bounds()
-    choices: tuple[Any, ...] = ()
+    options: tuple[Any, ...] | PluginKind = ()
     is_optional: bool = False
     effect: Effect = Effect.RIG
 
@@ -132,6 +133,11 @@ class Setting:
     def name(self) -> str:
         """The key in its section."""
         return self.key.rpartition(".")[2]
+
+    @property
+    def choices(self) -> tuple[Any, ...]:
+        """The values of a choice, those of plugins included."""
+        return self.options.names if isinstance(self.options, PluginKind) else self.options
 
     @property
     def range_text(self) -> str:
@@ -260,7 +266,9 @@ def _setting(key: str, info: FieldInfo) -> list[Setting]:
         "effect": effect_of(key),
     }
     if get_origin(kind) is Literal:
-        return [Setting(key, kind=FieldKind.CHOICE, choices=get_args(kind), **common)]
+        return [Setting(key, kind=FieldKind.CHOICE, options=get_args(kind), **common)]
+    if plugins := [item for item in info.metadata if isinstance(item, PluginKind)]:
+        return [Setting(key, kind=FieldKind.CHOICE, options=plugins[0], **common)]
     if kind is bool:
         return [Setting(key, kind=FieldKind.SWITCH, **common)]
     if kind in (int, float):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, get_args
+from typing import Protocol, cast
 
 import numpy as np
 
-from core.config.models import AdviceConfig, Config, PolicyName
+from core.config.models import POLICIES, AdviceConfig, Config
 from core.control.joints import limited
 from core.control.pursuit import Pursuit, speed_word
 from core.messages import message
@@ -37,9 +37,6 @@ def table_policy(scene: Scene, config: AdviceConfig) -> Advice | None:
     return Advice(
         Speed.MODERATE, config.moderate_mm_s, steer, message("crossed the centerline to the {side}, angle left", side=where)
     )
-
-
-POLICY_NAMES: tuple[PolicyName, ...] = get_args(PolicyName)
 
 
 class Policy(Protocol):
@@ -104,8 +101,8 @@ class StopsAtTarget:
         self._policy.reset()
 
 
-def make_policy(name: PolicyName, config: Config, seed: int = 0) -> Policy:
-    """A new policy; `seed` is for the random operator."""
+def make_policy(name: str, config: Config, seed: int = 0) -> Policy:
+    """A new policy; `seed` is for the random operator. Raises PluginError."""
     policy: Policy
     if name == "pursuit":
         policy = Pursuit(config.policy.pursuit, config.advice)
@@ -114,6 +111,8 @@ def make_policy(name: PolicyName, config: Config, seed: int = 0) -> Policy:
     elif name == "push":  # baseline: straight on at moderate speed, whatever the picture shows
         straight_on = Advice(Speed.MODERATE, config.advice.moderate_mm_s, 0.0, "straight on")
         policy = Memoryless(lambda _: straight_on)
-    else:
+    elif name == "random":
         policy = RandomOperator(config, seed)
+    else:
+        policy = cast(Policy, POLICIES.make(name, config, seed))
     return StopsAtTarget(policy, config.policy.pursuit.arrive_px)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.config.acceptance import Acceptance, AcceptanceError, is_outdated, read_acceptance
-from core.config.models import Config, PolicyName, QualityConfig
+from core.config.models import Config, QualityConfig
 from core.config.rig_file import RigFile, rig_in_use
 from core.config.safety import LIMITS_FORCE, wiring_of
 from core.control.modes import Hindrance
 from core.perception.model_file import ModelError, ModelInfo, model_folder, read_model_info
 
-BLIND_POLICIES: frozenset[PolicyName] = frozenset({"push", "random"})
+BLIND_POLICIES = frozenset({"push", "random"})
 """Policies that do not look at the picture: baselines of trials."""
 MOST_ROLL_DEG = 45.0
 """Beyond this roll right and left act mostly out of the picture, or the wrong way."""

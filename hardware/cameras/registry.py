@@ -1,8 +1,8 @@
 """The registry of cameras, ``CAMERA_KINDS``: a row for each value of ``rig.camera``, for rig, device search, wizard and preflight.
 
-A new camera is a file in this folder with a ``Sensor`` (see ``live``) or a ``Camera``, a row here, its name in ``RigConfig.camera``
-(``core/config/models.py``), and in ``RESERVED`` where rig files of it are kept. Drivers are imported where they are used: their
-libraries take long to load, or may be missing.
+A new camera is a file in this folder with a ``Sensor`` (see ``live``) or a ``Camera``, a row here, and its name in ``CAMERAS``
+(``core/config/models.py``); or a plugin. Drivers are imported where they are used: their libraries take long to load, or may be
+missing.
 """
 
 from __future__ import annotations
@@ -10,11 +10,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from core.config.models import CameraConfig, RigConfig
+from core.config.models import CAMERAS, CameraConfig, RigConfig
 from core.devices import Camera, DeviceError
 from core.messages import message
 from core.program import how_to_install
@@ -247,3 +248,8 @@ CAMERA_KINDS: dict[str, CameraKind] = {
     "video_file": CameraKind("video", recorded=_video_file),
     "image_folder": CameraKind("pictures", recorded=_image_folder),
 }
+
+
+def camera_kind(name: str) -> CameraKind:
+    """What can be done with a value of ``rig.camera``; a plugin's camera is only made, which may raise PluginError."""
+    return CAMERA_KINDS.get(name) or CameraKind(name, partial(CAMERAS.make, name))

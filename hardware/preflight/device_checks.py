@@ -30,7 +30,7 @@ from core.messages import message
 from core.program import CALLED
 from core.types import Frame
 from hardware.cameras import sysfs
-from hardware.cameras.registry import CAMERA_KINDS
+from hardware.cameras.registry import CAMERA_KINDS, camera_kind
 from hardware.preflight.checks import NOT_CONFIGURED, RENEW, Check, one_line
 from hardware.processes import holders
 from hardware.rig import RigKind, kind_of, real_camera
@@ -44,9 +44,12 @@ _LEAST_RATE = 0.8
 
 def check_camera(config: Config) -> Check:
     """The rig's camera: there, permitted, on a fast enough port."""
-    rig, kind = config.rig, CAMERA_KINDS[config.rig.camera]
+    rig = config.rig
     if rig.camera == "twin":
         return Check("camera", True, "the bench twin needs none")
+    kind = camera_kind(rig.camera)
+    if kind.live is not None and kind.check is None and rig.source is None:
+        return Check("camera", True, f"{rig.camera}, of a plugin: see its picture")
     if rig.source is not None or kind.check is None:
         there = rig.source is not None and Path(rig.source).exists()
         detail = f"{rig.camera}: {rig.source}" + ("" if there else " is not there")
@@ -58,7 +61,7 @@ def check_camera(config: Config) -> Check:
 
 
 def _safe_camera(config: Config) -> Camera:
-    CAMERA_KINDS[config.rig.camera].check_library()
+    camera_kind(config.rig.camera).check_library()
     return real_camera(config)
 
 

@@ -30,9 +30,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from core.config.calibration import ZeroConfig
-from core.config.safety import JointName, SafetyConfig, ServosConfig
+from core.config.safety import DRIVES, OF_SERVOS, JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
 from core.control.kept_zero import ZeroBasis, ZeroRequest, request_problem, unknown_joint
+from core.devices import UserError
 from core.messages import message
 from hardware.servos.bus_guard import (
     LINGER_S,
@@ -45,7 +46,7 @@ from hardware.servos.bus_guard import (
     UnattendedWatch,
 )
 from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, PortSuccession, Request, ask_for_port
-from hardware.servos.drive import Drive, DriveBus
+from hardware.servos.drive import DriveBus
 from hardware.servos.dynamixel_bus import ServoBus
 from hardware.servos.dynamixel_port import (
     LATE_S,
@@ -68,17 +69,17 @@ _NOT_PROVEN = "the torque is not proven to be off: cut the servos' power"
 
 
 Bus = ServoBus | DriveBus
-DRIVES: dict[str, Callable[[str, int], Drive]] = {"stepper board": StepperBoard}
-"""Drives by ``servos.driver``, besides DYNAMIXEL: made of port and speed."""
 
 
 def make_bus(servos: ServosConfig, backups: Path | None) -> Bus:
-    """The bus of the configured drive. Raises NotReady."""
-    if servos.driver not in DRIVES:
+    """The bus of the configured drive. Raises NotReady, PluginError."""
+    if servos.driver in OF_SERVOS:
         return ServoBus(servos, backups=backups)
     if servos.port is None:
         raise NotReady("no servo port is configured: set servos.port")
-    return DriveBus(servos, DRIVES[servos.driver](servos.port, servos.baud))
+    if servos.driver == "stepper board":
+        return DriveBus(servos, StepperBoard(servos.port, servos.baud))
+    return DriveBus(servos, DRIVES.make(servos.driver, servos.port, servos.baud))
 
 
 class BusTorqueRelease:
@@ -747,7 +748,7 @@ def _serve(server: BusServer) -> int:
     backups = message.get("backups")
     try:
         bus = make_bus(servos, None if backups is None else Path(backups))
-    except ServoError as error:
+    except UserError as error:
         server.send_fatal(str(error))
         return 1
     with contextlib.suppress(PermissionError):  # the servos come before the pictures, where the system allows it

@@ -1,9 +1,8 @@
 """Drives other than DYNAMIXEL: a small protocol, and the bus that the guarded process makes of one.
 
 A drive opens, reads the state of its axes, writes goals, stops and closes; ``DriveBus`` adds zeros, arming, letting go and the
-proof that the torque is off, so that the bus process treats it as it does ``ServoBus``. ``DRIVES`` there has them by the value of
-``servos.driver``. One that cannot limit its force is not in ``LIMITS_FORCE`` (``core.config.safety``): the program drives no LIVE
-rig with it.
+proof that the torque is off, so that the bus process treats it as it does ``ServoBus`` (``make_bus`` there). One that cannot limit
+its force is not in ``LIMITS_FORCE`` (``core.config.safety``): the program drives no LIVE rig with it.
 """
 
 from __future__ import annotations

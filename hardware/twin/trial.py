@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core import geometry
-from core.config.models import Config, PolicyName
+from core.config.models import Config
 from core.control.direction_monitor import DirectionMonitor, MotionSent, head_seen
 from core.control.motion import AdviceController
 from core.control.policies import Policy, make_policy
@@ -113,7 +113,7 @@ class Trial:
     `pipeline` is reset. `masks` is the segmentation of the pipeline when it runs on true masks, else None.
     """
 
-    def __init__(self, plan: TrialPlan, seed: int, policy: PolicyName, pipeline: Pipeline, masks: TrueMasks | None = None) -> None:
+    def __init__(self, plan: TrialPlan, seed: int, policy: str, pipeline: Pipeline, masks: TrueMasks | None = None) -> None:
         config, own_seed = plan.config, FIRST_SEED + seed
         phantom = make_phantom(f"random:{own_seed}")
         self._plan, self._seed, self._name = plan, seed, policy

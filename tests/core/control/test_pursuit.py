@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.config.models import AdviceConfig, Config, PursuitConfig
+from core.config.models import POLICIES, AdviceConfig, Config, PursuitConfig
 from core.control.camera_monitor import RouteState
 from core.control.frame_reports import FrameReports
 from core.control.look_ahead import LookAhead
-from core.control.policies import POLICY_NAMES, RandomOperator, make_policy
+from core.control.policies import RandomOperator, make_policy
 from core.control.pursuit import BackOff, ContactLimit, FeedMonitor, MissCounter, Pursuit, RetryCounter, StallMonitor, speed_word
 from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene, Speed
 from tests.core.driving_scenes import BEND, FORK, STRAIGHT, scene_at, status
@@ -351,9 +351,9 @@ def test_single_frames_that_see_the_way_ahead_do_not_keep_the_robot_waiting(ahea
     assert (min(speeds) < 0.0) is backs_off
 
 
-@pytest.mark.parametrize("name", POLICY_NAMES)
+@pytest.mark.parametrize("name", POLICIES.own)
 def test_every_policy_stops_at_the_target(name: str) -> None:
-    policy = make_policy(name, Config())  # type: ignore[arg-type]
+    policy = make_policy(name, Config())
     advice = policy(scene_at(STRAIGHT, (375, 100), (380, 100)), status(0.0))
     assert advice is not None
     assert (advice.speed, advice.advance_mm_s, advice.steer_deg) == (Speed.STOP, 0.0, 0.0)
