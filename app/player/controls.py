@@ -272,10 +272,13 @@ class SessionEvents(QListView):
 
     def show_events(self, events: Sequence[Event], first_s: float) -> None:
         """All events; times count from `first_s`."""
-        listed = tuple(event for event in events if event.kind in LISTED)
-        raised = min((event.time_s for event in listed if event.kind in _RAISED), default=float("inf"))
-        # What ended before anything began here was raised before the recording.
-        self._model.show(tuple(e for e in listed if e.kind is not EventKind.CLEARED or e.time_s > raised), first_s)
+        listed, raised = [], set()
+        for event in events:
+            raised |= {event.text} if event.kind in _RAISED else set()
+            # What is cleared and was not raised here is from before the recording.
+            if event.kind in LISTED and (event.kind is not EventKind.CLEARED or event.text in raised):
+                listed.append(event)
+        self._model.show(tuple(listed), first_s)
 
     def show_time(self, time_s: float) -> None:
         """Mark the last one that had happened at a time of the recorded clock."""

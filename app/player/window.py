@@ -160,6 +160,7 @@ class PlayerPanels(ScenePanels):
         self.other = LiveView(pixels_per_mm) if with_other else None
         self.compared = QLabel("", self)
         self.compared.setVisible(with_other)
+        self.advice.is_recorded = True
         self.commands = ProvenanceTable()
         self.events = SessionEvents()
         self.values = _text_page(tr("Recorded values"))

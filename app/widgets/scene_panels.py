@@ -170,6 +170,8 @@ class AdviceLine(PaintedWidget):
         self._state: PoseState | None = None
         self._why_none = tr("waiting for the first picture")
         self._is_unsure = False
+        self.is_recorded = False
+        """It was given when the picture was recorded, not now."""
 
     @property
     def text(self) -> str:
@@ -213,7 +215,10 @@ class AdviceLine(PaintedWidget):
         _paint_chevrons(painter, QPointF(frame.left() + 92, frame.center().y()), _CHEVRONS[advice.speed], is_back=is_back)
         left = frame.left() + 168
         headline = QRectF(left, frame.top() + 6, frame.right() - left - 16, 34)
-        draw_text(painter, headline, advice_headline(advice), theme.bold(theme.Size.TITLE), theme.TEXT, smallest_px=11)
+        words, ink = advice_headline(advice), theme.TEXT
+        if self.is_recorded:
+            words, ink = tr("Then: {advice}", advice=words), theme.TEXT_DIM
+        draw_text(painter, headline, words, theme.bold(theme.Size.TITLE), ink, smallest_px=11)
         why = QRectF(left, frame.top() + 40, headline.width(), 22)
         colour = theme.FAULT if self._is_unsure else theme.TEXT_DIM
         draw_text(painter, why, self._why(advice), theme.font(15), colour, smallest_px=11, elided=True)

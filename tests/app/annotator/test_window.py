@@ -6,6 +6,7 @@ import json
 import logging
 import math
 import sqlite3
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -234,7 +235,7 @@ def test_short_lines_and_what_the_algorithm_drew_are_marked_in_the_list(rater: R
     rater.press(Key.Key_Return)
     rater.click(*VESSEL)
     assert queue.particulars(0) == ["short"]
-    assert "short: 20 + 40 px" in rater.window.panels.readout.accessibleDescription()
+    assert "; short: 2" in rater.window.panels.readout.accessibleDescription()
     rater.model.edit(TAKES_LINES, Annotation(ROBOT, VESSEL))
     assert queue.particulars(0) == ["algorithm"]
     rater.drag(ROBOT[0], (190.0, 170.0))
@@ -264,12 +265,52 @@ def test_a_file_of_another_program_that_is_dropped_is_imported(rater: Rater, tmp
     at = QPointF(50, 50)
     buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
     with rater.qtbot.waitSignal(rater.model.imported) as said:
-        QApplication.sendEvent(rater.window, QDropEvent(at, Qt.DropAction.CopyAction, data, buttons, keys))
+        rater.window.dropEvent(QDropEvent(at, Qt.DropAction.CopyAction, data, buttons, keys))
     assert said.args == [1, []]
     rater.press(Key.Key_N)
     assert rater.drawn.robot == ((10.0, 10.0), (90.0, 10.0))
     rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
     assert rater.drawn == Annotation(), "an import can be undone"
+
+
+def test_exports_and_reports_are_made_by_other_processes_from_a_copy(
+    rater: Rater, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str, ...]] = []
+    count = "import sqlite3, sys; n, = sqlite3.connect(sys.argv[1]).execute('SELECT count(*) FROM annotations').fetchone(); "
+
+    def command(*arguments: str) -> list[str]:
+        asked.append(arguments)
+        copy, out = (arguments[arguments.index(name) + 1] for name in ("--store", "--out"))
+        return [sys.executable, "-c", f"{count}open(sys.argv[2], 'w').write(str(n))", copy, out]
+
+    monkeypatch.setattr("app.annotator.files.command_of", command)
+    rater.press(Key.Key_X)
+    rater.window.files.export("coco", tmp_path / "masks")
+    rater.qtbot.waitUntil(lambda: "Written" in rater.message, timeout=30_000)
+    assert (tmp_path / "masks.json").read_text() == "1"
+    assert asked == [
+        (
+            "annotate",
+            str(tmp_path),
+            "--store",
+            asked[0][3],
+            "--export",
+            "coco",
+            "--out",
+            str(tmp_path / "masks.json"),
+            "--study",
+            "",
+        )
+    ]
+    assert not list(tmp_path.glob(".copy_*"))
+
+
+def test_the_next_rater_is_asked_for_and_this_window_closes(rater: Rater) -> None:
+    rater.window._on_rater("  ")
+    assert rater.window.isVisible()
+    rater.window._on_rater("bob")
+    assert (rater.window.isVisible(), rater.window.next_rater) == (False, "bob")
 
 
 def test_an_enter_that_is_held_ends_one_thing(rater: Rater) -> None:
@@ -660,7 +701,7 @@ def test_masks_of_the_image_before_are_proposed_and_taken(moving_rater: Rater) -
     moving_rater.press(Key.Key_N, Key.Key_V)
     moving_rater.qtbot.waitUntil(lambda: moving_rater.canvas.editor.drawing.proposal is not None, timeout=60_000)
     assert not moving_rater.drawn.masks, "a proposal is no answer"
-    assert moving_rater.message == "Proposed from 0.png, dotted: G takes the masks over, M hides them"
+    assert moving_rater.message == "Proposed from 0.png, dotted: G takes the masks over, V hides them"
     moving_rater.press(Key.Key_G)
     assert moving_rater.canvas.editor.drawing.proposal is None
     robot = fill(moving_rater.drawn.masks, MaskTarget.ROBOT, SIZE)

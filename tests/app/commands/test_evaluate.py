@@ -498,7 +498,7 @@ def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path)
     with pytest.raises(UserError, match="--study needs images annotated by hand"):
         evaluate(csv=paper_csv, out=tmp_path / "out", study="main")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(UserError, match="begin the study with: annotate"):
+    with pytest.raises(UserError, match=r"begin the study with: python main\.py annotate"):
         evaluate(tmp_path / "empty", out=tmp_path / "out", study="main")
 
 

@@ -331,7 +331,7 @@ def test_one_click_evaluates_what_was_measured_by_hand_and_opens_the_report(
     assert len(images) == 12
     measure(session / DEFAULT_NAME, images[:3], [0.0, 10.0, 20.0])
     after.offer(session)
-    assert list(strip.answers) == ["Evaluate", "Annotate", "Play", "\N{MULTIPLICATION SIGN}"]
+    assert list(strip.answers) == ["Annotate", "Evaluate", "Play", "\N{MULTIPLICATION SIGN}"]
     strip.answers["Evaluate"].click()
     assert "Evaluating" in strip.text
     qtbot.waitUntil(lambda: bool(shown), timeout=LONG_MS)

@@ -450,7 +450,8 @@ def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindo
     assert player.panels.bar.clip.text() == "Clip 0.4 s"
     press(player, Key.Key_E)
     assert player.panels.bar.progress.isVisible()
-    until(qtbot, lambda: "Clip saved" in player.panels.toast.text())
+    until(qtbot, lambda: "Clip saved" in player.panels.offers.text)
+    assert next(iter(player.panels.offers.answers)) == "Open its folder"
     assert not player.panels.bar.progress.isVisible()
     (path,) = (tmp_path / "kept").iterdir()
     assert path.name.endswith("_1000-1400ms.mp4")
@@ -482,7 +483,9 @@ def test_a_clip_is_cancelled_without_a_trace(player: PlayerWindow, tmp_path: Pat
 
 
 def test_a_snapshot_tells_that_it_is_played_back(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:
-    press(player, Key.Key_S)
+    press(player, Key.Key_S)  # in the operator window it retracts the robot: it does nothing here
+    assert player.panels.toast.text() == ""
+    press(player, Key.Key_S, modifier=Qt.KeyboardModifier.ControlModifier)
     until(qtbot, lambda: "Snapshot saved" in player.panels.toast.text())
     (values,) = (tmp_path / "kept").glob("*.json")
     told = json.loads(values.read_text())
@@ -537,7 +540,7 @@ def test_a_lost_picture_is_said_and_nothing_of_another_is_shown(open_player: Ope
     assert window.panels.notice.text.startswith("This picture is lost")
     assert window.panels.live.scene is None
     assert window.panels.badge.letter == "-"
-    press(window, Key.Key_S)
+    press(window, Key.Key_S, modifier=Qt.KeyboardModifier.ControlModifier)
     assert "No snapshot" in window.panels.toast.text()
 
 
@@ -637,7 +640,7 @@ def test_frames_are_annotated_in_a_window_of_their_own(
         asked.append(arguments)
         return [sys.executable, "-c", "import sys; sys.exit('error: no such file')"]
 
-    monkeypatch.setattr("app.player.window.command_of", command)
+    monkeypatch.setattr("app.ui.opening.command_of", command)
     again = tmp_path / "again.jsonl"
     replayed_file(session, again)
     window = open_player(session, again)
@@ -655,7 +658,7 @@ def test_frames_are_annotated_in_a_window_of_their_own(
     assert asked[-1][-1] == "12"
     window.annotate_refused()
     assert len(asked) == 4 and window.panels.toast.text() == "No frame without a pose here"
-    until(qtbot, lambda: not window._annotators)
+    until(qtbot, lambda: not window.others._children)
 
 
 def test_the_command_refuses_what_is_no_session_in_one_line(tmp_path: Path) -> None:

@@ -202,7 +202,7 @@ def test_where_lines_come_from_follows_undo_and_ends_with_cleared_lines() -> Non
 @pytest.mark.parametrize(("robot_px", "vessel_px", "is_short"), [(60.0, 60.0, False), (39.7, 60.0, False), (39.0, 60.0, True)])
 def test_lines_shorter_than_the_fit_wants_are_known(robot_px: float, vessel_px: float, is_short: bool) -> None:
     lines = Annotation(((300.0 - robot_px, 200.0), (300.0, 200.0)), ((300.0 - vessel_px, 210.0), (300.0 + vessel_px, 210.0)))
-    assert measure_lines(lines, (512, 512), PerceptionConfig()).is_short is is_short
+    assert measure_lines(lines, (640, 640), PerceptionConfig()).is_short is is_short
 
 
 VESSEL_BOX = MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (50.0, 10.0), (50.0, 30.0), (10.0, 30.0)))
