@@ -54,7 +54,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
         [
             MenuEntry(tr("Zoom &in"), partial(canvas.zoom, _ZOOM_STEP), ("+", "=")),
             MenuEntry(tr("Zoom &out"), partial(canvas.zoom, 1 / _ZOOM_STEP), ("-",)),
-            MenuEntry(tr("&Close-up of the head"), canvas.close_up, ("Z",)),
+            MenuEntry(tr("&Close-up of the head, or the cursor"), canvas.close_up, ("Z",)),
             MenuEntry(tr("&Whole picture"), canvas.fit, ("F", "0")),
             MenuEntry(tr("&Keep the zoom from picture to picture"), window.toggle_keeps_zoom, checked=True),
             None,

@@ -22,7 +22,7 @@ from core.annotation.store import FoundImage, StoredAnnotation
 from core.config.models import PerceptionConfig
 from core.files import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS, UNMEASURED, write_mask, write_png
-from core.types import Mask, Points, Pose, Refusal, Scene, Vector
+from core.types import Mask, Points, Pose, Reason, Refusal, Scene, Vector
 
 
 def merged(old: Annotation, new: Annotation) -> Annotation:
@@ -67,7 +67,7 @@ def export_training_set(
     problems = [f"image {sha256[:12]}: is not among the given images; left out" for sha256 in sources if sha256 not in here]
     complete: dict[str, StoredAnnotation] = {}
     for sha256, one in sources.items():
-        lacking = [target for target in MaskTarget if target not in one.content.drawn]
+        lacking = _lacking(one.content)
         if sha256 in here and lacking:
             problems.append(f"{here[sha256].path.name}: has no {lacking[0].value} mask; left out")
         elif sha256 in here:
@@ -106,6 +106,12 @@ def export_training_set(
     return len(complete), problems
 
 
+def _lacking(content: Annotation) -> list[MaskTarget]:
+    """The masks that a training set needs and that are not drawn; of a picture without a robot the vessel's is enough."""
+    drawn = content.drawn | ({MaskTarget.ROBOT} if content.no_robot else set())
+    return [target for target in MaskTarget if target not in drawn]
+
+
 def _truth_rows(
     measured: Sequence[StoredAnnotation],
     complete: Mapping[str, StoredAnnotation],
@@ -124,7 +130,8 @@ def _truth_rows(
         row: dict[str, Any] = {"stem": stems[sha256], "source": "annotated by hand", "reason": None}
         if lines is None or theta is None or manual is None or manual.state is None:
             nothing = ("head_xy", "theta_deg", "theta_signed_deg", "d_head_px", "d_tail_px", "crossed", "state")
-            rows.append(row | dict.fromkeys(nothing) | {"reason": UNMEASURED})
+            why = Reason.NO_ROBOT.value if complete[sha256].content.no_robot else UNMEASURED
+            rows.append(row | dict.fromkeys(nothing) | {"reason": why})
             continue
         readout = measure_lines(lines.content, here[sha256].record.size, PerceptionConfig())
         row |= {"head_xy": list(lines.content.robot[-1]), "robot_path_xy": [list(point) for point in lines.content.robot]}
@@ -200,7 +207,7 @@ def split_own_frames(
 
 def _complete(annotations: Sequence[StoredAnnotation]) -> list[str]:
     """SHA-256 of the images whose masks that count are there for both targets."""
-    return [sha256 for sha256, one in mask_source(annotations).items() if one.content.drawn.issuperset(MaskTarget)]
+    return [sha256 for sha256, one in mask_source(annotations).items() if not _lacking(one.content)]
 
 
 _LINE_PX = 60.0  # length of the proposed robot line, working px: the 40 px that count and some before

@@ -72,6 +72,15 @@ def test_a_training_set_is_what_training_reads(image: FoundImage, tmp_path: Path
         export_training_set([newer], [image], out)
 
 
+def test_a_picture_without_a_robot_trains_with_an_empty_mask(image: FoundImage, tmp_path: Path) -> None:
+    """Only where a rater has said so: else a robot that is there would be taught as background."""
+    out = tmp_path / "set"
+    assert export_training_set([stored(Annotation(no_robot=True, masks=(VESSEL_BOX,)))], [image], out) == (1, [])
+    (sample,), truth = find_labelled(out)
+    assert not sample.load()[2].any()
+    assert (truth["frame"]["reason"], truth["frame"]["state"]) == ("no robot", None)
+
+
 @pytest.mark.parametrize("ending", [".webp", ".JPG"])
 def test_training_finds_every_image_of_its_set(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"frame{ending}"
