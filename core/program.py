@@ -81,6 +81,8 @@ EXTRAS = {
     "mcap": "ros2",
     "mcap_ros2": "ros2",
     "pylsl": "lsl",
+    "pyarrow": "lerobot",
+    "gymnasium": "gym",
 }
 """Optional package -> the extra of pyproject.toml that brings it."""
 

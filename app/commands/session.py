@@ -130,11 +130,13 @@ def recover_session(
 @session.command()
 def export(
     session: SessionArgument,
-    out: Annotated[list[Path], typer.Option(help="file.mp4, .csv, .mcap, .ros2.mcap, or what a plugin writes; may be repeated")],
+    out: Annotated[
+        list[Path], typer.Option(help="x.mp4, .csv, .mcap, .ros2.mcap, .lerobot, or what a plugin writes; may be repeated")
+    ],
     plain: Annotated[bool, typer.Option("--plain", help="MP4 without overlays")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """A session as video, table, MCAP for Foxglove and PlotJuggler, or MCAP with messages of ROS 2 (.ros2.mcap)."""
+    """A session as video, table, MCAP for Foxglove and PlotJuggler or for ROS 2 (.ros2.mcap), or episode of a LeRobotDataset."""
     names = {str(path): exporter_name(path) for path in out}
     if not plain and "mp4" in names.values():
         check_qt("export it with --plain")

@@ -7,6 +7,7 @@ import os
 import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -127,13 +128,13 @@ def export_mp4(
     reader.wait()
     written = 0
     with new_file(path) as part:
-        movie: _Movie | None = None
+        movie: Movie | None = None
         try:
             for place in range(first, len(reader) if last is None else min(last, len(reader))):
                 tick = reader.tick(place)
                 if tick is not None:
                     image = draw(tick) if draw is not None else tick.frame.image
-                    movie = movie or _Movie(part, image)
+                    movie = movie or Movie(part, image)
                     movie.add(image, tick.frame.captured_s)
                     written += 1
                 on_row()
@@ -145,39 +146,47 @@ def export_mp4(
     return written
 
 
-class _Movie:
-    """An MP4 that every player takes: yuv420p, even sides, index in front."""
+class Movie:
+    """An MP4 that every player takes: yuv420p, even sides, index in front.
 
-    def __init__(self, path: Path, first: Image) -> None:
+    Parameters
+    ----------
+    path : of the file.
+    first : the first picture, which decides on the size.
+    time_base : all times are multiples of it (s).
+    key_every : every n-th picture can be decoded by itself.
+    """
+
+    def __init__(self, path: Path, first: Image, time_base: Fraction = MS, key_every: int = 30) -> None:
         height, width = first.shape[:2]
-        self._size = width + width % 2, height + height % 2
+        self.size = width + width % 2, height + height % 2
         self._container = av.open(media_name(path), "w", format="mp4", options={"movflags": "faststart"})
-        options = {"preset": "veryfast", "crf": "18", "g": "30", "bf": "0"}
+        options = {"preset": "veryfast", "crf": "18", "g": f"{key_every}", "bf": "0"}
         self._stream: Any = self._container.add_stream("libx264", rate=30, options=options)
-        self._stream.width, self._stream.height = self._size
+        self._stream.width, self._stream.height = self.size
         self._stream.pix_fmt = "yuv420p"
-        self._stream.codec_context.time_base = MS
+        self._stream.codec_context.time_base = self._time_base = time_base
         self._stream.codec_context.thread_count = 1
         self._zero_s: float | None = None
-        self._pts_ms = -1
+        self._pts = -1
 
     def add(self, image: Image, captured_s: float) -> None:
         self._zero_s = captured_s if self._zero_s is None else self._zero_s
-        self._pts_ms = max(self._pts_ms + 1, round((captured_s - self._zero_s) * 1000))
+        self._pts = max(self._pts + 1, round((captured_s - self._zero_s) / self._time_base))
         planes = np.asarray(cv2.cvtColor(self._fitted(image), cv2.COLOR_RGB2YUV_I420), np.uint8)
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
-        frame.pts, frame.time_base = self._pts_ms, MS
+        frame.pts, frame.time_base = self._pts, self._time_base
         self._container.mux(self._stream.encode(frame))
 
     def _fitted(self, image: Image) -> Image:
         """At the movie's size; an odd side grows by repeating its last row or column."""
         height, width = image.shape[:2]
         grown = image
-        if (width + width % 2, height + height % 2) == self._size:
+        if (width + width % 2, height + height % 2) == self.size:
             if width % 2 or height % 2:
                 grown = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
         else:
-            grown = np.asarray(cv2.resize(image, self._size, interpolation=cv2.INTER_AREA), np.uint8)
+            grown = np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), np.uint8)
         return np.ascontiguousarray(grown)
 
     def close(self) -> None:

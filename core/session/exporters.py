@@ -30,6 +30,7 @@ EXPORTERS = {
     "csv": Exporter("rows", "core.session.export:export_csv"),
     "mcap": Exporter("messages", "core.session.mcap_export:export_mcap"),
     "ros2.mcap": Exporter("messages", "core.session.mcap_export:export_ros2"),
+    "lerobot": Exporter("frames", "core.session.lerobot_export:export_lerobot"),
 }
 """The program's own exporters by ending, without its dot."""
 PLUGINS = PluginKind("exporters", tuple(EXPORTERS))

@@ -163,7 +163,7 @@ def test_a_killed_recording_is_recovered_by_the_command(config: Path, tmp_path: 
         (("session", "info", "{folder}"), "not a session"),
         (("session", "info", "{file}"), "not a file"),
         (("session", "recover", "{folder}/nothing"), "no such session"),
-        (("session", "export", "{folder}", "--out", "{folder}/x.avi"), "must be one of .mp4, .csv, .mcap, .ros2.mcap"),
+        (("session", "export", "{folder}", "--out", "{folder}/x.avi"), "must be one of .mp4, .csv, .mcap, .ros2.mcap, .lerobot"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path, arguments: tuple[object, ...], why: str) -> None:
