@@ -22,7 +22,8 @@ test:  ## ruff, mypy and pytest, no screen needed (ARGS='...' is handed to pytes
 	@$(MAKE) --no-print-directory --keep-going lint tests
 
 tests: setup  ## pytest alone (ARGS='...' is handed to it)
-	@$(PY) -m pytest $(ARGS)
+	@$(PY) -m compileall -q app core hardware tools || true # once: else each of the processes does it
+	$(PY) -m pytest $(ARGS)
 
 damage: setup  ## 50 kills of a recording, 100 of saves, 2600 damaged files: what the tests do a few times (minutes)
 	@export LUMENPILOT_FUZZ=1000
