@@ -180,17 +180,14 @@ _TEXT_PX = 400
 _HEAD_PX = 28
 
 
-class WizardPage(QWidget):
-    """One step. ``name`` stands in the list of steps; the page adds its controls to ``column``."""
+class StepPage(QWidget):
+    """A step of a guided procedure. ``name`` stands in the list of steps; the page adds its controls to ``column``."""
 
     name = ""
     hint = ""
 
-    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.model, self.picture = model, picture
-        self.still: Image | None = None
-        """Shown instead of the live picture."""
         self.main: QPushButton | None = None
         """The button of the step; it stands out until that is done."""
         self.column = QVBoxLayout(self)
@@ -199,7 +196,18 @@ class WizardPage(QWidget):
         title = QLabel(tr(self.name))
         title.setFont(theme.semi_bold(18))
         self.column.addWidget(title)
-        self.column.addWidget(note(tr(self.hint)))
+        if self.hint:
+            self.column.addWidget(note(tr(self.hint)))
+
+
+class WizardPage(StepPage):
+    """One step of the rig wizard."""
+
+    def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
+        super().__init__()
+        self.model, self.picture = model, picture
+        self.still: Image | None = None
+        """Shown instead of the live picture."""
 
     @property
     def draft(self) -> RigDraft | None:

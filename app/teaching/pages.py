@@ -20,14 +20,13 @@ from PySide6.QtWidgets import (
     QPushButton,
     QSizePolicy,
     QSpinBox,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.annotator.canvas import AnnotationCanvas
 from app.annotator.editing import MaskMode, Tool
 from app.annotator.outline_editor import VesselOutlineEditor
-from app.rig_wizard.pages_base import WizardPicture, button, enable, note, set_main_button
+from app.rig_wizard.pages_base import StepPage, WizardPicture, button, enable, note, set_main_button
 from app.teaching.folder import (
     ENOUGH_BENDS,
     ENOUGH_FRAMES,
@@ -160,15 +159,13 @@ def to_pixmap(image: Image) -> QPixmap:
     return QPixmap.fromImage(QImage(image.tobytes(), width, height, 3 * width, QImage.Format.Format_RGB888))
 
 
-class TeachingPage(QWidget):
-    """One step. ``name`` stands in the list of steps; ``right``: what is shown at the right of it.
+class TeachingPage(StepPage):
+    """One step. ``right``: what is shown at the right of it.
 
     ``edited`` comes when what was drawn has changed, and with it whether the page may be left.
     """
 
     edited = Signal()
-    name = ""
-    hint = ""
     step = TeachingStep.EMPTY
     is_live = False
     """Whether the picture at the right is the live one."""
@@ -176,16 +173,6 @@ class TeachingPage(QWidget):
     def __init__(self, model: TeachingModel, right: QWidget) -> None:
         super().__init__()
         self.model, self.right = model, right
-        self.main: QPushButton | None = None
-        """The button of the step; it stands out until that is done."""
-        self.column = QVBoxLayout(self)
-        self.column.setContentsMargins(0, 0, 0, 0)
-        self.column.setSpacing(theme.GAP)
-        title = QLabel(tr(self.name))
-        title.setFont(theme.semi_bold(18))
-        self.column.addWidget(title)
-        if self.hint:
-            self.column.addWidget(note(tr(self.hint)))
 
     @property
     def view(self) -> TeachingView:
