@@ -76,10 +76,3 @@ def run_apart(*arguments: object, cwd: Path | None = None) -> subprocess.Complet
     """The command in a process of its own, as its users start it."""
     command = [sys.executable, str(MAIN), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd=cwd)
-
-
-def run_without(package: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command in a process of its own in which `package` cannot be imported."""
-    code = f"import sys; sys.modules[{package!r}] = None; from app.cli import main; main()"
-    command = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=MAIN.parent)

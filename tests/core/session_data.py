@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -128,6 +129,13 @@ def record(folder: Path, ticks: Iterable[Tick], config: RecordConfig = QUICK) ->
     assert not status.problem, status.problem
     assert status.saved is not None
     return status.saved
+
+
+def set_open(session: Path) -> None:
+    """As a kill leaves the manifest."""
+    content = json.loads((session / "manifest.json").read_text())
+    content |= {"closed": False, "ended": "", "ended_utc": None, "counts": {}}
+    (session / "manifest.json").write_text(json.dumps(content))
 
 
 def wait_for(condition: object, timeout_s: float = 10.0) -> None:

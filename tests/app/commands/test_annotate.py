@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +23,7 @@ from core.evaluation.evaluation import read_measurements
 from core.learning.dataset import find_labelled, write_png
 from core.types import PoseState
 from hardware.twin.world import TwinWorld
+from tests.app.program import run as main
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
 
@@ -345,9 +344,7 @@ def test_wrong_calls_end_in_one_line(folder: Path, options: dict[str, object], m
 
 
 def test_the_command_ends_with_one_line_and_code_2(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, MAIN, "annotate", tmp_path / "nowhere"], capture_output=True, text=True, timeout=60, check=False
-    )
+    done = main("annotate", tmp_path / "nowhere")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == f"error: {tmp_path / 'nowhere'}: no such file or folder\n"
 

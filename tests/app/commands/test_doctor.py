@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -16,21 +14,13 @@ from core.config.rig_file import RigFileError
 from hardware.preflight import checks as program
 from hardware.preflight.checks import Check
 from hardware.rig import RigKind, rig_config
+from tests.app.program import run, run_apart
 
 
 def _exit_code(*, as_json: bool) -> object:
     with pytest.raises(SystemExit) as left:
         doctor(as_json)
     return left.value.code
-
-
-MAIN = Path(__file__).resolve().parents[3] / "main.py"
-
-
-def _doctor(*arguments: object) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
-    command = [sys.executable, str(MAIN), "doctor", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
 
 
 @pytest.fixture
@@ -45,7 +35,7 @@ def config(tmp_path: Path) -> Path:
 
 
 def test_a_script_gets_one_json_object_and_the_exit_code(config: Path) -> None:
-    done = _doctor("--json", "--config", config)
+    done = run_apart("doctor", "--json", "--config", config)
     checks = json.loads(done.stdout)["checks"]
     assert all(check.keys() == {"name", "ok", "detail", "fix"} for check in checks)
     assert done.returncode == (0 if all(check["ok"] for check in checks) else 1)
@@ -56,7 +46,7 @@ def test_a_script_gets_one_json_object_and_the_exit_code(config: Path) -> None:
 
 @pytest.mark.parametrize("arguments", [("--rig", "moon"), ("--config", "gone.toml")])
 def test_bad_input_is_one_line_and_exit_code_2(arguments: tuple[str, ...]) -> None:
-    done = _doctor("--json", *arguments)
+    done = run("doctor", "--json", *arguments)
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.startswith("error: ")

@@ -29,7 +29,7 @@ from core.evaluation.paper import PAPER_CONFUSION
 from core.learning.dataset import write_png
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
-from tests.app.program import MAIN, run, run_apart
+from tests.app.program import MAIN, run
 from tests.core.evaluation.test_metrics import label_pairs
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
@@ -90,9 +90,10 @@ def test_the_papers_labels_print_the_papers_table(paper_csv: Path, tmp_path: Pat
     assert ["D", "0", "1", "4"] in printed
 
 
+@pytest.mark.usefixtures("drawing")
 def test_json_is_all_there_is_on_standard_output(paper_csv: Path, tmp_path: Path) -> None:
     out = tmp_path / "deep" / "out"
-    done = run_apart("evaluate", "--csv", paper_csv, "--out", out, "--json")
+    done = run("evaluate", "--csv", paper_csv, "--out", out, "--json")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert json.loads(done.stdout) == json.loads((out / "metrics.json").read_text(encoding="utf-8"))

@@ -26,7 +26,7 @@ from core.session.reader import SessionReader, rows_cut_off
 from core.session.recovery import recover
 from hardware.twin.dataset import SynthError, SynthPlan, write_set
 from tests.app.golden_session import GOLDEN
-from tests.app.program import MAIN, run_without
+from tests.app.program import MAIN
 from tests.core.session_data import record, tick_of
 
 
@@ -282,28 +282,38 @@ def test_what_a_closed_session_has_lost_is_told(tmp_path: Path, capsys: pytest.C
     assert "1 of 1 videos are lost" in found()["problems"]  # type: ignore[operator]
 
 
-def test_commands_need_no_qt() -> None:
+WITHOUT_QT = """
+import importlib, json, sys
+sys.modules["PySide6"] = None
+modules, calls = json.loads(sys.argv[1])
+for name in modules:
+    importlib.import_module(name)
+from app.cli import main
+for words in calls:
+    sys.argv = ["main.py", *words]
+    try:
+        main()
+    except SystemExit as ended:
+        print(ended.code, flush=True)
+"""
+
+
+def test_commands_need_no_qt_but_for_overlays_which_are_refused_before_anything_is_done(labelled: Path, tmp_path: Path) -> None:
     modules = [f"app.commands.{path.stem}" for path in sorted((MAIN.parent / "app" / "commands").glob("[!_]*.py"))]
-    code = f"import importlib, sys; sys.modules['PySide6'] = None; [importlib.import_module(name) for name in {modules}]"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=MAIN.parent)
-    assert done.returncode == 0, done.stderr
-
-
-def test_without_qt_overlays_are_refused_before_anything_is_done(labelled: Path, tmp_path: Path) -> None:
-    out, lines, video = tmp_path / "overlays", tmp_path / "o.jsonl", tmp_path / "clip.mp4"
-    for arguments, instead in (
-        (("perceive", labelled / "images", "--jsonl", lines, "--overlay", out), "leave --overlay out"),
-        (("session", "export", tmp_path / "no_session", "--out", video), "export it with --plain"),
-    ):
-        done = run_without("PySide6", *arguments)
-        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr
-        assert done.stderr.startswith("error: overlays are drawn with Qt, which does not load (")
-        assert done.stderr.endswith(f", or {instead}\n")
-        assert not out.exists()
-        assert not lines.exists()
-
-
-def test_a_plain_video_needs_no_qt(tmp_path: Path) -> None:
-    session, video = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(6)]), tmp_path / "clip.mp4"
-    done = run_without("PySide6", "session", "export", session, "--out", video, "--plain")
-    assert (done.returncode, done.stdout) == (0, f"{video}: 6 pictures\n"), done.stderr
+    session, clip = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(6)]), tmp_path / "clip.mp4"
+    out, lines, video = tmp_path / "overlays", tmp_path / "o.jsonl", tmp_path / "video.mp4"
+    calls = (
+        ("perceive", labelled / "images", "--jsonl", lines, "--overlay", out),
+        ("session", "export", tmp_path / "no_session", "--out", video),
+        ("session", "export", session, "--out", clip, "--plain"),
+    )
+    given = json.dumps([modules, [list(map(str, words)) for words in calls]])
+    done = subprocess.run([sys.executable, "-c", WITHOUT_QT, given], capture_output=True, text=True, check=False, cwd=MAIN.parent)
+    assert (done.returncode, done.stdout) == (0, f"2\n2\n{clip}: 6 pictures\n"), done.stderr
+    refused = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert len(refused) == 2
+    for line, instead in zip(refused, ("leave --overlay out", "export it with --plain"), strict=True):
+        assert line.startswith("error: overlays are drawn with Qt, which does not load (")
+        assert line.endswith(f", or {instead}")
+    assert not out.exists()
+    assert not lines.exists()

@@ -412,7 +412,8 @@ def test_ctrl_c_tells_what_is_done(folder: Path, tmp_path: Path, monkeypatch: py
         signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(replay, "write_replay", interrupt)
-    done = main("replay", folder / "small", folder / "golden", "--json", "--out", tmp_path / "out")
+    second = shutil.copytree(folder / "small", tmp_path / "second")
+    done = main("replay", folder / "small", second, "--json", "--out", tmp_path / "out")
     assert (done.returncode, done.stderr.splitlines()[-1]) == (130, "interrupted")
     total = json.loads(done.stdout.splitlines()[-1])
     assert (total["ended"], total["frames"]) == ("ended after 1 of 2 sessions", 3)

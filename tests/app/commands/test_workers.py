@@ -33,10 +33,10 @@ def started(folder: Path, *arguments: str, where: Path = ROOT) -> subprocess.Pop
 
 
 def ended(*processes: subprocess.Popen[bytes]) -> None:
+    """At once: a worker that is asked to end waits for its task, be it an hour of sleep."""
     for process in processes:
-        process.terminate()
-    for process in processes:
-        process.wait(timeout=60)
+        process.kill()
+        process.wait()
 
 
 def scheduler(folder: Path, where: Path = ROOT) -> tuple[str, subprocess.Popen[bytes]]:
@@ -50,7 +50,7 @@ def scheduler(folder: Path, where: Path = ROOT) -> tuple[str, subprocess.Popen[b
 
 def worker(folder: Path, address: str, where: Path = ROOT) -> subprocess.Popen[bytes]:
     """A worker that the scheduler knows."""
-    process = started(folder, "worker", address, "--nthreads", "1", "--local-directory", str(folder), where=where)
+    process = started(folder, "worker", address, "--nthreads", "1", "--no-nanny", "--local-directory", str(folder), where=where)
     from distributed import Client
 
     with Client(address, set_as_default=False) as client:
@@ -174,6 +174,7 @@ def test_no_scheduler_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> Non
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_without_workers_that_can_do_it_nothing_waits(tmp_path: Path) -> None:
     found, process = scheduler(tmp_path, where=tmp_path)
     with pytest.raises(ClusterError, match=rf"has no workers; start some, in LumenPilot's folder: .*dask worker {found}"):

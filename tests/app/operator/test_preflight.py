@@ -306,6 +306,7 @@ def test_in_the_window_f6_reaches_the_pilot_only_after_the_checks(
     desk.close()
 
 
+@pytest.mark.slow
 def test_the_real_checks_come_line_by_line_from_a_process_of_their_own(qtbot: QtBot) -> None:
     bench = Bench()
     bench.config = Config.model_validate({"perception": {"segmentation": {"model": "no_such_model"}}})

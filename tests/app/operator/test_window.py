@@ -779,14 +779,13 @@ sys.exit(application.exec())
 @pytest.mark.parametrize(
     ("how", "after_ms"),
     [
-        ("close", 0),
         ("close", 80),
-        pytest.param("close", 150, marks=pytest.mark.slow),
-        ("close", 900),
         ("quit", 150),
-        pytest.param("quit", 900, marks=pytest.mark.slow),
         ("SIGINT", 900),
-        ("SIGTERM", 150),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (("close", 0), ("close", 150), ("close", 900), ("quit", 900), ("SIGTERM", 150))
+        ),
     ],
 )
 def test_exit_code_0_and_not_a_word(how: str, after_ms: int) -> None:

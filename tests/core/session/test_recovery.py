@@ -25,7 +25,7 @@ from core.session.manifest import EVENTS, Event, EventKind, SessionError, read_m
 from core.session.reader import SessionReader
 from core.session.recovery import Recovery, expected_loss, find_cut_sessions, recover
 from core.session.writer import SessionWriter
-from tests.core.session_data import ABOUT, QUICK, number_in, record, tick_of, wait_for
+from tests.core.session_data import ABOUT, QUICK, number_in, record, set_open, tick_of, wait_for
 
 CHILD = Path(__file__).with_name("recording_child.py")
 FPS = 30.0
@@ -41,13 +41,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def session(whole: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(whole, tmp_path / whole.name))
-
-
-def set_open(session: Path) -> None:
-    """As a kill leaves the manifest."""
-    content = json.loads((session / "manifest.json").read_text())
-    content |= {"closed": False, "ended": "", "ended_utc": None, "counts": {}}
-    (session / "manifest.json").write_text(json.dumps(content))
 
 
 def fingerprint(folder: Path) -> dict[str, str]:
