@@ -20,7 +20,7 @@ from typing import Annotated, Any, NoReturn, TextIO
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from app.commands.options import ConfigOption, RigOption, SourceOption
+from app.commands.options import ConfigOption, LslOption, RigOption, SourceOption, StreamOption, bare_stream
 from core.devices import UserError
 from core.program import CALLED, as_called, import_problem, is_installed, program_commit, program_version
 from core.system import keep_freed_memory, limit_heaps, limit_pictures
@@ -132,14 +132,17 @@ def _window(
     rig: RigOption = None,
     config: ConfigOption = None,
     source: SourceOption = None,
+    stream: StreamOption = None,
+    lsl: LslOption = False,
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="version and commit of this program")
     ] = False,
 ) -> None:
     """Without a command: the operator window."""
     if context.invoked_subcommand is None:
-        _open_window(rig, config, source)
-    given = [name for name, value in (("--rig", rig), ("--config", config), ("--source", source)) if value is not None]
+        _open_window(rig, config, source, stream=stream, lsl=lsl)
+    options = {"--rig": rig, "--config": config, "--source": source, "--stream": stream, "--lsl": lsl or None}
+    given = [name for name, value in options.items() if value is not None]
     if given:
         command = context.invoked_subcommand
         raise UserError(f"{given[0]} before {command} is for the window alone; write it behind, where {command} takes it")
@@ -149,19 +152,19 @@ def gui(
     rig: RigOption = None,
     config: ConfigOption = None,
     source: SourceOption = None,
+    stream: StreamOption = None,
+    lsl: LslOption = False,
     tour: Annotated[bool, typer.Option("--tour", help="show the tour, as at the first start")] = False,
     until_first_frame: Annotated[bool, typer.Option("--until-first-frame", hidden=True)] = False,
 ) -> None:
     """The operator window (the same as no command)."""
-    _open_window(rig, config, source, until_first_frame, tour=tour)
+    _open_window(rig, config, source, stream=stream, lsl=lsl, until_first_frame=until_first_frame, tour=tour)
 
 
-def _open_window(
-    rig: str | None, config_path: Path | None, source: Path | None, until_first_frame: bool = False, *, tour: bool = False
-) -> NoReturn:
+def _open_window(rig: str | None, config_path: Path | None, source: Path | None, **options: Any) -> NoReturn:
     from app.operator.startup import run_window
 
-    sys.exit(run_window(rig, config_path, source, until_first_frame=until_first_frame, tour=tour))
+    sys.exit(run_window(rig, config_path, source, **options))
 
 
 def main() -> None:
@@ -181,7 +184,7 @@ def main() -> None:
     try:
         try:
             _refuse_empty(sys.argv[1:])
-            code = app(prog_name=CALLED, standalone_mode=False)
+            code = app(args=bare_stream(sys.argv[1:]), prog_name=CALLED, standalone_mode=False)
         finally:
             _flush_output()
     except UserError as error:

@@ -1,16 +1,18 @@
-"""``python -m tools.benchmarks window|player|recording``: pace, blocking and memory of the windows, and what a recording costs."""
+"""``python -m tools.benchmarks window|player|recording|stream``: pace of the windows, cost of recording and live stream."""
 
 from __future__ import annotations
 
 import json
 import multiprocessing
 import os
+import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,13 +25,14 @@ from app.commands.benchmark import print_figures, quantiles, stream_config, use_
 from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption
 from app.commands.progress import progress_bar
 from app.operator.manual_drive import REPEAT_MS
-from app.operator.rig_engine import leaving_a_core
+from app.operator.rig_engine import EngineMaker, RigEngine, leaving_a_core
 from app.operator.startup import finish_loading, make_window
 from app.operator.window import OperatorWindow
 from app.player.window import PlayerWindow
 from app.ui.texts import OperatorStep
 from app.ui.window_base import make_application, quit_on_signal
 from core.config.models import Config, PursuitConfig, TwinConfig, choose_model, load_config
+from core.control.drive_view import DriveView
 from core.control.look_ahead import look_ahead
 from core.control.modes import DRIVING_MODES, Mode
 from core.control.motion import AT_REST, Jog
@@ -39,6 +42,7 @@ from core.perception.centerline import plan_route
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.session.codec import row_of
 from core.session.files import EncodedFrame, SessionFiles
+from core.session.live_output import FoxgloveServer, LiveOutput
 from core.session.manifest import about_rig
 from core.session.reader import SessionReader
 from core.session.video import FrameEncoder
@@ -144,6 +148,100 @@ def _slowdown(without: list[list[float]], recorded: list[list[float]]) -> dict[s
     ratios = np.median(beside[draws].reshape(RESAMPLES, -1), axis=1) / np.median(plain[draws].reshape(RESAMPLES, -1), axis=1)
     low, high = np.percentile(ratios, (2.5, 97.5))
     return {"slowdown": round(ratio, 3), "slowdown_ci95": [round(float(low), 3), round(float(high), 3)]}
+
+
+_STREAM_FRAMES = 120  # with and without a client in turn
+_DRAIN = """
+import base64, json, socket, struct, sys
+client = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
+client.sendall(("GET / HTTP/1.1\\r\\nHost: x\\r\\nUpgrade: websocket\\r\\nConnection: Upgrade\\r\\nSec-WebSocket-Key: "
+    + base64.b64encode(bytes(16)).decode()
+    + "\\r\\nSec-WebSocket-Version: 13\\r\\nSec-WebSocket-Protocol: foxglove.sdk.v1\\r\\n\\r\\n").encode())
+read = client.makefile("rb")
+while read.readline() != b"\\r\\n":
+    pass
+told = {}
+while told.get("op") != "advertise":
+    size = read.read(2)[1]
+    size = int.from_bytes(read.read({126: 2, 127: 8}[size]), "big") if size > 125 else size
+    told = json.loads(read.read(size))
+wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in told["channels"]]
+text = json.dumps({"op": "subscribe", "subscriptions": wanted}).encode()
+client.sendall(struct.pack("!BBH4x", 0x81, 0xFE, len(text)) + text)
+while client.recv(1 << 20):
+    pass
+"""
+"""A client that subscribes to all and drops what it gets: what is measured is the program, not the client."""
+
+
+def measure_stream(config: Config, blocks: int) -> dict[str, Any]:
+    """Run the twin's rig, with a client of the live stream that takes all and without one, in turn.
+
+    Returns
+    -------
+    dict
+        Of perceiving a frame (``frame``) and of the time from one turn of the pilot to the next (``control``): ``without_ms``,
+        ``with_ms`` and ``slowdown`` (ratio of the medians) with a 95 % interval over the blocks; and frames a second.
+    """
+    twin = config.twin.model_copy(update={"live_frames_per_second": FRAMES_PER_SECOND})
+    engine = EngineMaker()(config.model_copy(update={"twin": twin}))
+    output = LiveOutput(partial(FoxgloveServer, 0))
+    frames: dict[bool, list[list[float]]] = {False: [], True: []}
+    turns: dict[bool, list[list[float]]] = {False: [], True: []}
+    streamed_s = 0.0
+    try:
+        output.wait_open()
+        port, pilot = output.address.rpartition(":")[2], engine.pilot
+        assert pilot is not None
+        times, tick = [time.monotonic()], pilot.tick
+
+        def timed() -> DriveView:
+            times.append(time.monotonic())
+            return tick()
+
+        pilot.tick = timed  # type: ignore[method-assign]
+        _step(engine, _WARM_UP, None)
+        with progress_bar() as bar:
+            task = bar.add_task("blocks", total=2 * blocks)
+            for block in range(2 * blocks):
+                is_streamed = block % 4 in (1, 2)  # neither kind is always first
+                client = subprocess.Popen([sys.executable, "-c", _DRAIN, port]) if is_streamed else None
+                _step(engine, _WARM_UP, output if is_streamed else None)
+                first, began_s = len(times), time.monotonic()
+                frames[is_streamed].append(_step(engine, _STREAM_FRAMES, output if is_streamed else None))
+                turns[is_streamed].append((1e3 * np.diff(times[first:])).tolist())
+                if client is not None:
+                    streamed_s += time.monotonic() - began_s
+                    client.terminate()
+                    client.wait()
+                bar.advance(task)
+    finally:
+        output.close()
+        engine.close()
+    count = min(len(block) for kind in turns.values() for block in kind)
+    cut = {kind: [block[:count] for block in found] for kind, found in turns.items()}
+    return {
+        name: {
+            "without_ms": quantiles([ms for block in found[False] for ms in block]),
+            "with_ms": quantiles([ms for block in found[True] for ms in block]),
+            **_slowdown(found[False], found[True]),
+        }
+        for name, found in (("frame", frames), ("control", cut))
+    } | {"frames_per_second": round(blocks * _STREAM_FRAMES / streamed_s, 1), "blocks": blocks, "cores": os.cpu_count()}
+
+
+def _step(engine: RigEngine, count: int, output: LiveOutput | None) -> list[float]:
+    """Perceive `count` frames; milliseconds of each."""
+    times: list[float] = []
+    while len(times) < count:
+        tick, pilot = engine.step(0.1), engine.pilot
+        assert pilot is not None
+        pilot.window_alive()
+        if tick is not None:
+            times.append(tick.scene.latency_ms["total"])
+            if output is not None:
+                output.put(tick, pilot.view, engine.bus_status())
+    return times
 
 
 _CYCLE = 300  # frames that are perceived and encoded; the session repeats them
@@ -465,5 +563,15 @@ def recording(
     print_figures(measure_recording(settings, frames), json, "recording")
 
 
+def stream(
+    blocks: Annotated[int, typer.Option(min=1, max=200, help="of 120 frames, of each kind")] = 6,
+    json: JsonOption = False,
+    model: ModelOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """How much the live stream to one client slows perception and control of the twin down, in turns."""
+    print_figures(measure_stream(load_config(config, None, choose_model(model)), blocks), json, "stream")
+
+
 if __name__ == "__main__":
-    run_tool(window, player, recording)
+    run_tool(window, player, recording, stream)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.options import ConfigOption, JsonOption, RigOption
+from app.commands.options import ConfigOption, JsonOption, LslOption, RigOption, StreamOption, with_outputs
 from app.commands.progress import Interrupt, progress_bar
 from app.operator.rig_engine import EngineMaker
 from core.config.models import Config, sessions_folder
@@ -23,6 +23,7 @@ from core.perception.model_file import check_model
 from core.perception.pipeline import configured_bench
 from core.program import COMMAND
 from core.session.files import check_parent
+from core.session.live_output import LiveOutput, open_outputs
 from core.session.manifest import SessionError, about_rig, event_of_alert
 from core.session.writer import SessionWriter
 from hardware.rig import RigKind, rig_config
@@ -43,6 +44,8 @@ def record(
     out: Annotated[Path | None, typer.Option(help="folder in which the session is made; default: the configured one")] = None,
     rig: RigOption = None,
     lossless: Annotated[bool, typer.Option("--lossless", help="keep every pixel as it is; a hundred times the size")] = False,
+    stream: StreamOption = None,
+    lsl: LslOption = False,
     as_json: JsonOption = False,
     config_path: ConfigOption = None,
 ) -> None:
@@ -50,19 +53,28 @@ def record(
     # A camera that is lost meanwhile is waited for until the time is over; one that is still away then is an error.
     config, kind = rig_config(rig, config_path, None)
     settings = config.record.model_copy(update={"ring_s": 0.0} | ({"codec": "lossless"} if lossless else {}))
-    config = config.model_copy(update={"record": settings})
+    config = with_outputs(config.model_copy(update={"record": settings}), stream, lsl=lsl)
     folder = out if out is not None else sessions_folder(settings.folder)
     check_parent(folder)
     # A window opens without a model or a bench and shows it; here it is refused.
     check_model(config.perception.segmentation.model)
     configured_bench(as_calibrated(config).perception)
+    outputs = tuple(open_outputs(config.stream).values())
+    for output in outputs:
+        output.wait_open()
+        sys.stderr.write(f"live output: {output.address}\n")
     engine = EngineMaker()(config)
     writer: SessionWriter | None = None
     try:
-        writer = SessionWriter(settings, about_rig(as_calibrated(config), kind.value, config.rig.name), folder=folder)
-        done = _record(engine, writer, seconds)
+        about = about_rig(as_calibrated(config), kind.value, config.rig.name)
+        writer = SessionWriter(settings, about, folder=folder)
+        for output in outputs:
+            output.set_rig(about)
+        done = _record(engine, writer, seconds, outputs)
         length_s = done.seconds
     finally:
+        for output in outputs:
+            output.end()
         try:
             is_whole = writer.close() if writer is not None else True
         finally:
@@ -170,10 +182,10 @@ class _RecordProgress:
         self.lost_until = lost
 
 
-def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _RecordProgress:
+def _record(engine: RigEngine, writer: SessionWriter, seconds: float, outputs: Sequence[LiveOutput]) -> _RecordProgress:
     done = _RecordProgress()
     try:
-        _record_into(engine, writer, seconds, done)
+        _record_into(engine, writer, outputs, seconds, done)
     except DeviceError as error:
         done.ended = done.failed = str(error)
     away_s = time.monotonic() - done.picture_s
@@ -185,7 +197,10 @@ def _record(engine: RigEngine, writer: SessionWriter, seconds: float) -> _Record
     return done
 
 
-def _record_into(engine: RigEngine, writer: SessionWriter, seconds: float, done: _RecordProgress) -> None:
+def _record_into(
+    engine: RigEngine, writer: SessionWriter, outputs: Sequence[LiveOutput], seconds: float, done: _RecordProgress
+) -> None:
+    receivers: tuple[SessionWriter | LiveOutput, ...] = (writer, *outputs)
     began_s = time.monotonic()
     is_warm, dropped_before = False, 0
     writer.start()
@@ -204,10 +219,11 @@ def _record_into(engine: RigEngine, writer: SessionWriter, seconds: float, done:
             if pilot is not None:
                 pilot.window_alive()  # the pilot stops a robot whose window hangs; no window here
                 news = pilot.news()
-                for view in news.changes:
-                    writer.drive(view)
-                for alert in news.alerts:
-                    writer.add_event(event_of_alert(alert, news.view.time_s))
+                for receiver in receivers:
+                    for view in news.changes:
+                        receiver.drive(view)
+                    for alert in news.alerts:
+                        receiver.add_event(event_of_alert(alert, news.view.time_s))
             if tick is None:
                 if done.started_s is None and time.monotonic() - began_s > _PICTURE_WITHIN_S:
                     no_picture = f"no picture from the camera for {_PICTURE_WITHIN_S:.0f} s; check its cable"
@@ -224,7 +240,8 @@ def _record_into(engine: RigEngine, writer: SessionWriter, seconds: float, done:
             done.count_gap()
             done.count_lost(tick.frame.lost)
             done.camera_dropped = tick.dropped_frames - dropped_before
-            writer.put(tick, pilot.view if pilot is not None else None, engine.bus_status())
+            for receiver in receivers:
+                receiver.put(tick, pilot.view if pilot is not None else None, engine.bus_status())
             status = writer.status()
             if status.problem:
                 break

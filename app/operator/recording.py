@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -27,6 +27,7 @@ from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause
 from core.files import write_atomic
+from core.session.live_output import LiveOutput
 from core.session.manifest import About, Event, EventKind, about_rig, event_of_alert, event_of_target
 from core.session.recovery import CutSession, find_cut_sessions
 from core.session.writer import STOPPED, RecordStatus, SessionWriter, faults_between
@@ -56,6 +57,7 @@ class Recorder(QObject):
         self._writer: SessionWriter | None = None
         self._about: About | None = None
         self._target: Event | None = None
+        self._outputs: tuple[LiveOutput, ...] = ()
         self._config = rig.config
         self._shown = RecordStatus()
         self._marks = 0
@@ -72,12 +74,20 @@ class Recorder(QObject):
     def open_rig(self, config: Config, kind: RigKind) -> None:
         """Another rig is being opened: what is being recorded ends, for a session never mixes two rigs."""
         self._about = about_rig(config, kind.value, config.rig.name)
+        self.use_outputs(self._outputs)
         if self._writer is None:
             self._config = config
             self._writer = SessionWriter(config.record, self._about)
             self._timer.start()
         else:
             self._usable(self._writer).set_about(self._about)
+
+    def use_outputs(self, outputs: Iterable[LiveOutput]) -> None:
+        """Hand all that is kept also to these, recorded or not."""
+        self._outputs = tuple(outputs)
+        for output in self._outputs:
+            if self._about is not None:
+                output.set_rig(self._about)
 
     def _usable(self, writer: SessionWriter) -> SessionWriter:
         """The writer, or a new one in place of one that a fault of the program has ended: a day's recording goes on."""
@@ -136,6 +146,8 @@ class Recorder(QObject):
             self.said.emit(tr("Not marked: the recorder is behind"), True)
             return
         self._marks += 1
+        for output in self._outputs:
+            output.add_event(Event(time.monotonic(), EventKind.NOTE, f"mark {self._marks}"))
         if is_recorded:
             self.said.emit(tr("Mark {number} is in the session", number=self._marks), False)
         else:
@@ -144,23 +156,28 @@ class Recorder(QObject):
     def keep_target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""
         self._target = event_of_target(target, time.monotonic())
+        self._keep(self._target)
+
+    def _keep(self, event: Event) -> None:
         if self._writer is not None:
-            self._writer.add_event(self._target)
+            self._writer.add_event(event)
+        for output in self._outputs:
+            output.add_event(event)
 
     def keep_drive(self, view: DriveView) -> None:
         """Keep that mode or faults have changed, also when there are no pictures."""
         if self._writer is not None:
             self._writer.drive(view)
+        for output in self._outputs:
+            output.drive(view)
 
     def keep_rig_stop(self, message: str) -> None:
         """Keep that the rig stopped by itself, and why: from here on no pilot reports it."""
-        if self._writer is not None:
-            self._writer.event(EventKind.FAULT, Cause.HEARTBEAT_LOST.value, {"detail": message})
+        self._keep(Event(time.monotonic(), EventKind.FAULT, Cause.HEARTBEAT_LOST.value, {"detail": message}))
 
     def keep_alert(self, alert: Alert, time_s: float) -> None:
         """Keep an alert that was shown."""
-        if self._writer is not None:
-            self._writer.add_event(event_of_alert(alert, time_s))
+        self._keep(event_of_alert(alert, time_s))
 
     def close(self) -> bool:
         """End the session; False when the disk has not answered in time."""
@@ -171,9 +188,12 @@ class Recorder(QObject):
 
     def _put(self, tick: Tick) -> None:
         """A tick, in the engine's thread."""
-        writer, pilot = self._writer, self._engine.pilot
+        writer, outputs, pilot = self._writer, self._outputs, self._engine.pilot
+        view, bus = pilot.view if pilot is not None else None, self._engine.bus_status()
         if writer is not None:
-            writer.put(tick, pilot.view if pilot is not None else None, self._engine.bus_status())
+            writer.put(tick, view, bus)
+        for output in outputs:
+            output.put(tick, view, bus)
 
     @Slot()
     def _update(self) -> None:

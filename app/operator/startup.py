@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.commands.options import with_outputs
 from app.ui.display import check_display
 from core.config.files import settings_of_windows
 from core.config.models import Config
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from app.operator.rig_engine import EngineMaker
     from app.operator.window import OperatorWindow
+    from core.session.live_output import LiveOutput, OutputKind
 
 
 def finish_loading() -> None:
@@ -43,7 +45,14 @@ def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None)
 
 
 def run_window(
-    rig: str | None, config_path: Path | None, source: Path | None, *, until_first_frame: bool = False, tour: bool = False
+    rig: str | None,
+    config_path: Path | None,
+    source: Path | None,
+    *,
+    stream: int | None = None,
+    lsl: bool = False,
+    until_first_frame: bool = False,
+    tour: bool = False,
 ) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
     check_display()
@@ -51,8 +60,17 @@ def run_window(
     file = settings_of_windows(config_path)
     is_own = config_path is None and not until_first_frame  # a measurement does not depend on the user's settings
     config, kind = rig_config(rig, config_path, source, file.data if is_own else None)
+    config = with_outputs(config, stream, lsl=lsl)
+    outputs: dict[OutputKind, LiveOutput] = {}
+    if config.stream.foxglove or config.stream.lsl:
+        from core.session.live_output import open_outputs
+
+        outputs = open_outputs(config.stream)
+        for output in outputs.values() if stream is not None or lsl else ():  # what is asked for here is there, or an error
+            output.wait_open()
     ahead = start_ahead(config)  # before all that is slow to load here
 
+    from app.operator.live_menu import LiveMenuController
     from app.operator.manual_drive import OperatorDevices
     from app.operator.rig_engine import EngineMaker
     from app.operator.rig_menu import RigMenuController
@@ -75,11 +93,13 @@ def run_window(
         switches = overlay_switches(panels.overlay_bar)
         LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
     rigs = RigMenuController(window)
+    live = LiveMenuController(window, outputs)
 
     devices = OperatorDevices(config, lambda: window.rig.pilot, window.rig.stop, window)
     devices.said.connect(window.say)
     application.aboutToQuit.connect(settings.close)
     application.aboutToQuit.connect(rigs.close)
+    application.aboutToQuit.connect(live.close)
     application.aboutToQuit.connect(devices.close)
     application.aboutToQuit.connect(services.close)
     timers: list[QTimer] = []

@@ -402,6 +402,14 @@ class RigConfig(ConfigSection):
     watch_folder: bool = Field(False, description="image_folder: wait for new pictures, instead of playing those that are there")
 
 
+class StreamConfig(ConfigSection):
+    """What goes to other programs while the rig runs: docs/operating.md."""
+
+    foxglove: bool = Field(False, description="pictures, overlays, pose and joints as a WebSocket for Foxglove, on this computer")
+    port: int = Field(8765, ge=1024, le=65_535, description="of the WebSocket")
+    lsl: bool = Field(False, description="pose and markers for the lab streaming layer, in the local network")
+
+
 class WindowConfig(ConfigSection):
     """How the windows look, and where they keep pictures."""
 
@@ -426,6 +434,7 @@ class Config(ConfigSection):
     gamepad: GamepadConfig = GamepadConfig()
     window: WindowConfig = WindowConfig()
     record: RecordConfig = RecordConfig()
+    stream: StreamConfig = StreamConfig()
 
     @field_validator("servos")
     @classmethod

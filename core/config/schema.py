@@ -61,6 +61,8 @@ _TITLES = {  # of sections, and of settings whose name says little without its u
     "hand": "Driving by hand",
     "pedal": "Foot pedal",
     "record": "Recording",
+    "stream": "Live output",
+    "stream.lsl": "LSL",
     "record.max_mbit_s": "Max bit rate",
     "record.split_s": "Split after",
     "record.sync_s": "Sync every",
@@ -194,7 +196,7 @@ def effect_of(key: str) -> Effect:
 _LOADED_ONCE = {"working_size_px"} | {
     f"segmentation.{name}" for name in ("model", "device", "precision", "threads", "mirrored", "second_look")
 }
-_AT_START = {"rig", "record", "pedal", "gamepad"}
+_AT_START = {"rig", "record", "pedal", "gamepad", "stream"}
 
 
 def value_at(data: Any, key: str) -> Any:

@@ -6,6 +6,7 @@ Topics have the names of CRTK where it has one (``measured_js``, ``setpoint_js``
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from typing import Any
 
@@ -50,6 +51,7 @@ from core.session.values import (
 )
 from core.types import Command, Points, PoseState
 
+logging.getLogger("foxglove").setLevel(logging.CRITICAL)  # a client that goes away is no error; a full disk is ours to report
 _TEXTS = frozenset({"state", "refusal", "mode", "sent_by"})
 _MOTION = tuple(f"{who}_{name}" for who in ("asked", "commanded", "sent") for name in Command.__slots__)
 _TABLES: dict[str, tuple[str, ...]] = {

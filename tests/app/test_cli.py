@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 
 from app.cli import app, main
 from app.commands import synth
+from app.commands.options import bare_stream, with_outputs
+from core.config.models import Config
 from core.session.manifest import read_manifest
 from hardware.twin.rendering.presets import RARE_FAMILIES
 from tests.core.session_data import record, tick_of
@@ -151,3 +153,13 @@ def test_a_name_that_the_output_cannot_hold_is_no_traceback(tmp_path: Path, enco
 def test_the_help_of_synth_names_every_rare_look() -> None:
     """It is written out there: whoever asks for help does not wait for the twin to be imported."""
     assert f"({', '.join(RARE_FAMILIES)}: drawn" in " ".join(help_of("synth").split())
+
+
+def test_stream_may_have_a_port_and_need_not() -> None:
+    assert bare_stream(["gui", "--stream"]) == ["gui", "--stream=0"]
+    assert bare_stream(["--stream", "--lsl"]) == ["--stream=0", "--lsl"]
+    assert bare_stream(["gui", "--stream", "9000"]) == ["gui", "--stream", "9000"]
+    config = Config.model_validate({"stream": {"port": 9001}})
+    for given, expected in ((None, (False, 9001)), (0, (True, 9001)), (9000, (True, 9000))):
+        stream = with_outputs(config, given, lsl=False).stream
+        assert (stream.foxglove, stream.port) == expected
