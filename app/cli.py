@@ -59,6 +59,7 @@ COMMANDS = {
         "app.commands.replay",
         "Perceive recorded sessions again and compare; without --config or --preset in the recorded configuration.",
     ),
+    "trigger": ("app.commands.trigger", "Trigger the open window: record, mark, note, snapshot, target, status. Nothing moves."),
     "play": (
         "app.commands.session",
         "The player: a recorded session with everything that was understood, frame by frame.",

@@ -134,17 +134,24 @@ class Recorder(QObject):
 
         Nothing is typed here: the operator stays at the controls, and Space stays STOP.
         """
-        if self._writer is None:
-            return
-        writer = self._usable(self._writer)
-        status = writer.status()
+        self.note("")
+
+    def note(self, text: str) -> str:
+        """Note `text` at this moment, or a numbered mark when it is empty. Returns why it cannot be kept, "" when it is."""
+        writer = self._usable(self._writer) if self._writer is not None else None
+        status = self.status
         is_recorded = status.recording or status.armed
-        if not is_recorded and status.ring_s <= 0.0:
-            self.said.emit(tr("Nothing is being recorded that could be marked: F9 begins a session"), True)
-            return
-        if not writer.event(EventKind.NOTE, f"mark {self._marks + 1}"):
-            self.said.emit(tr("Not marked: the recorder is behind"), True)
-            return
+        problem = ""
+        if writer is None or (not is_recorded and status.ring_s <= 0.0):
+            problem = mark("Nothing is being recorded that could be marked: F9 begins a session")
+        elif not writer.event(EventKind.NOTE, text or f"mark {self._marks + 1}"):
+            problem = mark("Not marked: the recorder is behind")
+        if problem:
+            self.said.emit(tr_text(problem), True)
+            return problem
+        if text:
+            self.said.emit(tr("Noted: {text}", text=text), False)
+            return ""
         self._marks += 1
         for output in self._outputs:
             output.add_event(Event(time.monotonic(), EventKind.NOTE, f"mark {self._marks}"))
@@ -152,6 +159,7 @@ class Recorder(QObject):
             self.said.emit(tr("Mark {number} is in the session", number=self._marks), False)
         else:
             self.said.emit(tr("Mark {number} is in the last seconds: F10 saves them", number=self._marks), False)
+        return ""
 
     def keep_target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""

@@ -75,8 +75,11 @@ def run_window(
     from app.operator.rig_engine import EngineMaker
     from app.operator.rig_menu import RigMenuController
     from app.operator.services import WindowServices, tour_at_start
+    from app.operator.triggers import TriggerServer
     from app.settings.apply import SettingsController
+    from app.ui.actions import MenuEntry, add_menu
     from app.ui.crash_report import CrashWatch, state_folder
+    from app.ui.i18n import tr
     from app.ui.layout_state import LayoutState, Parts, overlay_switches
     from app.ui.window_base import make_application, run_until_closed
 
@@ -97,10 +100,13 @@ def run_window(
 
     devices = OperatorDevices(config, lambda: window.rig.pilot, window.rig.stop, window)
     devices.said.connect(window.say)
+    triggers = TriggerServer(window)
+    add_menu(window, tr("&Session"), [MenuEntry(tr("&Triggers from other programs..."), triggers.describe)])
     application.aboutToQuit.connect(settings.close)
     application.aboutToQuit.connect(rigs.close)
     application.aboutToQuit.connect(live.close)
     application.aboutToQuit.connect(devices.close)
+    application.aboutToQuit.connect(triggers.close)
     application.aboutToQuit.connect(services.close)
     timers: list[QTimer] = []
 
@@ -111,6 +117,7 @@ def run_window(
         if until_first_frame:
             timers.append(_leave_after_first_frame(window))
         else:
+            triggers.listen()
             tour_at_start(window, asked=tour)
 
     try:

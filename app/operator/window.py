@@ -20,7 +20,7 @@ from app.operator.rig_session import OpenEngineFor, RigSession
 from app.operator.tour import operator_stops
 from app.operator.twin_menu import TwinMenuController
 from app.ui.actions import MenuEntry, add_help_menu, add_menu
-from app.ui.i18n import tr
+from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import Origin, SnapshotWriter, pictures_folder
 from app.ui.texts import OperatorStep, Undriven
 from app.ui.window_base import WindowFrame
@@ -99,7 +99,8 @@ class OperatorWindow(WindowFrame):
         """The one that is on the screen, None before the first and after the last."""
         self._problem: str | None = None
         self._is_stale = False
-        self._target: Point | None = None
+        self.target: Point | None = None
+        """The operator's destination, source pixels."""
         self._on_place: Callable[[Point], object] | None = None
         self.rig = RigSession(config, open_engine, kind, self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
@@ -332,8 +333,22 @@ class OperatorWindow(WindowFrame):
         if self._on_place is not None:
             on_place, self._on_place = self._on_place, None
             on_place((x, y))
-        elif self.rig.engine.set_target((x, y)):
-            self._set_target((x, y))
+        else:
+            self.set_target((x, y))
+
+    @property
+    def waits_for_place(self) -> bool:
+        """Whether the next click into the picture is no destination."""
+        return self._on_place is not None
+
+    def set_target(self, target: Point | None) -> bool:
+        """Set or clear the destination, source pixels; False when no rig is open."""
+        is_set = self.rig.engine.set_target(target)
+        if is_set or target is None:
+            self.target = target
+            self.controls.log_target(target)
+            self.panels.live.show_target(target)
+        return is_set
 
     def ask_for_place(self, on_place: Callable[[Point], object] | None) -> None:
         """The next click into the picture is for `on_place`, in source pixels, and no destination; None: it is one again."""
@@ -343,24 +358,19 @@ class OperatorWindow(WindowFrame):
     def clear_target(self) -> None:
         """No destination; and a click into the picture is for one again."""
         self._on_place = None
-        if self._target is not None:
-            self._set_target(None)
-            self.rig.engine.set_target(None)
+        if self.target is not None:
+            self.set_target(None)
 
-    def _set_target(self, target: Point | None) -> None:
-        self._target = target
-        self.controls.log_target(target)
-        self.panels.live.show_target(target)
-
-    def save_snapshot(self) -> None:
-        """The picture that is shown, plain, with overlays, and its values."""
+    def save_snapshot(self) -> str:
+        """The picture that is shown, plain, with overlays, and its values. Returns why it cannot be, "" when it can."""
         rig = self.rig
         if self.shown_tick is None or self._is_stale:
-            why = tr("the picture is not live") if self._is_stale or rig.is_over else tr("there is no picture yet")
-            self.panels.toast.show_message(tr("No snapshot: {why}", why=why), is_fault=True)
-            return
+            why = mark("the picture is not live") if self._is_stale or rig.is_over else mark("there is no picture yet")
+            self.panels.toast.show_message(tr("No snapshot: {why}", why=tr_text(why)), is_fault=True)
+            return why
         phantom = rig.config.twin.phantom if rig.kind is RigKind.SIM else None
         self._snapshots.write(self.shown_tick, Origin(rig.kind.value, phantom, rig.config.perception.segmentation.model))
+        return ""
 
     def open_pictures(self) -> None:
         """Where snapshots go."""

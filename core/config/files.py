@@ -324,6 +324,11 @@ def settings_folder() -> Path:
     return Path(platformdirs.user_config_dir("LumenPilot", appauthor=False))
 
 
+def trigger_socket() -> Path:
+    """Where the operator window takes triggers from other programs, in the user's runtime folder."""
+    return Path(platformdirs.user_runtime_dir("LumenPilot", appauthor=False)) / "triggers.sock"
+
+
 def own_settings_path() -> Path:
     """The settings of the windows when no other file is named."""
     return settings_folder() / "settings.toml"

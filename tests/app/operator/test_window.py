@@ -496,7 +496,7 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     window.panels.picker.chosen.emit("tree")
     assert window.rig.phase is EnginePhase.STARTING
     assert not window.panels.live._picture.isVisible(), "the old world is not shown as the new one"
-    assert window._target is None
+    assert window.target is None
     assert window.controls.jog.held == frozenset()
     until(qtbot, lambda: window.shown_tick is not None)
     assert opened == ["s_curve", "tree"]
