@@ -25,7 +25,7 @@ from core.devices import UserError
 from core.files import ImageError, read_image
 from core.learning.dataset import write_mask, write_png
 from core.session.codec import scene_to_json, unread_to_json
-from core.types import Frame, Image, Point, Scene
+from core.types import Frame, Image, Mask, Point, Scene
 from hardware.cameras.picture_files import FilePicture, expand, inner_folders, is_frame_of, is_video, own_stems, pictures
 
 if TYPE_CHECKING:
@@ -202,13 +202,21 @@ def _perceive_picture(pipeline: Pipeline, picture: FilePicture, image: Image, in
     return pipeline(Frame(index, picture.time_s, image), targets.of(picture))
 
 
-def _write_masks(folder: Path, stem: str, scene: Scene) -> None:
-    """At source size, empty without any; raises OSError."""
+def source_masks(scene: Scene) -> dict[str, Mask]:
+    """The masks ``vessel`` and ``robot`` at source size, empty without any."""
     width, height = scene.source_size
+    found = {}
     for name in ("vessel", "robot"):
         mask = getattr(scene.masks, name) if scene.masks is not None else np.zeros((height, width), bool)
         if mask.shape != (height, width):
             mask = np.asarray(cv2.resize(mask.astype(np.uint8) * 255, (width, height), interpolation=cv2.INTER_LINEAR) > 127)
+        found[name] = mask
+    return found
+
+
+def _write_masks(folder: Path, stem: str, scene: Scene) -> None:
+    """Raises OSError."""
+    for name, mask in source_masks(scene).items():
         write_mask(folder / f"{stem}_{name}.png", mask)
 
 
