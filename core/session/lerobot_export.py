@@ -1,7 +1,7 @@
 """A session as an episode of a LeRobotDataset v3.0: a folder of Parquet, MP4 and JSON. Exported into the same folder, sessions
 become its episodes.
 
-Rows are put on an even grid of time, as the format demands: each grid point takes the newest row. Where there is none for longer
+Rows are put on an even grid of time, as the format demands: each grid point takes the newest row. Where no row came for longer
 than ``MAX_GAP_S`` the time is cut out. Each episode has files of its own.
 """
 
@@ -213,7 +213,7 @@ def _names(reader: SessionReader) -> dict[str, list[str]]:
 
 
 def _state(row: RecordedRow, names: Sequence[str], before: list[float] | None) -> list[float] | None:
-    """The state of a row. Without a measured robot its joints are those of `before`; None where there is none, either."""
+    """The state of a row. Without a measured robot its joints are those of `before`; None where those are unknown, too."""
     values = values_of(row)
     has_joints = row.status is not None
     if not has_joints and before is None:
