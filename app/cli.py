@@ -22,7 +22,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from app.commands.options import ConfigOption, LslOption, RigOption, SourceOption, StreamOption, bare_stream
 from core.devices import UserError
-from core.program import CALLED, as_called, import_problem, is_installed, program_commit, program_version
+from core.program import CALLED, as_called, import_problem, is_installed, program_line
 from core.system import keep_freed_memory, limit_heaps, limit_pictures
 
 COMMANDS = {
@@ -63,6 +63,10 @@ COMMANDS = {
     "play": (
         "app.commands.session",
         "The player: a recorded session with everything that was understood, frame by frame.",
+    ),
+    "library": (
+        "app.commands.session",
+        "The library: all sessions of a folder, searched, described, tagged, and opened from there.",
     ),
     "doctor": (
         "app.commands.doctor",
@@ -122,8 +126,7 @@ app = typer.Typer(
 
 def _print_version(is_asked: bool) -> None:
     if is_asked:
-        commit = program_commit()
-        print(f"lumenpilot {program_version()}" + (f" ({commit})" if commit else ""))
+        print(f"lumenpilot {program_line()}")
         raise typer.Exit
 
 

@@ -53,6 +53,23 @@ def program_version() -> str:
         return "0"
 
 
+@cache
+def program_id() -> dict[str, str]:
+    """``version`` and ``commit`` (where it is known) of the program that runs: they go into all that it keeps."""
+    commit = program_commit()
+    return {"version": program_version()} | ({"commit": commit} if commit else {})
+
+
+def known_program_id() -> dict[str, str]:
+    """``program_id`` without waiting for git: the version alone where nothing has asked for the commit before."""
+    return program_id() if program_id.cache_info().currsize else {"version": program_version()}
+
+
+def program_line() -> str:
+    """Version and commit in one line, "0.2.0 (0123456789ab)"."""
+    return " ".join([program_version(), *(f"({commit})" for commit in [program_id().get("commit")] if commit)])
+
+
 def program_commit() -> str | None:
     """Commit of the source that runs, with "+" when files differ from it; None where that is not known."""
     try:

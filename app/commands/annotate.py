@@ -36,7 +36,7 @@ from core.config.models import Config, choose_model, load_config
 from core.devices import UserError
 from core.files import write_atomic
 from core.perception import compiled
-from core.program import COMMAND
+from core.program import COMMAND, program_id
 from core.types import Frame
 
 if TYPE_CHECKING:
@@ -418,6 +418,7 @@ def _rater_window(
     from app.ui.layout_state import LayoutState, Parts, Switch, toggling
     from app.ui.window_base import run_until_closed
 
+    program_id()  # asks git once, before the rater begins
     name = options.study.name
     kept = store.study_settings(name) if name else None
     hides_angle = kept is not None and settings_from(kept, f"study {name!r}").hides_angle
@@ -452,7 +453,8 @@ def _report(store_path: Path, options: AnnotateOptions, config: Config) -> int:
         kept = store.study_settings(chosen) if chosen else None
         groups = groups_of_answered(annotations, {sha256: store_path.parent / name for sha256, name in names.items()})
         print_warnings([*store.problems, *rater_notes(annotations), *group_notes(annotations, groups), *notes])
-    report: dict[str, Any] = {"study": chosen} | agreement_report(annotations, names, options.study.seed or 0, groups)
+    report: dict[str, Any] = {"study": chosen, "program": program_id()}
+    report |= agreement_report(annotations, names, options.study.seed or 0, groups)
     if chosen:
         report["hides_angle"] = kept is not None and settings_from(kept, f"study {chosen!r}").hides_angle
     if options.out is not None:

@@ -26,7 +26,7 @@ from core.evaluation import evaluation
 from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, read_measurements, write_measurements
 from core.evaluation.paper import PAPER, against_paper, choose_images, measure_twice, wanted_images
 from core.files import name_as_text, name_of, write_atomic
-from core.program import COMMAND
+from core.program import COMMAND, program_id
 from core.types import Frame
 
 
@@ -104,7 +104,8 @@ def evaluate(
             manual_sd_deg = 1.5 if manual_sd is None else manual_sd
             found = _perceive_set(labelled, truth, settings, manual_sd_deg if like_paper else None, seed)
         found.source["preset"] = preset
-    metrics: dict[str, Any] = {"source": found.source, "seed": seed} | evaluation.evaluate(found.rows, seed)
+    metrics: dict[str, Any] = {"source": found.source, "seed": seed, "program": program_id()}
+    metrics |= evaluation.evaluate(found.rows, seed)
     if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
         raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
     metrics["notes"] = found.notes + metrics["notes"]
@@ -205,9 +206,23 @@ def _perceive_annotated(annotations: Path, config: Config, study: str | None, se
     rows, reasons, engine, missed = compare_with_algorithm(done, images, config)
     source: dict[str, Any] = {"kind": "annotated by hand", "name": name_as_text(name_of(annotations.parent))}
     source |= {"model": config.perception.segmentation.model, "preset": None, "engine": engine, "refused": reasons, "study": study}
+    source |= _session_of(annotations.parent)
     notes += more
     notes += [f"Interrupted after {len(rows)} of {len(rows) + missed} images."] if missed else []
     return _Study(rows, source, notes, rater_agreement(done, images, seed), interrupted=missed > 0)
+
+
+def _session_of(folder: Path) -> dict[str, Any]:
+    """What the session in a folder is about, and which program recorded it; nothing where it holds none."""
+    from core.session.manifest import MANIFEST, SessionError, read_description, read_manifest
+
+    if not (folder / MANIFEST).is_file():
+        return {}
+    try:
+        manifest = read_manifest(folder)
+        return {"session": {"recorded_by": manifest.program} | read_description(folder, manifest).model_dump(mode="json")}
+    except SessionError:  # damaged: the annotations are evaluated without it
+        return {}
 
 
 def _places_of(annotations: Path) -> list[Path]:

@@ -15,6 +15,7 @@ from app.annotator.comparison import agreement_tables, between_words, report_wor
 from core.config.models import RESOURCES
 from core.evaluation.metrics import RESAMPLES
 from core.evaluation.paper import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureFormat, FigureKind, Verdict, verdict
+from core.program import program_line
 
 _NAMED = 8
 """Figures that are not bettered are named up to this number; the tables have them all."""
@@ -118,6 +119,8 @@ def render_report(metrics: Mapping[str, Any], figures: Mapping[str, bytes]) -> s
     source, angle, state = metrics["source"], metrics["angle"], metrics["state"]
     verdicts = metrics.get("against_paper")
     notes = [*([summary_against_paper(verdicts)] if verdicts else []), *metrics["notes"]]
+    if session_notes := source.get("session", {}).get("notes"):
+        notes.append(f"Notes on the session: {session_notes}")
     return render_page(
         "evaluation.html.j2",
         title=f"Evaluation of {source['name']}",
@@ -205,7 +208,10 @@ def _lead(metrics: Mapping[str, Any]) -> str:
         parts.append(f"{images['answered']} of {images['measured']} measured ones answered")
     if "model" in source:
         parts.append(f"model {source['model']}" + (f", preset {source['preset']}" if source["preset"] else ""))
-    parts.append(time.strftime("%Y-%m-%d", time.gmtime()))
+    session = source.get("session", {})
+    names = ("operator", "task", "condition", "phantom")
+    parts += [f"{name} {session[name]}" for name in names if session.get(name)]
+    parts += [f"LumenPilot {program_line()}", time.strftime("%Y-%m-%d", time.gmtime())]
     return " · ".join(parts)
 
 

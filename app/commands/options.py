@@ -41,6 +41,12 @@ JsonOption = Annotated[bool, typer.Option("--json", help="one JSON object on sta
 ProgressOption = Annotated[
     bool, typer.Option("--progress-json", help="progress as JSON objects on standard output, one a line, for other programs")
 ]
+OperatorOption = Annotated[str | None, typer.Option(help="who recorded it")]
+TaskOption = Annotated[str | None, typer.Option(help="what was done")]
+ConditionOption = Annotated[str | None, typer.Option(help="under which condition, such as the arm of a study")]
+PhantomOption = Annotated[str | None, typer.Option(help="what lay before the camera; the twin knows it by itself")]
+NotesOption = Annotated[str | None, typer.Option(help="anything else")]
+TagOption = Annotated[list[str] | None, typer.Option("--tag", help="to find it by in the library; may be repeated")]
 SessionArgument = Annotated[Path, typer.Argument(metavar="SESSION", help="folder of a recorded session")]
 
 

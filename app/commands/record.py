@@ -6,13 +6,26 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.options import ConfigOption, JsonOption, LslOption, RigOption, StreamOption, with_outputs
+from app.commands.options import (
+    ConditionOption,
+    ConfigOption,
+    JsonOption,
+    LslOption,
+    NotesOption,
+    OperatorOption,
+    PhantomOption,
+    RigOption,
+    StreamOption,
+    TagOption,
+    TaskOption,
+    with_outputs,
+)
 from app.commands.progress import Interrupt, progress_bar
 from app.operator.rig_engine import EngineMaker
 from core.config.models import Config, sessions_folder
@@ -21,10 +34,10 @@ from core.config.safety import AtClose
 from core.devices import DeviceError, EndOfStream
 from core.perception.model_file import check_model
 from core.perception.pipeline import configured_bench
-from core.program import COMMAND
+from core.program import COMMAND, program_id
 from core.session.files import check_parent
 from core.session.live_output import LiveOutput, open_outputs
-from core.session.manifest import SessionError, about_rig, event_of_alert
+from core.session.manifest import SessionError, about_rig, changed_description, event_of_alert, remembered_description
 from core.session.writer import SessionWriter
 from hardware.rig import RigKind, rig_config
 
@@ -46,10 +59,16 @@ def record(
     lossless: Annotated[bool, typer.Option("--lossless", help="keep every pixel as it is; a hundred times the size")] = False,
     stream: StreamOption = None,
     lsl: LslOption = False,
+    operator: OperatorOption = None,
+    task: TaskOption = None,
+    condition: ConditionOption = None,
+    phantom: PhantomOption = None,
+    notes: NotesOption = None,
+    tag: TagOption = None,
     as_json: JsonOption = False,
     config_path: ConfigOption = None,
 ) -> None:
-    """Record a session without a window."""
+    """Record a session without a window. Operator, task, condition and phantom are remembered ones where they are not given."""
     # A camera that is lost meanwhile is waited for until the time is over; one that is still away then is an error.
     config, kind = rig_config(rig, config_path, None)
     settings = config.record.model_copy(update={"ring_s": 0.0} | ({"codec": "lossless"} if lossless else {}))
@@ -67,6 +86,9 @@ def record(
     writer: SessionWriter | None = None
     try:
         about = about_rig(as_calibrated(config), kind.value, config.rig.name)
+        program_id()  # asks git: no picture is to wait for it
+        given = {"operator": operator, "task": task, "condition": condition, "phantom": phantom, "notes": notes, "tags": tag}
+        about = replace(about, description=changed_description(remembered_description(), given))
         writer = SessionWriter(settings, about, folder=folder)
         for output in outputs:
             output.set_rig(about)

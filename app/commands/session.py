@@ -1,4 +1,4 @@
-"""``session info``, ``session recover`` and ``session export``, and ``play``, which opens the player."""
+"""``session info``, ``describe``, ``recover`` and ``export``; ``play`` and ``library``, which open the player and the library."""
 
 from __future__ import annotations
 
@@ -17,20 +17,38 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
-from app.commands.options import JsonOption, ProgressOption, SessionArgument
-from app.commands.progress import progress_bar, report_progress
+from app.commands.options import (
+    ConditionOption,
+    JsonOption,
+    NotesOption,
+    OperatorOption,
+    PhantomOption,
+    ProgressOption,
+    SessionArgument,
+    TagOption,
+    TaskOption,
+)
+from app.commands.progress import end_like_an_interrupt, progress_bar, report_progress
 from app.ui.display import check_qt
 from core.config.files import own_config
-from core.config.models import Config
+from core.config.models import Config, sessions_folder
 from core.control.modes import Mode
 from core.devices import UserError
 from core.session.exporters import export_session, exporter_name, items_of
 from core.session.files import is_being_written
-from core.session.manifest import Manifest, frames_lost
-from core.session.reader import SessionReader, losses, rows_cut_off
+from core.session.manifest import (
+    Manifest,
+    SessionError,
+    changed_description,
+    frames_lost,
+    read_description,
+    read_manifest,
+    write_description,
+)
+from core.session.reader import SessionReader, check_is_session, losses, rows_cut_off
 from core.types import Image, PoseState, Tick
 
-session = typer.Typer(help="Recorded sessions: look at them, recover cut ones, export.", no_args_is_help=True)
+session = typer.Typer(help="Recorded sessions: look at them, describe them, recover cut ones, export.", no_args_is_help=True)
 
 
 @session.command()
@@ -76,6 +94,9 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "session": str(reader.folder),
         "kind": manifest.kind if manifest else None,
         "rig": manifest.rig if manifest else None,
+        "program": manifest.program or None if manifest else None,
+        **{key: value or None for key, value in reader.description.model_dump(exclude={"tags"}).items()},
+        "tags": list(reader.description.tags),
         "started_utc": manifest.started_utc.isoformat() if manifest else None,
         "ended": ended,
         "recovered": f"{loss.seconds} s, {loss.rows} rows and {loss.pictures} pictures lost" if loss else None,
@@ -95,6 +116,31 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "bytes": sum(path.stat().st_size for path in reader.folder.iterdir() if path.is_file()),
         "problems": [*reader.problems, *losses(reader, events)],
     }
+
+
+@session.command("describe")
+def describe_session(
+    session: SessionArgument,
+    operator: OperatorOption = None,
+    task: TaskOption = None,
+    condition: ConditionOption = None,
+    phantom: PhantomOption = None,
+    notes: NotesOption = None,
+    tag: TagOption = None,
+    untag: Annotated[list[str] | None, typer.Option(help="a tag to take away; may be repeated")] = None,
+) -> None:
+    """Say what a session is about: in a file beside its manifest, nothing else of it changes. " " empties a text."""
+    check_is_session(session)
+    try:
+        manifest = read_manifest(session)
+    except SessionError as error:  # damaged, as `info` says; it can be described all the same
+        sys.stderr.write(f"note: {error}\n")
+        manifest = None
+    before = read_description(session, manifest)
+    away = {name.strip().lstrip("#").casefold() for name in untag or ()}
+    tags = [name for name in (*before.tags, *(tag or ())) if name.casefold() not in away]
+    given = {"operator": operator, "task": task, "condition": condition, "phantom": phantom, "notes": notes, "tags": tags}
+    write_description(session, changed_description(before, given))
 
 
 @session.command("recover")
@@ -135,11 +181,15 @@ def export(
     ],
     plain: Annotated[bool, typer.Option("--plain", help="MP4 without overlays")] = False,
     as_json: JsonOption = False,
+    progress_json: ProgressOption = False,
 ) -> None:
     """A session as video, table, MCAP for Foxglove and PlotJuggler or for ROS 2 (.ros2.mcap), or episode of a LeRobotDataset."""
     names = {str(path): exporter_name(path) for path in out}
     if not plain and "mp4" in names.values():
         check_qt("export it with --plain")
+    if progress_json:
+        report_progress()
+        end_like_an_interrupt()
     written: dict[str, int] = {}
     with SessionReader(session) as reader:
         reader.wait()
@@ -158,6 +208,8 @@ def export(
         return
     for problem in problems:
         sys.stderr.write(f"note: {problem}\n")
+    if progress_json:
+        return
     for name, count in written.items():
         sys.stdout.write(f"{name}: {count} {items_of(names[name])}\n")
 
@@ -206,6 +258,30 @@ def play(
         LayoutState(window, "player", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
         code = run_until_closed(application, window, window.show_message)
     sys.exit(code)
+
+
+def library(
+    folder: Annotated[Path | None, typer.Argument(help="where the sessions are; default: the configured folder")] = None,
+) -> None:
+    """The library: all sessions of a folder, searched, described, tagged, and opened from there."""
+    if folder is not None and not folder.is_dir():
+        raise UserError(f"{folder}: no such folder; give one that holds sessions")
+    from app.ui.display import check_display
+
+    check_display()
+    from app.ui.window_base import make_application, run_until_closed
+
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    own = own_config()
+    application = make_application(own.window)
+
+    from app.library.model import LibraryModel
+    from app.library.window import LibraryWindow
+    from app.ui.layout_state import LayoutState, Parts
+
+    window = LibraryWindow(LibraryModel((folder or sessions_folder(own.record.folder)).absolute()))
+    LayoutState(window, "library", Parts({"main": window.panels.columns}))
+    sys.exit(run_until_closed(application, window, window.show_message))
 
 
 def recorded_config(manifest: Manifest | None) -> Config:

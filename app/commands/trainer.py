@@ -31,6 +31,7 @@ from core.perception.model_file import SECOND_LOOK, ModelError, check_model, loa
 from core.perception.segmentation import OrientationAverage
 from core.perception.tip_refinement import WINDOW_PX, Planes
 from core.perception.unet import DualUNet, UNetShape, with_prior_planes
+from core.program import program_id
 from core.types import Image
 
 _EXAMPLES = 40
@@ -317,9 +318,11 @@ class Trainer:
             steps = {"step": self.steps_before + now.step, "steps": self.steps_total}
             self.writer.write(asdict(now) | steps | {"left_s": left_s})
 
+        told = {"program": program_id(), "plan": plan.to_json()}
+
         def save(network: DualUNet, step: int, *, whole: bool) -> None:
             figures = monitor.figures if monitor is not None else {}
-            task.save(network, self.out, self.notes | {"plan": plan.to_json(), "steps_done": step}, figures, whole=whole)
+            task.save(network, self.out, self.notes | told | {"steps_done": step}, figures, whole=whole)
             self.has_saved = True
 
         def on_checkpoint(network: DualUNet, step: int) -> None:

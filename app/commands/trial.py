@@ -26,6 +26,7 @@ from core.config.rig_file import find_rig, read_rig
 from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
 from core.files import write_atomic
+from core.program import program_line
 from hardware.twin.catalog import BENCH_LOOK, RANDOM_LOOK, TRIAL_LOOKS
 
 if TYPE_CHECKING:
@@ -350,11 +351,12 @@ def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> N
     looks = {RANDOM_LOOK: "random looks", BENCH_LOOK: "the default look"}.get(plan.look, f"looks: {plan.look}")
     seen = "true masks instead of the network" if plan.true_masks else f"model {plan.config.perception.segmentation.model}"
     seen += "" if plan.wall_force else ", without wall force"
+    made = f"LumenPilot {program_line()} · {time.strftime('%Y-%m-%d', time.gmtime())}"
     lowest = enumerate(worst(everything, _WORST))
     text = render_page(
         "trial.html.j2",
         title="Closed-loop trials in the bench twin",
-        lead=f"{len(everything)} trials · {looks} · {seen} · {time.strftime('%Y-%m-%d', time.gmtime())}",
+        lead=f"{len(everything)} trials · {looks} · {seen} · {made}",
         policies=list(sums),
         summary=summary_rows(sums),
         spreads=inline_svg(drawn(draw_spreads(by_policy), ".svg"), "spreads") if everything else "",

@@ -8,15 +8,18 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 from PySide6.QtCore import QObject, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QWidget
 
 from app.annotator.sources import REFUSED
 from app.operator.rig_session import RigSession
+from app.ui.description_form import DescriptionDialog
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.opening import OtherWindows
 from app.ui.workers import NOT_STARTED, ChildProcess, Worker, command_of
@@ -27,8 +30,23 @@ from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.faults import Cause
 from core.files import write_atomic
+from core.program import program_id
 from core.session.live_output import LiveOutput
-from core.session.manifest import About, Event, EventKind, about_rig, event_of_alert, event_of_target
+from core.session.manifest import (
+    About,
+    Description,
+    Event,
+    EventKind,
+    SessionError,
+    about_rig,
+    event_of_alert,
+    event_of_target,
+    read_description,
+    read_manifest,
+    remember_description,
+    remembered_description,
+    write_description,
+)
 from core.session.recovery import CutSession, find_cut_sessions
 from core.session.writer import STOPPED, RecordStatus, SessionWriter, faults_between
 from core.types import Point, Tick
@@ -60,6 +78,8 @@ class Recorder(QObject):
         self._outputs: tuple[LiveOutput, ...] = ()
         self._config = rig.config
         self._shown = RecordStatus()
+        self.description = remembered_description()
+        """What the next sessions are about."""
         self._marks = 0
         self._timer = QTimer(self, interval=_UPDATE_EVERY_MS)
         self._timer.timeout.connect(self._update)
@@ -73,7 +93,7 @@ class Recorder(QObject):
 
     def open_rig(self, config: Config, kind: RigKind) -> None:
         """Another rig is being opened: what is being recorded ends, for a session never mixes two rigs."""
-        self._about = about_rig(config, kind.value, config.rig.name)
+        self._about = replace(about_rig(config, kind.value, config.rig.name), description=self.description)
         self.use_outputs(self._outputs)
         if self._writer is None:
             self._config = config
@@ -88,6 +108,13 @@ class Recorder(QObject):
         for output in self._outputs:
             if self._about is not None:
                 output.set_rig(self._about)
+
+    def describe(self, description: Description) -> None:
+        """What the next sessions are about, without notes and tags; from the next start of the program on, too."""
+        self.description = description.for_next
+        if self._about is not None and self._writer is not None:
+            self._about = replace(self._about, description=self.description)
+            self._writer.describe(self.description)
 
     def _usable(self, writer: SessionWriter) -> SessionWriter:
         """The writer, or a new one in place of one that a fault of the program has ended: a day's recording goes on."""
@@ -218,6 +245,73 @@ class Recorder(QObject):
         if now.problem and now.problems != before.problems:  # last: what was saved until then must not cover it
             problem = now.problem.removeprefix(STOPPED)
             self.said.emit(tr("Recording stopped: {problem}", problem=tr_text(problem)), True)
+
+
+class DescriptionController(QObject):
+    """Asks what a session is about, or the next ones, and keeps it in a thread.
+
+    ``said`` carries a line and whether it is a fault.
+
+    Parameters
+    ----------
+    window : that the dialog belongs to.
+    recorder : gets what the next sessions are about.
+    """
+
+    said = Signal(str, bool)
+
+    def __init__(self, window: QWidget, recorder: Recorder) -> None:
+        super().__init__(window)
+        self._window, self._recorder = window, recorder
+        self._files = Worker("descriptions", self)
+        self._files.done.connect(lambda _key, line: self.said.emit(line, False) if isinstance(line, str) else None)
+        self._files.submit("program", program_id)  # asks git: no recording is to wait for it
+        self._files.failed.connect(lambda _session, line: self.said.emit(tr_text(line), True))
+
+    def ask_for_next(self) -> None:
+        """What the next recordings are about."""
+        about = tr("The next recordings, until you say otherwise")
+        dialog = DescriptionDialog(self._window, about, self._recorder.description, is_of_session=False)
+        dialog.given.connect(self._keep_next)
+        dialog.show()
+
+    def ask(self, session: Path) -> None:
+        """What a session is about. The next ones get it, too, without tags and notes."""
+        try:
+            manifest = read_manifest(session)
+            description = read_description(session, manifest)
+        except SessionError as error:
+            self.said.emit(tr_text(str(error)), True)
+            return
+        dialog = DescriptionDialog(self._window, session.name, description)
+        dialog.given.connect(partial(self._keep, session, is_twin=manifest.kind == "SIM"))
+        dialog.show()
+
+    def _keep(self, session: Path, description: Description, *, is_twin: bool) -> None:
+        phantom = self._recorder.description.phantom if is_twin else description.phantom  # a twin's is no bench's
+        self._recorder.describe(description.model_copy(update={"phantom": phantom}))
+        following = self._recorder.description
+
+        def keep() -> str:
+            write_description(session, description)
+            remember_description(following)
+            return tr("Described: {name}", name=session.name)
+
+        self._files.submit(session, keep)
+
+    def _keep_next(self, description: Description) -> None:
+        self._recorder.describe(description)
+
+        def keep() -> str:
+            remember_description(description)
+            return tr("The next recordings will say so")
+
+        self._files.submit("next", keep)
+
+    def close(self) -> None:
+        """Finish what is being kept."""
+        self._files.stop(finish=True)
+        self._files.wait(_END_WITHIN_MS)
 
 
 _KEY = "recovery"
@@ -431,9 +525,9 @@ def open_file(path: Path) -> bool:
 
 
 class AfterSession(QObject):
-    """Offers to evaluate, annotate or play a session that has ended, and starts that.
+    """Offers to describe, annotate, evaluate or play a session that has ended, and starts that.
 
-    ``said`` carries a line for the operator and whether it is a fault.
+    ``said`` carries a line for the operator and whether it is a fault, ``describe_asked`` the session.
 
     Parameters
     ----------
@@ -442,6 +536,7 @@ class AfterSession(QObject):
     """
 
     said = Signal(str, bool)
+    describe_asked = Signal(object)
 
     def __init__(self, offers: Offers, show_file: Callable[[Path], bool] = open_file, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -452,17 +547,19 @@ class AfterSession(QObject):
         self._windows = OtherWindows(self)
         self._windows.said.connect(self.said)
 
-    def offer(self, session: Path, text: str = mark("Session saved")) -> None:
-        """A session has ended, or was recovered; `text` says which."""
+    def offer(self, session: Path, text: str = mark("Session saved"), *, asks_who: bool = False) -> None:
+        """A session has ended, or was recovered; `text` says which. `asks_who`: it is not known who recorded it."""
         self.session = session
         report = tr("The algorithm against angles measured by hand, as a report")
         measure = tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES)
-        answers = (
+        describe = OfferButton(tr("Describe"), partial(self.describe_asked.emit, session), tr("Operator, task, condition, tags"))
+        answers: tuple[OfferButton, ...] = (
             OfferButton(tr("Annotate"), partial(self.annotate, session), measure),
             OfferButton(tr("Evaluate"), partial(self.evaluate, session), report),
             OfferButton(tr("Play"), partial(self.play, session), tr("The player, with everything as it was understood")),
         )
         detail = tr("{name}, in {parent}", name=session.name, parent=session.parent)
+        answers = (describe, *answers) if asks_who else (*answers, describe)
         self._offers.offer(Offer(_OFFER, tr_text(text), detail, answers))
 
     def withdraw(self) -> None:
@@ -490,6 +587,10 @@ class AfterSession(QObject):
     def play(self, session: Path) -> None:
         """The player."""
         self._windows.open(tr("Opening the player: {name}", name=session.name), "play", str(session))
+
+    def open_library(self, folder: Path) -> None:
+        """All sessions of a folder."""
+        self._windows.open(tr("Opening the library"), "library", str(folder))
 
     def evaluate(self, session: Path) -> None:
         """The report; without anything measured by hand yet, the annotation tool, for that comes first."""

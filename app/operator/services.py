@@ -17,7 +17,7 @@ from app.operator.engine_thread import EnginePhase
 from app.operator.models import ModelMenu
 from app.operator.preflight import PreflightModel
 from app.operator.preflight_list import PreflightList
-from app.operator.recording import AfterSession, Declined, RecoveryController, open_file
+from app.operator.recording import AfterSession, Declined, DescriptionController, RecoveryController, open_file
 from app.operator.rig_engine import leaving_a_core
 from app.operator.rig_session import StopOutcome
 from app.operator.window import OperatorWindow
@@ -25,7 +25,7 @@ from app.training.dialog import TrainingDialog
 from app.training.model import collect_from_file
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
-from app.ui.i18n import tr
+from app.ui.i18n import mark, tr
 from app.ui.texts import OperatorStep
 from app.widgets.messages import Offer, OfferButton
 from core.config.models import sessions_folder
@@ -73,6 +73,7 @@ class WindowServices(QObject):
         offers = window.panels.offers
         self._offers = offers
         self.after = AfterSession(offers, parent=self)
+        self.descriptions = DescriptionController(window, window.recorder)
         self.recovery = RecoveryController(
             sessions_folder(window.rig.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
         )
@@ -105,8 +106,9 @@ class WindowServices(QObject):
 
     def _wire(self) -> None:
         window = self._window
-        for part in (self.after, self.recovery, self.models):
+        for part in (self.after, self.descriptions, self.recovery, self.models):
             part.said.connect(window.say)
+        self.after.describe_asked.connect(self.descriptions.ask)
         self.recovery.recovered.connect(self.after.offer)
         window.recorder.changed.connect(self._on_recording)
         window.rig.phase_changed.connect(self._on_phase)
@@ -120,6 +122,10 @@ class WindowServices(QObject):
     def _add_menus(self) -> None:
         window = self._window
         session = [
+            MenuEntry(tr("Session &library"), self._open_library, ("Ctrl+L",)),
+            MenuEntry(tr("Describe the &next recordings..."), self.descriptions.ask_for_next),
+            MenuEntry(tr("&Describe the newest session..."), partial(self._with_newest, self.descriptions.ask)),
+            None,
             MenuEntry(tr("&Annotate the newest session"), partial(self._with_newest, self.after.annotate)),
             MenuEntry(tr("Annotate its &refused frames"), partial(self._with_newest, self.after.annotate_refused)),
             MenuEntry(tr("&Evaluate the newest session"), partial(self._with_newest, self.after.evaluate)),
@@ -142,7 +148,7 @@ class WindowServices(QObject):
 
     def close(self) -> None:
         """The window closes."""
-        for part in (self.recovery, self.preflight, self.after):
+        for part in (self.recovery, self.preflight, self.after, self.descriptions):
             part.close()
         self.checks.close()
         self.awake.close()
@@ -162,7 +168,9 @@ class WindowServices(QObject):
         if status.saved is not None and status.saved != self._saved:
             self._saved = status.saved
             if not status.recording:
-                self.after.offer(status.saved)
+                asks_who = not self._window.recorder.description.operator
+                text = mark("Session saved. Who recorded it?") if asks_who else mark("Session saved")
+                self.after.offer(status.saved, text, asks_who=asks_who)
 
     def _with_newest(self, step: object) -> None:
         session = self.after.session
@@ -170,6 +178,9 @@ class WindowServices(QObject):
             self._window.say(tr("No session yet: F9 records one"), False)
         elif callable(step):
             step(session)
+
+    def _open_library(self) -> None:
+        self.after.open_library(sessions_folder(self._window.rig.config.record.folder))
 
     def _choose_session(self) -> None:
         folder = sessions_folder(self._window.rig.config.record.folder)

@@ -41,7 +41,7 @@ from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.widgets.basics import column, line, name_list
 from app.widgets.painting import CENTER, RIGHT, PaintedWidget, draw_box, draw_text
-from core.session.manifest import Event, EventKind, Manifest
+from core.session.manifest import Description, Event, EventKind, Manifest
 
 _TYPED = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:[.,]\d*)?|[.,]\d+)(?: *(ms|s))?")
 _UNFINISHED = re.compile(r"[\d:., ms]*")
@@ -350,8 +350,9 @@ _HEIGHT = 34
 class RecordedPlate(PaintedWidget):
     """What was recorded, SIM or LIVE, on which rig, when: an outlined word, not filled as the banner of a live rig."""
 
-    def __init__(self, manifest: Manifest | None, name: str) -> None:
+    def __init__(self, manifest: Manifest | None, name: str, description: Description) -> None:
         super().__init__(hint=(420, _HEIGHT), height=_HEIGHT)
+        self._description, self._is_written = description, False
         self._kind = manifest.kind if manifest is not None else "UNKNOWN"
         self._manifest, self._name = manifest, name
         self._note = ""
@@ -359,9 +360,22 @@ class RecordedPlate(PaintedWidget):
 
     def show_written(self, is_written: bool) -> None:
         """Whether it is still being recorded: then it is not cut off."""
-        self._note = _note(self._manifest, self._name, is_written=is_written)
+        self._is_written = is_written
+        self._show()
+
+    def show_description(self, description: Description) -> None:
+        """What the session is about."""
+        self._description = description
+        self._show()
+
+    def _show(self) -> None:
+        about, note = self._description, _note(self._manifest, self._name, is_written=self._is_written)
+        self._note = "  \N{MIDDLE DOT}  ".join(part for part in (note, about.line) if part)
+        program = self._manifest.program if self._manifest is not None else ""
+        made = tr("recorded with LumenPilot {program}", program=program) if program else ""
+        tags = " ".join(f"#{tag}" for tag in about.tags)
         self.setAccessibleName(self.text)
-        self.setToolTip(self.text)
+        self.setToolTip("\n".join(part for part in (self.text, tags, about.notes, made) if part))
         self.update()
 
     @property

@@ -20,7 +20,7 @@ from core.devices import UserError
 from core.files import name_of
 from core.session.export import export_mp4
 from core.session.files import add_event, is_being_written
-from core.session.manifest import Event, SessionError
+from core.session.manifest import Description, Event, SessionError, write_description
 from core.session.reader import SessionReader, losses
 from core.types import Image, Tick
 
@@ -43,8 +43,9 @@ class PlayedSession(QObject):
 
     ``changed``: course or events; ``polled``: the reader was asked; ``emptied``: why there is nothing to play;
     ``problems_found``: all problems; ``is_written``: whether the session is still being recorded; ``compared``: the results of a
-    replay have been read; ``note_refused``: a note that could not be written; ``clip_progressed``: the share of the clip that is
-    written, None when none is; ``clip_saved``: its path and a line; ``message``: a line for people and whether it is a fault.
+    replay have been read; ``described``: what the session is about, once that is kept; ``note_refused``: a note that could not be
+    written; ``clip_progressed``: the share of the clip that is written, None when none is; ``clip_saved``: its path and a line;
+    ``message``: a line for people and whether it is a fault.
 
     Parameters
     ----------
@@ -58,6 +59,7 @@ class PlayedSession(QObject):
     problems_found = Signal(object)
     is_written = Signal(bool)
     compared = Signal()
+    described = Signal(object)
     note_refused = Signal(object)
     clip_progressed = Signal(object)
     clip_saved = Signal(object, str)
@@ -150,6 +152,10 @@ class PlayedSession(QObject):
                 self.message.emit(tr("{count} results of the replay cannot be read", count=result.skipped), True)
             self.course = self._with_replay(self.course)
             self.compared.emit()
+        elif isinstance(result, Description):
+            self.described.emit(result)
+            self.message.emit(tr("Kept beside the session"), False)
+            return
         elif isinstance(result, Event):
             self.events = tuple(sorted((*self.events, result), key=lambda one: one.time_s))
             self.message.emit(tr("Note kept"), False)
@@ -170,6 +176,10 @@ class PlayedSession(QObject):
     def add_note(self, event: Event) -> None:
         """Into the session's own file."""
         self._files.submit(event, partial(_add_note, self._reader.folder, event))
+
+    def describe(self, description: Description) -> None:
+        """Beside the session's manifest."""
+        self._files.submit("description", partial(_describe, self._reader.folder, description))
 
     def save_snapshot(self, tick: Tick) -> None:
         """The picture plain, with overlays, and its values."""
@@ -246,6 +256,11 @@ def _add_note(folder: Path, event: Event) -> Event:
     except SessionError:
         _log.warning("a note was not kept: %s", event.text)  # the user may have closed the window by now
         raise
+
+
+def _describe(folder: Path, description: Description) -> Description:
+    write_description(folder, description)
+    return description
 
 
 def _free_path(folder: Path, session: Path, times_s: tuple[float, float]) -> Path:

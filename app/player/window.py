@@ -24,6 +24,7 @@ from app.player.session_model import PlayedSession
 from app.player.timeline import TimelineView
 from app.ui import theme
 from app.ui.actions import KeyTable, MenuEntry, add_help_menu, add_menu, menu_tables, shown
+from app.ui.description_form import DescriptionDialog
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import pictures_folder
 from app.ui.theme import ON_PICTURE
@@ -40,7 +41,7 @@ from core.config.models import Config
 from core.config.rig_file import scaled
 from core.session.codec import RecordedRow
 from core.session.exporters import PLUGINS
-from core.session.manifest import Event, EventKind, Manifest
+from core.session.manifest import Description, Event, EventKind
 from core.session.reader import SessionReader
 from core.types import Point, Scene, Tick
 from hardware.rig import RigKind
@@ -65,6 +66,9 @@ def add_player_menus(window: PlayerWindow) -> None:
             *([MenuEntry(tr("Annotate the &differences"), window.annotate_differences)] if window.has_replay else []),
             MenuEntry(tr("Annotate frames evenly over the session"), window.annotate_session),
             MenuEntry(tr("Report of the algorithm"), window.evaluate, ("Ctrl+R",)),
+            None,
+            MenuEntry(tr("&Describe the session..."), window.describe, ("D",)),
+            MenuEntry(tr("Session &library"), window.open_library, ("Ctrl+L",)),
         ]
     )
     view = add_scene_view_menu(
@@ -146,7 +150,8 @@ _BANNER_WIDTH, _GAP = 330, 8
 class PlayerPanels(ScenePanels):
     """Makes the widgets, lays them out, and shows one recorded row on all of them."""
 
-    def __init__(self, config: Config, manifest: Manifest | None, name: str, *, with_other: bool = False) -> None:
+    def __init__(self, config: Config, reader: SessionReader, *, with_other: bool = False) -> None:
+        manifest = reader.manifest
         known = manifest.known if manifest is not None else None
         pixels_per_mm = scaled(config, known).policy.pursuit.pixels_per_mm
         super().__init__(config.perception, pixels_per_mm, _TEXT_EVERY_S)
@@ -154,7 +159,7 @@ class PlayerPanels(ScenePanels):
         self._provenance = Provenance()
         self.banner = SimBanner(RigKind.PLAYBACK)
         self.banner.setFixedWidth(_BANNER_WIDTH)
-        self.plate = RecordedPlate(manifest, name)
+        self.plate = RecordedPlate(manifest, reader.folder.name, reader.description)
         self.live.setAccessibleName(tr("Recorded picture"))
         self.live.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.other = LiveView(pixels_per_mm) if with_other else None
@@ -352,10 +357,11 @@ class PlayerWindow(WindowFrame):
         self._shown: Decoded | None = None
         self._note_s = 0.0
         self._refused_notes: deque[Event] = deque()
+        self._description = reader.description
         self._decoder = FrameDecoder(reader, self)
         self.session = PlayedSession(reader, pictures_folder(config.window.pictures_folder), self)
         self._turn = QTimer(self, interval=_TURN_MS, timerType=Qt.TimerType.PreciseTimer)
-        self.panels = PlayerPanels(config, reader.manifest, reader.folder.name, with_other=against is not None)
+        self.panels = PlayerPanels(config, reader, with_other=against is not None)
         self.setCentralWidget(self.panels)
         self.after = AfterSession(self.panels.offers, parent=self)
         add_player_menus(self)
@@ -386,6 +392,7 @@ class PlayerWindow(WindowFrame):
         session.is_written.connect(panels.plate.show_written)
         session.problems_found.connect(panels.show_problems)
         session.compared.connect(self._on_compared)
+        session.described.connect(self._on_described)
         session.note_refused.connect(self._on_note_refused)
         session.clip_progressed.connect(bar.show_progress)
         panels.timeline.sought.connect(self.seek)
@@ -671,6 +678,23 @@ class PlayerWindow(WindowFrame):
         rows = ",".join(str(row) for row in self.course.rows[places].tolist())
         words = tr("Opening the annotator: {count} frames", count=len(places))
         self.others.open(words, "annotate", str(self._reader.folder), "--rows", rows)
+
+    # ---- what it is about
+
+    def open_library(self) -> None:
+        """All sessions of its folder."""
+        self.others.open(tr("Opening the library"), "library", str(self._reader.folder.absolute().parent))
+
+    def describe(self) -> None:
+        """Ask what the session is about."""
+        self.pause()
+        dialog = DescriptionDialog(self, self._reader.folder.name, self._description)
+        dialog.given.connect(self.session.describe)
+        dialog.show()
+
+    def _on_described(self, description: Description) -> None:
+        self._description = description
+        self.panels.plate.show_description(description)
 
     # ---- notes
 

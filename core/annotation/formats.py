@@ -30,6 +30,7 @@ from core.annotation.model import Annotation, AnnotationError, Line, MaskPolygon
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.files import write_atomic
 from core.learning.dataset import write_png
+from core.program import program_id
 from core.types import Mask, Points
 
 _MAX_BYTES = 500_000_000
@@ -532,7 +533,8 @@ def _write_coco(chosen: _Chosen, names: _Names, out: Path) -> None:
     """Pieces with holes are run lengths, others polygons."""
     numbers = {target: number for number, target in enumerate(MaskTarget, 1)}
     categories = [{"id": number, "name": target.value, "supercategory": ""} for target, number in numbers.items()]
-    content: dict[str, list[dict[str, Any]]] = {"images": [], "annotations": [], "categories": categories}
+    info = {"description": "LumenPilot annotations"} | program_id()
+    content: dict[str, Any] = {"info": info, "images": [], "annotations": [], "categories": categories}
     for number, (image, annotation) in enumerate(chosen, 1):
         width, height = image.record.size
         content["images"].append({"id": number, "file_name": names[image.path], "width": width, "height": height})

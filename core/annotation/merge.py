@@ -161,6 +161,8 @@ def _join_file(
     for name, rater, *look in theirs.execute(looks).fetchall():
         if study in (None, name):
             database.execute(ADD_LOOK, (name, persons.names.get(rater, rater), *look))
+    rows = theirs.execute("SELECT version, commit_id, first_utc FROM programs").fetchall()
+    database.executemany("INSERT OR IGNORE INTO programs VALUES (?, ?, ?)", rows)
     joined.persons[where] = dict(persons.names)
 
 
@@ -276,7 +278,7 @@ def _add_edits(database: sqlite3.Connection, theirs: sqlite3.Connection, one: Ke
 
 _MAX_ROW = 1_000_000
 _MISSES = 2_000  # after so many row numbers on end that cannot be read, nothing more is expected
-_TABLES = ("images", "studies", "annotations", "journal", "origins", "looks")
+_TABLES = ("images", "studies", "annotations", "journal", "origins", "looks", "programs")
 
 
 def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:

@@ -34,6 +34,7 @@ from core.annotation.model import (
     annotation_from_json,
 )
 from core.files import ImageError, name_as_text, read_image
+from core.program import known_program_id
 
 SCHEMA_VERSION = 1
 APPLICATION_ID = 0x4C50414E  # "LPAN"
@@ -55,11 +56,13 @@ ADDED = {
     "origins": "(annotation_id INTEGER PRIMARY KEY REFERENCES annotations(id), origin TEXT NOT NULL)",
     "looks": "(image_id INTEGER NOT NULL REFERENCES images(id), study TEXT NOT NULL, rater TEXT NOT NULL, repeat INTEGER NOT NULL,"
     " after INTEGER NOT NULL, UNIQUE (image_id, study, rater, repeat))",
+    "programs": "(version TEXT NOT NULL, commit_id TEXT NOT NULL, first_utc TEXT NOT NULL, UNIQUE (version, commit_id))",
 }
 """Tables that files of earlier versions lack, and those versions ignore.
 
 ``origins``: a random number that an annotation gets when it is begun, and keeps in every copy: it tells which ones are the same.
 ``looks``: who was shown the algorithm's answer, and after which of their own edits.
+``programs``: versions and commits of this program ("": not known) that have written annotations, and since when.
 """
 ANNOTATION_COLUMNS = (
     "sha256, study, rater, repeat, view, content, check_sum, theta_deg, theta_signed_deg, d_head_px, d_tail_px, crossed,"
@@ -378,6 +381,9 @@ class AnnotationStore:
             ).fetchone()
             if database.execute("SELECT 1 FROM journal WHERE annotation_id = ?", (annotation_id,)).fetchone() is None:
                 database.execute("INSERT OR IGNORE INTO origins VALUES (?, ?)", (annotation_id, secrets.token_hex(8)))
+            program = known_program_id()  # a rater does not wait for git
+            written_by = program["version"], program.get("commit", ""), now
+            database.execute("INSERT OR IGNORE INTO programs VALUES (?, ?, ?)", written_by)
             step = entry.content.to_json() if entry.content is not None else None
             database.execute(
                 "INSERT INTO journal (annotation_id, number, kind, base, action, content, check_sum, made_utc)"

@@ -25,6 +25,7 @@ from typing import TypeVar
 from core.config.models import RecordConfig
 from core.files import name_as_text
 from core.locks import lock_file
+from core.program import program_id
 from core.session.codec import InvalidRecord
 from core.session.manifest import (
     ADDED_LATER,
@@ -39,6 +40,7 @@ from core.session.manifest import (
     SessionError,
     event_to_json,
     new_manifest,
+    program_versions,
     read_manifest,
     write_manifest,
 )
@@ -362,6 +364,7 @@ class SessionFiles:
         _sync_files(self.folder, all_videos=True)
         self.counts.dropped = dropped
         changes = {"closed": not problem, "ended": name_as_text(ended), "ended_utc": datetime.now(UTC), "counts": self.counts}
+        changes["versions"] = self._manifest.versions | program_versions(program_id())  # git may not have answered in the beginning
         try:
             write_manifest(self.folder, self._manifest.model_copy(update=changes))
         except OSError as error:

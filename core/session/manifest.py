@@ -1,6 +1,7 @@
-"""``manifest.json``, which says what a session is, and the events of ``events.jsonl``.
+"""``manifest.json``, which says what a session is, its description, and the events of ``events.jsonl``.
 
-The manifest is written when the session begins and when it ends, each time atomically.
+The manifest is written when the session begins and when it ends, each time atomically. Its description is that of the beginning;
+what is changed later, and the tags, stand beside it in ``description.json``, so that no file of the recorder is written again.
 """
 
 from __future__ import annotations
@@ -9,15 +10,16 @@ import contextlib
 import json
 import platform
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+import platformdirs
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from core.bench.bench import BenchError, bench_sha256, read_bench
 from core.config.calibration import CalibrationConfig
@@ -30,10 +32,11 @@ from core.control.modes import ARMED_MODES, DRIVING_MODES, Mode
 from core.devices import UserError
 from core.files import write_atomic
 from core.perception.model_file import ModelError, model_folder, read_model_info
+from core.program import known_program_id, program_id
 from core.session.codec import JsonLayout, Moment, Text, finite, finite_tree, read_json
 from core.types import Point
 
-MANIFEST, FRAMES, EVENTS = "manifest.json", "frames.jsonl", "events.jsonl"
+MANIFEST, DESCRIPTION, FRAMES, EVENTS = "manifest.json", "description.json", "frames.jsonl", "events.jsonl"
 PREFIX, RECOVERED = "session_", "_recovered"
 FORMAT = 1
 _MAX_BYTES = 8_000_000
@@ -52,9 +55,67 @@ class NewerVersion(SessionError):
     """The session was written by a newer version of the program."""
 
 
+_MOST_LETTERS, _MOST_TAGS = 4000, 50
+
+
+def _kept_text(text: object) -> object:
+    """A text as a file can hold it; a value of another type is left to the validation, None is no text."""
+    if not isinstance(text, str):
+        return "" if text is None else text
+    return text.encode("utf-8", errors="replace").decode("utf-8").strip()[:_MOST_LETTERS]
+
+
+def _kept_line(text: object) -> object:
+    return " ".join(kept.split()) if isinstance(kept := _kept_text(text), str) else kept
+
+
+def _kept_tags(tags: object) -> object:
+    """Tags as given, or separated by commas, each once."""
+    parts = tags.split(",") if isinstance(tags, str) else tags
+    if not isinstance(parts, list | tuple):
+        return parts
+    lines = [line.replace(",", " ").lstrip("#") if isinstance(line := _kept_line(part), str) else line for part in parts]
+    return tuple({str(line).casefold(): line for line in lines if line != ""}.values())[:_MOST_TAGS]
+
+
+Line = Annotated[str, BeforeValidator(_kept_line)]
+"""One line of text; too much of it is cut off."""
+
+
+class Description(BaseModel):
+    """What a session is about, in the operator's words. ``phantom`` is what lay before the camera."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    operator: Line = ""
+    task: Line = ""
+    condition: Line = ""
+    phantom: Line = ""
+    notes: Annotated[str, BeforeValidator(_kept_text)] = ""
+    tags: Annotated[tuple[str, ...], BeforeValidator(_kept_tags)] = ()
+
+    @property
+    def line(self) -> str:
+        """All but notes and tags, in one line; "" where nothing is known."""
+        return " \N{MIDDLE DOT} ".join(part for part in (self.operator, self.task, self.condition, self.phantom) if part)
+
+    @property
+    def for_next(self) -> Description:
+        """What the next recordings get, too: notes and tags are of one session."""
+        return self.model_copy(update={"notes": "", "tags": ()})
+
+
+def changed_description(before: Description, given: Mapping[str, object]) -> Description:
+    """A description with the values that are given; None: as before."""
+    return Description.model_validate(before.model_dump() | {key: value for key, value in given.items() if value is not None})
+
+
 @dataclass(frozen=True, slots=True)
 class About:
-    """Where the pictures come from. ``calibration`` is the rig's (None: not calibrated), ``bench`` its bench's name and hash."""
+    """Where the pictures come from. ``calibration`` is the rig's (None: not calibrated), ``bench`` its bench's name and hash.
+
+    ``phantom`` is what the rig itself knows of it: the twin's, or the bench's name.
+    """
 
     kind: Kind
     rig: str
@@ -62,6 +123,8 @@ class About:
     model: dict[str, str | None] = field(default_factory=dict)
     calibration: dict[str, Any] | None = None
     bench: dict[str, str] | None = None
+    phantom: str = ""
+    description: Description = field(default_factory=Description)
 
 
 class Counts(BaseModel):
@@ -92,7 +155,8 @@ class Loss(BaseModel):
 class Manifest(BaseModel):
     """A session. ``started_utc`` and ``started_monotonic_s`` are one moment; rows and events count by the latter's clock.
 
-    ``closed`` is True only when the session ended properly; ``ended`` then says why.
+    ``closed`` is True only when the session ended properly; ``ended`` then says why. ``description`` is that of the beginning: see
+    ``read_description``.
     """
 
     model_config = ConfigDict(extra="ignore")
@@ -109,6 +173,7 @@ class Manifest(BaseModel):
     versions: dict[str, str] = {}
     calibration: dict[str, Any] | None = None
     bench: dict[str, str] | None = None
+    description: Description = Description()
     config: dict[str, Any] = {}
     closed: bool = False
     ended_utc: datetime | None = None
@@ -122,6 +187,12 @@ class Manifest(BaseModel):
         with contextlib.suppress(ValidationError):
             return CalibrationConfig.model_validate(self.calibration) if self.calibration is not None else None
         return None
+
+    @property
+    def program(self) -> str:
+        """Version and commit of the program that recorded it; "" where an earlier version did not say."""
+        version, commit = self.versions.get("lumenpilot", ""), self.versions.get("commit", "")
+        return f"{version} ({commit})" if version and commit else version
 
 
 def about_rig(config: Config, kind: Kind, rig: str) -> About:
@@ -140,7 +211,9 @@ def about_rig(config: Config, kind: Kind, rig: str) -> About:
     with contextlib.suppress(RigFileError):  # reported when the rig is opened
         known = calibration_of(config)
     calibration = known.model_dump(mode="json", exclude={"view"}) if known is not None else None
-    return About(kind, rig, config.model_dump(mode="json"), model, calibration, _about_bench(config.perception.bench))
+    bench = _about_bench(config.perception.bench)
+    phantom = config.twin.phantom if kind == "SIM" else (bench or {}).get("name", "")
+    return About(kind, rig, config.model_dump(mode="json"), model, calibration, bench, phantom)
 
 
 def _about_bench(folder: str | None) -> dict[str, str] | None:
@@ -153,9 +226,15 @@ def _about_bench(folder: str | None) -> dict[str, str] | None:
         return {"problem": str(error)}
 
 
-def package_versions() -> dict[str, str]:
-    """Versions of all that decides what is seen and written."""
-    versions = {"python": platform.python_version(), "system": f"{platform.system()} {platform.machine()}"}
+def program_versions(program: Mapping[str, str]) -> dict[str, str]:
+    """Version and commit as they stand among the versions of a session."""
+    return {{"version": "lumenpilot"}.get(key, key): value for key, value in program.items()}
+
+
+def package_versions(*, waits: bool = True) -> dict[str, str]:
+    """Versions of all that decides what is seen and written; without `waits` not the commit where git has not answered yet."""
+    versions = program_versions(program_id() if waits else known_program_id())
+    versions |= {"python": platform.python_version(), "system": f"{platform.system()} {platform.machine()}"}
     for name in _PACKAGES:
         try:
             versions[name] = metadata.version(name)
@@ -165,7 +244,9 @@ def package_versions() -> dict[str, str]:
 
 
 def new_manifest(about: About, session_id: str, started: datetime, monotonic_s: float, codec: str) -> Manifest:
-    """The manifest of a session that begins."""
+    """The manifest of a session that begins. The twin knows its phantom; elsewhere the operator knows better."""
+    given = about.description.phantom
+    phantom = about.phantom or given if about.kind == "SIM" else given or about.phantom
     return Manifest(
         id=session_id,
         kind=about.kind,
@@ -174,9 +255,10 @@ def new_manifest(about: About, session_id: str, started: datetime, monotonic_s: 
         started_monotonic_s=monotonic_s,
         codec=codec,
         model=about.model,
-        versions=package_versions(),
+        versions=package_versions(waits=False),
         calibration=about.calibration,
         bench=about.bench,
+        description=about.description.model_copy(update={"phantom": phantom}),
         config=about.config,
     )
 
@@ -190,7 +272,61 @@ def write_manifest(folder: Path, manifest: Manifest) -> int:
 
 def read_manifest(folder: Path) -> Manifest:
     """Raises SessionError: not there, damaged, or of a newer version."""
-    path = folder / MANIFEST
+    return _read(folder / MANIFEST, Manifest)
+
+
+def read_description(folder: Path, manifest: Manifest | None) -> Description:
+    """What a session is about: as it was changed last, else as its manifest has it.
+
+    Raises SessionError when what was changed is damaged or of a newer version.
+    """
+    if (folder / DESCRIPTION).exists():
+        return _read(folder / DESCRIPTION, Description)
+    return manifest.description if manifest is not None else Description()
+
+
+def write_description(folder: Path, description: Description) -> None:
+    """Keep a description beside the manifest, atomically, also while the session is recorded; its other files stay as they are.
+
+    Raises SessionError when it cannot be written, or what is there is of a newer version.
+    """
+    path = folder / DESCRIPTION
+    try:
+        read_description(folder, None)
+    except NewerVersion:
+        raise
+    except SessionError:  # damaged: what is given now takes its place
+        pass
+    try:
+        write_atomic(path, (json.dumps({"format": FORMAT} | description.model_dump(), indent=1) + "\n").encode(), durable=True)
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be written ({error.strerror}); nothing was changed: make the folder writable") from None
+
+
+def remembered_folder() -> Path:
+    """Where the description for the next recordings is kept, in a ``description.json`` of its own."""
+    return Path(platformdirs.user_state_dir("LumenPilot"))
+
+
+def remembered_description() -> Description:
+    """What the next recordings get; a file that cannot be read says nothing."""
+    with contextlib.suppress(SessionError):
+        return read_description(remembered_folder(), None).for_next
+    return Description()
+
+
+def remember_description(description: Description) -> None:
+    """Keep a description for the next recordings. Raises SessionError."""
+    with contextlib.suppress(OSError):  # named when it is written
+        remembered_folder().mkdir(parents=True, exist_ok=True)
+    write_description(remembered_folder(), description.for_next)
+
+
+_Read = TypeVar("_Read", bound=BaseModel)
+
+
+def _read(path: Path, kind: type[_Read]) -> _Read:
+    """A JSON file of a session. Raises SessionError: not there, damaged, or of a newer version."""
     try:
         with path.open("rb") as file:
             data = file.read(_MAX_BYTES + 1)
@@ -199,13 +335,13 @@ def read_manifest(folder: Path) -> Manifest:
     except OSError as error:
         raise SessionError(f"{path}: cannot be read ({error.strerror})") from None
     if len(data) > _MAX_BYTES:
-        raise SessionError(f"{path}: too large for a manifest")
+        raise SessionError(f"{path}: too large")
     try:
         content = json.loads(data)
         version = content.get("format") if isinstance(content, dict) else None
         if type(version) is int and version > FORMAT:
             raise NewerVersion(f"{path}: format {version} is of a newer version (this one knows {FORMAT}); update the program")
-        return Manifest.model_validate(content)
+        return kind.model_validate(content)
     except ValidationError as error:
         first: Any = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])

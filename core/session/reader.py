@@ -28,11 +28,13 @@ from core.session.files import FileLine, check_seal, is_sealed, lines_of, read_l
 from core.session.manifest import (
     EVENTS,
     FRAMES,
+    Description,
     Event,
     Manifest,
     NewerVersion,
     SessionError,
     event_from_json,
+    read_description,
     read_manifest,
     was_added_later,
 )
@@ -359,7 +361,7 @@ class SessionReader:
     Raises
     ------
     SessionError
-        When the folder is no session, or one of a newer version. A damaged manifest is only named in `problems`.
+        When the folder is no session, or one of a newer version. A damaged manifest or description is only named in `problems`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -374,6 +376,11 @@ class SessionReader:
         except NewerVersion:
             raise
         except SessionError as error:
+            self._problem(str(error))
+        try:
+            self.description = read_description(folder, self.manifest)
+        except SessionError as error:
+            self.description = self.manifest.description if self.manifest is not None else Description()
             self._problem(str(error))
         self._rows: OrderedDict[int, RecordedRow | None] = OrderedDict()
         self._file: IO[bytes] | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -17,6 +18,7 @@ from core.files import name_as_text, sync_folder
 from core.session.codec import Count, InvalidRecord, JsonLayout, read_json, row_from_json
 from core.session.files import FileLine, alone_in, is_being_written, is_sealed, lines_of, read_line
 from core.session.manifest import (
+    DESCRIPTION,
     EVENTS,
     FRAMES,
     PREFIX,
@@ -260,7 +262,7 @@ def _manifest_of(session: Path) -> tuple[Manifest, list[str]]:
     except NewerVersion:
         raise
     except SessionError as error:
-        return _unknown(session), [str(error)]
+        return unknown_manifest(session), [str(error)]
 
 
 def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Recovery:
@@ -273,6 +275,8 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
         found.copy_video(path, work / path.name)
         on_bytes(path.stat().st_size)
     found.check_anything(session)
+    with contextlib.suppress(FileNotFoundError):
+        shutil.copy(session / DESCRIPTION, work / DESCRIPTION)
     if is_unknown and found.rows:
         # The zero of the rows' clock is unknown; the time in the folder's name is that of the first row.
         manifest = manifest.model_copy(update={"started_monotonic_s": found.captured_s[0]})
@@ -285,7 +289,7 @@ def _salvage(session: Path, work: Path, target: Path, on_bytes: OnBytes) -> Reco
     return Recovery(target, len(found.rows), len(found.kept), loss)
 
 
-def _unknown(session: Path) -> Manifest:
+def unknown_manifest(session: Path) -> Manifest:
     """A manifest for a session whose own is lost: nothing is claimed."""
     try:
         started = datetime.strptime(session.name.removeprefix(PREFIX)[:16], "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)

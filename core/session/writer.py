@@ -25,7 +25,7 @@ from core.control.faults import Cause, Fault
 from core.messages import message
 from core.session.codec import light_tick, row_of
 from core.session.files import EncodedFrame, SessionFiles
-from core.session.manifest import About, Event, EventKind, SessionError, events_between
+from core.session.manifest import About, Description, Event, EventKind, SessionError, events_between
 from core.session.video import FrameEncoder, VideoError
 from core.types import Frame, Tick
 
@@ -498,6 +498,10 @@ class Recording:
             if self._target is not None:  # under other thresholds the rig and its destination are the same
                 self._ring.add_event(self._target)
 
+    def describe(self, description: Description) -> None:
+        """What later sessions are about; the one that is being written stays as it is."""
+        self._about = replace(self._about, description=description)
+
     def save_ring(self) -> None:
         """Write what the ring holds, in the background."""
         frames, events = self._ring.content() if self._ring is not None else ([], [])
@@ -570,6 +574,10 @@ class SessionWriter:
     def set_about(self, about: About) -> None:
         """Another rig was opened: the running session ends and the ring is cleared, since a session never mixes two rigs."""
         self._enqueue_end(lambda dropped: self._recording.change_rig(about, dropped))
+
+    def describe(self, description: Description) -> None:
+        """What the sessions that begin from here on are about."""
+        self._enqueue(lambda: self._recording.describe(description))
 
     def put(self, tick: Tick, drive: DriveView | None = None, bus: Any = None) -> bool:
         """Hand a tick over, with who drives and the newest status of the servo bus (a dataclass) where there are such.

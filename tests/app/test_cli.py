@@ -24,7 +24,10 @@ COMMANDS = (
     "gui", "perceive", "synth", "train", "teach", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
     "trigger", "play", "doctor", "desktop", "session", "rig",
 )  # fmt: skip
-INNER = {"session": ("info", "recover", "export"), "rig": ("list", "show", "calibrate", "accept", "restore-servos", "board")}
+INNER = {
+    "session": ("info", "describe", "recover", "export"),
+    "rig": ("list", "show", "calibrate", "accept", "restore-servos", "board"),
+}
 SLOW = ("PySide6", "numpy", "torch", "openvino", "cv2", "scipy", "mujoco", "pydantic", "rich")
 
 

@@ -19,6 +19,7 @@ from app.commands import record as record_command
 from app.commands.session import describe
 from core.config.safety import AtClose
 from core.devices import DeviceError
+from core.program import program_line
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
 from core.types import Tick
@@ -51,7 +52,8 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def recorded(config: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object]]:
     """A session of the twin, and what ``record --json`` said."""
     out = tmp_path_factory.mktemp("sessions")
-    done = run("record", "--seconds", 1.5, "--out", out / "new folder", "--config", config, "--json")
+    about = ("--operator", "Ana", "--condition", "alone", "--tag", "pilot")
+    done = run("record", "--seconds", 1.5, "--out", out / "new folder", "--config", config, "--json", *about)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     return Path(result["session"]), result
@@ -87,6 +89,26 @@ def test_info_is_one_object_and_a_table(recorded: tuple[Path, dict[str, object]]
     assert table.returncode == 0
     assert "all recorded" in table.stdout
     assert "ADVISORY" in table.stdout
+
+
+def test_what_a_session_is_about_is_given_and_changed(recorded: tuple[Path, dict[str, object]]) -> None:
+    session, _ = recorded
+    for changes, expected in (
+        ((), {"operator": "Ana", "condition": "alone", "phantom": "s_curve", "task": None, "tags": ["pilot"]}),
+        (
+            ("--task", "loop", "--condition", " ", "--tag", "b", "--untag", "pilot"),
+            {"condition": None, "task": "loop", "tags": ["b"]},
+        ),
+    ):
+        assert run("session", "describe", session, *changes).returncode == 0
+        info = json.loads(run("session", "info", session, "--json").stdout)
+        assert {key: info[key] for key in expected} == expected
+    assert info["program"] == program_line()
+    assert read_manifest(session).description.tags == ("pilot",), "the manifest is as it was recorded"
+    assert (
+        run("library", session / "nothing").stderr
+        == f"error: {session / 'nothing'}: no such folder; give one that holds sessions\n"
+    )
 
 
 def test_export_writes_all_formats(recorded: tuple[Path, dict[str, object]], tmp_path: Path) -> None:

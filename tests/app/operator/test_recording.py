@@ -19,6 +19,7 @@ from app.operator.record_bar import RecordBar
 from app.operator.recording import AfterSession, Declined, RecoveryController, loss_words
 from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
+from app.ui.description_form import DescriptionDialog
 from app.widgets.messages import OfferStrip
 from core.annotation.store import DEFAULT_NAME
 from core.config.models import Config
@@ -28,7 +29,14 @@ from core.control.modes import Act
 from core.evaluation.replay import event_target
 from core.session import writer as session_writer
 from core.session.files import is_being_written
-from core.session.manifest import MANIFEST, EventKind
+from core.session.manifest import (
+    MANIFEST,
+    Description,
+    EventKind,
+    read_description,
+    read_manifest,
+    remembered_description,
+)
 from core.session.reader import SessionReader
 from core.session.recovery import CutSession
 from core.session.writer import RecordStatus
@@ -331,7 +339,7 @@ def test_one_click_evaluates_what_was_measured_by_hand_and_opens_the_report(
     assert len(images) == 12
     measure(session / DEFAULT_NAME, images[:3], [0.0, 10.0, 20.0])
     after.offer(session)
-    assert list(strip.answers) == ["Annotate", "Evaluate", "Play", "\N{MULTIPLICATION SIGN}"]
+    assert list(strip.answers) == ["Annotate", "Evaluate", "Play", "Describe", "\N{MULTIPLICATION SIGN}"]
     strip.answers["Evaluate"].click()
     assert "Evaluating" in strip.text
     qtbot.waitUntil(lambda: bool(shown), timeout=LONG_MS)
@@ -387,8 +395,9 @@ def test_a_window_that_fails_says_why(after: AfterSession, said: list[str], qtbo
 
 
 def test_the_window_offers_it_when_a_recording_ends_and_takes_it_back_when_the_next_begins(
-    running: OperatorWindow, qtbot: QtBot, tmp_path: Path
+    running: OperatorWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "remembered"))
     side = WindowServices(running, tmp_path / "state")
     strip = running.panels.offers
     running.recorder.toggle()
@@ -399,9 +408,23 @@ def test_the_window_offers_it_when_a_recording_ends_and_takes_it_back_when_the_n
     assert strip.geometry().bottom() < live.height(), "over the picture's lower edge"
     assert strip.width() <= live.width()
     assert running.panels.toast.geometry().bottom() < strip.y(), "no message over the offer"
-    assert side.after.session is not None
+    session = side.after.session
+    assert session is not None
+    assert "Who recorded it?" in strip.text
+    strip.answers["Describe"].click()
+    (dialog,) = running.findChildren(DescriptionDialog)
+    dialog.form.fields["operator"].setText("Ana")
+    dialog.form.fields["tags"].setText("pilot")
+    dialog.accept()
     running.recorder.toggle()
-    until(qtbot, lambda: strip.text == "")
+    until(qtbot, lambda: strip.text == "" and running.recorder.status.frames >= 1)
+    until(qtbot, lambda: remembered_description() == Description(operator="Ana"))
+    assert read_description(session, None).tags == ("pilot",)
+    running.recorder.toggle()
+    until(qtbot, lambda: "Session saved" in strip.text)
+    assert "Who recorded it?" not in strip.text
+    assert side.after.session is not None
+    assert read_manifest(side.after.session).description == Description(operator="Ana", phantom="s_curve")
     side.close()
 
 

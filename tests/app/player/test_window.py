@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import threading
@@ -19,12 +20,22 @@ from pytestqt.qtbot import QtBot
 from app.player import session_model
 from app.player.course import JumpKind
 from app.player.window import PlayerWindow
+from app.ui.description_form import DescriptionDialog
 from app.ui.texts import signed_degrees
 from core.config.models import Config
 from core.control.modes import Mode
 from core.session.codec import scene_to_json
 from core.session.files import LineFile
-from core.session.manifest import Event, EventKind, SessionError, event_of_target, read_manifest, write_manifest
+from core.session.manifest import (
+    Description,
+    Event,
+    EventKind,
+    SessionError,
+    event_of_target,
+    read_description,
+    read_manifest,
+    write_manifest,
+)
 from core.session.reader import SessionReader
 from core.session.writer import SessionWriter
 from core.types import Frame, PoseState, Reason, Refusal, RobotStatus, Tick
@@ -659,6 +670,22 @@ def test_frames_are_annotated_in_a_window_of_their_own(
     window.annotate_refused()
     assert len(asked) == 4 and window.panels.toast.text() == "No frame without a pose here"
     until(qtbot, lambda: not window.others._children)
+
+
+def test_the_player_says_what_the_session_is_about_and_keeps_changes(
+    open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot
+) -> None:
+    copy = Path(shutil.copytree(session, tmp_path / session.name))
+    window = open_player(copy)
+    until(qtbot, lambda: window.place == 0)
+    press(window, Key.Key_D)
+    (dialog,) = window.findChildren(DescriptionDialog)
+    dialog.form.fields["operator"].setText("Ana")
+    dialog.form.fields["tags"].setText("pilot")
+    QTest.keyClick(dialog.form.fields["operator"], Key.Key_Return)
+    until(qtbot, lambda: "Ana" in window.panels.plate.text)
+    assert "#pilot" in window.panels.plate.toolTip()
+    assert read_description(copy, None) == Description(operator="Ana", tags=("pilot",))
 
 
 def test_the_command_refuses_what_is_no_session_in_one_line(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run, scrubbed
+from core.program import program_version
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
 
@@ -46,7 +47,15 @@ def test_an_error_stops_the_servos_ends_the_recording_and_is_reported_once(where
         assert len(reader) >= 5
         assert not reader.problems
     text = report.read_text()
-    for part in ("== versions", "openvino", "== configuration", '"perception"', "in fail", "== last lines of the log"):
+    for part in (
+        "== versions",
+        f"lumenpilot {program_version()}",
+        "openvino",
+        "== configuration",
+        '"perception"',
+        "in fail",
+        "== last lines of the log",
+    ):
         assert part in text
     assert str(Path.home()) not in text
     assert ("thread helper" in text) is (where == "thread")
