@@ -12,7 +12,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from app.annotator.sources import recording_of
+from app.annotator.sources import recorded_angles, recording_of
 from app.commands.progress import progress_bar
 from core.annotation.agreement_report import (
     agreement_report,
@@ -215,3 +215,28 @@ def rater_agreement(answers: Sequence[StoredAnnotation], images: Sequence[FoundI
     groups = groups_of_answered(answers, {image.sha256: image.path for image in images})
     report = agreement_report(answers, {image.sha256: name_as_text(image.path.name) for image in images}, seed, groups)
     return {"study": answers[0].key.study} | report
+
+
+ANGLE_COLUMNS = (
+    *("image", "frame", "time_s", "rater", "theta_deg", "theta_signed_deg", "state", "provenance"),
+    "algorithm_theta_signed_deg",
+)
+"""Of ``--export angles``: an angle by hand in each row; ``time_s`` counts from the first picture of the recording."""
+
+
+def angles_over_time(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage]) -> list[dict[str, Any]]:
+    """The angles of all pictures with both lines, by recording, rater and time; the recorded ones of the algorithm beside them."""
+    paths = {image.sha256: image.path for image in images}
+    found = [one for one in annotations if one.theta_deg is not None and not one.content.without_pose and one.key.sha256 in paths]
+    recorded = {folder: recorded_angles(folder) for folder in {paths[one.key.sha256].parent for one in found}}
+    rows = []
+    order = {one.key: (paths[one.key.sha256].parent, one.key.rater, paths[one.key.sha256].name, one.key.repeat) for one in found}
+    for one in sorted(found, key=lambda one: order[one.key]):
+        path = paths[one.key.sha256]
+        digits = path.stem.rpartition("_")[2]
+        frame = int(digits) if digits.isascii() and digits.isdigit() else None
+        time_s, algorithm = recorded[path.parent].get(-1 if frame is None else frame, (None, None))
+        state = one.content.state.value if one.content.state is not None else None
+        values = (name_as_text(path.name), frame, time_s, one.key.rater, one.theta_deg, one.theta_signed_deg, state)
+        rows.append(dict(zip(ANGLE_COLUMNS, (*values, one.provenance.value, algorithm), strict=True)))
+    return rows

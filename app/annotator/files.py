@@ -23,9 +23,13 @@ if TYPE_CHECKING:
 
 IMPORTED = tuple({one.ending for one in FORMATS.values()} - {".png"})
 """Endings of files that are imported when they are dropped; a dropped picture is opened."""
-_EXPORTS = {"dataset": mark("Training set (a folder)"), "csv": mark("Table for evaluate (*.csv)")}
+_EXPORTS = {
+    "dataset": mark("Training set (a folder)"),
+    "csv": mark("Table for evaluate (*.csv)"),
+    "angles": mark("Angles over time, with a figure (*.csv)"),
+}
 """What can be exported besides ``FORMATS``, as the file dialog lists it."""
-_ENDING = {"csv": ".csv"} | {one.name: one.ending for one in FORMATS.values() if one.writes_file}
+_ENDING = {"csv": ".csv", "angles": ".csv"} | {one.name: one.ending for one in FORMATS.values() if one.writes_file}
 _WORK = "work"
 """Key of the offer that shows the work that goes on."""
 

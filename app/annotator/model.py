@@ -15,15 +15,18 @@ from app.ui.workers import Worker
 from app.widgets.image_canvas import halvings
 from core.annotation.carry import carried_masks
 from core.annotation.exchange import Proposal, merged, proposal_of
+from core.annotation.follow import followed_lines
 from core.annotation.formats import Imported, read_files
 from core.annotation.model import (
     ANSWERED,
+    FOLLOWS_LINES,
     AngleProvenance,
     Annotation,
     AnnotationError,
     History,
     ImageView,
     JournalEntry,
+    Line,
     MaskTarget,
     Readout,
     Status,
@@ -68,7 +71,8 @@ class AnnotationModel(QObject):
     place of an item; ``imported`` with the number of images that got something from other programs' files, and lines on what was
     left out; ``saved`` when everything is on the disk; ``failed`` with one line and whether edits wait to be written;
     ``proposed`` when there is a proposal for the open item; ``carried`` with masks that another image's lead to, as an
-    annotation of the open item, and that image's name.
+    annotation of the open item, and that image's name; ``following`` with how many images of how many are done; ``followed`` with
+    the number of images whose lines were changed.
 
     Parameters
     ----------
@@ -85,6 +89,8 @@ class AnnotationModel(QObject):
     proposed = Signal()
     carried = Signal(object, str)
     imported = Signal(int, object)
+    following = Signal(int, int)
+    followed = Signal(int)
 
     def __init__(
         self,
@@ -128,6 +134,10 @@ class AnnotationModel(QObject):
         self._carrying = Worker("carrying", self, latest_only=True)
         self._carrying.done.connect(self._on_carried)
         self._carrying.failed.connect(lambda _place, line: self.failed.emit(line, False))
+        self._tracking = Worker("following", self, latest_only=True, behind=True)
+        self._tracking.done.connect(self._on_followed)
+        self._tracking.failed.connect(self._on_not_followed)
+        self._goes_on = False
         self._importing = Worker("importing", self)
         self._importing.done.connect(self._on_read)
         self._importing.failed.connect(lambda _paths, line: self.failed.emit(line, False))
@@ -415,6 +425,69 @@ class AnnotationModel(QObject):
         if self.item is not None and self.item.key == key and self.is_open:
             self.carried.emit(self._in_view(found[0]), found[1])
 
+    # ---- lines through a clip
+
+    def follow(self) -> int:
+        """Follow the lines of the open item's clip: the images of its folder and size, in the order of their names.
+
+        Images whose lines were drawn or corrected are followed from; the others get lines, unless their answer is that there is
+        no pose. Returns the number of those; 0 in a blind study, and where no image has both lines.
+        """
+        item = self.item
+        if item is None or self.blind:
+            return 0
+        near = (item.image.path.parent, item.image.record.size)
+        places = [k for k, one in enumerate(self.items) if (one.image.path.parent, one.image.record.size) == near]
+        places.sort(key=lambda place: self.items[place].image.path.name)
+        keys = {number: self.content(place) for number, place in enumerate(places) if self._is_own(place)}
+        if not keys or len(keys) == len(places):
+            return 0
+        paths, count, store = [self.items[place].image.path for place in places], len(places) - len(keys), self.store
+        unread = [place for place in places if place not in self._histories]
+        self._goes_on = True
+
+        def find() -> tuple[list[tuple[int, Line, Line]], dict[int, History]]:
+            found = []
+            lines = followed_lines(lambda number: read_image(paths[number]), keys, len(paths), lambda: self._goes_on)
+            for number, robot, vessel in lines:
+                found.append((places[number], robot, vessel))
+                self.following.emit(len(found), count)
+            return found, {place: store.history(self.items[place].key) for place in unread}
+
+        self._tracking.submit(item.key, find)
+        return count
+
+    def stop_following(self) -> None:
+        """What was followed so far is kept."""
+        self._goes_on = False
+
+    def _is_own(self, place: int) -> bool:
+        """Whether an item has both lines, and not by following alone."""
+        content = self.content(place)
+        has_both = len(content.robot) > 1 and len(content.vessel) > 1
+        return has_both and self.provenance(place) is not AngleProvenance.FOLLOWED
+
+    def _on_followed(self, _key: object, found: tuple[list[tuple[int, Line, Line]], dict[int, History]]) -> None:
+        lines, histories = found
+        changed = set()
+        for place, robot, vessel in lines:
+            old = self.content(place)
+            if self._is_own(place) or old.without_pose:  # drawn or answered meanwhile
+                continue
+            history = self._histories.get(place) or self._histories.setdefault(place, histories[place])
+            content = replace(old, robot=robot, vessel=vessel)
+            entry = history.edit(FOLLOWS_LINES, content)
+            if entry is not None:
+                self._write(place, entry, content)
+                changed.add(place)
+        if self.index in changed:
+            self.changed.emit()
+        self.followed.emit(len(changed))
+
+    def _on_not_followed(self, _key: object, line: str) -> None:
+        self.followed.emit(0)
+        self.failed.emit(line, False)
+
     # ---- other programs' files
 
     def import_files(self, paths: Sequence[Path]) -> None:
@@ -461,7 +534,7 @@ class AnnotationModel(QObject):
         if self._is_shut:
             return ()
         self._save_time()
-        self._is_shut = True
+        self._is_shut, self._goes_on = True, False
         self._retry.stop()
         if self._to_write:
             self._saving.submit("edit", self._write_all)

@@ -99,6 +99,31 @@ def recording_of(folder: Path) -> Path | None:
     return folder if (folder / _VIDEO_RECORD).is_file() else None
 
 
+def recorded_angles(folder: Path) -> dict[int, tuple[float, float | None]]:
+    """By number of the picture in its video, the time (s) and, of a session, the algorithm's signed angle (degrees, None: refused).
+
+    Empty for a folder that was not extracted from a video that is still there.
+    """
+    name = folder.name.removesuffix(_FRAMES_SUFFIX)
+    beside = [path for path in sorted(folder.parent.glob(f"{escape(name)}*")) if is_video(path) and name in (path.name, path.stem)]
+    if name == folder.name or not beside:
+        return {}
+    video = beside[0]
+    times_ms = times_of(video)
+    if not is_of_session(video):
+        return {index: ((time_ms - times_ms[0]) / 1000.0, None) for index, time_ms in enumerate(times_ms)}
+    number, index_of = video_number(video), {time_ms: index for index, time_ms in enumerate(times_ms)}
+    with SessionReader(folder.absolute().parent) as reader:
+        reader.wait()
+        line = reader.timeline()
+    found: dict[int, tuple[float, float | None]] = {}
+    for place in np.flatnonzero(line.video == number).tolist():
+        index, theta = index_of.get(int(line.pts_ms[place])), float(line.theta_deg[place])
+        if index is not None:
+            found[index] = round(float(line.time_s[place] - line.time_s[0]), 6), None if math.isnan(theta) else theta
+    return found
+
+
 def _evenly(count: int) -> Choose:
     """`count` pictures evenly over time, or all where there are fewer."""
     return lambda total: sorted({round(place) for place in np.linspace(0, total - 1, min(count, total))})

@@ -86,6 +86,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             None,
             MenuEntry(tr("Take the &algorithm's lines, or mask"), window.apply_proposal, ("G",)),
             MenuEntry(tr("&Masks as in another image"), window.carry_masks, ("V",)),
+            MenuEntry(tr("Follow the &lines through the clip"), window.follow_lines, ("Ctrl+F",)),
             MenuEntry(tr("&Fewer points on outlines"), window.simplify, ("S",)),
         ],
     )
@@ -177,8 +178,8 @@ class AnnotatorPanels(QWidget):
         self.offers.lifted.connect(self.toast.lift)
 
 
-_DONE = "done"
-"""Key of the offer after the last image."""
+_DONE, _FOLLOWING = "done", "following"
+"""Keys of the offers after the last image, and while lines are followed."""
 _TAKEN_BACK = {Answer.CANNOT_TELL: "can tell", Answer.NO_ROBOT: "there is a robot"}
 
 
@@ -224,6 +225,8 @@ class AnnotatorWindow(WindowFrame):
         model.failed.connect(self._on_failed)
         model.proposed.connect(self._show_proposal)
         model.carried.connect(self._show_carried)
+        model.following.connect(self._show_following)
+        model.followed.connect(self._on_followed)
         self.files.said.connect(self.show_message)
         self.others.said.connect(self.show_message)
         panels.bar.answered.connect(self.give)
@@ -546,6 +549,27 @@ class AnnotatorWindow(WindowFrame):
             self.show_message(tr("A blind study: masks are drawn outside it"))
         else:
             self.show_message(tr("No other image of this folder and size has a robot mask"))
+
+    def follow_lines(self) -> None:
+        """Follow the drawn lines through all images of the clip; what was drawn or corrected stays, and is followed from."""
+        self._complete_edits()
+        count = self.model.follow()
+        if count:
+            self._show_following(0, count)
+        elif self.model.blind:
+            self.show_message(tr("A blind study: lines are drawn by hand in it"))
+        else:
+            self.show_message(tr("Draw both lines on an image of this folder first; the others get theirs from it"))
+
+    def _show_following(self, done: int, count: int) -> None:
+        stop = OfferButton(tr("Stop"), self.model.stop_following, tr("What was followed so far is kept"))
+        words = tr("Following the lines: {done} of {count} images", done=done, count=count)
+        self.panels.offers.offer(Offer(_FOLLOWING, words, "", (stop,), share=done / count, dismissed=self.model.stop_following))
+
+    def _on_followed(self, count: int) -> None:
+        self.panels.offers.withdraw(_FOLLOWING)
+        if count:
+            self.show_message(tr("{count} images have followed lines: correct one, and Ctrl+F follows from it", count=count))
 
     def _show_carried(self, proposal: Annotation, name: str) -> None:
         self._hide_proposal()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
 from collections import Counter
@@ -29,7 +30,7 @@ from app.commands.progress import check_can_write, progress_bar
 from app.ui.i18n import tr
 from core.annotation.formats import FORMATS, export_as, read_files
 from core.annotation.model import AnnotationError, ImageView, measure_lines
-from core.annotation.store import AnnotationStore, FoundImage, ItemKey
+from core.annotation.store import AnnotationStore, FoundImage, ItemKey, StoredAnnotation
 from core.annotation.study import QueueOrder, StudySettings, Task, queue_order, repeat_views, settings_from, tasks
 from core.config.files import own_config
 from core.config.models import Config, choose_model, load_config
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from app.annotator.model import QueueEntry
 
 
-EXPORTS = ("dataset", "csv", *(one.name for one in FORMATS.values() if one.write is not None))
+EXPORTS = ("dataset", "csv", "angles", *(one.name for one in FORMATS.values() if one.write is not None))
 _DISAGREEMENT_DEG = 30.0
 """A disagreement of so much takes all certainty from an image, half as much half of it."""
 _KEPT = (("loupe", "L"), ("masks", "K"))
@@ -168,6 +169,8 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         print_warnings(problems)
         said = f"{count} image{'s' if count != 1 else ''} with both masks in {options.out}"
         sys.stderr.write(f"{said}; next: {COMMAND} train --data {options.out} --init default --out MODEL\n")
+    elif options.export == "angles":
+        _export_angles(annotations, images, options.out)
     elif options.export in FORMATS:
         count = export_as(FORMATS[options.export], annotations, images, options.out)
         sys.stderr.write(f"{options.export} of {count} image{'s' if count != 1 else ''} in {options.out}\n")
@@ -193,6 +196,29 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         if missed:
             raise KeyboardInterrupt
     return 0
+
+
+def _export_angles(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], out: Path) -> None:
+    """The angles over time as a table, and as a figure beside it. Raises AnnotationError."""
+    from app.annotator.comparison import ANGLE_COLUMNS, angles_over_time
+    from app.commands.figures import draw_angles, save_figure
+
+    figure = out.with_suffix(".svg")
+    for path in (out, figure):
+        if path.exists():
+            raise AnnotationError(f"{path}: is there already; choose another --out")
+    rows = angles_over_time(annotations, images)
+    if not rows:
+        raise AnnotationError("no image has both lines; draw them in annotate, and follow them with Ctrl+F")
+    try:
+        with out.open("x", newline="", encoding="utf-8") as file:
+            table = csv.DictWriter(file, ANGLE_COLUMNS)
+            table.writeheader()
+            table.writerows(rows)
+        save_figure(draw_angles(rows), figure)
+    except OSError as error:
+        raise AnnotationError(f"{error.filename or out}: cannot be written ({error.strerror}); choose another --out") from None
+    sys.stderr.write(f"{len(rows)} angles in {out}, their course in {figure}\n")
 
 
 def import_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:
@@ -349,7 +375,7 @@ def run_annotate(options: AnnotateOptions) -> int:
     if options.joins and options.study.rater is not None:
         raise AnnotationError("--join takes all raters of a file; --as THERE=HERE says what one of them is called here")
     if options.export is not None and options.out is None:
-        raise AnnotationError("--export needs --out: a file for csv and coco, else a folder")
+        raise AnnotationError("--export needs --out: a file for csv, angles and coco, else a folder")
     if options.as_json and not options.report:
         raise AnnotationError("--json is for --report; leave it out")
     if options.rows is not None:

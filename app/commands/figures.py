@@ -231,6 +231,25 @@ def _round_step(rough: float) -> float:
 _Floats = NDArray[np.float64]
 
 
+def draw_angles(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Angles by hand over time (rows of ``--export angles``), drawn ones larger than followed ones, beside the algorithm's."""
+    with styled():
+        figure = _new_figure((7.0, 2.75))
+        axes = figure.add_subplot()
+        timed = all(row["time_s"] is not None for row in rows)
+        across = _column([row["time_s"] if timed else number for number, row in enumerate(rows)])
+        algorithm, manual = (_column([row[name] for row in rows]) for name in ("algorithm_theta_signed_deg", "theta_signed_deg"))
+        is_followed = np.array([row["provenance"] == "followed" for row in rows])
+        axes.plot(across, algorithm, color=GREY, lw=1.6, label="algorithm")
+        axes.plot(across[is_followed], manual[is_followed], ".", color=BLUE, ms=2.5, label="followed")
+        axes.plot(across[~is_followed], manual[~is_followed], "o", color=VERMILLION, ms=3.5, label="drawn or corrected")
+        axes.axhline(0.0, color=PALE, lw=0.7, zorder=0)
+        axes.set_xlabel("time (s)" if timed else "picture")
+        axes.set_ylabel("theta (°)")
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=3, frameon=False, fontsize=7, borderaxespad=0.0)
+    return figure
+
+
 def draw_replay(changes: Sequence[Change], matrix: list[list[int]], name: str) -> Figure:
     """Two columns of a journal's page. `matrix` is that of ``summarise``; `name` the session's."""
     time_s = np.array([change.time_s for change in changes])

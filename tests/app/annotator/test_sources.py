@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from app.annotator.comparison import groups_of
-from app.annotator.sources import default_store, image_files, session_rows
+from app.annotator.sources import default_store, image_files, recorded_angles, session_rows
 from core.annotation.store import DEFAULT_NAME
 from core.devices import UserError
 from core.learning.dataset import write_png
@@ -162,3 +162,10 @@ def test_rows_that_are_not_there_are_named(session: Path, chosen: str, message: 
 def test_rows_are_those_of_a_session(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such session"):
         session_rows(tmp_path / "gone", "1")
+
+
+def test_a_picture_of_a_session_has_its_time_and_the_recorded_angle(tmp_path: Path) -> None:
+    session = record(tmp_path, [tick_of(k, 1000.0 + k / 10, full=k > 0) for k in range(4)])
+    (folder,) = {path.parent for path in image_files([session], 4)}
+    assert recorded_angles(folder) == {0: (0.0, None), 1: (0.1, -5.5), 2: (0.2, -5.5), 3: (0.3, -5.5)}
+    assert recorded_angles(tmp_path) == {}

@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -835,3 +836,30 @@ def test_contrast_changes_the_picture_only(rater: Rater) -> None:
     assert rater.canvas.grab().toImage().pixelColor(middle).red() == before + 30
     QTest.keyClick(rater.canvas, Key.Key_Slash)
     assert rater.canvas.grab().toImage().pixelColor(middle).red() == before
+
+
+def test_lines_are_followed_through_the_clip_and_begin_again_from_a_correction(qtbot: QtBot, tmp_path: Path) -> None:
+    still = np.random.default_rng(1).integers(40, 200, (SIZE[1], SIZE[0], 3), np.uint8)
+    for k in range(3):
+        write_png(tmp_path / f"{k}.png", np.roll(still, 2 * k, axis=1))
+    rater = Rater(qtbot, tmp_path, (ImageView.AS_IS,), blind=False, hides_angle=False)
+    control = Qt.KeyboardModifier.ControlModifier
+    rater.press(Key.Key_F, modifier=control)
+    assert rater.message == "Draw both lines on an image of this folder first; the others get theirs from it"
+    lines = Annotation(((200.0, 240.0), (300.0, 240.0)), ((150.0, 260.0), (450.0, 260.0)))
+    rater.model.edit("draw", lines)
+    with qtbot.waitSignal(rater.model.followed, timeout=60_000) as done:
+        rater.press(Key.Key_F, modifier=control)
+    assert done.args == [2]
+    assert [rater.model.provenance(k).value for k in range(3)] == ["manual", "followed", "followed"]
+    heads = [rater.model.content(k).robot[-1] for k in range(3)]
+    assert heads == [pytest.approx((300.0 + 2 * k, 240.0), abs=0.3) for k in range(3)]
+    rater.press(Key.Key_N, Key.Key_N)
+    low = replace(rater.drawn, robot=((204.0, 250.0), (304.0, 250.0)))
+    rater.model.edit("move a point", low)
+    assert rater.model.provenance(2).value == "corrected"
+    with qtbot.waitSignal(rater.model.followed, timeout=60_000):
+        rater.press(Key.Key_F, modifier=control)
+    assert rater.model.content(2) == low, "a correction stays"
+    kept = {one.key.sha256: one for one in rater.kept()}
+    assert sorted(one.provenance.value for one in kept.values()) == ["corrected", "followed", "manual"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 import sqlite3
@@ -140,6 +141,19 @@ def test_annotations_become_a_training_set_a_coco_file_and_come_back(folder: Pat
         assert [(one.key.rater, len(one.content.masks)) for one in store.annotations()] == [("eve", 2)] * 3
     with pytest.raises(UserError, match="nothing was imported"):
         run(folder, imports=(tmp_path / "coco.json",), store=other, study=StudyOptions(rater="eve"))
+
+
+def test_angles_over_time_go_out_as_table_and_figure(folder: Path, tmp_path: Path) -> None:
+    annotate(folder, raters=("ann",))
+    run(folder, export="angles", out=tmp_path / "angles.csv")
+    with (tmp_path / "angles.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["image"], row["rater"], row["provenance"]) for row in rows] == [(f"{k}.png", "ann", "manual") for k in range(3)]
+    assert all(abs(float(row["theta_signed_deg"])) == float(row["theta_deg"]) for row in rows)
+    assert (rows[0]["time_s"], rows[0]["algorithm_theta_signed_deg"]) == ("", ""), "they are of no recording"
+    assert (tmp_path / "angles.svg").read_bytes().startswith(b"<?xml")
+    with pytest.raises(UserError, match=r"angles\.csv: is there already"):
+        run(folder, export="angles", out=tmp_path / "angles.csv")
 
 
 def test_a_training_set_has_the_angles_of_one_study_and_masks_from_anywhere(folder: Path, tmp_path: Path) -> None:
@@ -319,7 +333,7 @@ def test_an_empty_name_is_no_model() -> None:
     ("options", "message"),
     [
         ({"report": True}, "no such annotation file; annotate the images first"),
-        ({"export": "xml", "out": Path("x")}, "--export xml: must be one of dataset, csv, labelme, coco"),
+        ({"export": "xml", "out": Path("x")}, "--export xml: must be one of dataset, csv, angles, labelme, coco"),
         ({"export": "csv"}, "--export needs --out"),
         ({"report": True, "salvage": True}, "give one of them"),
         ({"imports": (Path("nowhere.json"),)}, "nothing was imported"),
