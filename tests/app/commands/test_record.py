@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -27,6 +26,7 @@ from hardware.servos.bus_ipc import BusStatus
 from tests.app.bus_status import bus, servo
 from tests.app.fakes import FakePilot
 from tests.app.program import run
+from tests.core.session_data import record as record_session
 from tests.core.session_data import set_open, tick_of
 
 # a small picture and one thread: the machine that runs the tests may be busy
@@ -133,15 +133,15 @@ def test_export_writes_all_formats(recorded: tuple[Path, dict[str, object]], tmp
     assert "there already" in again.stderr
 
 
-def test_a_recording_that_was_killed_is_recovered_by_the_command(recorded: tuple[Path, dict[str, object]], tmp_path: Path) -> None:
-    session = Path(shutil.copytree(recorded[0], tmp_path / recorded[0].name))
+def test_a_recording_that_was_killed_is_recovered_by_the_command(tmp_path: Path) -> None:
+    session = record_session(tmp_path, [tick_of(k, 1000.0 + k / 30) for k in range(8)])
     set_open(session)
     info = run("session", "info", session, "--json")
     assert json.loads(info.stdout)["ended"] == "cut"
     done = run("session", "recover", session, "--json")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
-    assert (result["frames"], result["lost"]["rows"]) == (recorded[1]["frames"], 0)
+    assert (result["frames"], result["lost"]["rows"]) == (8, 0)
     assert json.loads(run("session", "info", result["session"], "--json").stdout)["problems"] == []
 
 
