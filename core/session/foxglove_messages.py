@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -187,31 +188,27 @@ def overlays(row: RecordedRow, stamp: Timestamp, kind: str) -> ImageAnnotations:
 
     In source pixels; viewers count from the corner of the first pixel, we from its centre. `kind`: a word before the pose, or "".
     """
-    scene = row.scene
-    lines: list[tuple[str, Points, float]] = []
-    outlines: list[tuple[str, Points, float]] = []
+    scene, lines = row.scene, list[tuple[PointsAnnotationType, str, Any, float]]()
     if scene.masks is not None:
         for name, mask, leave_px in (("vessel", scene.masks.vessel, VESSEL_LINE_PX), ("robot", scene.masks.robot, ROBOT_LINE_PX)):
-            outlines += [(name, outline.astype(np.float64), 1.0) for outline in mask_outlines(mask, leave_px)]
-    if scene.vessel_graph is not None:
-        lines += [("vessel", _line(edge.points), 1.5) for edge in scene.vessel_graph.edges]
+            lines += [(PointsAnnotationType.LineLoop, name, outline, 1.0) for outline in mask_outlines(mask, leave_px)]
+    edges = scene.vessel_graph.edges if scene.vessel_graph is not None else ()
+    strips: list[tuple[str, Points, float]] = [("vessel", edge.points, 1.5) for edge in edges]
     if scene.route is not None:
-        lines.append(("route", _line(scene.route.points), 3.0))
+        strips.append(("route", scene.route.points, 3.0))
     if scene.path is not None:
-        lines.append(("robot", _line(scene.path.points), 2.0))
+        strips.append(("robot", scene.path.points, 2.0))
     for name, vector in (("vessel vector", scene.vessel_vector), ("robot vector", scene.robot_vector)):
         if vector is not None:
-            lines.append((name, np.array([vector.start, vector.end], np.float64), 3.0))
+            strips.append((name, np.array([vector.start, vector.end]), 3.0))
+    lines += [(PointsAnnotationType.LineStrip, name, thinned(line), width) for name, line, width in strips if len(line)]
+    whole = np.concatenate([np.zeros((0, 2)), *(line for _, _, line, _ in lines)])
+    corners = (Point2(x=x, y=y) for x, y in np.round(scene.points_to_source(whole) + 0.5, 2).tolist())
     points = [
         PointsAnnotation(
-            timestamp=stamp,
-            type=shape,
-            points=[Point2(x=x, y=y) for x, y in np.round(scene.points_to_source(line) + 0.5, 2).tolist()],
-            outline_color=_COLOURS[name],
-            thickness=thickness,
+            timestamp=stamp, type=kind_of, points=list(islice(corners, len(line))), outline_color=_COLOURS[name], thickness=width
         )
-        for shape, drawn in ((PointsAnnotationType.LineLoop, outlines), (PointsAnnotationType.LineStrip, lines))
-        for name, line, thickness in drawn
+        for kind_of, name, line, width in lines
     ]
     pose = scene.pose
     text = f"{pose.state.value}  theta {pose.theta_signed_deg:+.1f} deg" if pose else str(scene.refusal or "no pose")
@@ -224,7 +221,3 @@ def overlays(row: RecordedRow, stamp: Timestamp, kind: str) -> ImageAnnotations:
         background_color=_SHADE,
     )
     return ImageAnnotations(timestamp=stamp, points=points, texts=[caption])
-
-
-def _line(points: Points) -> Points:
-    return np.array(thinned(points), np.float64).reshape(-1, 2)
