@@ -15,6 +15,7 @@ from rich.table import Table
 from app.annotator.sources import recorded_angles, recording_of
 from app.commands.progress import progress_bar
 from core.annotation.agreement_report import (
+    DECIMALS,
     agreement_report,
     choose_study,
     manual_measurements,
@@ -172,7 +173,8 @@ def compare_with_algorithm(
             for row in bar.track(manual, description="images"):
                 image = here[row.image]
                 scene = pipeline.perceive_single(Frame(len(rows), 0.0, read_image(image.path)))
-                angle, state = (scene.pose.theta_deg, scene.pose.state.value) if scene.pose is not None else (None, None)
+                pose = scene.pose
+                angle, state = (round(pose.theta_deg, DECIMALS), pose.state.value) if pose is not None else (None, None)
                 name, group = name_as_text(image.path.name), groups[image.path]
                 rows.append(replace(row, image=name, algorithm_angle=angle, algorithm_state=state, group=group))
                 if scene.refusal is not None and row.state is not None:

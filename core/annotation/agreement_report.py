@@ -18,7 +18,7 @@ from core.annotation.merge import raters_alike
 from core.annotation.model import ANSWERED, AnnotationError, Status, measure_lines, status_of
 from core.annotation.store import ImageRecord, StoredAnnotation
 from core.config.models import PerceptionConfig
-from core.evaluation.evaluation import Measurement, short_number
+from core.evaluation.evaluation import Measurement
 from core.evaluation.metrics import (
     LIMITS_SD,
     are_too_few,
@@ -214,7 +214,15 @@ def write_measures(path: Path, measures: Sequence[Mapping[str, Any]]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, list(measures[0]), lineterminator="\n")
         table.writeheader()
-        table.writerows({name: short_number(value) for name, value in row.items()} for row in measures)
+        table.writerows({name: _rounded(value) for name, value in row.items()} for row in measures)
+
+
+DECIMALS = 4
+"""Of angles and distances in tables: finer than any of them is measured."""
+
+
+def _rounded(value: object) -> object:
+    return round(value, DECIMALS) if isinstance(value, float) else value
 
 
 def manual_measurements(annotations: Iterable[StoredAnnotation], names: Mapping[str, str]) -> list[Measurement]:
@@ -284,8 +292,8 @@ def _common(name: str, group: Sequence[StoredAnnotation]) -> Measurement:
     answers = [(Status.NO_ROBOT if one.content.no_robot else Status.CANNOT_TELL).value for one in group]
     return Measurement(
         name,
-        fmean(first) if first else None,
-        fmean(later) if later else None,
+        round(fmean(first), DECIMALS) if first else None,
+        round(fmean(later), DECIMALS) if later else None,
         state,
         None,
         None,

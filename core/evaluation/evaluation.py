@@ -220,12 +220,7 @@ def write_measurements(path: Path, rows: Iterable[Measurement]) -> None:
         table.writerow((*columns, *counts))
         for row in rows:
             values = (*(getattr(row, name) for name in columns), *(row.counts if counts else ()))
-            table.writerow(["" if value is None else short_number(value) for value in values])
-
-
-def short_number(value: object) -> object:
-    """An angle or a distance with four decimals: finer than any of them is measured."""
-    return round(value, 4) if isinstance(value, float) else value
+            table.writerow(["" if value is None else value for value in values])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
