@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from core.config.calibration import ZeroConfig
 from core.config.files import settings_folder
-from core.config.models import CAMERAS, CameraConfig, Config, RigConfig, load_config, merge
+from core.config.models import CAMERAS, CameraConfig, Config, RigConfig, load_config
 from core.config.rig_file import RESERVED, calibration_of, find_rig, has_rig, with_rig
 from core.config.safety import ServosConfig
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
@@ -23,6 +23,7 @@ from hardware.cameras.undistorted import UndistortedCamera
 if TYPE_CHECKING:
     from hardware.servos.discovery import FoundPort
     from hardware.servos.servo_robot import ServoRobot
+    from hardware.simulated_clock import SimulatedClock
     from hardware.twin.process import PrestartedProcesses
     from hardware.twin.world import TwinWorld
 
@@ -37,13 +38,18 @@ class RigKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """An open rig. ``robot``: None when pictures are only looked at; ``world`` exists when the twin is in this process."""
+    """An open rig.
+
+    ``robot``: None when pictures are only looked at; ``world`` exists when the twin is in this process, and ``clock`` when it is in
+    one of its own: frames, servos and pilot have its time.
+    """
 
     name: str
     kind: RigKind
     camera: Camera
     robot: GuardedRobot | None
     world: TwinWorld | None = None
+    clock: SimulatedClock | None = None
 
     def close(self) -> None:
         try:
@@ -207,12 +213,13 @@ def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         twin = RemoteTwin(config, START_INSERTION_MM, loading.twin)
         undo.callback(twin.close)
         servos = config.servos.model_copy(update={"port": twin.port})
-        robot = ServoRobot(servos, config.safety, name="bench twin with servos", truth=twin.status, process=loading.bus)
+        name, safety = "bench twin with servos", config.safety
+        robot = ServoRobot(servos, safety, name=name, truth=twin.status, process=loading.bus, clock=twin.clock)
         undo.callback(robot.close)
         robot.connect()
         robot.zero(_zero_of_twin(servos))
         undo.pop_all()
-    return Rig(config.rig.name, RigKind.SIM, twin, robot)
+    return Rig(config.rig.name, RigKind.SIM, twin, robot, clock=twin.clock)
 
 
 def _zero_of_twin(servos: ServosConfig) -> ZeroRequest:
@@ -284,8 +291,8 @@ def rig_config(
     """
     if rig is not None and source is not None:
         raise UserError("--source is looked at instead of a rig's camera: leave --rig out")
+    config = load_config(config_path, overrides=own)
     if source is None:
-        config = load_config(config_path, overrides=own)
         if rig is None:
             return config, kind_of(config.rig)
         if rig in RESERVED or (rig in CAMERAS.plugins and not has_rig(rig)):
@@ -293,7 +300,13 @@ def rig_config(
         else:
             path, found = find_rig(rig)
             config = with_rig(config, found, path)
-        return config, kind_of(config.rig)
+    else:
+        config = with_source(config, source)
+    return config, kind_of(config.rig)
+
+
+def with_source(config: Config, source: Path) -> Config:
+    """The configuration with a recording, file or folder of pictures instead of the rig's camera. Raises DeviceError, UserError."""
     try:
         exists = source.exists()
     except OSError as error:
@@ -306,9 +319,8 @@ def rig_config(
     camera = "video_file" if ending in VIDEO_ENDINGS else "realsense" if ending == _REALSENSE_ENDING else "image_folder"
     if camera == "image_folder" and source.is_file():
         _check_picture(source)
-    chosen = {"rig": {"camera": camera, "robot": "none", "source": str(source), "file": None}}
-    config = load_config(config_path, overrides=merge(own or {}, chosen))
-    return config, kind_of(config.rig)
+    chosen = {"camera": camera, "robot": "none", "source": str(source), "file": None}
+    return config.model_copy(update={"rig": RigConfig.model_validate(config.rig.model_dump() | chosen)})
 
 
 def _check_picture(file: Path) -> None:

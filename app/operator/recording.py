@@ -97,7 +97,7 @@ class Recorder(QObject):
         self.use_outputs(self._outputs)
         if self._writer is None:
             self._config = config
-            self._writer = SessionWriter(config.record, self._about)
+            self._writer = SessionWriter(config.record, self._about, clock=self._now_s)
             self._timer.start()
         else:
             self._usable(self._writer).set_about(self._about)
@@ -116,12 +116,17 @@ class Recorder(QObject):
             self._about = replace(self._about, description=self.description)
             self._writer.describe(self.description)
 
+    def _now_s(self) -> float:
+        """The clock of the frames."""
+        pilot = self._engine.pilot
+        return pilot.now_s if pilot is not None else time.monotonic()
+
     def _usable(self, writer: SessionWriter) -> SessionWriter:
         """The writer, or a new one in place of one that a fault of the program has ended: a day's recording goes on."""
         if writer.is_alive or self._about is None:
             return writer
         writer.close(0.0)
-        self._writer = usable = SessionWriter(self._config.record, self._about)
+        self._writer = usable = SessionWriter(self._config.record, self._about, clock=self._now_s)
         if self._target is not None:
             usable.add_event(self._target)
         return usable
@@ -190,7 +195,7 @@ class Recorder(QObject):
 
     def keep_target(self, target: Point | None) -> None:
         """Keep the operator's destination, source pixels."""
-        self._target = event_of_target(target, time.monotonic())
+        self._target = event_of_target(target, self._now_s())
         self._keep(self._target)
 
     def _keep(self, event: Event) -> None:

@@ -41,7 +41,9 @@ class RigEngine(Engine):
             if rig.kind is RigKind.LIVE:
                 self._records = read_records(config, firmware)
                 readiness, view = self._records.readiness(config), _calibrated_view(config)
-            pilot = Pilot(rig.robot, policy, config, model, left_over=left_over, readiness=readiness, view=view)
+            pilot = Pilot(
+                rig.robot, policy, config, model, left_over=left_over, readiness=readiness, view=view, bench_clock=rig.clock
+            )
         super().__init__(rig.camera, perceive, policy, rig.close, pilot, rig.robot)
         self._is_live = rig.kind is RigKind.LIVE
         self._servos = rig.robot if isinstance(rig.robot, ServoRobot) else None

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt, QTimer, Signal
+from PySide6.QtCore import QPoint, QPointF, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPicture, QResizeEvent, QTransform
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
@@ -366,6 +366,10 @@ class LiveView(QWidget):
         self._drawn.setGeometry(self._view.geometry())
         label_px = 0 if self._marks.is_on(Layer.LOUPE) else _LABEL_PX  # the loupe shows the same values larger
         self._drawn.record(self._marks, self._to_view(), label_px)
+
+    def place_of(self, point: Point) -> QPoint:
+        """Where a place of the picture, source pixels, is on this widget."""
+        return self._to_view().map(QPointF(point[0] + 0.5, point[1] + 0.5)).toPoint()
 
     def _to_view(self) -> QTransform:
         """From source pixels to the view's."""

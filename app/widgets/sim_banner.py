@@ -25,7 +25,10 @@ class BannerText:
 
 BANNERS = {
     RigKind.SIM: BannerText(
-        mark("SIM"), "SIM", mark("simulated bench twin"), mark("Everything here is simulated; no hardware moves")
+        mark("SIM"),
+        "SIM",
+        mark("bench twin"),
+        mark("Everything here is simulated; no hardware moves. On a busy computer the simulation runs slower"),
     ),
     RigKind.LIVE: BannerText(
         mark("LIVE"), "LIVE", mark("real servos move"), mark("Commands move real servos. Keep the power cut in reach")
@@ -47,10 +50,23 @@ class SimBanner(PaintedWidget):
     def show_kind(self, kind: RigKind, *, has_servos: bool = True) -> None:
         """The kind of the rig that is being opened."""
         self._text = BANNERS[kind] if has_servos or kind is not RigKind.LIVE else _LOOK_ONLY
+        self.percent = 100
         self.setMinimumWidth(int(self._plate_width()))  # the word stays visible, whatever else needs room
         self.update()
         self.setAccessibleName(f"{tr(self._text.word)}: {tr(self._text.meaning)}")
         self.setToolTip(tr(self._text.meaning))
+
+    def show_speed(self, speed: float) -> None:
+        """How fast the simulation runs, 0..1: said where the computer is too slow for it."""
+        percent = min(100, 5 * round(20.0 * speed))
+        if percent != self.percent:
+            self.percent = percent
+            self.update()
+
+    @property
+    def note(self) -> str:
+        """What stands beside the word."""
+        return tr("{percent} % speed", percent=self.percent) if self.percent < 100 else tr(self._text.note)
 
     @property
     def word(self) -> str:
@@ -62,7 +78,7 @@ class SimBanner(PaintedWidget):
         draw_text(painter, plate.adjusted(24, 0, -22, 0), tr(self._text.word), _word_font(), theme.INK, CENTER)
         left = plate.right() + 14
         room = QRectF(left, 0, self.width() - left, self.height())
-        draw_text(painter, room, tr(self._text.note), theme.font(theme.Size.BODY), theme.TEXT_DIM, elided=True)
+        draw_text(painter, room, self.note, theme.font(theme.Size.BODY), theme.TEXT_DIM, elided=True)
 
     def _plate_width(self) -> float:
         return text_width(_word_font(), tr(self._text.word)) + 68.0

@@ -281,8 +281,9 @@ class AlertReporter:
                 raised.append((Hindrance.UNACKNOWLEDGED, ""))
             elif not state.health.servos_ready:
                 raised.append((Hindrance.SERVOS_UNCHECKED, ""))
+        is_moving = not jog.is_rest or decision.mode in DRIVING_MODES
         if sent is not None and permitted is not None:
-            if sent.rejection is not None and sent.rejection not in _NO_ALERT:
+            if is_moving and sent.rejection is not None and sent.rejection not in _NO_ALERT:
                 raised.append((sent.rejection, ""))
             # the program bends to the end of a tendon's travel in normal driving; at the end of the feed it gets nowhere
             by_program = permitted is Source.PROGRAM and jog.is_rest
@@ -292,7 +293,6 @@ class AlertReporter:
                 raised.append((Note.AT_LOW_END if is_low else Note.AT_END, ", ".join(at_end)))
             if is_beyond:
                 raised.append((Note.BEYOND_END, ", ".join(f"{name} {at:.1f} mm" for name, at in sent.at_low.items())))
-        is_moving = not jog.is_rest or decision.mode in DRIVING_MODES
         if kept_back is not None and permitted is not None and is_moving and kept_back.reason not in _NO_ALERT:
             raised.append((kept_back.reason, kept_back.detail))
         self.report(raised, now_s, before.mode, changed=decision.mode is not before.mode)

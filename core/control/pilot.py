@@ -31,7 +31,7 @@ from core.control.modes import ARMED_MODES, DRIVING_MODES, Act, AgainstProgram, 
 from core.control.motion import AT_REST, AdviceController, Jog, JogIntegrator, Retraction, combined, next_retraction, within_robot
 from core.control.policies import Policy
 from core.control.readiness import READY, Readiness
-from core.control.robot import GuardedRobot, SentMotion
+from core.control.robot import BenchClock, GuardedRobot, SentMotion
 from core.control.servo_requests import ReleaseEvent, ServoRequests, TorqueRelease
 from core.control.supervisor import hindrances, supervise
 from core.devices import DeviceError
@@ -108,6 +108,10 @@ KEYBOARD = "window"
 was cut) seems to be held on."""
 PERIOD_S = 0.02
 """Of the turns."""
+_TURNS_AHEAD = 4
+"""A simulated bench is at most so many turns ahead of the pilot: less than ``command_max_age_s``."""
+_SHARE_OF_AGE = 2 / 3
+"""Nor does it go on beyond this share of the age at which pose and positions are too old; the rest is for the way to the gate."""
 _ARRIVED_S = 0.5
 """The program hands the robot back after resting so long at the destination."""
 _MOST_CHANGES = 200
@@ -130,6 +134,8 @@ class Pilot:
     left_over : what is not acknowledged yet of the rig before this one: starting again acknowledges nothing.
     readiness : what stands against the program's driving of this rig; ``set_readiness`` when settings have changed.
     view : a picture of the rig's calibration, with which the camera's are compared.
+    bench_clock : instead of `clock`, that of a simulated bench. It is granted no time in which an input of the pilot would become
+        too old because the computer is slow. The time of a real bench waits for nothing.
     """
 
     def __init__(
@@ -142,9 +148,14 @@ class Pilot:
         left_over: LeftOver | None = None,
         readiness: Readiness = READY,
         view: Image | None = None,
+        bench_clock: BenchClock | None = None,
     ) -> None:
         self._readiness = readiness
-        self._robot, self._policy, self._config, self._clock = robot, policy, config, clock
+        self._bench_clock = bench_clock
+        self._perceived_s: float | None = None
+        self._held_s: float | None = None
+        self._bus_s: float | None = None
+        self._robot, self._policy, self._config, self._clock = robot, policy, config, bench_clock or clock
         self._inputs = InputQueue(config.safety, [model])
         self._requests = ServoRequests(robot, self._inputs.post)
         self._release = TorqueRelease(is_enabled=config.servos.torque_off_on_stop)
@@ -172,7 +183,7 @@ class Pilot:
         self._changes: list[DriveView] = []
         self._is_stop_pending = False
         self._hand_speed = 1.0
-        self._view = DriveView(clock(), mode=self._state.mode, latched=left_over.fault if left_over is not None else None)
+        self._view = DriveView(self._clock(), mode=self._state.mode, latched=left_over.fault if left_over is not None else None)
         if left_over is not None and left_over.stopped:
             self._requests.stop()
             self._release.handle(ReleaseEvent.REQUEST)
@@ -235,6 +246,16 @@ class Pilot:
         self._halted = True
 
     @property
+    def now_s(self) -> float:
+        """The clock of the frames."""
+        return self._clock()
+
+    @property
+    def simulation_speed(self) -> float:
+        """How fast a simulated bench runs, 0..1; for one caller. 1 on a real one."""
+        return 1.0 if self._bench_clock is None else self._bench_clock.speed
+
+    @property
     def left_over(self) -> LeftOver | None:
         """What the next rig must take over, once this one is closed; None when there is nothing to acknowledge."""
         view = self.view
@@ -260,8 +281,10 @@ class Pilot:
 
     def deadman(self, source: Hashable, pressed: bool | None) -> None:
         """A deadman as it is now (None: it cannot tell); to be repeated many times a second. One that is held is enough."""
-        is_enough = source != KEYBOARD or self._readiness.keyboard_deadman
-        self._inputs.post(DeadmanReport(pressed, self._clock(), source, is_enough))
+        is_enough, now_s = source != KEYBOARD or self._readiness.keyboard_deadman, self._clock()
+        if source == KEYBOARD:
+            self._held_s = now_s if pressed else None
+        self._inputs.post(DeadmanReport(pressed, now_s, source, is_enough))
 
     def estop(self, pressed: bool) -> None:
         """What the E-stop button's own contact says; to be repeated while the board talks."""
@@ -328,6 +351,7 @@ class Pilot:
             report = replace(report, route=RouteState.READY)  # a policy backs out of a branch that it missed by itself
         arrived = sound and scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
         self._inputs.set_advice(LatestAdvice(frame.captured_s, advice, arrived), report, Beat(Part.PERCEPTION))
+        self._perceived_s = frame.captured_s
         return advice if not blanked or blanked in _ENDED_BY_A_FRAME else None
 
     # ---- from the pilot's own thread
@@ -371,6 +395,15 @@ class Pilot:
             self._view = view
             self._turns_back = decision.mode in DRIVING_MODES and not decision.hold_expired
             self._is_stop_pending = self._is_stop_pending and Act.STOP not in inputs.events
+        if self._bench_clock is not None:
+            safety = self._config.safety
+            known = (
+                (now_s, _TURNS_AHEAD * PERIOD_S),
+                (self._held_s, safety.deadman_timeout_s),
+                (self._perceived_s, _SHARE_OF_AGE * safety.pose_hold_s),
+                (None if self._requests.busy else self._bus_s, _SHARE_OF_AGE * safety.measurement_max_age_s),
+            )
+            self._bench_clock.grant(min(at_s + ahead_s for at_s, ahead_s in known if at_s is not None))
         return view
 
     def close(self) -> None:
@@ -408,6 +441,7 @@ class Pilot:
             events.append(Fault(Cause.BUS_DEAD, failure))
         elif (report := self._robot.report()) is not None:
             events.append(report)
+            self._bus_s = now_s
             is_released = is_released or report.torque_off
             if report.let_out:
                 note = Note.STILL_TIGHT if report.still_tight else Note.LET_OUT

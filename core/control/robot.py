@@ -34,6 +34,15 @@ class SentMotion:
     at_low: Mapping[JointName, float] = field(default_factory=dict)
 
 
+class BenchClock(Protocol):
+    """The clock of a simulated bench, which goes on only as far as it is granted, and `speed` simulated seconds a second."""
+
+    def __call__(self) -> float: ...
+    def grant(self, until_s: float) -> None: ...
+    @property
+    def speed(self) -> float: ...
+
+
 class GuardedRobot(Robot, Protocol):
     """All methods may be called from any thread. ``stop`` never waits and never fails.
 

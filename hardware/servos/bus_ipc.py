@@ -18,7 +18,7 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
@@ -37,6 +37,7 @@ from hardware.processes import MESSAGE_BYTES, DeviceProcess, ParentLink, SharedS
 from hardware.servos import dynamixel_port
 from hardware.servos.dynamixel_port import BusProcessLost, LineCounts, ServoError
 from hardware.servos.registers import ServoReading, ServoState
+from hardware.simulated_clock import SimulatedClock
 
 _log = logging.getLogger(__name__)
 _SLOTS = (64, 64, 65_536)
@@ -260,6 +261,7 @@ class BusClient:
     backups : folder for the EEPROM of servos before it is changed; None: it is not kept.
     keep : file in which the process keeps where the joints are; None: only as long as it runs.
     searched : zeros of the last search for slack.
+    clock : file of a simulated bench's clock; None: the wall clock.
 
     Raises BusProcessLost: when the process cannot be started.
     """
@@ -273,6 +275,7 @@ class BusClient:
         backups: Path | None = None,
         keep: Path | None = None,
         searched: ZeroConfig | None = None,
+        clock: str | None = None,
     ) -> None:
         self._lock, self._requesting = threading.Lock(), threading.Lock()
         self._request_id = 0
@@ -289,6 +292,7 @@ class BusClient:
                     "backups": None if backups is None else str(backups),
                     "keep": None if keep is None else str(keep),
                     "searched": None if searched is None else searched.model_dump(mode="json"),
+                    "clock": clock,
                 }
             )
 
@@ -483,20 +487,27 @@ class Request:
     details: dict[str, Any] = field(default_factory=dict)
 
 
+def wall_clock_s() -> float:
+    return time.monotonic()
+
+
 class BusServer(ParentLink):
-    """The bus process's end. Only ``first_message`` and ``wait`` wait."""
+    """The bus process's end. Only ``first_message`` and ``wait`` wait. ``now_s`` is the clock of the orders."""
 
     def __init__(self, arguments: Sequence[str]) -> None:
         super().__init__(arguments)
         self._poll = select.poll()
         self._poll.register(self.pipe, select.POLLIN)
         self._poll.register(self.socket, select.POLLIN)
+        self.now_s: Callable[[], float] = wall_clock_s
 
     def first_message(self) -> dict[str, Any] | None:
         """The configuration; the application has given the memory its length by then."""
         message = super().first_message()
         if message is not None:
             self._order, self._heartbeat, self._status = SharedSlot.row(self.map_memory(_MEMORY_BYTES), _SLOTS)
+            if (clock := message.get("clock")) is not None:
+                self.now_s = SimulatedClock(clock)
         return message
 
     def wait(self, timeout_s: float) -> tuple[bool, bool]:
@@ -548,7 +559,7 @@ class BusServer(ParentLink):
         """The newest heartbeat; one from the future does not count."""
         found = self._heartbeat.newest()
         beat = unpack_heartbeat(found[1]) if found is not None else None
-        return beat if beat is not None and beat.time_s <= time.monotonic() else None
+        return beat if beat is not None and beat.time_s <= self.now_s() else None
 
     def publish(self, status: BusStatus) -> None:
         self._status.put(pickle.dumps(status, pickle.HIGHEST_PROTOCOL))

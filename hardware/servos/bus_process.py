@@ -45,7 +45,7 @@ from hardware.servos.bus_guard import (
     ReleaseRamp,
     UnattendedWatch,
 )
-from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, PortSuccession, Request, ask_for_port
+from hardware.servos.bus_ipc import BusPhase, BusServer, BusStatus, CycleTimes, PortSuccession, Request, ask_for_port, wall_clock_s
 from hardware.servos.drive import DriveBus
 from hardware.servos.dynamixel_bus import ServoBus
 from hardware.servos.dynamixel_port import (
@@ -71,10 +71,10 @@ _NOT_PROVEN = "the torque is not proven to be off: cut the servos' power"
 Bus = ServoBus | DriveBus
 
 
-def make_bus(servos: ServosConfig, backups: Path | None) -> Bus:
+def make_bus(servos: ServosConfig, backups: Path | None, now_s: Callable[[], float] = wall_clock_s) -> Bus:
     """The bus of the configured drive. Raises NotReady, PluginError."""
     if servos.driver in OF_SERVOS:
-        return ServoBus(servos, backups=backups)
+        return ServoBus(servos, backups=backups, now_s=now_s)
     if servos.port is None:
         raise NotReady("no servo port is configured: set servos.port")
     if servos.driver == "stepper board":
@@ -200,11 +200,18 @@ class BusLoop:
     """Owns bus and guard. ``run`` returns when the application ends it, or is gone; the servos hold by then."""
 
     def __init__(
-        self, server: BusServer, bus: Bus, servos: ServosConfig, safety: SafetyConfig, keeper: ZeroKeeper | None = None
+        self,
+        server: BusServer,
+        bus: Bus,
+        servos: ServosConfig,
+        safety: SafetyConfig,
+        keeper: ZeroKeeper | None = None,
+        now_s: Callable[[], float] = wall_clock_s,
     ) -> None:
         self._server, self._bus, self._servos = server, bus, servos
+        self._now_s = now_s
         self._keeper = keeper or ZeroKeeper(servos, None)
-        self._guard = BusGuard(servos, safety, time.monotonic())
+        self._guard = BusGuard(servos, safety, self._now_s())
         self._release = BusTorqueRelease(bus, self._guard, servos.port)
         self._period_s = 1.0 / servos.bus_hz
         self._timer = CycleTimer(round(_WINDOW_S * servos.bus_hz))
@@ -241,19 +248,19 @@ class BusLoop:
 
     def run(self) -> None:
         """Cycle until the end. Afterwards the servos hold, a requested torque-off is done, and the port is free."""
-        due_s = time.monotonic()
+        due_s = self._now_s()
         try:
             while not self._ended:
                 self._listen_until(due_s)
                 if not self._ended:
                     self._run_cycle()
-                    due_s = max(due_s + self._period_s, time.monotonic())
+                    due_s = max(due_s + self._period_s, self._now_s())
         finally:
             try:
                 self._release_at_end()
             finally:
                 self._bus.close()
-                self._keeper.close(time.monotonic())  # before the next process gets the port, and reads the file
+                self._keeper.close(self._now_s())  # before the next process gets the port, and reads the file
                 if self._succession is not None:
                     self._succession.close()
 
@@ -264,10 +271,10 @@ class BusLoop:
         if self._is_off_after_ramp:
             self._end_ramp()
         if self._release.is_requested and not self._bus.is_open:
-            self._reopen(time.monotonic())
+            self._reopen(self._now_s())
         if self._release.is_requested:
             self._guard_port(lambda: self._release.release(_TRIES_AT_END))
-        self._publish(time.monotonic())
+        self._publish(self._now_s())
         if self._release.is_requested:
             text = f"the servo bus process ends, and {self._release.problem}"
             _log.error(text)
@@ -276,7 +283,7 @@ class BusLoop:
     def _listen_until(self, due_s: float) -> None:
         """Handle STOP and requests at once, until the next cycle is due."""
         while not self._ended:
-            left_s = due_s - time.monotonic()
+            left_s = due_s - self._now_s()
             if self._succession is not None:
                 is_asked = self._succession.wait(left_s)
                 if is_asked and self._succession.must_relax and not self._is_let_go:
@@ -305,7 +312,7 @@ class BusLoop:
             self._ended = True
             return
         self._guard_port(self._look)
-        self._keeper.write(time.monotonic())
+        self._keeper.write(self._now_s())
         self._ended = not self._bus.is_open or self._is_slack()
         if not self._ended and self._servos.port is not None:
             self._succession = PortSuccession(self._servos.port)
@@ -317,7 +324,7 @@ class BusLoop:
 
     def _look(self) -> None:
         self._read()
-        self._watch = self._watch.update(self._readings, time.monotonic(), self._servos)
+        self._watch = self._watch.update(self._readings, self._now_s(), self._servos)
 
     def _is_slack(self) -> bool:
         """Whether all servos tell that their torque is off."""
@@ -325,7 +332,7 @@ class BusLoop:
 
     def _attend(self, silent_s: float) -> None:
         """One cycle of a bus whose application is silent or gone."""
-        now_s = time.monotonic()
+        now_s = self._now_s()
         if not self._is_let_go and self._servos.unattended_s > 0.0 and self._bus.is_open:
             attention = Attention.RELAX if self._is_hurried else self._watch.next(silent_s, now_s, self._servos)
             if attention is not Attention.REST:
@@ -350,7 +357,7 @@ class BusLoop:
 
         A key that stays down and a broken wire send it fifty times a second; held as often, a tendon under load would creep.
         """
-        now_s = time.monotonic()
+        now_s = self._now_s()
         is_same = self._guard.stopped and now_s - self._stop_s < _SAME_STOP_S
         self._stop_s = now_s
         if not is_same:
@@ -377,7 +384,7 @@ class BusLoop:
             raise StoppedMeanwhile("the application ended meanwhile: nothing was switched on")
 
     def _run_cycle(self) -> None:
-        started_s = time.monotonic()
+        started_s = self._now_s()
         self._cycle += 1
         silence_s = self._guard.silence_s(self._server.heartbeat(), started_s)
         is_settled = not self._guard.armed and not self._release.is_requested and self._ramp is None
@@ -395,8 +402,8 @@ class BusLoop:
             self._watch, self._is_let_go = UnattendedWatch(), False
         if self._succession is not None and started_s > self._give_up_s:
             self._ended = True
-        self._publish(time.monotonic())
-        self._timer.add(started_s, time.monotonic())
+        self._publish(self._now_s())
+        self._timer.add(started_s, self._now_s())
 
     def _read(self) -> Fault | None:
         """Read all servos; the fault that ends the motion, when one is going on and must end."""
@@ -404,7 +411,7 @@ class BusLoop:
         errors = self._bus.counts.corrupt - self._corrupt  # damaged answers since the last cycle
         self._corrupt += errors
         self._bad_packets += errors
-        now_s = time.monotonic()
+        now_s = self._now_s()
         self._keeper.update(self._readings, now_s)
         return self._guard.update(self._readings, errors, self._server.heartbeat(), now_s)
 
@@ -425,7 +432,7 @@ class BusLoop:
 
     def _let_go_slowly(self, speed_mm_s: float, *, then_off: bool) -> None:
         """Begin a ramp from where the servos are; where that is not known, the torque goes off at once if it is to."""
-        self._ramp = self._guard.release_ramp(time.monotonic(), speed_mm_s)
+        self._ramp = self._guard.release_ramp(self._now_s(), speed_mm_s)
         self._is_off_after_ramp = then_off
         if self._ramp is None:
             self._end_ramp()
@@ -433,7 +440,7 @@ class BusLoop:
     def _follow_ramp(self, ramp: ReleaseRamp) -> None:
         """Let the tendons go a little further; in the end all servos hold where they are, or the torque goes off."""
         at_mm = [reading.position_mm if isinstance(reading, ServoState) else None for reading in self._readings]
-        goals_mm = ramp.goals(at_mm, time.monotonic())
+        goals_mm = ramp.goals(at_mm, self._now_s())
         if goals_mm is None:
             self._settle = _SETTLE_CYCLES
             self._bus.hold()
@@ -457,7 +464,7 @@ class BusLoop:
 
     def _drive(self) -> None:
         order, beat = self._server.order(), self._server.heartbeat()
-        now_s = time.monotonic()  # after both: nothing in them is from the future
+        now_s = self._now_s()  # after both: nothing in them is from the future
         step = self._guard.step(order, beat, now_s)
         if step.goals_mm is None:
             return
@@ -473,7 +480,7 @@ class BusLoop:
 
     def _hold_after(self, fault: Fault) -> None:
         """Goal = measured. What the tension has caused lets the tendons go slowly; the torque goes off where that is requested."""
-        self._keeper.write(time.monotonic())
+        self._keeper.write(self._now_s())
         self._ramp, self._is_off_after_ramp = None, False
         is_off = fault.cause.reaction is Reaction.STOP and self._servos.torque_off_on_stop
         is_ramp = self._bus.is_open and fault.cause in RELEASED
@@ -519,8 +526,8 @@ class BusLoop:
         self._readings = ()
         self._lost, self._open_problem = True, ""
         if self._succession is not None:
-            self._give_up_s = min(self._give_up_s, time.monotonic() + _LOST_ALONE_S)
-        self._reopen_at_s = time.monotonic() + _REOPEN_S
+            self._give_up_s = min(self._give_up_s, self._now_s() + _LOST_ALONE_S)
+        self._reopen_at_s = self._now_s() + _REOPEN_S
 
     def _reopen(self, now_s: float) -> None:
         self._reopen_at_s = now_s + _REOPEN_S
@@ -568,7 +575,7 @@ class BusLoop:
             raise
         self._settle = 0
         self._release.cancel()
-        self._guard.set_armed(time.monotonic())
+        self._guard.set_armed(self._now_s())
 
     def _read_all(self) -> list[MissingServo]:
         """Where all joints are: a quiet bus was not read for long, and after a zero the last positions mean nothing.
@@ -616,11 +623,11 @@ class BusLoop:
         self._bus.set_zero(wanted.positions_mm, kept)
         self._keeper.forget(wanted.forgotten)
         self._read()
-        self._keeper.write(time.monotonic())
+        self._keeper.write(self._now_s())
 
     def _disarm(self) -> None:
         self._guard.disarm()
-        self._keeper.write(time.monotonic())
+        self._keeper.write(self._now_s())
         if self._bus.is_open and self._ramp is None:
             self._settle = _SETTLE_CYCLES
             self._bus.disarm()
@@ -672,8 +679,8 @@ class BusLoop:
         except ServoError as refused:
             error = refused
         self._finish_stop()
-        self._guard.note_request(time.monotonic())
-        self._publish(time.monotonic())
+        self._guard.note_request(self._now_s())
+        self._publish(self._now_s())
         self._server.answer(request, error)
 
     def _phase(self) -> BusPhase:
@@ -747,7 +754,7 @@ def _serve(server: BusServer) -> int:
     servos, safety = ServosConfig.model_validate(message["servos"]), SafetyConfig.model_validate(message["safety"])
     backups = message.get("backups")
     try:
-        bus = make_bus(servos, None if backups is None else Path(backups))
+        bus = make_bus(servos, None if backups is None else Path(backups), server.now_s)
     except UserError as error:
         server.send_fatal(str(error))
         return 1
@@ -757,7 +764,7 @@ def _serve(server: BusServer) -> int:
     keeper = ZeroKeeper(
         servos, None if keep is None else Path(keep), None if searched is None else ZeroConfig.model_validate(searched)
     )
-    loop = BusLoop(server, bus, servos, safety, keeper)
+    loop = BusLoop(server, bus, servos, safety, keeper, server.now_s)
     signal.signal(signal.SIGTERM, lambda *_: loop.end())
     gc.collect()
     gc.freeze()  # what is loaded stays: later collections are short

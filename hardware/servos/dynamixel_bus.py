@@ -275,6 +275,7 @@ class ServoBus(JointBus[ServoLine]):
     config : identities, conversion and speeds. Envelope and step limits are the gate's business, not the driver's.
     port : serial device; default is the configuration's.
     backups : folder that keeps what the EEPROM of a servo was before it is changed; None: it is not kept.
+    now_s : the clock of the readings.
 
     Notes
     -----
@@ -282,7 +283,14 @@ class ServoBus(JointBus[ServoLine]):
     is closed, and ``open`` starts again: disarmed, without zeros.
     """
 
-    def __init__(self, config: ServosConfig, port: str | None = None, backups: Path | None = None) -> None:
+    def __init__(
+        self,
+        config: ServosConfig,
+        port: str | None = None,
+        backups: Path | None = None,
+        now_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._now_s = now_s
         chosen = port or config.port
         if chosen is None:
             raise NotReady("no servo port is configured: set servos.port")
@@ -472,7 +480,7 @@ class ServoBus(JointBus[ServoLine]):
                 self._turns[address] += 1  # of what was really asked: else the next request would look like the one before
             data |= answer.data
             missed |= answer.missed
-        now = time.monotonic()
+        now = self._now_s()
         readings: list[ServoReading] = []
         for joint in self._joints:
             if joint.id in data:

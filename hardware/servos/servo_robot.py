@@ -25,6 +25,7 @@ from hardware.servos.bus_guard import report_of
 from hardware.servos.bus_ipc import END_S, BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, IssuedGoals
 from hardware.servos.dynamixel_port import BusProcessLost, NotReady, ServoError, TorqueStillOn
 from hardware.servos.registers import ServoReading, ServoState, wire_force_mn
+from hardware.simulated_clock import SimulatedClock
 
 _OPEN_S, _ARM_S, _REQUEST_S, _TORQUE_OFF_S = 20.0, 10.0, 5.0, 10.0
 _RELAX_S, _LOOK_S = 15.0, 0.05
@@ -47,6 +48,7 @@ class ServoRobot:
     searched : zeros of the rig file, of the last search for slack; offered, too.
     process : a bus process that was started ahead, for the first connection.
     backups : folder that keeps the servos' EEPROM as it was before it is changed; None for software servos.
+    clock : of a simulated bench; None: the wall clock.
 
     Notes
     -----
@@ -67,7 +69,9 @@ class ServoRobot:
         searched: ZeroConfig | None = None,
         process: DeviceProcess | None = None,
         backups: Path | None = None,
+        clock: SimulatedClock | None = None,
     ) -> None:
+        self._clock = clock
         self._servos = servos if truth is None else servos.model_copy(update={"unattended_s": 0.0})
         self._safety = safety
         self._name = name
@@ -81,6 +85,9 @@ class ServoRobot:
         self._reported = (0, 0, 0)  # cycle, bad packets and restarts of the last report
         self._reported_offs = self._reported_releases = 0
         self._not_connected: str | None = None
+
+    def _now_s(self) -> float:
+        return time.monotonic() if self._clock is None else self._clock()
 
     @property
     def name(self) -> str:
@@ -111,6 +118,7 @@ class ServoRobot:
                     backups=self._backups,
                     keep=self._keep,
                     searched=self._searched,
+                    clock=self._clock.file if self._clock is not None else None,
                 )
                 undo.callback(client.close)
                 self._request(client, "open", _OPEN_S)
@@ -210,7 +218,7 @@ class ServoRobot:
         """A sign of life of the application; `permitted` says whose orders may be followed (None: of no source)."""
         self._supervised = True
         if (client := self._client) is not None:
-            client.put_heartbeat(Heartbeat(time.monotonic(), permitted))
+            client.put_heartbeat(Heartbeat(self._now_s(), permitted))
 
     def send(
         self,
@@ -238,7 +246,7 @@ class ServoRobot:
         """
         limited = within_speeds(command, self._servos)
         client = self._connected()
-        client.put_order(BusOrder(limited, source, time.monotonic(), captured_s, retracts))
+        client.put_order(BusOrder(limited, source, self._now_s(), captured_s, retracts))
         self._beat_unsupervised()
         sent = self._sent(client.status())
         return sent.motion if sent is not None else Command()
@@ -246,7 +254,7 @@ class ServoRobot:
     def hold(self) -> None:
         """Stop all motion and keep the bend; stays armed."""
         if (client := self._client) is not None:
-            client.put_order(BusOrder(None, Source.OPERATOR, time.monotonic()))
+            client.put_order(BusOrder(None, Source.OPERATOR, self._now_s()))
             self._beat_unsupervised()
 
     def status(self) -> RobotStatus:
@@ -259,7 +267,7 @@ class ServoRobot:
         states = [reading for reading in self._states if isinstance(reading, ServoState)]
         servos = self._servos
         if not states:
-            return status_at((0.0,) * len(servos.joints), (0.0,) * len(servos.tendons), time.monotonic(), servos)
+            return status_at((0.0,) * len(servos.joints), (0.0,) * len(servos.tendons), self._now_s(), servos)
         forces_mn = tuple(
             wire_force_mn(joint, servos.model_of(joint), state.current_ma or 0.0)
             for joint, state in zip(servos.tendons, states, strict=False)
@@ -316,7 +324,7 @@ class ServoRobot:
     def _sent(self, status: BusStatus | None) -> IssuedGoals | None:
         if status is None or status.sent is None or not status.armed or self.failure is not None:
             return None
-        is_late = time.monotonic() - status.time_s > self._safety.bus_hold_s
+        is_late = self._now_s() - status.time_s > self._safety.bus_hold_s
         return status.sent.kept() if is_late else status.sent
 
     def kept_back(self) -> Rejection | None:
@@ -358,7 +366,7 @@ class ServoRobot:
     def _beat_unsupervised(self) -> None:
         """A sign of life of a program without a supervisor."""
         if (client := self._client) is not None and not self._supervised:
-            client.put_heartbeat(Heartbeat(time.monotonic(), Source.OPERATOR))
+            client.put_heartbeat(Heartbeat(self._now_s(), Source.OPERATOR))
 
 
 def _stops(status: BusStatus) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from core.config.models import TwinConfig
 
 BENCH_LOOK = "bench"
@@ -38,6 +40,11 @@ LOOKS = (*LOOK_TITLES, *RARE_TITLES, BENCH_LOOK)
 RANDOM_LOOK = "random"
 """For trials: each gets another look of the ten families."""
 TRIAL_LOOKS = (RANDOM_LOOK, BENCH_LOOK, *LOOK_TITLES, *RARE_TITLES)
+
+
+def family_of(seed: int) -> str:
+    """Name of the family that a look is drawn from where none is named; the same for the same `seed` (not negative)."""
+    return tuple(LOOK_TITLES)[int(np.random.default_rng([seed, 7919]).integers(len(LOOK_TITLES)))]
 
 
 def look_of(config: TwinConfig) -> str | None:

@@ -19,11 +19,12 @@ import numpy as np
 
 from core.config.models import Config, TwinConfig
 from core.config.safety import ServosConfig
-from core.devices import DeviceError
+from core.devices import CameraLost, DeviceError
 from core.messages import message
 from core.types import Command, Frame, RobotStatus
 from hardware.processes import DeviceProcess, SharedSlot
 from hardware.servos.bus_ipc import start_bus
+from hardware.simulated_clock import SimulatedClock
 from hardware.twin.actuation import JointsToTwin
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ _STATUS = struct.Struct(
     "<B3d8d2d"
 )  # tendons; time, insertion, delivery; pulls and forces, filled up; contact (NaN: unknown), rotation
 _MOST_TENDONS = 4
+_SILENT_S = 20.0
+"""A twin that gives no picture for so long has stopped."""
 
 
 def slot_sizes(twin: TwinConfig) -> tuple[int, int]:
@@ -85,14 +88,18 @@ class RemoteTwin:
 
     def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
         self._number = 0
+        self._heard_s = time.monotonic()
         self._closed = False
         sizes = slot_sizes(config.twin)
         self._process, memory = DeviceProcess.claim(prestarted, start_twin, sum(map(SharedSlot.size, sizes)))
         self._frames, self._status = SharedSlot.row(memory, sizes)
         with contextlib.ExitStack() as undo:
-            undo.callback(self.close)
+            undo.callback(self._end)
+            self.clock = SimulatedClock()
+            undo.callback(self.clock.close)
             with contextlib.suppress(OSError):  # a process that has ended gives no answer either
-                self._process.send({"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm})
+                about = {"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm}
+                self._process.send({**about, "clock": self.clock.file})
             answer = self._receive(_START_S)
             if "error" in answer:
                 raise DeviceError(answer["error"])
@@ -117,11 +124,13 @@ class RemoteTwin:
         while True:
             found = self._frames.newest()
             if found is not None and found[0] != self._number:
-                self._number = found[0]
+                self._number, self._heard_s = found[0], time.monotonic()
                 return unpack_frame(found[1])
             left_s = until_s - time.monotonic()
             if left_s <= 0.0:
                 self._check()
+                if time.monotonic() - self._heard_s > _SILENT_S:  # its clock stands still, so no age would tell it
+                    raise CameraLost("the bench twin gives no pictures: F5 starts it again")
                 return None
             select.select([self._process.pipe], [], [], left_s)
             with contextlib.suppress(BlockingIOError):
@@ -140,9 +149,13 @@ class RemoteTwin:
         """End the process; may be called twice."""
         if not self._closed:
             self._closed = True
-            self._process.request_end()
-            self._process.await_end(_END_S)
-            self._process.release()
+            self._end()
+            self.clock.close()
+
+    def _end(self) -> None:
+        self._process.request_end()
+        self._process.await_end(_END_S)
+        self._process.release()
 
     def _check(self) -> None:
         code = self._process.exit_code()

@@ -14,6 +14,7 @@ import threading
 from core.config.models import Config
 from core.devices import DeviceError
 from hardware.processes import ParentLink, SharedSlot
+from hardware.simulated_clock import WorldClock
 from hardware.twin.process import drive_world, pack_frame, pack_status, slot_sizes, wired
 from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.world import TwinWorld
@@ -33,10 +34,11 @@ def main(arguments: list[str]) -> int:
     sizes = slot_sizes(config.twin)
     frames, status = SharedSlot.row(link.map_memory(sum(map(SharedSlot.size, sizes))), sizes)
     try:
-        world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety)
+        clock = WorldClock(message["clock"])
+        world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety, clock=clock)
         world.insert(message["insertion_mm"])
         wiring = wired(config.twin, config.servos)
-        servos = SoftServoBus(wiring, wire_time=True)
+        servos = SoftServoBus(wiring, clock=clock, wire_time=True)
         servos.start()
     except (ValueError, OSError, DeviceError) as error:
         link.send({"error": str(error)})

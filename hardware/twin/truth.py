@@ -261,7 +261,7 @@ class RouteFollower:
         places = np.flatnonzero(near)
         nearest = places[np.argmin(np.sum((self.route[places] - head) ** 2, axis=1))]
         self._progress_mm = float(self._along[nearest])
-        goal = self._point_at(self._progress_mm + self._lookahead_mm)
+        goal = self.point_at(self._progress_mm + self._lookahead_mm)
         heading = _heading(robot_points_mm)
         wanted = goal - head
         right = np.array([-heading[1], heading[0]])
@@ -272,7 +272,7 @@ class RouteFollower:
         bend = float(np.clip(1.6 * error + self._wander * self._drift, -1, 1))
         return Command(bend=bend, advance_mm_s=advance_mm_s)
 
-    def _point_at(self, along_mm: float) -> NDArray[np.float64]:
+    def point_at(self, along_mm: float) -> NDArray[np.float64]:
         before = int(np.searchsorted(self._along, along_mm, side="right")) - 1
         if before >= len(self.route) - 1:
             return np.asarray(self.route[-1])

@@ -25,6 +25,7 @@ from core.control.robot import SentMotion
 from core.devices import DeviceError, Latest
 from core.perception.centerline import plan_route
 from core.types import Command, Frame, Point, Points, RobotStatus
+from hardware.simulated_clock import STEP_S, WorldClock
 from hardware.twin.actuation import DirectJoints
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
@@ -116,7 +117,6 @@ _log = logging.getLogger(__name__)
 
 _CONTROL_S = 0.02  # period of the command, in simulated time
 _COMMAND_EXPIRES_S = 0.3
-_CATCH_UP_S = 0.2
 _REST_S = 0.3
 """After an insertion the robot comes to rest."""
 
@@ -125,7 +125,8 @@ class TwinWorld:
     """Steps the physics under the robot's current command and renders frames.
 
     Lock-step: call ``advance`` and ``frame``; the same seeds and commands give the same bits. Real time: ``start`` runs both in a
-    thread; it drops delays of more than 0.2 s, so on a busy machine the world becomes slower and does not jump.
+    thread by a ``WorldClock``, so on a busy machine the world becomes slower and does not jump. Frames have the time of `clock`;
+    without one that of the wall clock.
     """
 
     def __init__(
@@ -138,8 +139,10 @@ class TwinWorld:
         seed: int = 0,
         servos: ServosConfig | None = None,
         safety: SafetyConfig | None = None,
+        clock: WorldClock | None = None,
     ) -> None:
         self.config = config
+        self._clock = clock
         servos = servos or ServosConfig()
         self.phantom = phantom or make_phantom(config.phantom)
         self.appearance = appearance_of(config) if appearance is None else appearance
@@ -253,22 +256,20 @@ class TwinWorld:
 
     def _follow_clock(self) -> None:
         period = 1.0 / self.config.live_frames_per_second
-        clock = next_frame = time.monotonic()
+        clock = self._clock or WorldClock()
+        clock.begin()
+        next_frame_s = clock.world_s
         while not self._stop.is_set():
-            now = time.monotonic()
-            clock = max(clock, now - _CATCH_UP_S)
             if self.robot.command_age_s() > _COMMAND_EXPIRES_S:
                 # The program repeats its command unless it hangs.
                 self.robot.hold()
-            if now - clock >= _CONTROL_S:
-                self.advance(_CONTROL_S)
-                clock += _CONTROL_S
-            if now >= next_frame:
-                self.frames.put(self.frame(captured_s=time.monotonic()))
-                next_frame = max(next_frame + period, now)
-            wait = min(clock + _CONTROL_S, next_frame) - time.monotonic()
-            if wait > 0:
-                self._stop.wait(wait)
+            if (wait_s := clock.wait_s()) > 0.0:
+                self._stop.wait(wait_s)
+                continue
+            self.advance(STEP_S)
+            if clock.world_s >= next_frame_s:
+                self.frames.put(self.frame(captured_s=time.monotonic() if self._clock is None else clock.world_s))
+                next_frame_s = max(next_frame_s + period, clock.world_s)
 
 
 class TwinCamera:

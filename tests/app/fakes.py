@@ -218,6 +218,8 @@ class FakePilot:
         self.estop_said: list[bool] = []
         self.beats = 0
         self.speed = 0.0
+        self.simulation_speed = 1.0
+        self.now_s = 0.0
         self.asked: list[str] = []
         self.halted = False
         self.faults: list[Fault] = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from core.config.models import TwinConfig
 from core.types import Points
-from hardware.twin.catalog import BENCH_LOOK, LOOKS, look_of
+from hardware.twin.catalog import BENCH_LOOK, LOOKS, family_of, look_of
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES, draw_family
 from hardware.twin.view import CameraView
@@ -130,7 +130,7 @@ def random_appearance(seed: int, family: str | None = None) -> Appearance:
     known = (*LOOK_FAMILIES, *RARE_FAMILIES)
     if family is not None and family not in known:
         raise ValueError(f"unknown look family {family!r}; known: {', '.join(known)}")
-    chosen = family or LOOK_FAMILIES[int(np.random.default_rng([seed, 7919]).integers(len(LOOK_FAMILIES)))]
+    chosen = family or family_of(seed)
     rng = np.random.default_rng([seed, known.index(chosen), 104729])
     return Appearance(**draw_family(chosen, rng))
 

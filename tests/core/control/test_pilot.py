@@ -24,8 +24,8 @@ from core.control.pilot import KEYBOARD, PERIOD_S, LeftOver, Pilot, PilotLoop
 from core.control.policies import make_policy
 from core.control.readiness import Readiness
 from core.system import slept_s
-from core.types import Advice, Points, Reason, Refusal, Route, Scene, Speed
-from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, scene_at
+from core.types import Advice, Frame, Points, Reason, Refusal, Route, Scene, Speed
+from tests.core.pilot_bench import ADVICE, WELL, Bench, Policy, Robot, scene_at
 
 
 @pytest.fixture
@@ -990,3 +990,37 @@ def test_a_pull_at_the_end_that_is_held_over_a_stop_must_begin_again(bench: Benc
     bench.jog = Jog(advance=-1.0)
     bench.turn(2)
     assert bench.robot.retracts
+
+
+class BenchTime:
+    """The clock of a simulated bench, which the test sets."""
+
+    now_s, granted_s, speed = 100.0, 0.0, 1.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    def grant(self, until_s: float) -> None:
+        self.granted_s = until_s
+
+
+def test_a_simulated_bench_is_granted_no_time_in_which_an_input_becomes_too_old() -> None:
+    at, robot, safety = BenchTime(), Robot(), SafetyConfig()
+    pilot = Pilot(robot, Policy(), Config(), ModelReport(True), bench_clock=at)
+    try:
+        frame = Frame(1, 99.96, np.zeros((480, 640, 3), np.uint8))
+        pilot.deadman(KEYBOARD, True)
+        pilot.update_scene(frame, scene_at(1, frame.captured_s), None, has_target=True)
+        pilot.tick()
+        assert at.granted_s == pytest.approx(99.96 + safety.pose_hold_s * 2 / 3), "a slow perception"
+        at.now_s = 100.05
+        pilot.update_scene(replace(frame, index=2, captured_s=100.05), scene_at(2, 100.05), None, has_target=True)
+        pilot.tick()
+        assert at.granted_s == pytest.approx(100.0 + safety.deadman_timeout_s), "a window that hangs while the deadman is held"
+        pilot.deadman(KEYBOARD, False)
+        robot.bus = None
+        at.now_s = 100.09
+        pilot.tick()
+        assert at.granted_s == pytest.approx(100.05 + safety.measurement_max_age_s * 2 / 3), "a servo process that is late"
+    finally:
+        pilot.close()
