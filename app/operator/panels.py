@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
@@ -48,6 +48,8 @@ class OperatorPanels(ScenePanels):
 
     ``picker``: None when there is no phantom to choose.
     """
+
+    performance_shown = Signal(bool)
 
     def __init__(self, config: Config, kind: RigKind, phantoms: Sequence[tuple[str, str]]) -> None:
         super().__init__(config.perception, config.policy.pursuit.pixels_per_mm, TEXT_EVERY_S)
@@ -216,6 +218,15 @@ class OperatorPanels(ScenePanels):
         self._blank_title = title
         self.jog.set_enabled(False, title)
 
+    @property
+    def shows_performance(self) -> bool:
+        """Whether frame rates and latencies are shown; they are of no use in driving."""
+        return not self._performance.isHidden()
+
+    def toggle_performance(self) -> None:
+        self._performance.setHidden(self.shows_performance)
+        self.performance_shown.emit(self.shows_performance)
+
     def clear_history(self) -> None:
         """Empty trends and performance, for another rig."""
         self._beside = None
@@ -260,7 +271,9 @@ class OperatorPanels(ScenePanels):
     def _right_side(self) -> QVBoxLayout:
         self._legend = card_note(_trend_legend(True))
         self.trends.distances_shown.connect(self._show_legend)
-        hands = row(Card(tr("Move the robot"), self.jog, tr("hold")), Card(tr("Performance"), self.performance))
+        self._performance = Card(tr("Performance"), self.performance)
+        self._performance.hide()
+        hands = row(Card(tr("Move the robot"), self.jog, tr("hold a key")), self._performance)
         self.pages.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.pages.tabBar().setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the arrows move the robot
         for page, name in (

@@ -25,7 +25,7 @@ KEPT_S = 600.0
 """Checks are valid for so long."""
 _BEGIN_AFTER_MS = 4000
 """After the first picture of a rig: its own start has the computer to itself."""
-_LONGEST_MS = 60_000
+_LONGEST_MS = 180_000
 """Checks that take longer are cancelled."""
 _MATTERS = ("rig", "camera", "perception", "servos", "pedal", "gamepad", "record")
 """Sections of the configuration that the checks depend on: another phantom needs no new ones."""

@@ -186,7 +186,7 @@ class Recorder(QObject):
             return ""
         self._marks += 1
         for output in self._outputs:
-            output.add_event(Event(time.monotonic(), EventKind.NOTE, f"mark {self._marks}"))
+            output.add_event(Event(self._now_s(), EventKind.NOTE, f"mark {self._marks}"))
         if is_recorded:
             self.said.emit(tr("Mark {number} is in the session", number=self._marks), False)
         else:
@@ -213,7 +213,7 @@ class Recorder(QObject):
 
     def keep_rig_stop(self, message: str) -> None:
         """Keep that the rig stopped by itself, and why: from here on no pilot reports it."""
-        self._keep(Event(time.monotonic(), EventKind.FAULT, Cause.HEARTBEAT_LOST.value, {"detail": message}))
+        self._keep(Event(self._now_s(), EventKind.FAULT, Cause.HEARTBEAT_LOST.value, {"detail": message}))
 
     def keep_alert(self, alert: Alert, time_s: float) -> None:
         """Keep an alert that was shown."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer, Slot
 from PySide6.QtGui import QAction, QActionGroup
-from PySide6.QtWidgets import QMenu
+from PySide6.QtWidgets import QFileDialog, QMenu
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.rig_engine import quick_sight
@@ -25,9 +25,10 @@ from core.config.models import Config
 from core.config.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
 from core.config.safety import OF_SERVOS
 from core.control.modes import ARMED_MODES, Mode
+from core.devices import UserError
 from core.types import Frame, Point, Scene
 from hardware.cameras.registry import FoundCamera
-from hardware.rig import RigKind, find_devices, kind_of, with_camera
+from hardware.rig import RigKind, find_devices, kind_of, with_camera, with_source
 
 if TYPE_CHECKING:
     from hardware.calibration.bench import CalibrationBench
@@ -80,6 +81,17 @@ class RigMenuController(QObject):
                 MenuEntry(tr("&Forget the insertion port"), self.forget_port),
             ],
         )[0]
+        add_menu(
+            window,
+            tr("&File"),
+            [
+                MenuEntry(
+                    tr("Open a picture or &video..."), partial(self.ask_source, QFileDialog.FileMode.ExistingFile), ("Ctrl+O",)
+                ),
+                MenuEntry(tr("Open a &folder of pictures..."), partial(self.ask_source, QFileDialog.FileMode.Directory)),
+            ],
+        )
+        window.source_chosen.connect(self.choose_source)
         self._menu = next(one for one in new.associatedObjects() if isinstance(one, QMenu))
         self._menu.setToolTipsVisible(True)
         self._group = QActionGroup(self)
@@ -166,6 +178,26 @@ class RigMenuController(QObject):
             self._refuse(why)
             return
         self._rig.use_config(with_camera(self._rig.config, camera))
+
+    def ask_source(self, mode: QFileDialog.FileMode) -> None:
+        """Ask for a picture, video or folder of pictures to look at instead of the rig's camera."""
+        dialog = QFileDialog(self._window, tr("Look at pictures instead of the camera's"))
+        dialog.setFileMode(mode)
+        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+        dialog.fileSelected.connect(lambda path: self.choose_source(Path(path)))
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.show()  # not open(): the STOP button must stay within reach
+
+    @Slot(object)
+    def choose_source(self, path: Path) -> None:
+        """Look at a picture, video or folder of pictures; the menu Rig leads back to a rig."""
+        if why := self.hindrance():
+            self._refuse(why)
+            return
+        try:
+            self._rig.use_config(with_source(self._rig.config, path))
+        except UserError as error:
+            self._refuse(str(error))
 
     def hindrance(self) -> str:
         """Why neither rig nor camera may be taken away now; "" when they may."""

@@ -68,7 +68,7 @@ def run_window(
         outputs = open_outputs(config.stream)
         for output in outputs.values() if stream is not None or lsl else ():  # what is asked for here is there, or an error
             output.wait_open()
-    ahead = start_ahead(config)  # before all that is slow to load here
+    ahead = start_ahead(config)  # before all that is slow to load here; it is told the configuration later
 
     from app.operator.live_menu import LiveMenuController
     from app.operator.manual_drive import OperatorDevices
@@ -76,13 +76,16 @@ def run_window(
     from app.operator.rig_menu import RigMenuController
     from app.operator.services import WindowServices, tour_at_start
     from app.operator.triggers import TriggerServer
+    from app.operator.twin_menu import with_kept_twin
     from app.settings.apply import SettingsController
     from app.ui.actions import MenuEntry, add_menu
     from app.ui.crash_report import CrashWatch, state_folder
     from app.ui.i18n import tr
-    from app.ui.layout_state import LayoutState, Parts, overlay_switches
+    from app.ui.layout_state import LayoutState, Parts, Switch, overlay_switches, toggling
     from app.ui.window_base import make_application, run_until_closed
 
+    if is_own and kind is RigKind.SIM and "twin" not in file.data:
+        config = with_kept_twin(config)
     finish_loading()
     application = make_application(config.window)
     maker = EngineMaker(ahead)
@@ -93,7 +96,8 @@ def run_window(
     settings = SettingsController(window, file, maker.perceive_again)
     if not until_first_frame:
         panels = window.panels
-        switches = overlay_switches(panels.overlay_bar)
+        performance = Switch(lambda: panels.shows_performance, toggling(panels.toggle_performance))
+        switches = {**overlay_switches(panels.overlay_bar), "performance": performance}
         LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
     rigs = RigMenuController(window)
     live = LiveMenuController(window, outputs)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from pydantic import ValidationError
 from PySide6.QtCore import QObject, Slot
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QMainWindow, QMenu
@@ -14,12 +16,30 @@ from app.operator.panels import OperatorPanels
 from app.operator.rig_session import RigSession
 from app.ui.actions import MenuEntry, add_menu, plain
 from app.ui.i18n import mark, tr, tr_text
-from core.config.models import TwinConfig
+from app.ui.layout_state import layout_settings
+from core.config.models import Config, TwinConfig
 from hardware.rig import RigKind, kind_of
-from hardware.twin.catalog import BENCH_LOOK, BENCH_TITLE, LOOK_TITLES, RARE_TITLES, look_of
+from hardware.twin.catalog import BENCH_LOOK, BENCH_TITLE, LOOK_TITLES, LOOKS, RARE_TITLES, family_of, look_of
+from hardware.twin.phantom import PHANTOM_TITLES
 
 _ANY = mark("Any of the ten &families")
 _SEED_MAX = 999_999
+_KEPT = "twin"
+"""Where the choice is kept until the next start."""
+
+
+def with_kept_twin(config: Config) -> Config:
+    """The configuration with the phantom and the look that were chosen last; a choice that is not known any more is ignored."""
+    settings = layout_settings()
+    kept = {name: settings.value(f"{_KEPT}/{name}") for name in ("phantom", "look", "appearance_seed")}
+    kept = {name: value or None for name, value in kept.items() if value is not None}
+    try:
+        twin = TwinConfig.model_validate(config.twin.model_dump() | kept)
+    except ValidationError:
+        return config
+    if twin.phantom not in PHANTOM_TITLES and re.fullmatch(r"random:\d{1,6}", twin.phantom) is None:
+        return config
+    return config.model_copy(update={"twin": twin}) if twin.look is None or twin.look in LOOKS else config
 
 
 class TwinMenuController(QObject):
@@ -85,7 +105,7 @@ class TwinMenuController(QObject):
             self._say(tr("The look stays as it is: {why}", why=why), True)
             return
         self._use({"look": look, "appearance_seed": seed})
-        title = plain(self._looks[look].text()) if look in self._looks else str(look)
+        title = tr_text(LOOK_TITLES[family_of(seed)]) if look is None else plain(self._looks[look].text())
         self._say(tr("Look: {title}", title=title), False)
 
     @Slot(str)
@@ -98,5 +118,8 @@ class TwinMenuController(QObject):
 
     def _use(self, change: dict[str, Any]) -> None:
         config = self._rig.config
+        settings = layout_settings()
+        for name, value in change.items():
+            settings.setValue(f"{_KEPT}/{name}", "" if value is None else value)
         self._live.setFocus()
         self._rig.use_config(config.model_copy(update={"twin": config.twin.model_copy(update=change)}))

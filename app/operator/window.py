@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import QObject, Qt, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
@@ -19,7 +20,7 @@ from app.operator.recording import Recorder
 from app.operator.rig_session import OpenEngineFor, RigSession
 from app.operator.tour import operator_stops
 from app.operator.twin_menu import TwinMenuController
-from app.ui.actions import MenuEntry, add_help_menu, add_menu
+from app.ui.actions import MenuEntry, add_help_menu, add_menu, plain
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import Origin, SnapshotWriter, pictures_folder
 from app.ui.texts import OperatorStep, Undriven
@@ -28,6 +29,8 @@ from app.widgets.event_log import LogKind
 from app.widgets.scene_panels import add_scene_view_menu
 from app.widgets.tour_overlay import TourOverlay
 from core.config.models import Config, PerceptionConfig
+from core.files import VIDEO_ENDINGS
+from core.session.manifest import MANIFEST
 from core.types import Frame, Point, Scene, Tick
 from hardware.rig import RigKind
 
@@ -91,6 +94,9 @@ class OperatorWindow(WindowFrame):
     phantoms : (name, title) of the phantoms to choose from; only the bench twin has any.
     """
 
+    source_chosen = Signal(object)
+    """The path of a picture, video or folder of pictures to look at instead of the rig's camera."""
+
     def __init__(self, config: Config, open_engine: OpenEngineFor, kind: RigKind, phantoms: Sequence[tuple[str, str]] = ()) -> None:
         super().__init__()
         self.last_tick: Tick | None = None
@@ -129,6 +135,16 @@ class OperatorWindow(WindowFrame):
         self.panels.toast.show_message(message, is_fault=is_fault)
         self.panels.log(LogKind.NOTE, message)
 
+    def open_path(self, path: Path) -> None:
+        """Pictures and videos are looked at in this window; sessions and annotations open in their own."""
+        from core.learning.dataset import IMAGE_ENDINGS
+
+        is_session = any((at / MANIFEST).is_file() for at in (path, path.parent))
+        if not is_session and (path.is_dir() or path.suffix.lower() in (*IMAGE_ENDINGS, *VIDEO_ENDINGS, ".bag")):
+            self.source_chosen.emit(path)
+        else:
+            super().open_path(path)
+
     @Slot()
     def show_tour(self) -> None:
         """Show the tour from its first stop."""
@@ -148,7 +164,10 @@ class OperatorWindow(WindowFrame):
                 MenuEntry(tr("&Mark this moment"), recorder.mark, ("M", "Shift+M")),
             ]
         )
-        add_scene_view_menu(self, self.panels)
+        performance = MenuEntry(tr("&Performance figures"), self.panels.toggle_performance, checked=False)
+        actions = add_scene_view_menu(self, self.panels, [performance])
+        action = next(one for one in actions if plain(one.text()) == plain(performance.text))
+        self.panels.performance_shown.connect(action.setChecked)
         add_menu(
             self,
             tr("&Robot"),
@@ -312,6 +331,8 @@ class OperatorWindow(WindowFrame):
         """A picture that does not change is not live: after half a second nothing of it is shown as true."""
         if self.rig.phase is not EnginePhase.RUNNING:
             return
+        if (pilot := self.rig.pilot) is not None:
+            self.panels.banner.show_speed(pilot.simulation_speed)
         problem = self.rig.engine.problem
         if self.shown_tick is not None:
             if age_s > self._stale_after_s:

@@ -118,7 +118,7 @@ class JogReadout(PaintedWidget):
     @property
     def text(self) -> str:
         bend, pitch = (NONE if share is None else f"{share:.2f}" for share in (self._bend, self._pitch))
-        return tr("bend {bend}, pitch {pitch}, in {inserted} mm", bend=bend, pitch=pitch, inserted=self._inserted)
+        return tr("bend {bend}, pitch {pitch}, inserted {inserted} mm", bend=bend, pitch=pitch, inserted=self._inserted)
 
     @property
     def _inserted(self) -> str:
@@ -143,9 +143,9 @@ class JogReadout(PaintedWidget):
 
     def paint(self, painter: QPainter) -> None:
         label, names = theme.font(theme.Size.LABEL), (tr("bend"), tr("pitch"))
-        inserted = tr("in {inserted} mm", inserted=self._inserted)
+        inserted = tr("inserted {inserted} mm", inserted=self._inserted)
         # room for three digits, so that the bars do not grow and shrink as the robot goes in
-        last_px = max(text_width(label, text) for text in (inserted, tr("in {inserted} mm", inserted="000")))
+        last_px = max(text_width(label, text) for text in (inserted, tr("inserted {inserted} mm", inserted="000")))
         spare_px = self.width() - last_px - sum(text_width(label, name) for name in names) - 4 * _BETWEEN_PX
         bar_px, left = max(8.0, spare_px / 2), 0.0
         for name, share in zip(names, (self._bend, self._pitch), strict=True):
@@ -188,9 +188,9 @@ class JogPanel(QWidget):
         grid = QGridLayout()
         grid.setSpacing(4)
         for motion, row, place, arrow, key, text in (
-            (Motion.PITCH_DOWN, 0, 0, None, "Q", tr("dip")),
+            (Motion.PITCH_DOWN, 0, 0, None, "Q", tr("pitch down")),
             (Motion.ADVANCE, 0, 1, QPointF(0, -1), "W", tr("advance")),
-            (Motion.PITCH_UP, 0, 2, None, "E", tr("lift")),
+            (Motion.PITCH_UP, 0, 2, None, "E", tr("pitch up")),
             (Motion.STEER_LEFT, 1, 0, QPointF(-1, 0), "A", tr("left")),
             (Motion.RETRACT, 1, 1, QPointF(0, 1), "S", tr("retract")),
             (Motion.STEER_RIGHT, 1, 2, QPointF(1, 0), "D", tr("right")),
@@ -244,7 +244,7 @@ class JogPanel(QWidget):
         bend, pitch = f"{speeds.bend_mm_s:.3g}", f"{speeds.pitch_mm_s:.3g}"
         self._readout.show_speeds(
             tr(
-                "feed {feed:.3g}, sheath {sheath:.3g}, wires {wires} mm/s",
+                "speeds: feed {feed:.3g}, sheath {sheath:.3g}, tendons {wires} mm/s",
                 feed=speeds.advance_mm_s,
                 sheath=speeds.delivery_mm_s,
                 wires=bend if bend == pitch else f"{bend}/{pitch}",

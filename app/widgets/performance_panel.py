@@ -97,6 +97,6 @@ def _heads(shown: float | None, engine: float | None, dropped: int | None, block
         (tr("shown/s"), shown, False),
         (tr("frames/s"), engine, False),
         (tr("dropped"), dropped, False),
-        (tr("block ms"), block_ms, is_long),
+        (tr("pause ms"), block_ms, is_long),
     )
     return tuple((name, NONE if value is None else f"{value:.0f}", is_bad) for name, value, is_bad in values)

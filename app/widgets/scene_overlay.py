@@ -234,6 +234,8 @@ def _steady_side(side: float, offset_px: float) -> float:
 
 _SEEN = 3.0  # contrast from which on a swatch is seen
 _CHIP_HEIGHT, _CHIP_NARROW, _CHIP_GAP = 30, 54, 5
+_SWATCH_PX = 13
+"""Room of a chip's colour; without it the colour is a line below the name."""
 _SWATCH = {
     Layer.MASKS: ON_PICTURE.VESSEL,
     Layer.VESSEL: ON_PICTURE.VESSEL,
@@ -288,7 +290,7 @@ class OverlayBar(QWidget):
 
     def _rows(self, width: int) -> list[list[_Chip]]:
         chips = list(self._chips.values())
-        if width >= _full_width(chips):
+        if width >= _full_width(chips) - _SWATCH_PX * len(chips):  # names without colours: the picture needs the height
             return [chips]
         half = (len(chips) + 1) // 2
         return [chips[:half], chips[half:]]
@@ -333,11 +335,11 @@ class _Chip(Painted, QAbstractButton):
         key_colour = theme.TEXT_DIM if on else theme.TEXT_FAINT
         draw_text(painter, QRectF(8, 0, 10, height), self._layer.value.key, theme.semi_bold(11), key_colour, CENTER)
         left, swatch = 22.0, _SWATCH[self._layer]
-        if self.width() >= self.sizeHint().width():  # no room for the colour in a narrow window
-            is_lost = theme.contrast(swatch, theme.RAISED) < _SEEN  # a pale colour on a light chip
-            box = QRectF(left, height / 2 - 4, 8, 8)
-            draw_box(painter, box, 2, swatch if on else None, theme.TEXT_FAINT if is_lost else swatch, 1.5)
-            left = 35.0
+        is_lost = theme.contrast(swatch, theme.RAISED) < _SEEN  # a pale colour on a light chip
+        is_wide = self.width() >= self.sizeHint().width()
+        box = QRectF(left, height / 2 - 4, 8, 8) if is_wide else QRectF(left, height - 6, self.width() - left - 8, 3)
+        draw_box(painter, box, 2 if is_wide else 1, swatch if on else None, theme.TEXT_FAINT if is_lost else swatch, 1.5)
+        left += _SWATCH_PX if is_wide else 0
         room = QRectF(left, 0, self.width() - left - 4, height)
         colour = theme.TEXT if on else theme.TEXT_FAINT
         draw_text(painter, room, self.text(), theme.font(12), colour, smallest_px=10, elided=True)

@@ -152,7 +152,7 @@ class Pilot:
     ) -> None:
         self._readiness = readiness
         self._bench_clock = bench_clock
-        self._perceived_s: float | None = None
+        self._perceived_s = clock() if bench_clock is None else bench_clock()  # the bench waits for its first scene, too
         self._held_s: float | None = None
         self._bus_s: float | None = None
         self._robot, self._policy, self._config, self._clock = robot, policy, config, bench_clock or clock

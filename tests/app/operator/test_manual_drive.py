@@ -172,18 +172,18 @@ def test_who_brings_the_robot_back_without_a_picture_sees_how_far_it_is_in(
 ) -> None:
     """By its servos, where they answer and are zeroed; else nobody knows."""
     jog = running.panels.jog
-    until(qtbot, lambda: jog.readout.endswith("in 84 mm"))
+    until(qtbot, lambda: jog.readout.endswith("inserted 84 mm"))
     engine.silent = True
     until(qtbot, lambda: running.panels.badge.title == "No new picture")
-    until(qtbot, lambda: jog.readout == "bend –, pitch –, in – mm")
+    until(qtbot, lambda: jog.readout == "bend –, pitch –, inserted – mm")
     engine.bus_status = lambda: bus(time_s=time.monotonic())  # type: ignore[assignment,return-value]
-    until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, in 20 mm")
+    until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, inserted 20 mm")
     zeroed = (True, True, True, True, False, True, True)
     engine.bus_status = lambda: bus(time_s=time.monotonic(), zeroed=zeroed)  # type: ignore[assignment,return-value]
-    until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, in – mm")
+    until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, inserted – mm")
     engine.bus_status = lambda: None  # type: ignore[assignment,return-value]
     engine.silent = False
-    until(qtbot, lambda: jog.readout.endswith("in 84 mm"))
+    until(qtbot, lambda: jog.readout.endswith("inserted 84 mm"))
 
 
 def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:

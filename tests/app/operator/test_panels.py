@@ -36,7 +36,7 @@ def test_neither_advice_nor_ghost_outlives_its_frame(qtbot: QtBot) -> None:
 def test_another_rig_brings_the_speeds_of_its_keys(qtbot: QtBot) -> None:
     panels = OperatorPanels(Config(), RigKind.SIM, [])
     qtbot.addWidget(panels)
-    assert panels.jog.speeds == "feed 10, sheath 10, wires 2.4 mm/s"
+    assert panels.jog.speeds == "speeds: feed 10, sheath 10, tendons 2.4 mm/s"
     slow = Config().hand.model_copy(update={"advance_mm_s": 3.0})
     panels.set_config(Config().model_copy(update={"hand": slow}))
-    assert panels.jog.speeds == "feed 3, sheath 10, wires 2.4 mm/s"
+    assert panels.jog.speeds == "speeds: feed 3, sheath 10, tendons 2.4 mm/s"

@@ -384,3 +384,15 @@ def test_at_the_programs_end_the_wizard_gives_everything_back(window: OperatorWi
     desk.close()
     assert wizard.model.bench is None
     assert len(opened) == 1  # no rig is opened again
+
+
+def test_a_dropped_folder_of_pictures_is_looked_at(
+    window: OperatorWindow, opened: list[Config], qtbot: QtBot, tmp_path: Path
+) -> None:
+    desk = _desk(window)
+    window.open_path(tmp_path)
+    until(qtbot, lambda: len(opened) == 2)
+    assert (opened[1].rig.source, opened[1].rig.camera, opened[1].rig.robot) == (str(tmp_path), "image_folder", "none")
+    desk.choose_source(tmp_path / "gone.mp4")
+    assert "no such file" in window.panels.toast.text()
+    assert len(opened) == 2

@@ -9,8 +9,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from pytestqt.qtbot import QtBot
 
+from app.operator.twin_menu import with_kept_twin
 from app.operator.window import OperatorWindow
 from app.ui.actions import plain
+from app.ui.layout_state import layout_settings
 from core.config.models import Config, TwinConfig, load_config
 from tests.app.fakes import FakeBench, FakeEngine, until
 
@@ -58,6 +60,10 @@ def test_a_look_opens_the_twin_again_and_is_marked(window: OperatorWindow, opene
     until(qtbot, lambda: len(opened) == 2 and window.shown_tick is not None)
     assert (opened[1].look, opened[1].appearance_seed, opened[1].phantom) == ("tank", 1, opened[0].phantom)
     assert _marked(window) == ["Tank of rippling water"]
+    kept = with_kept_twin(load_config()).twin
+    assert (kept.look, kept.appearance_seed) == ("tank", 1), "at the next start, too"
+    layout_settings().setValue("twin/phantom", "no such phantom")
+    assert with_kept_twin(load_config()) == load_config()
     assert window.panels.toast.text() == "Look: Tank of rippling water"
     _entries(window)["Clear bench"].trigger()
     until(qtbot, lambda: len(opened) == 3 and window.shown_tick is not None)

@@ -17,7 +17,7 @@ def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:
     panel = own(JogPanel(ServosConfig()))
     assert panel.speeds == "", "no rig is known"
     panel.set_speeds(JogConfig(bend_rate_per_s=1.2, advance_mm_s=10.0, delivery_mm_s=8.0), ServosConfig(max_pull_mm=2.0))
-    assert panel.speeds == "feed 10, sheath 8, wires 2.4 mm/s"
+    assert panel.speeds == "speeds: feed 10, sheath 8, tendons 2.4 mm/s"
     assert panel.speeds in panel._readout.accessibleDescription()
     assert panel._caps[Motion.WITHDRAW].toolTip() == "sheath back: hold to move, release to stop; 8 mm/s"
     assert panel._caps[Motion.PITCH_UP].toolTip().endswith("the tendons are pulled 2.4 mm/s")
@@ -25,9 +25,9 @@ def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:
     panel.speed_changed.connect(heard.append)
     panel._speed.setCurrentIndex(1)
     assert heard == [0.5]
-    assert panel.speeds == "feed 5, sheath 4, wires 1.2 mm/s"
+    assert panel.speeds == "speeds: feed 5, sheath 4, tendons 1.2 mm/s"
     panel.set_speeds(JogConfig(), ServosConfig(max_pull_mm=1.0))
-    assert panel.speeds == "feed 5, sheath 5, wires 0.6 mm/s", "another rig has the chosen share, too"
+    assert panel.speeds == "speeds: feed 5, sheath 5, tendons 0.6 mm/s", "another rig has the chosen share, too"
 
 
 def test_key_caps_light_up_and_can_be_held_with_the_mouse(own: Own, qtbot: QtBot) -> None:
@@ -51,16 +51,16 @@ def test_readout_shows_and_says_how_the_robot_stands(own: Own) -> None:
     panel = own(JogPanel(ServosConfig()), 203, 170, show=True)
     pictures = []
     for pulls, text in (
-        ((0.3, 0.3, 0.3, 0.3), "bend 0.00, pitch 0.00, in 84 mm"),
-        ((1.3, -0.7, 0.3, 0.3), "bend 0.50, pitch 0.00, in 84 mm"),
-        ((0.3, 0.3, -0.7, 1.3), "bend 0.00, pitch -0.50, in 84 mm"),
+        ((0.3, 0.3, 0.3, 0.3), "bend 0.00, pitch 0.00, inserted 84 mm"),
+        ((1.3, -0.7, 0.3, 0.3), "bend 0.50, pitch 0.00, inserted 84 mm"),
+        ((0.3, 0.3, -0.7, 1.3), "bend 0.00, pitch -0.50, inserted 84 mm"),
     ):
         panel.show_status(RobotStatus(0.0, 84.2, 0.0, pulls, (0.0,) * 4))
         assert panel.readout == panel._readout.accessibleDescription() == text
         pictures.append(panel._readout.grab().toImage())
     assert pictures[0] != pictures[1] and pictures[1] != pictures[2]
     panel.show_status(None)
-    assert panel.readout == "bend –, pitch –, in – mm", "a straight head would be something that is known"
+    assert panel.readout == "bend –, pitch –, inserted – mm", "a straight head would be something that is known"
     panel.set_enabled(False, "Fault")
     assert panel.accessibleDescription() == "Fault"
 
@@ -69,13 +69,13 @@ def test_readout_shows_nothing_of_unknown_joints(own: Own) -> None:
     panel = own(JogPanel(ServosConfig()))
     panel.show_known((False,) * 7)
     panel.show_status(RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4))
-    assert panel.readout == "bend –, pitch –, in – mm"
+    assert panel.readout == "bend –, pitch –, inserted – mm"
     unknown = panel._readout.grab().toImage()
     panel.show_known((True, True, False, True, True, True, True))
-    assert panel.readout == "bend 0.00, pitch –, in 0 mm"
+    assert panel.readout == "bend 0.00, pitch –, inserted 0 mm"
     assert panel._readout.grab().toImage() != unknown, "a bar without a mark is no straight head"
     panel.show_known((True,) * 4 + (False, True, True))
-    assert panel.readout == "bend 0.00, pitch 0.00, in – mm"
+    assert panel.readout == "bend 0.00, pitch 0.00, inserted – mm"
 
 
 def test_keys_of_motions_that_the_robot_does_not_have_are_hidden(own: Own) -> None:
@@ -84,7 +84,7 @@ def test_keys_of_motions_that_the_robot_does_not_have_are_hidden(own: Own) -> No
     turns = {Motion.TURN_LEFT, Motion.TURN_RIGHT}
     assert {motion for motion, cap in panel._caps.items() if not cap.isVisible()} == {Motion.DELIVER, Motion.WITHDRAW} | turns
     panel.show_status(RobotStatus(0.0, 84.2, 0.0, (1.3, -0.7), (0.0,) * 2, rotation_deg=-90.0))
-    assert panel.readout == "bend 0.50, pitch 0.00, in 84 mm", "its tendons bend in the picture's plane now"
+    assert panel.readout == "bend 0.50, pitch 0.00, inserted 84 mm", "its tendons bend in the picture's plane now"
     flat = TURNED.model_copy(update={"joints": TURNED.joints[:3]})
     panel.set_speeds(JogConfig(), flat)
     assert not panel._caps[Motion.PITCH_UP].isVisible(), "two tendons cannot pitch without a rotation"

@@ -14,7 +14,7 @@ def test_performance_shows_percentiles_and_marks_a_long_block(own: Own) -> None:
     assert "network" not in panel.text
     assert "total 30.0 30.0" in panel.text
     assert "segmentation 21.0 21.0" in panel.text
-    assert "block ms 12" in panel.text
+    assert "pause ms 12" in panel.text
     panel.clear()
     assert "total" not in panel.text
     panel.add(make_tick(), 80.0)
