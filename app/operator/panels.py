@@ -196,11 +196,12 @@ class OperatorPanels(ScenePanels):
     def show_stale(self, age_s: float, problem: str | None) -> None:
         """No new picture has come for so long, and why, where the camera tells it."""
         told = tr_text(problem) if problem is not None else ""
-        self.blank(tr("No new picture"), told or tr("Check the camera; F5 starts the rig again"))
+        waits = tr("The simulation waits for this computer, which is busy") if self.banner.kind is RigKind.SIM else ""
+        self.blank(tr("No new picture"), told or waits or tr("Check the camera; F5 starts the rig again"))
         self.performance.clear()
         self.trends.show_silence(age_s)
         title = tr("No new picture for {seconds:.0f} s", seconds=age_s)
-        detail = told or tr("The camera or the program is behind")
+        detail = told or waits or tr("The camera or the program is behind")
         self._warn(title, detail, restartable=problem is not None)
 
     def show_no_picture(self, problem: str) -> None:

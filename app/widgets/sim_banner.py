@@ -50,7 +50,7 @@ class SimBanner(PaintedWidget):
     def show_kind(self, kind: RigKind, *, has_servos: bool = True) -> None:
         """The kind of the rig that is being opened."""
         self._text = BANNERS[kind] if has_servos or kind is not RigKind.LIVE else _LOOK_ONLY
-        self.percent = 100
+        self.kind, self.percent = kind, 100
         self.setMinimumWidth(int(self._plate_width()))  # the word stays visible, whatever else needs room
         self.update()
         self.setAccessibleName(f"{tr(self._text.word)}: {tr(self._text.meaning)}")
@@ -58,7 +58,7 @@ class SimBanner(PaintedWidget):
 
     def show_speed(self, speed: float) -> None:
         """How fast the simulation runs, 0..1: said where the computer is too slow for it."""
-        percent = min(100, 5 * round(20.0 * speed))
+        percent = max(5, min(100, 5 * round(20.0 * speed)))
         if percent != self.percent:
             self.percent = percent
             self.update()

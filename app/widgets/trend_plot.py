@@ -53,7 +53,7 @@ class TrendPlot(QWidget):
         view.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         view.viewport().setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         view.ci.layout.setContentsMargins(0, 4, 14, 0)
-        view.ci.layout.setVerticalSpacing(6)
+        view.ci.layout.setVerticalSpacing(14)  # the ticks of two scales are told apart
         view.ci.layout.setHorizontalSpacing(0)
         self.setLayout(column(view))
         self._angle = _Chart(view, 0, _ANGLE_RANGES, is_signed=True, allowed=limits.theta_allow_deg)

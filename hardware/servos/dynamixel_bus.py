@@ -275,7 +275,7 @@ class ServoBus(JointBus[ServoLine]):
     config : identities, conversion and speeds. Envelope and step limits are the gate's business, not the driver's.
     port : serial device; default is the configuration's.
     backups : folder that keeps what the EEPROM of a servo was before it is changed; None: it is not kept.
-    now_s : the clock of the readings.
+    now_s : the clock of the answers.
 
     Notes
     -----
@@ -294,7 +294,7 @@ class ServoBus(JointBus[ServoLine]):
         chosen = port or config.port
         if chosen is None:
             raise NotReady("no servo port is configured: set servos.port")
-        super().__init__(config, ServoLine(chosen, config.baud))
+        super().__init__(config, ServoLine(chosen, config.baud, now_s))
         self._backups = backups
         self._blocks = _blocks(config)
         self._reset()

@@ -85,19 +85,20 @@ _READ_SLICE_S = 0.0005
 
 
 class LockedPort(PortHandler):  # type: ignore[misc]
-    """A serial port that only one program can hold, timed by the monotonic clock.
+    """A serial port that only one program can hold, timed by ``now_s``, the monotonic clock.
 
     Programs that ask for the lock (flock) are refused by it, all others by the terminal's exclusive mode: while it is on, the
     system refuses every further ``open``, but for those of root. One that had the port open before is looked for.
     """
 
     is_open: bool
+    now_s: Callable[[], float] = staticmethod(time.monotonic)
     _late_bytes: int | None = None
     """What may still be read after the time for an answer is over: what had come by then. None: it is not over."""
 
     def getCurrentTime(self) -> float:  # noqa: N802 - the vendor's name
         """Milliseconds. The vendor takes the wall clock, which may jump."""
-        return time.monotonic() * 1000.0
+        return self.now_s() * 1000.0
 
     def setupPort(self, cflag_baud: int) -> bool:  # noqa: N802
         """Open the port; called by ``openPort`` and ``setBaudRate``. Raises PortError."""
@@ -281,11 +282,11 @@ class _Round:
 class ServoLine:
     """The port with the packet handler. All methods but the constructor raise ``PortLost`` when the port vanishes.
 
-    ``interruptible`` lets a check raise between two transactions.
+    ``interruptible`` lets a check raise between two transactions. `now_s` is the clock of the answers.
     """
 
-    def __init__(self, port: str, baud: int) -> None:
-        self.port, self.baud = port, baud
+    def __init__(self, port: str, baud: int, now_s: Callable[[], float] = time.monotonic) -> None:
+        self.port, self.baud, self._now_s = port, baud, now_s
         self.counts = LineCounts()
         self._port: LockedPort | None = None
         self._handler = StuffingHandler()
@@ -330,6 +331,7 @@ class ServoLine:
         """
         self.close()
         port = LockedPort(self.port)
+        port.now_s = self._now_s
         try:
             if not port.setBaudRate(self.baud):
                 raise PortError(f"servos.baud {self.baud} is not a speed of these servos: use 57600, 115200, 1000000, 2000000 ...")
@@ -459,7 +461,7 @@ class ServoLine:
         A silent servo may also silence those after it in the list: the rest is asked again without it. A servo that was silent is
         left alone until its answer cannot come any more.
         """
-        now = time.monotonic()
+        now = self._now_s()
         data: dict[int, bytes] = {}
         missed = {i: Miss.WAITING for i in ids if self._quiet_until.get(i, 0.0) > now}
         rest = [i for i in ids if i not in missed]
@@ -549,13 +551,13 @@ class ServoLine:
     def _note(self, servo_id: int, result: int) -> None:
         if result == COMM_RX_TIMEOUT:
             self.counts.silent += 1
-            self._quiet_until[servo_id] = time.monotonic() + LATE_S
+            self._quiet_until[servo_id] = self._now_s() + LATE_S
         elif result != COMM_SUCCESS:
             self.counts.corrupt += 1
 
     def _let_late_answers_pass(self, servo_id: int) -> None:
         """Before a single request: the sender drops what has come until then."""
-        self.pause(self._quiet_until.get(servo_id, 0.0) - time.monotonic())
+        self.pause(self._quiet_until.get(servo_id, 0.0) - self._now_s())
 
 
 def _error_text(error: int) -> str:
