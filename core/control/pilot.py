@@ -396,11 +396,11 @@ class Pilot:
             self._turns_back = decision.mode in DRIVING_MODES and not decision.hold_expired
             self._is_stop_pending = self._is_stop_pending and Act.STOP not in inputs.events
         if self._bench_clock is not None:
-            safety = self._config.safety
+            safety, frame_s = self._config.safety, 1.0 / self._config.twin.live_frames_per_second
             known = (
                 (now_s, _TURNS_AHEAD * PERIOD_S),
                 (self._held_s, safety.deadman_timeout_s),
-                (self._perceived_s, _SHARE_OF_AGE * safety.pose_hold_s),
+                (self._perceived_s, max(_SHARE_OF_AGE * safety.pose_hold_s, 2.0 * frame_s)),
                 (None if self._requests.busy else self._bus_s, _SHARE_OF_AGE * safety.measurement_max_age_s),
             )
             self._bench_clock.grant(min(at_s + ahead_s for at_s, ahead_s in known if at_s is not None))
