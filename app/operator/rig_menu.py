@@ -300,7 +300,7 @@ class RigMenuController(QObject):
             return
         if self._rig.orders != request.order:  # another order came in between: F5, a phantom, a model
             self._request = None
-            self._window.say(tr("The rig was opened anew meanwhile; ask for the wizard again"), is_fault=True)
+            self._window.say(tr("The rig was opened again meanwhile; ask for the wizard again"), is_fault=True)
         elif self._is_lent(phase):  # and not what became of the rig before
             self._request = None
             QTimer.singleShot(0, partial(self._show, request))

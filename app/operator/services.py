@@ -219,7 +219,9 @@ class WindowServices(QObject):
 
     def _cost_of_another_model(self) -> str:
         ends = tr(" The recording ends.") if self._is_recording else ""
-        return tr("The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}", ends=ends)
+        return tr(
+            "The rig is opened again: no picture for some seconds, and the servos must be switched on again.{ends}", ends=ends
+        )
 
     def _use_model(self, name: str) -> None:
         config = self._window.rig.config

@@ -146,7 +146,7 @@ class CameraPage(WizardPage):
         if self.cameras.currentRow() < 0:
             return
         if self.draft is not None and self.draft.has_news:
-            self.ask(tr("Open the camera anew and lose what was found?"), tr("Open"), self._open_now)
+            self.ask(tr("Open the camera again and lose what was found?"), tr("Open"), self._open_now)
         else:
             self._open_now()
 

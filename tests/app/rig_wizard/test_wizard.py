@@ -458,7 +458,7 @@ def test_opening_the_camera_anew_asks_before_it_loses_what_was_found(opened: Rig
     draft, page = opened.model.draft, opened.camera_page
     draft.scale = ScaleConfig(mm_per_px=0.3, size_px=(640, 480), method="board", uncertainty_share=0.01)
     page.open_button.click()
-    assert opened.question.text == "Open the camera anew and lose what was found?"
+    assert opened.question.text == "Open the camera again and lose what was found?"
     opened.question.cancel()
     assert opened.model.draft is draft
     page.open_button.click()
