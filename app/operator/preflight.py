@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, sentence
-from app.ui.workers import ChildProcess, module_of
+from app.ui.workers import LOW_PRIORITY, ChildProcess, module_of
 from core.config.models import Config
 from core.control.alerts import alert_of
 from core.control.drive_view import DriveView
@@ -200,7 +200,8 @@ class PreflightModel(QObject):
         self._cancel()
         config = self._config()
         self._checks, self._checked, self._problem, self._of = [], None, "", _digest(config)
-        child = ChildProcess(self._command, self, given=config.model_dump_json())
+        priority = 0 if config.rig.camera == "twin" else LOW_PRIORITY  # the twin waits for a busy computer, real devices do not
+        child = ChildProcess(self._command, self, given=config.model_dump_json(), priority=priority)
         child.told.connect(self._on_check)
         child.ended.connect(self._on_ended)
         self._child = child
