@@ -22,7 +22,7 @@ from tests.core.session_data import record, tick_of
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
     "gui", "perceive", "synth", "train", "teach", "calibrate", "annotate", "evaluate", "trial", "benchmark", "record", "replay",
-    "trigger", "play", "doctor", "desktop", "session", "rig",
+    "trigger", "play", "library", "doctor", "desktop", "session", "rig",
 )  # fmt: skip
 INNER = {
     "session": ("info", "describe", "recover", "export"),
