@@ -67,6 +67,8 @@ class _Client(QObject):
 
     def _serve(self) -> None:
         """Answer the whole lines that are there, some at a time."""
+        if self._line.fileno() < 0:  # closed during the pause
+            return
         for _ in range(_LINES_AT_ONCE):
             request, has_end, rest = self._waiting.partition(b"\n")
             if not has_end or len(request) >= MAX_LINE:
