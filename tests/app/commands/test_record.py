@@ -94,7 +94,7 @@ def test_info_is_one_object_and_a_table(recorded: tuple[Path, dict[str, object]]
 def test_what_a_session_is_about_is_given_and_changed(recorded: tuple[Path, dict[str, object]]) -> None:
     session, _ = recorded
     for changes, expected in (
-        ((), {"operator": "Ana", "condition": "alone", "phantom": "s_curve", "task": None, "tags": ["pilot"]}),
+        ((), {"operator": "Ana", "condition": "alone", "phantom": "tree", "task": None, "tags": ["pilot"]}),
         (
             ("--task", "loop", "--condition", " ", "--tag", "b", "--untag", "pilot"),
             {"condition": None, "task": "loop", "tags": ["b"]},
