@@ -554,9 +554,11 @@ class SessionWriter:
         """Begin a session with the next frame. Does nothing when one is being recorded."""
 
         def begin() -> None:
-            with self._changed:
-                self._starts_waiting -= 1
-            self._recording.begin()
+            try:
+                self._recording.begin()
+            finally:
+                with self._changed:
+                    self._starts_waiting -= 1
 
         with self._changed:
             if self._enqueue(begin):
@@ -628,7 +630,7 @@ class SessionWriter:
         """How it is going, now."""
         status = self._status.now
         if not status.recording:
-            return status
+            return replace(status, armed=True) if self._starts_waiting else status  # its thread has not come to it yet
         elapsed_s = max(0.0, self._clock() - self._recording.began_s)
         return replace(status, elapsed_s=elapsed_s, dropped=max(0, self._dropped_until_end() - self._recording.dropped_before))
 
