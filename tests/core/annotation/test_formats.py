@@ -228,7 +228,7 @@ def test_coco_has_boxes_and_areas(image: FoundImage, tmp_path: Path) -> None:
     (flat,) = second["segmentation"]
     assert shoelace(np.reshape(flat, (-1, 2))) == pytest.approx(second["area"], abs=0.6), "an area, but for its four corners"
     assert (min(flat[::2]), max(flat[::2]), min(flat[1::2]), max(flat[1::2])) == (20.0, 41.0, 18.0, 23.0)
-    assert set(content) == {"images", "annotations", "categories"}
+    assert set(content) == {"info", "images", "annotations", "categories"}
 
 
 def test_labelme_has_the_parts_that_labelme_reads(image: FoundImage, tmp_path: Path) -> None:
