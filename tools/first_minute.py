@@ -66,6 +66,15 @@ class Session:
             time.sleep(0.01)
         return True
 
+    def press(self, how: str, key: str) -> None:
+        """Into the list of checks, or else the window: without a window manager nothing else gives them the keys."""
+        for name in ("Before driving", "LumenPilot"):
+            command = ["xdotool", "search", "--onlyvisible", "--name", name, "windowfocus"]
+            if subprocess.run(command, env=self._environment, check=False, capture_output=True).returncode == 0:
+                break
+        time.sleep(0.2)
+        self.act(how, key)
+
     def act(self, *words: object) -> None:
         subprocess.run(["xdotool", *map(str, words)], env=self._environment, check=True)
 
@@ -99,19 +108,18 @@ def _drive(session: Session) -> str:
     """Click, arm, hand over; returns how it ended."""
     if not session.until(_ARM_WITHIN_S, armable=True):
         return f"arming was refused for {_ARM_WITHIN_S:g} s: {session.state.get('against')}"
-    session.act("search", "--onlyvisible", "--name", "LumenPilot", "windowfocus")  # there is no window manager
-    session.act("key", "Escape")  # the tour of a first start
+    session.press("key", "Escape")  # the tour of a first start
     session.act("mousemove", *session.state["target_at"], "click", 1)
     for _ in range(round(_ARM_WITHIN_S / _ASK_EVERY_S)):  # the first press may begin the checks, as a user does
-        session.act("key", "F6")
+        session.press("key", "F6")
         if session.until(_ASK_EVERY_S, mode="ARMED"):
             break
     else:
         return f"not armed: {session.state.get('bar')}"
-    session.act("keydown", "Shift_L")
+    session.press("keydown", "Shift_L")
     try:
         session.until(5.0, can_hand_over=True)
-        session.act("key", "F7")
+        session.press("key", "F7")
         if not session.until(5.0, mode="AUTONOMOUS"):
             return f"not handed over: {session.state.get('mode')}"
         began_s, slowest = time.monotonic(), 100
