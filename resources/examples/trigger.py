@@ -25,6 +25,5 @@ with socket.socket(socket.AF_UNIX) as line:
     for trial in (1, 2, 3):
         ask("note", text=f"trial {trial}")
         time.sleep(0.1)
-    ask("snapshot")
     print(ask("status")["session"])
     ask("record stop")
