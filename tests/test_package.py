@@ -38,7 +38,14 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_holds_all_that_the_program_needs_and_nothing_else(wheel: Path) -> None:
     names = set(ZipFile(wheel).namelist())
-    wanted = {"lumenpilot/__init__.py", "lumenpilot/__main__.py", "lumenpilot/api.py", "lumenpilot/main.py", "lumenpilot/commit"}
+    wanted = {
+        "lumenpilot/__init__.py",
+        "lumenpilot/__main__.py",
+        "lumenpilot/api.py",
+        "lumenpilot/gym.py",
+        "lumenpilot/main.py",
+        "lumenpilot/commit",
+    }
     wanted |= {"lumenpilot/scripts/desktop.sh"}
     for layer in ("app", "core", "hardware", "resources"):
         files = (path for path in (ROOT / layer).rglob("*") if path.is_file() and "__pycache__" not in path.parts)
