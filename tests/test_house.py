@@ -14,6 +14,8 @@ from packaging.markers import Marker
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from tools import lock
+
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("app", "core", "hardware")
 TEXT = {".py", ".toml", ".md", ".sh", ".yaml", ".lock", ".json", ".cfg", ".txt", ".css", ""}
@@ -50,7 +52,7 @@ def pins() -> dict[str, str]:
     return found
 
 
-LOCKED = ("cluster", "l515", "train")
+LOCKED = lock.EXTRAS
 """Extras that set-up installs."""
 
 

@@ -11,14 +11,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from PySide6.QtCore import QObject, QTimer, QUrl, Signal, Slot
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QWidget
 
 from app.annotator.sources import REFUSED
-from app.operator.rig_session import RigSession
 from app.ui.description_form import DescriptionDialog
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.opening import OtherWindows
@@ -51,6 +50,9 @@ from core.session.recovery import CutSession, find_cut_sessions
 from core.session.writer import STOPPED, RecordStatus, SessionWriter, faults_between
 from core.types import Point, Tick
 from hardware.rig import RigKind
+
+if TYPE_CHECKING:  # the player needs this file where there is no robot: not on Linux
+    from app.operator.rig_session import RigSession
 
 _UPDATE_EVERY_MS = 250
 _CLOSE_WITHIN_S = 10.0

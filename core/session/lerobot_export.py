@@ -35,7 +35,7 @@ VIDEO = "observation.images.top"
 MAX_GAP_S = 0.5
 """Longer times without a picture are cut out."""
 _FILES_PER_CHUNK = 1000
-"""A folder ``chunk-XXX`` has so many files at most."""
+"""A folder ``chunk-NNN`` has so many files at most."""
 _TASK = "steer the robot through the vessel to the target"
 """The task of all episodes."""
 _QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
