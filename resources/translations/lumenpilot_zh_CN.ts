@@ -64,8 +64,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/canvas.py"/>
-        <source>let go of the line or the point</source>
-        <translation>放开线或点</translation>
+        <source>let go of the line or the point; a click goes on</source>
+        <translation>放开线或点；单击继续</translation>
     </message>
     <message>
         <location filename="../../app/annotator/canvas.py"/>
@@ -89,8 +89,13 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
-        <source>click the outline to put one in · R region, T brush, Y tube · S simplify · G take the model's masks</source>
-        <translation>单击轮廓可插入一点 · R 区域，T 画笔，Y 管 · S 简化 · G 采用模型的掩膜</translation>
+        <source>then drag a point, click the outline to put one in · S fewer points · G the algorithm's mask of this tool</source>
+        <translation>然后拖动点，单击轮廓可加入一点 · S 减少点数 · G 取此工具的算法掩膜</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/editing.py"/>
+        <source>short: {robot:.0f} + {vessel:.0f} px</source>
+        <translation>偏短：{robot:.0f} + {vessel:.0f} px</translation>
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
@@ -119,8 +124,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
-        <source>Robot mask: drag points</source>
-        <translation>机器人掩膜：拖动点</translation>
+        <source>Click around the robot, Enter closes the outline</source>
+        <translation>沿机器人四周单击，回车闭合轮廓</translation>
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
@@ -129,8 +134,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
-        <source>Vessel mask: drag points</source>
-        <translation>血管掩膜：拖动点</translation>
+        <source>Click around the vessel, Enter closes the outline</source>
+        <translation>沿血管四周单击，回车闭合轮廓</translation>
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
@@ -178,6 +183,96 @@ destination, target: 目标点, 目标            route: 路线                 
         <translation>沿中线拖动，圆与血管同宽：自动找到两侧管壁 · 滚轮或 [ ] 调宽度，拖动中也可，Ctrl + 滚轮缩放 · 右键拖动去除 · Y 返回点编辑</translation>
     </message>
     <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Training set (a folder)</source>
+        <translation>训练集（文件夹）</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Table for evaluate (*.csv)</source>
+        <translation>供 evaluate 使用的表格 (*.csv)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Angles over time, with a figure (*.csv)</source>
+        <translation>随时间变化的角度，附图 (*.csv)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>A folder of pictures, or a session</source>
+        <translation>图像文件夹，或会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Files of other programs</source>
+        <translation>其他程序的文件</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Export as</source>
+        <translation>导出为</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Exporting {name}</source>
+        <translation>正在导出 {name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Comparing the raters</source>
+        <translation>正在比较评估者</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>The algorithm perceives the images</source>
+        <translation>算法正在识别图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Cancel</source>
+        <translation>取消</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Stop it</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Written: {path}</source>
+        <translation>已写入：{path}</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>{count} images got annotations</source>
+        <translation>{count} 幅图像获得了标注</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source> (and {count} more)</source>
+        <translation>（以及另外 {count} 个）</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Wait until the other one is done</source>
+        <translation>请等另一项完成</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Cancelled</source>
+        <translation>已取消</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>Nothing was imported</source>
+        <translation>没有导入任何内容</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/files.py"/>
+        <source>It ended with exit code {code}</source>
+        <translation>以退出码 {code} 结束</translation>
+    </message>
+    <message>
         <location filename="../../app/annotator/outline_editor.py"/>
         <source>Undone: {action}</source>
         <translation>已撤销：{action}</translation>
@@ -199,6 +294,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
+        <source>short</source>
+        <translation>偏短</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
         <source>new</source>
         <translation>未开始</translation>
     </message>
@@ -216,6 +316,61 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/panels.py"/>
         <source>can't tell</source>
         <translation>无法判断</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>no robot</source>
+        <translation>没有机器人</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>algorithm</source>
+        <translation>算法</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>followed</source>
+        <translation>跟踪</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>corrected</source>
+        <translation>已修正</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>All images</source>
+        <translation>所有图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>Without an answer</source>
+        <translation>没有答案</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>Answered</source>
+        <translation>已回答</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>With masks</source>
+        <translation>有掩膜</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>With a note</source>
+        <translation>有备注</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>With short lines</source>
+        <translation>有偏短的线</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>Not drawn by hand</source>
+        <translation>并非手工绘制</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -249,6 +404,26 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
+        <source>Can't tell</source>
+        <translation>无法判断</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>A robot may be there, but the picture does not show its pose</source>
+        <translation>可能有机器人，但图像看不出其位姿</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>No robot</source>
+        <translation>没有机器人</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>The picture shows no robot</source>
+        <translation>图像中没有机器人</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
         <source>{finished} of {count} done</source>
         <translation>{count} 张中完成 {finished} 张</translation>
     </message>
@@ -279,6 +454,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
+        <source>Which images are listed</source>
+        <translation>列出哪些图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
         <source>Progress</source>
         <translation>进度</translation>
     </message>
@@ -286,11 +466,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/panels.py"/>
         <source>Readout</source>
         <translation>读数</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/panels.py"/>
-        <source>Can't tell</source>
-        <translation>无法判断</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -304,8 +479,13 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
-        <source>X takes it back</source>
-        <translation>按 X 收回</translation>
+        <source>{key} takes it back</source>
+        <translation>{key} 可撤回</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>Blind: press A B C D; then theta is shown</source>
+        <translation>盲法：按 A B C D；之后才显示 θ</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -316,11 +496,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/panels.py"/>
         <source>The lines say {state}, by the rule</source>
         <translation>按规则，两条线表明 {state}</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/panels.py"/>
-        <source>moving</source>
-        <translation>移动中</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -349,6 +524,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
+        <source>hidden</source>
+        <translation>已隐藏</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
         <source>crossed</source>
         <translation>越过</translation>
     </message>
@@ -361,6 +541,16 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/panels.py"/>
         <source>theta</source>
         <translation>θ</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>moving</source>
+        <translation>移动中</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>short lines</source>
+        <translation>偏短的线</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -394,13 +584,18 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
+        <source>Following the lines: {done} of {count} images</source>
+        <translation>正在跟踪线：{count} 幅图像中的 {done} 幅</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
         <source>{count} edits could not be written.</source>
         <translation>{count} 处编辑无法写入。</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>State {state}</source>
-        <translation>状态 {state}</translation>
+        <source>Answer: {answer}</source>
+        <translation>答案：{answer}</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -416,6 +611,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>Double click</source>
         <translation>双击</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>end the line</source>
+        <translation>结束此线</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -439,13 +639,13 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Note on this image  (F2)</source>
-        <translation>本图像的备注  (F2)</translation>
+        <source>Note on this image  (M)</source>
+        <translation>本图像的备注  (M)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>LumenPilot — annotate</source>
-        <translation>LumenPilot — 标注</translation>
+        <source>LumenPilot — annotate {name}</source>
+        <translation>LumenPilot — 标注 {name}</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -459,6 +659,56 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
+        <source>Report</source>
+        <translation>报告</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>How well the raters agree, with each other and themselves</source>
+        <translation>评估者彼此之间以及与自己的一致程度</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Next rater...</source>
+        <translation>下一位评估者...</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>The same images for somebody else</source>
+        <translation>同样的图像交给另一个人</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Evaluate</source>
+        <translation>评估</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>The algorithm against these answers, as a report</source>
+        <translation>算法与这些答案的比较，作为报告</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Export...</source>
+        <translation>导出...</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Training set, table, or masks for other programs</source>
+        <translation>训练集、表格，或供其他程序使用的掩膜</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Next rater</source>
+        <translation>下一位评估者</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Who annotates next? Now it is {rater}.</source>
+        <translation>接下来谁标注？现在是 {rater}。</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
         <source>Algorithm: θ {theta:.1f}°, state {state}, confidence {confidence:.2f}. G takes it over</source>
         <translation>算法：θ {theta:.1f}°，状态 {state}，置信度 {confidence:.2f}。按 G 采用</translation>
     </message>
@@ -469,8 +719,18 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Proposed from {name}, dotted: G takes the masks over, M hides them</source>
-        <translation>由 {name} 提议，虚线：G 采用掩膜，M 隐藏</translation>
+        <source>Stop</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>What was followed so far is kept</source>
+        <translation>已跟踪的部分保留</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Proposed from {name}, dotted: G takes the masks over, V hides them</source>
+        <translation>由 {name} 提出，虚线：G 采用这些掩膜，V 隐藏它们</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -494,13 +754,43 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Where is it &amp;saved?</source>
-        <translation>保存在哪里(&amp;S)？</translation>
+        <source>&amp;Open...</source>
+        <translation>打开(&amp;O)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Import...</source>
+        <translation>导入(&amp;I)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Export...</source>
+        <translation>导出(&amp;E)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Report of the raters</source>
+        <translation>评估者报告(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Report of the &amp;algorithm</source>
+        <translation>算法报告(&amp;A)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Next rater...</source>
+        <translation>下一位评估者(&amp;N)...</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
         <source>&amp;Train on my annotations...</source>
         <translation>用我的标注训练(&amp;T)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Show where it is &amp;saved</source>
+        <translation>显示保存位置(&amp;S)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -514,13 +804,18 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>&amp;Close-up of the head</source>
-        <translation>头端特写(&amp;C)</translation>
+        <source>&amp;Close-up of the head, or the cursor</source>
+        <translation>头部或光标处的放大图(&amp;C)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
         <source>&amp;Whole picture</source>
         <translation>整幅图像(&amp;W)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Keep the zoom from picture to picture</source>
+        <translation>逐幅图像保持缩放(&amp;K)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -544,8 +839,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Picture as it is</source>
-        <translation>图像原样</translation>
+        <source>&amp;Normal contrast and brightness</source>
+        <translation>正常对比度和亮度(&amp;N)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -579,8 +874,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Take the &amp;algorithm's</source>
-        <translation>采用算法结果(&amp;A)</translation>
+        <source>Take the &amp;algorithm's lines, or mask</source>
+        <translation>采用算法的线或掩膜(&amp;A)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -589,8 +884,13 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>&amp;Simplify outlines</source>
-        <translation>简化轮廓(&amp;S)</translation>
+        <source>Follow the &amp;lines through the clip</source>
+        <translation>沿片段跟踪线(&amp;L)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Fewer points on outlines</source>
+        <translation>减少轮廓点数(&amp;F)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -629,8 +929,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Lis&amp;t</source>
-        <translation>列表(&amp;T)</translation>
+        <source>Lis&amp;t of images</source>
+        <translation>图像列表(&amp;T)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -644,13 +944,18 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>All images have an answer</source>
-        <translation>所有图像均已作答</translation>
+        <source>All {count} images have an answer</source>
+        <translation>全部 {count} 幅图像都有答案</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Simplify is for masks: 3 or 4 first</source>
-        <translation>简化只用于掩膜：请先按 3 或 4</translation>
+        <source>Enter takes {state}, as the lines say · or A B C D, X, O</source>
+        <translation>回车采用线所示的 {state} · 或按 A B C D、X、O</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Fewer points are for masks: 3 or 4 first</source>
+        <translation>减少点数只用于掩膜：先按 3 或 4</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -661,6 +966,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>Finding the masks by those of {name}</source>
         <translation>正在根据 {name} 的掩膜寻找掩膜</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>{count} images have followed lines: correct one, and Ctrl+F follows from it</source>
+        <translation>{count} 幅图像有跟踪的线：修正其中一幅，Ctrl+F 从它继续跟踪</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -684,8 +994,13 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>Not complete: {missing}; or X, can't tell</source>
-        <translation>未完成：{missing}；或按 X：无法判断</translation>
+        <source>Now the state as you see it: A B C D, X or O</source>
+        <translation>现在给出您看到的状态：A B C D、X 或 O</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Not complete: {missing}; or X, can't tell; or O, no robot</source>
+        <translation>不完整：{missing}；或 X，无法判断；或 O，没有机器人</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -699,8 +1014,23 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
+        <source>A blind study: lines are drawn by hand in it</source>
+        <translation>盲法研究：其中的线由手工绘制</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Draw both lines on an image of this folder first; the others get theirs from it</source>
+        <translation>先在此文件夹的一幅图像上画两条线；其他图像由此得到</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
         <source>The algorithm found no {what}</source>
         <translation>算法没有找到{what}</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>The algorithm's lines are yours now: correct them, Enter goes on, Ctrl+Z takes them back</source>
+        <translation>算法的线现在归您：修正它们，回车继续，Ctrl+Z 撤回</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -719,8 +1049,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
-        <source>The last image. All are done</source>
-        <translation>最后一张图像。全部完成</translation>
+        <source>A blind study: choose the state yourself, A B C D</source>
+        <translation>盲法研究：状态由您自己选择，A B C D</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -746,6 +1076,241 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/commands/annotate.py"/>
         <source>rater {rater}</source>
         <translation>标注者 {rater}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/model.py"/>
+        <source>Newest first</source>
+        <translation>最新的在前</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/model.py"/>
+        <source>Oldest first</source>
+        <translation>最旧的在前</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/model.py"/>
+        <source>Longest first</source>
+        <translation>最长的在前</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/model.py"/>
+        <source>Most faults first</source>
+        <translation>故障最多的在前</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/model.py"/>
+        <source>By operator</source>
+        <translation>按操作者</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Mouse</source>
+        <translation>鼠标</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>recording</source>
+        <translation>正在录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>recorded with LumenPilot {program}</source>
+        <translation>由 LumenPilot {program} 录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>faults: {faults}</source>
+        <translation>故障：{faults}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>play the session</source>
+        <translation>播放会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>no pose</source>
+        <translation>无位姿</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Search: operator, task, date, rig, #tag, fault ...</source>
+        <translation>搜索：操作者、任务、日期、装置、#标签、故障……</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Search</source>
+        <translation>搜索</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>All tags</source>
+        <translation>所有标签</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Tag</source>
+        <translation>标签</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Order</source>
+        <translation>顺序</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Sessions</source>
+        <translation>会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Play</source>
+        <translation>回放</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Annotate</source>
+        <translation>标注</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Export</source>
+        <translation>导出</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Session</source>
+        <translation>会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>rig {name}</source>
+        <translation>装置 {name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Session</source>
+        <translation>会话(&amp;S)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>reading ...</source>
+        <translation>正在读取……</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>{shown} of {count}</source>
+        <translation>{count} 个中的 {shown} 个</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>LumenPilot — sessions in {folder}</source>
+        <translation>LumenPilot — {folder} 中的会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>A folder with sessions</source>
+        <translation>含会话的文件夹</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Opening the annotator: {name}</source>
+        <translation>正在打开标注窗口：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Export {name}</source>
+        <translation>导出 {name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>not described</source>
+        <translation>没有描述</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Export as .{ending}...</source>
+        <translation>导出为 .{ending}...</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Play</source>
+        <translation>播放(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Annotate</source>
+        <translation>标注(&amp;A)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Describe</source>
+        <translation>描述(&amp;D)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Show its &amp;folder</source>
+        <translation>显示其文件夹(&amp;F)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Recover a copy</source>
+        <translation>恢复副本(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>no session here</source>
+        <translation>这里没有会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Opening the player: {name}</source>
+        <translation>正在打开回放器：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Recovering a copy: {name}</source>
+        <translation>正在恢复副本：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Recovered: {name}</source>
+        <translation>已恢复：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Exported: {path}</source>
+        <translation>已导出：{path}</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Nothing is left of it</source>
+        <translation>其中没有剩下任何内容</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Open a folder...</source>
+        <translation>打开文件夹(&amp;O)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Reload</source>
+        <translation>重新读取(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>&amp;Search</source>
+        <translation>搜索(&amp;S)</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>unknown</source>
+        <translation>未知</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Ended with exit code {code}</source>
+        <translation>以退出码 {code} 结束</translation>
     </message>
     <message>
         <location filename="../../app/operator/awake.py"/>
@@ -820,6 +1385,26 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/leaving.py"/>
         <source>The torque is not proven to be off: cut the servos' power</source>
         <translation>无法证实扭矩已断开：请切断舵机电源</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/live_menu.py"/>
+        <source>Stream for &amp;Foxglove</source>
+        <translation>Foxglove 数据流(&amp;F)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/live_menu.py"/>
+        <source>Outlets for LS&amp;L</source>
+        <translation>LSL 输出(&amp;L)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/live_menu.py"/>
+        <source>Live output: {address}</source>
+        <translation>实时输出：{address}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/live_menu.py"/>
+        <source>&amp;File</source>
+        <translation>文件(&amp;F)</translation>
     </message>
     <message>
         <location filename="../../app/operator/manual_drive.py"/>
@@ -968,6 +1553,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/panels.py"/>
+        <source>The simulation waits for this computer, which is busy</source>
+        <translation>仿真在等待这台繁忙的计算机</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/panels.py"/>
         <source>No new picture</source>
         <translation>没有新图像</translation>
     </message>
@@ -985,6 +1575,11 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/panels.py"/>
         <source>No picture from the camera</source>
         <translation>相机没有画面</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/panels.py"/>
+        <source>Performance</source>
+        <translation>性能</translation>
     </message>
     <message>
         <location filename="../../app/operator/panels.py"/>
@@ -1028,13 +1623,8 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/panels.py"/>
-        <source>hold</source>
-        <translation>按住</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/panels.py"/>
-        <source>Performance</source>
-        <translation>性能</translation>
+        <source>hold a key</source>
+        <translation>按住一个键</translation>
     </message>
     <message>
         <location filename="../../app/operator/panels.py"/>
@@ -1282,9 +1872,64 @@ Torque off now: the wires spring back at once.</source>
         <translation>立即检查(&amp;N)</translation>
     </message>
     <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>Record</source>
+        <translation>录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>F9 begins or ends a session</source>
+        <translation>F9 开始或结束会话录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>F10 saves the last seconds without having recorded</source>
+        <translation>F10 保存没有录制的最近几秒</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>M marks this moment with a number</source>
+        <translation>M 用编号标记此刻</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>no picture yet</source>
+        <translation>还没有图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>{value:.1f} GB free on the disk</source>
+        <translation>磁盘剩余 {value:.1f} GB</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>{count} dropped</source>
+        <translation>丢弃 {count} 帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>stopped: disk full</source>
+        <translation>已停：磁盘已满</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>stopped</source>
+        <translation>已停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/record_bar.py"/>
+        <source>Recording</source>
+        <translation>录制</translation>
+    </message>
+    <message>
         <location filename="../../app/operator/recording.py"/>
         <source>{seconds:.1f} s are lost (rows: {rows}, pictures: {pictures})</source>
         <translation>丢失 {seconds:.1f} s（{rows} 行，{pictures} 张图像）</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>The next recordings, until you say otherwise</source>
+        <translation>接下来的录制，直到您另作说明</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -1338,8 +1983,23 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>The annotation tool takes {frames} pictures, evenly over the session. Then evaluate again.</source>
-        <translation>标注工具将从会话中均匀取 {frames} 张图像。完成后再评估。</translation>
+        <source>The annotator takes {frames} pictures, evenly over the session. Then evaluate again.</source>
+        <translation>标注窗口从会话中均匀取 {frames} 幅图像。之后再次评估。</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Nothing is being recorded that could be marked: F9 begins a session</source>
+        <translation>当前没有在录制，无法标记：按 F9 开始会话</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Described: {name}</source>
+        <translation>已描述：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>The next recordings will say so</source>
+        <translation>接下来的录制会这样注明</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -1388,13 +2048,18 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Opening the annotation tool: {name}</source>
-        <translation>正在打开标注工具：{name}</translation>
+        <source>Describe</source>
+        <translation>描述</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Opening the player: {name}</source>
-        <translation>正在打开回放器：{name}</translation>
+        <source>Operator, task, condition, tags</source>
+        <translation>操作者、任务、条件、标签</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Opening the library</source>
+        <translation>正在打开会话库</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -1408,11 +2073,6 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Cancel</source>
-        <translation>取消</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>Stop; a report of before stays</source>
         <translation>停止；之前的报告保留</translation>
     </message>
@@ -1423,23 +2083,18 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Annotate</source>
-        <translation>标注</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>Nothing to save yet: record.ring_s is 0, or the rig has just been opened</source>
         <translation>尚无可保存内容：record.ring_s 为 0，或装置刚打开</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Nothing is being recorded that could be marked: F9 begins a session</source>
-        <translation>当前没有在录制，无法标记：按 F9 开始会话</translation>
+        <source>Not marked: the recorder is behind</source>
+        <translation>未标记：录制器跟不上</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Not marked: the recorder is behind</source>
-        <translation>未标记：录制器跟不上</translation>
+        <source>Noted: {text}</source>
+        <translation>已记录：{text}</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -1503,16 +2158,6 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Evaluate</source>
-        <translation>评估</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Play</source>
-        <translation>回放</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>The player, with everything as it was understood</source>
         <translation>打开回放器，显示当时理解的全部内容</translation>
     </message>
@@ -1563,18 +2208,13 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>No picture is measured to the end yet: both lines and a state, or can't tell</source>
-        <translation>还没有一张图像测量完整：需要两条线和一个状态，或“无法判断”</translation>
+        <source>No picture is measured to the end yet: both lines and a state, can't tell, or no robot</source>
+        <translation>还没有图像测量完毕：两条线和一个状态、无法判断，或没有机器人</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
         <source>Not evaluated: {why}</source>
         <translation>未能评估：{why}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>That window ended with exit code {code}</source>
-        <translation>该窗口以退出码 {code} 结束</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -1600,6 +2240,11 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/rig_menu.py"/>
         <source>C&amp;amera</source>
         <translation>相机(&amp;A)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rig_menu.py"/>
+        <source>Look at pictures instead of the camera's</source>
+        <translation>查看图像而不是相机画面</translation>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
@@ -1648,13 +2293,23 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
-        <source>The rig was opened anew meanwhile; ask for the wizard again</source>
-        <translation>期间装置已重新打开；请再次打开向导</translation>
+        <source>The rig was opened again meanwhile; ask for the wizard again</source>
+        <translation>其间装置已重新打开；请再次打开向导</translation>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
         <source>Rig {name} saved</source>
         <translation>装置 {name} 已保存</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rig_menu.py"/>
+        <source>Open a picture or &amp;video...</source>
+        <translation>打开图像或视频(&amp;V)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rig_menu.py"/>
+        <source>Open a &amp;folder of pictures...</source>
+        <translation>打开图像文件夹(&amp;F)...</translation>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
@@ -1698,18 +2353,13 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
-        <source>The rig is opened anew: no picture for some seconds, and the servos must be switched on again.{ends}</source>
-        <translation>装置将重新打开：几秒内没有图像，且须重新开启舵机。{ends}</translation>
+        <source>The rig is opened again: no picture for some seconds, and the servos must be switched on again.{ends}</source>
+        <translation>装置将重新打开：几秒钟没有图像，且伺服须重新接通。{ends}</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
         <source>An empty picture, the vessel's outline and a minute of moving the robot; then five minutes of waiting.</source>
         <translation>一张空台架图像、血管轮廓和一分钟的机器人移动；然后等待五分钟。</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/services.py"/>
-        <source>&amp;Session</source>
-        <translation>会话(&amp;S)</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -1821,8 +2471,18 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
-        <source>&amp;Evaluate the newest session</source>
-        <translation>评估最新会话(&amp;E)</translation>
+        <source>Session &amp;library</source>
+        <translation>会话库(&amp;L)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>Describe the &amp;next recordings...</source>
+        <translation>描述接下来的录制(&amp;N)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>&amp;Describe the newest session...</source>
+        <translation>描述最新的会话(&amp;D)...</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -1833,6 +2493,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/operator/services.py"/>
         <source>Annotate its &amp;refused frames</source>
         <translation>标注其被拒绝的帧(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>&amp;Evaluate the newest session</source>
+        <translation>评估最新会话(&amp;E)</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -1891,13 +2556,18 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
-        <source>Session</source>
-        <translation>会话</translation>
+        <source>Session saved. Who recorded it?</source>
+        <translation>会话已保存。由谁录制？</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
         <source>Another bench is in use; this one is being trained: wait for it, or stop it</source>
         <translation>正在使用另一台架；此台架正在训练：请等待，或将其停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/startup.py"/>
+        <source>&amp;Triggers from other programs...</source>
+        <translation>来自其他程序的触发(&amp;T)...</translation>
     </message>
     <message>
         <location filename="../../app/operator/tour.py"/>
@@ -1931,6 +2601,16 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/tour.py"/>
+        <source>Keep it</source>
+        <translation>保存下来</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/tour.py"/>
+        <source>F9 records a session: every picture and all that was understood, advised, asked and sent. M marks a moment, F10 keeps the last seconds without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again.</source>
+        <translation>F9 录制会话：每幅图像以及理解、建议、要求和发送的全部内容。M 标记此刻，F10 保存没有录制的最近几秒，P 截图。F1 显示所有按键；“帮助”中的“导览”可再次显示本导览。</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/tour.py"/>
         <source>Move it yourself</source>
         <translation>亲手移动</translation>
     </message>
@@ -1961,18 +2641,28 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/tour.py"/>
-        <source>Keep it</source>
-        <translation>保存下来</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/tour.py"/>
-        <source>F9 records a session: every picture and all that was understood, advised, asked and sent. M marks a moment, F10 keeps the last seconds without a recording, P a snapshot. F1 shows all keys; Help, Tour shows this again.</source>
-        <translation>F9 录制会话：每幅图像以及理解、建议、要求和发送的全部内容。M 标记此刻，F10 保存没有录制的最近几秒，P 截图。F1 显示所有按键；“帮助”中的“导览”可再次显示本导览。</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/tour.py"/>
         <source> or </source>
         <translation> 或 </translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/triggers.py"/>
+        <source>not started</source>
+        <translation>未启动</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/triggers.py"/>
+        <source>another window of the program has the socket</source>
+        <translation>程序的另一个窗口占用了该套接字</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/triggers.py"/>
+        <source>No triggers from other programs: {why}</source>
+        <translation>没有来自其他程序的触发：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/triggers.py"/>
+        <source>Triggers from other programs: {path}; see main.py trigger --help</source>
+        <translation>来自其他程序的触发：{path}；见 main.py trigger --help</translation>
     </message>
     <message>
         <location filename="../../app/operator/twin_menu.py"/>
@@ -2003,6 +2693,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/operator/twin_menu.py"/>
         <source>The phantom stays as it is: {why}</source>
         <translation>体模保持不变：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/window.py"/>
+        <source>&amp;Performance figures</source>
+        <translation>性能数据(&amp;P)</translation>
     </message>
     <message>
         <location filename="../../app/operator/window.py"/>
@@ -2161,8 +2856,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
-        <source>Save this picture  (S)</source>
-        <translation>保存此图像  (S)</translation>
+        <source>Save this picture  (Ctrl+S)</source>
+        <translation>保存此图像  (Ctrl+S)</translation>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
@@ -2191,13 +2886,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
-        <source>Previous of the kind beside  (P)</source>
-        <translation>上一个该类事件  (P)</translation>
+        <source>To the previous one of the kind beside  (P)</source>
+        <translation>到旁边所示种类的上一个  (P)</translation>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
-        <source>Next of the kind beside  (N)</source>
-        <translation>下一个该类事件  (N)</translation>
+        <source>To the next one of the kind beside  (N)</source>
+        <translation>到旁边所示种类的下一个  (N)</translation>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
@@ -2238,11 +2933,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/controls.py"/>
         <source>Clip {seconds:.1f} s</source>
         <translation>片段 {seconds:.1f} 秒</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/controls.py"/>
-        <source>unknown</source>
-        <translation>未知</translation>
     </message>
     <message>
         <location filename="../../app/player/course.py"/>
@@ -2456,13 +3146,18 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
-        <source>Note kept</source>
-        <translation>备注已保存</translation>
+        <source>Kept beside the session</source>
+        <translation>保存在会话旁</translation>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
         <source>Clip not saved: {why}</source>
         <translation>片段未保存：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/session_model.py"/>
+        <source>Note kept</source>
+        <translation>备注已保存</translation>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
@@ -2511,11 +3206,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/timeline.py"/>
-        <source>no pose</source>
-        <translation>无位姿</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/timeline.py"/>
         <source>state {state}</source>
         <translation>状态 {state}</translation>
     </message>
@@ -2526,13 +3216,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
-        <source>&amp;Play</source>
-        <translation>播放(&amp;P)</translation>
+        <source>Played back, not live</source>
+        <translation>回放，非实时</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
-        <source>Played back, not live</source>
-        <translation>回放，非实时</translation>
+        <source>Opening the annotator: {count} frames</source>
+        <translation>正在打开标注窗口：{count} 帧</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -2596,8 +3286,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
-        <source>mode then</source>
-        <translation>当时模式</translation>
+        <source>mode when it was recorded</source>
+        <translation>录制时的模式</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -2676,6 +3366,26 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
+        <source>Open its folder</source>
+        <translation>打开其文件夹</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Open the clip</source>
+        <translation>打开片段</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>A session, or a folder of pictures</source>
+        <translation>会话，或图像文件夹</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Export the session as</source>
+        <translation>会话导出为</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
         <source>No frame without a pose here</source>
         <translation>此处没有无位姿的帧</translation>
     </message>
@@ -2686,8 +3396,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
-        <source>Opening the annotation tool: {count} frames</source>
-        <translation>正在打开标注工具：{count} 帧</translation>
+        <source>E&amp;xport...</source>
+        <translation>导出(&amp;X)...</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -2703,6 +3413,21 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/window.py"/>
         <source>Annotate &amp;refused frames</source>
         <translation>标注被拒绝的帧(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Annotate frames evenly over the session</source>
+        <translation>在会话中均匀取帧标注</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Report of the algorithm</source>
+        <translation>算法报告</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>&amp;Describe the session...</source>
+        <translation>描述会话(&amp;D)...</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -2781,13 +3506,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
-        <source>As &amp;recorded</source>
-        <translation>按录制速度(&amp;R)</translation>
+        <source>Speed as &amp;recorded</source>
+        <translation>按录制的速度(&amp;R)</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
-        <source>Another &amp;kind</source>
-        <translation>其他类别(&amp;K)</translation>
+        <source>Jump to the next &amp;kind of thing</source>
+        <translation>跳到下一个同类事件(&amp;K)</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -3046,8 +3771,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/camera_pages.py"/>
-        <source>Open the camera anew and lose what was found?</source>
-        <translation>重新打开相机并丢弃已找到的结果？</translation>
+        <source>Open the camera again and lose what was found?</source>
+        <translation>重新打开相机并丢弃找到的结果？</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/camera_pages.py"/>
@@ -3213,11 +3938,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Servo port</source>
         <translation>舵机端口</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>&amp;Search</source>
-        <translation>搜索(&amp;S)</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -3586,11 +4306,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/apply.py"/>
-        <source>&amp;File</source>
-        <translation>文件(&amp;F)</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/apply.py"/>
         <source>The robot is armed: settings can be changed when it is disarmed</source>
         <translation>机器人处于待命：解除待命后才能更改设置</translation>
     </message>
@@ -3701,8 +4416,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
-        <source>Search name, meaning, unit  (Ctrl+F)</source>
-        <translation>搜索名称、含义、单位  (Ctrl+F)</translation>
+        <source>Search name, meaning, unit (Ctrl+F); Space is STOP while the robot can move</source>
+        <translation>搜索名称、含义、单位 (Ctrl+F)；机器人可动时空格即停止</translation>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
@@ -4228,11 +4943,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/teaching/pages.py"/>
         <source>rejected</source>
         <translation>拒绝</translation>
-    </message>
-    <message>
-        <location filename="../../app/teaching/pages.py"/>
-        <source>corrected</source>
-        <translation>已修正</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -4843,6 +5553,71 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>语言(&amp;L) (Language)</translation>
     </message>
     <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Operator</source>
+        <translation>操作者</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>who recorded it</source>
+        <translation>由谁录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Task</source>
+        <translation>任务</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>what was done</source>
+        <translation>做了什么</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Condition</source>
+        <translation>条件</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>such as the arm of a study</source>
+        <translation>例如研究的分组</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Phantom</source>
+        <translation>体模</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>what lay before the camera</source>
+        <translation>相机前面是什么</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Tags</source>
+        <translation>标签</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>separated by commas</source>
+        <translation>以逗号分隔</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Description</source>
+        <translation>描述</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Keep</source>
+        <translation>保留</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/description_form.py"/>
+        <source>Notes</source>
+        <translation>备注</translation>
+    </message>
+    <message>
         <location filename="../../app/ui/layout_state.py"/>
         <source>&amp;View</source>
         <translation>视图(&amp;V)</translation>
@@ -4851,6 +5626,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/layout_state.py"/>
         <source>&amp;Reset layout</source>
         <translation>重置布局(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>That window ended with exit code {code}</source>
+        <translation>该窗口以退出码 {code} 结束</translation>
     </message>
     <message>
         <location filename="../../app/ui/snapshot.py"/>
@@ -4931,11 +5711,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>D: head and tail lie on opposite sides of the centerline. Crossed: moderate speed, steer by theta.</source>
         <translation>D：头端和尾端位于中心线两侧。已越过：中速，按 θ 转向。</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>Stop</source>
-        <translation>停止</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -5469,11 +6244,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>Phantom</source>
-        <translation>体模</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>The vessel phantom that the bench twin shows; another one starts the twin again.</source>
         <translation>数字孪生台架显示的血管体模；选择另一个会重新启动。</translation>
     </message>
@@ -5838,21 +6608,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>退出(&amp;Q)</translation>
     </message>
     <message>
-        <location filename="../../app/widgets/advice_line.py"/>
-        <source>waiting for the first picture</source>
-        <translation>等待第一幅图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/advice_line.py"/>
-        <source>No advice: {why}</source>
-        <translation>无建议：{why}</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/advice_line.py"/>
-        <source>the pose is unsure; {why}</source>
-        <translation>位姿不确定；{why}</translation>
-    </message>
-    <message>
         <location filename="../../app/widgets/alerts.py"/>
         <source>+{count} more</source>
         <translation>另有 {count} 项</translation>
@@ -6044,11 +6799,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/distance_bars.py"/>
-        <source>no picture yet</source>
-        <translation>还没有图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/distance_bars.py"/>
         <source>wall</source>
         <translation>管壁</translation>
     </message>
@@ -6174,18 +6924,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/event_log.py"/>
-        <source>Operator</source>
-        <translation>操作者</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/event_log.py"/>
         <source>Targets</source>
         <translation>目标</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/event_log.py"/>
-        <source>Notes</source>
-        <translation>备注</translation>
     </message>
     <message>
         <location filename="../../app/widgets/event_log.py"/>
@@ -6309,12 +7049,12 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
-        <source>bend {bend}, pitch {pitch}, in {inserted} mm</source>
+        <source>bend {bend}, pitch {pitch}, inserted {inserted} mm</source>
         <translation>弯曲 {bend}，俯仰 {pitch}，进深 {inserted} mm</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
-        <source>in {inserted} mm</source>
+        <source>inserted {inserted} mm</source>
         <translation>进深 {inserted} mm</translation>
     </message>
     <message>
@@ -6334,8 +7074,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
-        <source>feed {feed:.3g}, sheath {sheath:.3g}, wires {wires} mm/s</source>
-        <translation>推送 {feed:.3g}，鞘管 {sheath:.3g}，驱动丝 {wires} mm/s</translation>
+        <source>speeds: feed {feed:.3g}, sheath {sheath:.3g}, tendons {wires} mm/s</source>
+        <translation>速度：进给 {feed:.3g}，鞘管 {sheath:.3g}，腱 {wires} mm/s</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
@@ -6346,16 +7086,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/widgets/jog_panel.py"/>
         <source>Speed of all motions by hand, of the configured full speed</source>
         <translation>所有手动动作的速度，占所配置全速的比例</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/jog_panel.py"/>
-        <source>dip</source>
-        <translation>下俯</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/jog_panel.py"/>
-        <source>lift</source>
-        <translation>上仰</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
@@ -6502,19 +7232,9 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>按住</translation>
     </message>
     <message>
-        <location filename="../../app/widgets/overlay_bar.py"/>
-        <source>Overlays</source>
-        <translation>叠加层</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/overlay_bar.py"/>
-        <source>Overlay {label}</source>
-        <translation>叠加层 {label}</translation>
-    </message>
-    <message>
         <location filename="../../app/widgets/performance_panel.py"/>
-        <source>block ms</source>
-        <translation>阻塞 ms</translation>
+        <source>pause ms</source>
+        <translation>暂停 ms</translation>
     </message>
     <message>
         <location filename="../../app/widgets/performance_panel.py"/>
@@ -6570,51 +7290,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/phantom_picker.py"/>
         <source>Another ran&amp;dom phantom</source>
         <translation>另一个随机体模(&amp;D)</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>Record</source>
-        <translation>录制</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>F9 begins or ends a session</source>
-        <translation>F9 开始或结束会话录制</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>F10 saves the last seconds without having recorded</source>
-        <translation>F10 保存没有录制的最近几秒</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>M marks this moment with a number</source>
-        <translation>M 用编号标记此刻</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>{value:.1f} GB free on the disk</source>
-        <translation>磁盘剩余 {value:.1f} GB</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>{count} dropped</source>
-        <translation>丢弃 {count} 帧</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>stopped: disk full</source>
-        <translation>已停：磁盘已满</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>stopped</source>
-        <translation>已停止</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/record_bar.py"/>
-        <source>Recording</source>
-        <translation>录制</translation>
     </message>
     <message>
         <location filename="../../app/widgets/scene_overlay.py"/>
@@ -6707,9 +7382,29 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <translation>若遵循建议，头端在接下来两秒的去处：虚线管形</translation>
     </message>
     <message>
+        <location filename="../../app/widgets/scene_overlay.py"/>
+        <source>Overlays</source>
+        <translation>叠加层</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_overlay.py"/>
+        <source>Overlay {label}</source>
+        <translation>叠加层 {label}</translation>
+    </message>
+    <message>
         <location filename="../../app/widgets/scene_panels.py"/>
-        <source>allowed {limit:g} px</source>
-        <translation>允许 {limit:g} px</translation>
+        <source>waiting for the first picture</source>
+        <translation>等待第一幅图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_panels.py"/>
+        <source>state A: up to {limit:g}°</source>
+        <translation>状态 A：至多 {limit:g}°</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_panels.py"/>
+        <source>state A: up to {limit:g} px</source>
+        <translation>状态 A：至多 {limit:g} px</translation>
     </message>
     <message>
         <location filename="../../app/widgets/scene_panels.py"/>
@@ -6725,6 +7420,21 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/scene_panels.py"/>
         <source>&amp;Previous page</source>
         <translation>上一页(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_panels.py"/>
+        <source>No advice: {why}</source>
+        <translation>无建议：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_panels.py"/>
+        <source>the pose is unsure; {why}</source>
+        <translation>位姿不确定；{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_panels.py"/>
+        <source>Then: {advice}</source>
+        <translation>然后：{advice}</translation>
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
@@ -7133,13 +7843,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/sim_banner.py"/>
-        <source>simulated bench twin</source>
-        <translation>数字孪生台架</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/sim_banner.py"/>
-        <source>Everything here is simulated; no hardware moves</source>
-        <translation>此处一切均为仿真；没有硬件运动</translation>
+        <source>Everything here is simulated; no hardware moves. On a busy computer the simulation runs slower</source>
+        <translation>这里的一切都是仿真；没有硬件运动。计算机繁忙时仿真会变慢</translation>
     </message>
     <message>
         <location filename="../../app/widgets/sim_banner.py"/>
@@ -7160,6 +7865,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/sim_banner.py"/>
         <source>Nothing here is happening now</source>
         <translation>此处所见并非正在发生</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/sim_banner.py"/>
+        <source>{percent} % speed</source>
+        <translation>{percent} % 速度</translation>
     </message>
     <message>
         <location filename="../../app/widgets/state_badge.py"/>
@@ -9323,6 +10033,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>there is a robot</source>
+        <translation>有机器人</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>take the algorithm's lines</source>
         <translation>采用算法的线</translation>
     </message>
@@ -9710,11 +10425,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>no vessel</source>
         <translation>没有血管</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>no robot</source>
-        <translation>没有机器人</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -13428,8 +14138,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Foot pedal: deadman and STOP over a serial line. Its protocol and wiring: docs/bench.md.</source>
-        <translation>脚踏板：经串口的使能键和停止。协议与接线：docs/bench.md。</translation>
+        <source>Foot pedal: deadman and STOP over a serial line. Wiring: docs/bench.md.</source>
+        <translation>脚踏板：通过串行线的使能和停止。接线：docs/bench.md。</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -13685,6 +14395,41 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>less free disk ends the recording while it can still be closed</source>
         <translation>磁盘剩余更少则趁还能收尾时结束录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Live output</source>
+        <translation>实时输出</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>What goes to other programs while the rig runs: docs/operating.md.</source>
+        <translation>装置运行时传给其他程序的内容：docs/operating.md。</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Foxglove</source>
+        <translation>Foxglove</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>pictures, overlays, pose and joints as a WebSocket for Foxglove, on this computer</source>
+        <translation>图像、叠加层、位姿和关节，作为供 Foxglove 使用的 WebSocket，仅限本机</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>of the WebSocket</source>
+        <translation>WebSocket 的端口</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>LSL</source>
+        <translation>LSL</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>pose and markers for the lab streaming layer, in the local network</source>
+        <translation>供 lab streaming layer 使用的位姿和标记，在局域网中</translation>
     </message>
 </context>
 </TS>

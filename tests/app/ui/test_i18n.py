@@ -8,6 +8,7 @@ import pickle
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from PySide6.QtCore import QCoreApplication, QLocale, Qt, QTranslator
@@ -23,7 +24,7 @@ from app.ui import i18n
 from app.ui.actions import LanguageMenu, plain
 from app.ui.i18n import AUTO, CHINESE, ENGLISH, LOCALE, english_texts, language_in_use, tr, tr_text, use_language
 from app.ui.texts import QUANTITY, advice_headline, tip
-from core.annotation.model import Status
+from core.annotation.model import Annotation, Status
 from core.config.files import Profiles, read_settings
 from core.config.models import Config, QualityConfig
 from core.config.schema import Bounds
@@ -327,7 +328,8 @@ def test_counts_of_the_record_bar_and_statuses_of_the_queue_are_looked_up(qtbot:
     bar.show_status(RecordStatus(recording=True, dropped=5))
     assert "<5 dropped>" in bar.text
     for status in Status:
-        queue = QueueModel(["a.png"], lambda _row, status=status: status, lambda _row: False)
+        items = Mock(**{"status.return_value": status, "is_short.return_value": False, "content.return_value": Annotation()})
+        queue = QueueModel(["a.png"], items)
         assert queue.index(0).data(Qt.ItemDataRole.ToolTipRole) == f"1: a.png: <{status.value}>"
 
 
