@@ -98,6 +98,9 @@ def usable_part(data: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
             data, key = _without(data, first["loc"])
             if first["type"] == "extra_forbidden":
                 problems.append(f"{key}: {UNKNOWN}")
+            elif key == "servos.driver":  # the default driver's packets are not for what is on this port
+                data = {**data, "servos": {name: value for name, value in data["servos"].items() if name != "port"}}
+                problems.append(f"{key}: {plain_message(first)}; no servo port is opened")
             else:
                 problems.append(f"{key}: {plain_message(first)}; the default is used")
         else:

@@ -19,6 +19,7 @@ from core.config.files import (
     read_settings,
     settings_of_windows,
     settings_text,
+    usable_part,
     write_settings,
 )
 from core.config.models import Config, ConfigError, load_config
@@ -249,6 +250,13 @@ def test_a_limit_of_an_older_file_that_is_too_loose_now_is_not_used_and_told(tmp
     file = read_settings(path)
     assert (file.config.safety.min_confidence, file.config.safety.healthy_s) == (0.5, 2.0)
     assert file.problems == (f"{path}: safety.min_confidence: Input should be greater than or equal to 0.5; the default is used",)
+
+
+def test_a_port_is_not_opened_with_the_packets_of_another_drive() -> None:
+    """The package of the drive is gone: nothing else may talk to what is on its port."""
+    used, (problem,) = usable_part({"servos": {"driver": "of_a_package_that_is_gone", "port": "/dev/ttyUSB0", "baud": 57600}})
+    assert used == {"servos": {"baud": 57600}}
+    assert problem.startswith("servos.driver: ") and problem.endswith("no servo port is opened")
 
 
 def test_what_can_be_used_is_used_and_the_rest_is_told(tmp_path: Path) -> None:
