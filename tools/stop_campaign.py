@@ -272,14 +272,14 @@ def run_procedure(name: str, draw: random.Random, stop_after_s: float | None) ->
     config = ServosConfig(port="lockstep", unattended_s=0.0)  # the application ends with its procedure
     holds, requests = PROCEDURES[name]
     with lockstep(config, draw) as line:
-        bus = ServoBus(config)
+        bus = ServoBus(config, now_s=line.monotonic)
         end = LockstepEnd(line, [("open", {}), _ZERO, _ARM, ("disarm", {}), ("acknowledge", {})] if holds else [])
-        loop = BusLoop(cast(BusServer, end), bus, config, SafetyConfig())
+        loop = BusLoop(cast(BusServer, end), bus, config, SafetyConfig(), now_s=line.monotonic)
         if holds:
             with patch.object(bus, "close"):
                 loop.run()
             end = LockstepEnd(line, requests)
-            loop = BusLoop(cast(BusServer, end), bus, config, SafetyConfig())
+            loop = BusLoop(cast(BusServer, end), bus, config, SafetyConfig(), now_s=line.monotonic)
         else:
             end._requests.extend(requests)
         begun_s = line.now_s

@@ -164,7 +164,7 @@ class OperatorWindow(WindowFrame):
                 MenuEntry(tr("&Mark this moment"), recorder.mark, ("M", "Shift+M")),
             ]
         )
-        performance = MenuEntry(tr("&Performance figures"), self.panels.toggle_performance, checked=False)
+        performance = MenuEntry(tr("Performance fi&gures"), self.panels.toggle_performance, checked=False)
         actions = add_scene_view_menu(self, self.panels, [performance])
         action = next(one for one in actions if plain(one.text()) == plain(performance.text))
         self.panels.performance_shown.connect(action.setChecked)

@@ -2696,8 +2696,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/window.py"/>
-        <source>&amp;Performance figures</source>
-        <translation>性能数据(&amp;P)</translation>
+        <source>Performance fi&amp;gures</source>
+        <translation>性能数据(&amp;G)</translation>
     </message>
     <message>
         <location filename="../../app/operator/window.py"/>

@@ -41,9 +41,12 @@ def no_leaks(qapp: QApplication, imported: set[str]) -> Iterator[None]:
     _leave_out(imported)
     before = set(QApplication.topLevelWidgets())
     yield
-    gc.collect()
-    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    qapp.processEvents()
+    for _ in range(2):  # what Qt lets go of may hold more
+        gc.collect()
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        qapp.processEvents()
+        if set(QApplication.topLevelWidgets()) <= before:
+            break
     left = [widget for widget in QApplication.topLevelWidgets() if widget not in before]
     assert not left, f"left over: {left}"
     _leave_out(imported)

@@ -219,12 +219,15 @@ class FakePilot:
         self.beats = 0
         self.speed = 0.0
         self.simulation_speed = 1.0
-        self.now_s = 0.0
         self.asked: list[str] = []
         self.halted = False
         self.faults: list[Fault] = []
         self.view = DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False)
         self.alerts: list[Alert] = []
+
+    @property
+    def now_s(self) -> float:
+        return time.monotonic()
 
     @property
     def can_move(self) -> bool:
