@@ -88,6 +88,10 @@ _REFRACTION_PX = 6.0
 """Shift of what is seen at the wall of a tube that refracts, times -0.6 to 0.8."""
 _COLOR_TRIES = 12
 """Colours that are drawn until a robot stands out from what lies below it."""
+_TIPS, _TIP_PX = 0.5, (2.0, 60.0)
+"""Share of the robots with a tip of another colour, and its length: as often one of some pixels as a long one."""
+_JACKETS = 0.2
+"""Share of the robots with a core of one colour in a jacket of another one, or of a darker one."""
 _FADING = 0.5
 """Share of the robots in X-rays whose body grows darker or fainter away from the tip."""
 _SHEATHED, _SHEATH_RADII, _SHEATH_BEGINS_PX = 0.35, (1.15, 2.4), (15.0, 400.0)
@@ -383,7 +387,7 @@ class _Band:
         from_tip = (along[-1] - wanted).astype(np.float32)
         tangent = np.gradient(points, axis=0)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True) + 1e-9
-        tip_px = float(rng.uniform(4, 60))
+        tip_px = float(np.exp(rng.uniform(*np.log(_TIP_PX))))
         radius = np.full(len(points), radius_px, np.float32)
         if rng.random() < 0.3:  # a tip of another width
             radius[from_tip < tip_px] *= np.float32(rng.uniform(0.7, 1.2))
@@ -472,7 +476,10 @@ def _robot_colors(rng: Generator, band: _Band, color: F32, pattern: str, *, is_x
         elif pattern == "rings" and rng.random() < 0.5:
             is_other &= band.from_tip_px < 2 * band.tip_px
         body[:, is_other] = other(0.5, 1.5) * np.float32(rng.uniform(0.4, 1))
-    if rng.random() < 0.4:
+    if rng.random() < _JACKETS:
+        jacket = np.abs(band.side) > float(rng.uniform(0.55, 0.85))
+        body[:, jacket] = color * np.float32(rng.uniform(0.3, 1.0)) if rng.random() < 0.5 else other(0.4, 1.2)
+    if rng.random() < _TIPS:
         body[:, band.from_tip_px < band.tip_px] = other(0.4, 1.2)
     return body
 
