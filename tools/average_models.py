@@ -1,4 +1,4 @@
-"""Mean of the weights of models that were trained on from one another: ``python -m tools.average_models OUT MODEL=WEIGHT[,NEAR] ...``
+"""Mean of the weights of models that were trained on from one another: `python -m tools.average_models OUT MODEL=WEIGHT[,NEAR] ...`
 
 A model that was trained on for strange benches forgets some of the twin; the mean with the model before keeps both (M. Wortsman et
 al., "Robust fine-tuning of zero-shot models", CVPR 2022; "Model soups", ICML 2022). The weights of the sum are brought to 1. NEAR,
