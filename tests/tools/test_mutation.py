@@ -28,6 +28,7 @@ def test_a_small_module_has_all_its_mutants() -> None:
     assert found["0 -> 1"][3] == "    return 1"
 
 
+@pytest.mark.slow
 def test_every_explained_survivor_is_a_change_of_todays_code() -> None:
     known: Counter[tuple[str, str, str]] = Counter()
     for module in mutation.TESTS:

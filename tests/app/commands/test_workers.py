@@ -116,6 +116,7 @@ def test_sessions_are_perceived_again_on_a_cluster(address: str, tmp_path: Path)
     assert (outcome.result, outcome.problem) == ({}, f"{away}: no such session")
 
 
+@pytest.mark.slow
 def test_what_a_cluster_has_not_made_is_made_when_the_command_is_given_again(address: str, tmp_path: Path) -> None:
     plan = SynthPlan(tmp_path / "set", 17, 3, (160, 120))
 

@@ -337,6 +337,7 @@ def test_of_another_network_it_is_refused(model: Path, tmp_path: Path) -> None:
             read_model_info(tmp_path / "wider")
 
 
+@pytest.mark.slow
 def test_it_stays_with_a_new_second_look_and_goes_with_a_new_network(model: Path, tmp_path: Path) -> None:
     base = Path(shutil.copytree(model, tmp_path / "base"))
     seen = np.array([OpenVinoSegmenter(base, 1).segment_signed([image])[0][2] for image in pictures(LEAST)])

@@ -155,6 +155,7 @@ def test_stop_ends_a_step(servos: SoftServoBus, config: Config) -> None:
                 AcceptanceBench(config, stop, None).show_direction(_joint(config, "advance"))
     finally:
         timer.join()
+    time.sleep(0.5)  # the axis comes to rest
     at_mm = servos.positions_mm()
     time.sleep(0.2)
     assert servos.positions_mm() == pytest.approx(at_mm, abs=0.05)

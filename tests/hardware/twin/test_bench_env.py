@@ -11,6 +11,7 @@ import lumenpilot.gym
 from hardware.twin.bench_env import AHEAD_MM, BenchEnv
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::UserWarning")  # the checker's advice, such as on the range of actions
 def test_gymnasium_accepts_it() -> None:
     check_env(gymnasium.make(lumenpilot.gym.ID, render_mode="rgb_array").unwrapped)
