@@ -38,6 +38,7 @@ def test_it_runs_the_window_and_ends_by_itself() -> None:
     assert found["capture_to_screen_ms"]["p50"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_long_session_is_made_opened_and_sought_in(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(benchmarks, "_CYCLE", 8)
     monkeypatch.setattr(benchmarks, "_SEEKS", 5)

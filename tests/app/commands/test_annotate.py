@@ -376,6 +376,7 @@ def test_the_states_given_count_and_not_those_of_the_lines(folder: Path, tmp_pat
     assert read_measurements(tmp_path / "table.csv")[0].state == "A"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("all_orientations")
 def test_worst_first_looks_at_disagreement_too(folder: Path) -> None:
     """An image whose manual angle is 60 degrees off the algorithm's comes before those that nobody has measured."""

@@ -34,6 +34,7 @@ def config(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_script_gets_one_json_object_and_the_exit_code(config: Path) -> None:
     done = run_apart("doctor", "--json", "--config", config)
     checks = json.loads(done.stdout)["checks"]

@@ -359,6 +359,7 @@ def test_each_has_its_files(told: tuple[list[dict[str, Any]], Path, str]) -> Non
         assert (own / "replay.svg").is_file()
 
 
+@pytest.mark.slow
 def test_over_processes_it_is_the_same(folder: Path, told: tuple[list[dict[str, Any]], Path, str]) -> None:
     done = main("replay", folder, "--diff", "--json", "--workers", "2")
     assert done.returncode == 0, done.stderr

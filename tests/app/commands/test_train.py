@@ -141,6 +141,7 @@ def test_an_interrupted_training_keeps_what_was_learnt(frames: Path, tmp_path: P
     assert read_model_info(out).training["steps_done"] == 3
 
 
+@pytest.mark.slow
 def test_a_damaged_frame_is_one_clear_line_and_the_model_until_then_is_there(frames: Path, tmp_path: Path) -> None:
     folder, out = tmp_path / "set", tmp_path / "model"
     shutil.copytree(frames, folder)
@@ -204,6 +205,7 @@ def test_accuracy_is_one_json_object_and_tells_by_look(model: Path, frames: Path
     assert result["mean_over_looks_left_out"]["frames"] == looks.count(looks[0])
 
 
+@pytest.mark.slow
 def test_sets_stand_side_by_side_each_also_with_its_bench(model: Path, frames: Path, tmp_path: Path) -> None:
     with_bench = Path(shutil.copytree(frames, tmp_path / "set"))
     sample = find_samples([frames])[0]

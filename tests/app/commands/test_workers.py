@@ -101,6 +101,7 @@ def test_frames_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Pa
     assert far == near
 
 
+@pytest.mark.slow
 def test_sessions_are_perceived_again_on_a_cluster(address: str, tmp_path: Path) -> None:
     """Where a path leads to them; one that a worker does not see is told, and the others go on."""
     arguments = ("replay", GOLDEN, "--scheduler", address, "--json", "--out", tmp_path / "out")
