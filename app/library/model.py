@@ -308,7 +308,7 @@ class LibraryFilter(QSortFilterProxyModel):
         self.sort(0)
 
     def show(self, words: str, tag: str, order: SortOrder) -> None:
-        """Filter and sort anew."""
+        """Filter and sort again."""
         self.words, self.tag, self.order = words, tag, order
         self.invalidate()
 

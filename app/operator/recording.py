@@ -175,20 +175,21 @@ class Recorder(QObject):
         writer = self._usable(self._writer) if self._writer is not None else None
         status = self.status
         is_recorded = status.recording or status.armed
+        event = Event(self._now_s(), EventKind.NOTE, text or f"mark {self._marks + 1}")
         problem = ""
         if writer is None or (not is_recorded and status.ring_s <= 0.0):
             problem = mark("Nothing is being recorded that could be marked: F9 begins a session")
-        elif not writer.event(EventKind.NOTE, text or f"mark {self._marks + 1}"):
+        elif not writer.add_event(event):
             problem = mark("Not marked: the recorder is behind")
         if problem:
             self.said.emit(tr_text(problem), True)
             return problem
+        for output in self._outputs:
+            output.add_event(event)
         if text:
             self.said.emit(tr("Noted: {text}", text=text), False)
             return ""
         self._marks += 1
-        for output in self._outputs:
-            output.add_event(Event(self._now_s(), EventKind.NOTE, f"mark {self._marks}"))
         if is_recorded:
             self.said.emit(tr("Mark {number} is in the session", number=self._marks), False)
         else:

@@ -148,7 +148,7 @@ class TriggerServer(QObject):
         self.problem = ""
 
     def describe(self) -> None:
-        """Say in the window where the socket is, or why there is none."""
+        """Say in the window where the socket is, or why it is not open."""
         if self.problem:
             self._window.say(tr("No triggers from other programs: {why}", why=tr_text(self.problem)), is_fault=True)
         else:

@@ -168,7 +168,7 @@ def whole_summary(reader: SessionReader) -> SessionSummary:
 
 @dataclass(frozen=True, slots=True)
 class Cached:
-    """A summary, the signature of the session that it was made of, and a small picture (JPEG; empty: there is none)."""
+    """A summary, the signature of the session that it was made of, and a small picture (JPEG; empty: not made)."""
 
     signature: str
     summary: SessionSummary

@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from PySide6.QtCore import QSize, Qt
@@ -147,6 +148,14 @@ def test_a_moment_is_marked_while_shift_is_held_as_the_deadman(running: Operator
     until(qtbot, lambda: running.recorder.status.saved is not None)
     (session,) = sessions(tmp_path / "sessions")
     assert _notes(session) == ["mark 1"]
+
+
+def test_notes_and_marks_go_to_live_outputs_too(remembering: OperatorWindow) -> None:
+    output = Mock()
+    remembering.recorder.use_outputs([output])
+    assert remembering.recorder.note("trial 3") == ""
+    remembering.recorder.mark()
+    assert [call.args[0].text for call in output.add_event.call_args_list] == ["trial 3", "mark 1"]
 
 
 def test_a_moment_of_the_last_seconds_can_be_marked(remembering: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
