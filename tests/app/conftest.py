@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.operator.window import OperatorWindow
+from app.ui.layout_state import layout_settings
 from app.ui.theme import apply_theme
 from core.config.models import Config, PerceptionConfig
 from hardware.rig import RigKind
@@ -28,6 +29,7 @@ PHANTOMS = (("s_curve", "S-curve"), ("tree", "Tree"))
 @pytest.fixture(scope="session", autouse=True)
 def themed(qapp: QApplication) -> None:
     apply_theme(qapp)
+    layout_settings()  # QSettings keeps the folder that is set at its first use: not that of a test which makes it unwritable
 
 
 @pytest.fixture(scope="session")

@@ -37,6 +37,7 @@ def open_engine(bench: FakeBench, opened: list[TwinConfig]) -> OpenEngine:
 
 @pytest.fixture
 def window(make_window: MakeWindow, open_engine: OpenEngine, qtbot: QtBot) -> OperatorWindow:
+    layout_settings().clear()  # what other tests have chosen
     window = make_window(open_engine)
     window.start()
     until(qtbot, lambda: window.shown_tick is not None)
