@@ -29,13 +29,14 @@ class Frame:
     """One camera image. ``captured_s`` is ``time.monotonic()`` at capture (or simulated time in lock-step).
 
     ``index`` counts the frames that the camera gave; ``lost`` the frames that never came, by its own count or by its rate, since
-    it was opened.
+    it was opened. ``published_s`` is ``time.monotonic()`` when a bench with a simulated clock gave it; None: ``captured_s``.
     """
 
     index: int
     captured_s: float
     image: Image
     lost: int = 0
+    published_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -43,13 +43,17 @@ _JPEG_QUALITY = 80
 
 
 class Receiver(Protocol):
-    """Where frames and events go; used by one thread. ``address`` is for people."""
+    """Where frames and events go; used by one thread. ``address`` is for people.
+
+    ``at_s`` is ``time.monotonic()`` of the capture or the event, also on a bench with a simulated clock. It does not go back from
+    frame to frame, nor from event to event.
+    """
 
     address: str
 
     def set_rig(self, about: About) -> None: ...
-    def send(self, tick: Tick, drive: DriveView | None, bus: Any) -> None: ...
-    def send_event(self, event: Event) -> None: ...
+    def send(self, at_s: float, tick: Tick, drive: DriveView | None, bus: Any) -> None: ...
+    def send_event(self, at_s: float, event: Event) -> None: ...
     def close(self) -> None: ...
 
 
@@ -130,15 +134,22 @@ class LiveOutput:
 
     def _send_all(self, receiver: Receiver) -> None:
         about, due_s = None, 0.0
+        frame_s = event_s = behind_s = 0.0  # of the last ones; how far the rig's clock is behind the real one
         while not self._closing.is_set():
             newest = self._newest.take(_POLL_S)
             if self._about is not about:
-                about = self._about
+                about, behind_s = self._about, 0.0
                 receiver.set_rig(about) if about is not None else None
-            while self._events:
-                receiver.send_event(self._events.popleft())
             if newest is not None:
-                receiver.send(*newest)
+                frame = newest[0].frame
+                behind_s = 0.0 if frame.published_s is None else frame.published_s - frame.captured_s
+            while self._events:
+                event = self._events.popleft()
+                event_s = max(event_s, event.time_s + behind_s)
+                receiver.send_event(event_s, event)
+            if newest is not None:
+                frame_s = max(frame_s, frame.captured_s + behind_s)  # a NaN changes nothing
+                receiver.send(frame_s, *newest)
                 # on average a thirtieth apart, as in the window
                 due_s = max(due_s, time.monotonic() - _EVERY_S) + _EVERY_S
                 self._closing.wait(max(0.0, due_s - time.monotonic()))
@@ -169,13 +180,13 @@ class FoxgloveServer:
         except RuntimeError as error:
             raise UserError(f"port {port}: the stream cannot be opened ({error})") from None
         self.address = f"ws://{_HOST}:{self._server.port}"
-        self._zero_ns = time.time_ns() - time.monotonic_ns()
+        self._zero_ns = time.time_ns() - time.monotonic_ns()  # kept: stamps do not jump when the computer's time is set
 
     def set_rig(self, about: About) -> None:
         self._messages.set_rig(about.kind, about.config)
 
-    def send(self, tick: Tick, drive: DriveView | None, bus: Any) -> None:
-        at_ns = self._ns(tick.frame.captured_s)
+    def send(self, at_s: float, tick: Tick, drive: DriveView | None, bus: Any) -> None:
+        at_ns = self._ns(at_s)
         if self._messages.wants_rows:
             self._messages.log_row(row_of_tick(tick, drive, bus), at_ns, at_ns)
         if self._messages.wants_pictures:
@@ -183,8 +194,8 @@ class FoxgloveServer:
 
             self._messages.log_picture(jpeg_of(tick.frame.image, _JPEG_QUALITY), at_ns, at_ns)
 
-    def send_event(self, event: Event) -> None:
-        at_ns = self._ns(event.time_s)
+    def send_event(self, at_s: float, event: Event) -> None:
+        at_ns = self._ns(at_s)
         self._messages.log_event(event, at_ns, at_ns)
 
     def _ns(self, time_s: float) -> int:
@@ -241,8 +252,8 @@ class LslOutlets:
     def set_rig(self, about: About) -> None:
         self._mark(f"rig: {about.kind} {about.rig}", time.monotonic())
 
-    def send(self, tick: Tick, drive: DriveView | None, bus: Any) -> None:
-        pose, at_s = tick.scene.pose, tick.frame.captured_s
+    def send(self, at_s: float, tick: Tick, drive: DriveView | None, bus: Any) -> None:
+        pose = tick.scene.pose
         sample = [math.nan, math.nan, math.nan, _NO_STATE, math.nan]
         if pose is not None:
             place = list(PoseState).index(pose.state)
@@ -253,8 +264,8 @@ class LslOutlets:
             self._state = state
             self._mark(f"state: {state.value if state is not None else tick.scene.refusal or 'no pose'}", at_s)
 
-    def send_event(self, event: Event) -> None:
-        self._mark(event_line(event), event.time_s)
+    def send_event(self, at_s: float, event: Event) -> None:
+        self._mark(event_line(event), at_s)
 
     def _mark(self, text: str, at_s: float) -> None:
         self._markers.push_sample([text], self._zero_s + at_s)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from hardware.twin.world import TwinWorld
 
 _START_S, _END_S = 60.0, 5.0  # time limits for start and end of the process
-_FRAME = struct.Struct("<Qdii")  # index, captured, width, height
+_FRAME = struct.Struct("<Qddii")  # index, captured, published, width, height
 _STATUS = struct.Struct(
     "<B3d8d2d"
 )  # tendons; time, insertion, delivery; pulls and forces, filled up; contact (NaN: unknown), rotation
@@ -47,14 +47,15 @@ def slot_sizes(twin: TwinConfig) -> tuple[int, int]:
 
 
 def pack_frame(frame: Frame) -> bytes:
+    """The bytes of a frame that is published now."""
     height, width = frame.image.shape[:2]
-    return _FRAME.pack(frame.index, frame.captured_s, width, height) + frame.image.tobytes()
+    return _FRAME.pack(frame.index, frame.captured_s, time.monotonic(), width, height) + frame.image.tobytes()
 
 
 def unpack_frame(data: bytes) -> Frame:
-    index, captured_s, width, height = _FRAME.unpack_from(data)
+    index, captured_s, published_s, width, height = _FRAME.unpack_from(data)
     image = np.frombuffer(data, np.uint8, 3 * width * height, _FRAME.size).reshape(height, width, 3)
-    return Frame(index, captured_s, image)
+    return Frame(index, captured_s, image, published_s=published_s)
 
 
 def pack_status(status: RobotStatus) -> bytes:

@@ -34,10 +34,10 @@ class ListReceiver:
     def set_rig(self, about: About) -> None:
         self.rigs.append(about.kind)
 
-    def send(self, tick: Tick, drive: DriveView | None, bus: Any) -> None:
+    def send(self, at_s: float, tick: Tick, drive: DriveView | None, bus: Any) -> None:
         self.ticks.append(tick)
 
-    def send_event(self, event: Event) -> None:
+    def send_event(self, at_s: float, event: Event) -> None:
         self.events.append(event.kind.value)
 
     def close(self) -> None:

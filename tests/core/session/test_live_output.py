@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import util
 from pathlib import Path
 from typing import Any
@@ -96,7 +97,7 @@ def test_without_a_subscriber_nothing_is_encoded(server: FoxgloveServer, monkeyp
 
     monkeypatch.setattr(mcap_export, "jpeg_of", encode)
     monkeypatch.setattr("core.session.live_output.row_of_tick", encode)
-    server.send(tick_of(0, 1.0, full=True), drive_of(1.0), bus())
+    server.send(1.0, tick_of(0, 1.0, full=True), drive_of(1.0), bus())
 
 
 def subscribed(port: int, channel: int) -> socket.socket:
@@ -123,7 +124,7 @@ def test_a_client_that_never_reads_costs_frames_and_bounded_memory(server: Foxgl
             time.sleep(0.005)
         before = psutil.Process().memory_info().rss
         for index in range(count):
-            server.send(tick_of(index, 1.0), None, None)  # returns, whatever the client does
+            server.send(1.0, tick_of(index, 1.0), None, None)  # returns, whatever the client does
         assert psutil.Process().memory_info().rss - before < 0.4 * count * len(frame)
 
 
@@ -135,19 +136,23 @@ class StuckReceiver:
     def __init__(self) -> None:
         self.sent: list[int] = []
         self.events: list[str] = []
+        self.stamps: list[float] = []
         self.began, self.release, self.last = threading.Event(), threading.Event(), threading.Event()
 
     def set_rig(self, about: About) -> None: ...
 
-    def send(self, tick: Tick, drive: DriveView | None, bus: Any) -> None:
+    def send(self, at_s: float, tick: Tick, drive: DriveView | None, bus: Any) -> None:
         self.sent.append(tick.frame.index)
+        self.stamps.append(at_s)
         self.began.set()
         self.release.wait()
         if tick.frame.index == 999:
             self.last.set()
 
-    def send_event(self, event: Event) -> None:
+    def send_event(self, at_s: float, event: Event) -> None:
         self.events.append(event.text)
+        self.stamps.append(at_s)
+        self.last.set()
 
     def close(self) -> None: ...
 
@@ -166,6 +171,33 @@ def test_a_receiver_that_is_stuck_gets_the_newest_frame_and_all_events() -> None
     output.close()
     assert receiver.sent == [0, 999]
     assert receiver.events == ["ADVISORY", "ARMED", ""]
+
+
+def test_stamps_are_real_times_and_never_go_back() -> None:
+    receiver = StuckReceiver()
+    receiver.release.set()
+    output = LiveOutput(lambda: receiver)
+
+    def frame_at(captured_s: float, published_s: float | None = None) -> float:
+        tick = tick_of(999, captured_s)
+        receiver.last.clear()
+        output.put(replace(tick, frame=replace(tick.frame, published_s=published_s)))
+        receiver.last.wait()
+        return receiver.stamps.pop()
+
+    def event_at(time_s: float) -> float:
+        receiver.last.clear()
+        output.add_event(Event(time_s, EventKind.NOTE, "mark"))
+        receiver.last.wait()
+        return receiver.stamps.pop()
+
+    assert (frame_at(10.0), event_at(10.5)) == (10.0, 10.5)  # a camera
+    assert (frame_at(5.0, 12.0), event_at(5.5)) == (12.0, 12.5)  # the twin's clock is 7 s behind,
+    assert (frame_at(5.25, 13.0), event_at(5.375)) == (13.0, 13.125)  # then 7.75 s, as it waited for the program
+    assert (frame_at(5.5, 12.5), event_at(5.0)) == (13.0, 13.125)
+    assert frame_at(math.nan) == 13.0
+    assert (frame_at(14.0), event_at(14.5)) == (14.0, 14.5)  # a camera again
+    output.close()
 
 
 def test_an_error_in_the_receiver_ends_it_alone(caplog: pytest.LogCaptureFixture) -> None:

@@ -61,13 +61,14 @@ def test_what_is_packed_is_unpacked() -> None:
 
 
 def test_frames_come_in_order_and_each_once(twin: RemoteTwin) -> None:
-    asked_s = twin.clock()
+    asked_s, before_s = twin.clock(), time.monotonic()
     frames = [next_frame(twin) for _ in range(4)]
     indices = [frame.index for frame in frames]
     assert indices == sorted(set(indices))
     assert frames[0].image.shape == (120, 160, 3)
     assert asked_s <= frames[-1].captured_s <= twin.clock(), "on the bench's clock"
     assert [frame.captured_s for frame in frames] == sorted(frame.captured_s for frame in frames)
+    assert before_s <= (frames[-1].published_s or 0.0) <= time.monotonic(), "on the real clock"
     assert not np.array_equal(frames[0].image, frames[-1].image), "noise of a camera"
 
 
