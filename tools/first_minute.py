@@ -1,4 +1,5 @@
-"""The first minute of a user on the bench twin: the real window on a screen of its own (Xvfb), real keys and clicks (xdotool).
+"""The first minute of a user on the bench twin: the real window on a screen of its own (Xvfb), real keys and clicks (xdotool),
+and a window manager (openbox), which gives the keys to the list of checks when it opens.
 
 ``python -m tools.first_minute --times 5`` starts it so often, clicks a destination, arms, holds Shift, hands over with F7, and says
 of each time how long the first understood picture took, and whether the program arrived without a HOLD. The user's own settings are
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -66,15 +68,6 @@ class Session:
             time.sleep(0.01)
         return True
 
-    def press(self, how: str, key: str) -> None:
-        """Into the list of checks, or else the window: without a window manager nothing else gives them the keys."""
-        for name in ("Before driving", "LumenPilot"):
-            command = ["xdotool", "search", "--onlyvisible", "--name", name, "windowfocus"]
-            if subprocess.run(command, env=self._environment, check=False, capture_output=True).returncode == 0:
-                break
-        time.sleep(0.2)
-        self.act(how, key)
-
     def act(self, *words: object) -> None:
         subprocess.run(["xdotool", *map(str, words)], env=self._environment, check=True)
 
@@ -87,39 +80,40 @@ class Session:
 @contextmanager
 def _screen(size: str) -> Iterator[dict[str, str]]:
     """The environment of a program on a screen of this size, with settings and caches of its own."""
+    if any(shutil.which(program) is None for program in ("Xvfb", "xdotool", "openbox")):
+        raise UserError("this needs Xvfb, xdotool and openbox: apt install xvfb xdotool openbox")
     ours, theirs = os.pipe()
     command = ["Xvfb", "-displayfd", str(theirs), "-screen", "0", f"{size}x24"]
     with tempfile.TemporaryDirectory(prefix="lumenpilot_first_") as folder, open(ours, encoding="ascii") as told:
+        server = subprocess.Popen(command, pass_fds=(theirs,), stderr=subprocess.DEVNULL)
+        os.close(theirs)
+        homes = {f"XDG_{kind}_HOME": f"{folder}/{kind.lower()}" for kind in ("CONFIG", "CACHE", "STATE", "DATA")}
+        screen = {**os.environ, **homes, "DISPLAY": f":{told.readline().strip()}", "QT_QPA_PLATFORM": "xcb"}
+        manager = subprocess.Popen(["openbox"], env=screen, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            server = subprocess.Popen(command, pass_fds=(theirs,), stderr=subprocess.DEVNULL)
-        except FileNotFoundError:
-            raise UserError("this needs Xvfb and xdotool: apt install xvfb xdotool") from None
+            yield screen
         finally:
-            os.close(theirs)
-        try:
-            homes = {f"XDG_{kind}_HOME": f"{folder}/{kind.lower()}" for kind in ("CONFIG", "CACHE", "STATE", "DATA")}
-            yield {**os.environ, **homes, "DISPLAY": f":{told.readline().strip()}", "QT_QPA_PLATFORM": "xcb"}
-        finally:
-            server.terminate()
-            server.wait()
+            for process in (manager, server):
+                process.terminate()
+                process.wait()
 
 
 def _drive(session: Session) -> str:
     """Click, arm, hand over; returns how it ended."""
     if not session.until(_ARM_WITHIN_S, armable=True):
         return f"arming was refused for {_ARM_WITHIN_S:g} s: {session.state.get('against')}"
-    session.press("key", "Escape")  # the tour of a first start
+    session.act("key", "Escape")  # the tour of a first start
     session.act("mousemove", *session.state["target_at"], "click", 1)
     for _ in range(round(_ARM_WITHIN_S / _ASK_EVERY_S)):  # the first press may begin the checks, as a user does
-        session.press("key", "F6")
+        session.act("key", "F6")
         if session.until(_ASK_EVERY_S, mode="ARMED"):
             break
     else:
         return f"not armed: {session.state.get('bar')}"
-    session.press("keydown", "Shift_L")
+    session.act("keydown", "Shift_L")
     try:
         session.until(5.0, can_hand_over=True)
-        session.press("key", "F7")
+        session.act("key", "F7")
         if not session.until(5.0, mode="AUTONOMOUS"):
             return f"not handed over: {session.state.get('mode')}"
         began_s, slowest = time.monotonic(), 100

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel,
 from app.operator.preflight import Preflight, PreflightFinding, PreflightModel
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.texts import OperatorStep
 from app.widgets.basics import card_note, takes_enter
 from app.widgets.painting import PaintedWidget, Sign, draw_text, paint_sign, polygon, set_colours
 from hardware.preflight.preflight import Level
@@ -83,6 +84,7 @@ class PreflightList(QDialog):
         self.again.clicked.connect(model.begin)
         self.arm.clicked.connect(self._on_arm)
         self.leave.clicked.connect(self.close)
+        self.arm.setShortcut(OperatorStep.ARM.value.key)  # the keys are this window's while it is in front
         self.arm.setObjectName("main_button")
         buttons = QHBoxLayout()
         buttons.addWidget(self._note, 1)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import pytest
-from PySide6.QtCore import QPoint, QRect
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
@@ -133,6 +133,12 @@ def test_good_checks_do_not_say_ready_while_arming_would_be_refused(
     shown.renew()
     assert shown.headline == "Ready: 3 of 3 checks good"
     assert shown.arm.isEnabled()
+    shown.open_list()
+    with qtbot.waitActive(shown, timeout=30_000):
+        shown.activateWindow()
+    with qtbot.waitSignal(shown.arm_asked, timeout=30_000):  # the bar says "press F6" while this list has the keys
+        qtbot.keyClick(shown, Qt.Key.Key_F6)
+    assert not shown.isVisible()
 
 
 def test_the_bar_does_not_offer_arming_that_the_checks_would_refuse(qtbot: QtBot) -> None:
