@@ -28,9 +28,7 @@ _TRIES = 3  # over real lines, where a machine that pauses at the wrong moment s
 
 _HEAD = """# Faults
 
-What the program does in each fault. `python -m tools.fault_campaign --out docs/faults.md` brings them about and writes this
-page (`--only N`: one fault; `--quick`: those that need no line, process or window; `--json`: also the alerts and the session's
-events).
+What the program does in each fault. `python -m tools.fault_campaign --out docs/faults.md` brings them about and writes this page.
 
 **HOLD** stops an autonomous motion and may clear itself within half a second; **DISARM** holds, leaves autonomy and must be
 acknowledged; **STOP** does so in every mode and blocks the bus. Times are the pilot's own, from the injection on; ages count from
