@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DEFAULT_GOAL := help
-.PHONY: help run test tests damage mutation lint translations setup packages install uninstall clean
+.PHONY: help run test tests damage mutation docs lint translations setup packages install uninstall clean
 
 # Tools are started as modules, so that a checkout that was moved still works (the scripts in .venv/bin name their old place).
 PY := .venv/bin/python
@@ -40,6 +40,9 @@ lint: packages  ## ruff and mypy only
 	$(PY) -m ruff check || failed=1
 	nice $(PY) -m mypy || failed=1 # beside the tests, with --jobs 2, it takes what they leave: they often wait
 	[[ -z $$failed ]]
+
+docs: setup  ## README and docs/ as a site of HTML pages in out/site (ARGS=--new-pictures takes the pictures of the windows now)
+	@$(PY) -m tools.docs_site $(ARGS)
 
 translations: setup  ## renew the texts of resources/translations from the code, and make the .qm files
 	@$(PY) -m tools.translations
