@@ -20,7 +20,7 @@ from typing import Annotated, Any, NoReturn, TextIO
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from app.commands.options import ConfigOption, LslOption, RigOption, SourceOption, StreamOption, bare_stream
+from app.commands.options import BenchOption, ConfigOption, LslOption, RigOption, SourceOption, StreamOption, bare_stream
 from core.devices import UserError
 from core.program import CALLED, as_called, import_problem, is_installed, program_line
 from core.system import keep_freed_memory, limit_heaps, limit_pictures
@@ -45,6 +45,10 @@ COMMANDS = {
     "evaluate": (
         "app.commands.evaluate",
         "The algorithm against manual measures, with the statistics of the paper beside its own figures.",
+    ),
+    "phantom": (
+        "app.commands.phantom",
+        "Your own bench as a phantom of the twin: from its vessel, an outline, a drawing, or centerlines.",
     ),
     "trial": (
         "app.commands.trial",
@@ -158,11 +162,12 @@ def gui(
     source: SourceOption = None,
     stream: StreamOption = None,
     lsl: LslOption = False,
+    bench: BenchOption = None,
     tour: Annotated[bool, typer.Option("--tour", help="show the tour, as at the first start")] = False,
     until_first_frame: Annotated[bool, typer.Option("--until-first-frame", hidden=True)] = False,
 ) -> None:
     """The operator window (the same as no command)."""
-    _open_window(rig, config, source, stream=stream, lsl=lsl, until_first_frame=until_first_frame, tour=tour)
+    _open_window(rig, config, source, stream=stream, lsl=lsl, until_first_frame=until_first_frame, tour=tour, bench=bench)
 
 
 def _open_window(rig: str | None, config_path: Path | None, source: Path | None, **options: Any) -> NoReturn:

@@ -23,6 +23,9 @@ RigOption = Annotated[
         "--rig", help="twin (needs no hardware), realsense, webcam, basler, or a name of rig list; default: the configured one"
     ),
 ]
+BenchOption = Annotated[
+    str | None, typer.Option("--bench", help="the twin in the phantom of your bench (see phantom): its folder, model, or rig")
+]
 SourceOption = Annotated[
     Path | None, typer.Option("--source", help="video, picture or folder to look at instead of a rig's camera")
 ]

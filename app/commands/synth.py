@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from app.commands.options import SchedulerOption
+from app.commands.options import BenchOption, SchedulerOption
 from app.commands.progress import console, progress_bar
 
 
@@ -28,6 +28,7 @@ def synth(
         ),
     ] = None,
     phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,
+    bench: BenchOption = None,
     poses: Annotated[
         int, typer.Option(min=1, max=8, help="poses of the robot in every look: more frames in the same time, but fewer looks")
     ] = 1,
@@ -39,6 +40,10 @@ def synth(
 ) -> None:
     """Randomised labelled frames from the bench twin: images, masks, truth."""
     families = tuple(family) if family else None
+    if bench is not None:
+        from hardware.twin.own_phantom import phantom_name
+
+        phantom = phantom_name(bench)
     make_set(out, count, seed, (width, height), families, phantom, poses, workers, scheduler, scenes=scenes)
 
 

@@ -18,7 +18,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from app.commands.options import ConfigOption, ModelOption, SchedulerOption, check_masks
+from app.commands.options import BenchOption, ConfigOption, ModelOption, SchedulerOption, check_masks
 from app.commands.progress import console, progress_bar
 from app.commands.workers import over_cluster, over_processes
 from core.config.models import POLICIES, choose_model, load_config
@@ -28,6 +28,7 @@ from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
 from core.files import write_atomic
 from core.program import program_line
 from hardware.twin.catalog import BENCH_LOOK, RANDOM_LOOK, TRIAL_LOOKS
+from hardware.twin.phantom import own_file
 
 if TYPE_CHECKING:
     from hardware.twin.trial import TrialPlan
@@ -70,6 +71,7 @@ def trial(
     rig: Annotated[
         str | None, typer.Option(help="rig file, by name or path: the robot has its joints (resources/rigs has examples)")
     ] = None,
+    bench: BenchOption = None,
     scheduler: SchedulerOption = None,
     model: ModelOption = None,
     config_path: ConfigOption = None,
@@ -89,7 +91,11 @@ def trial(
         config = config.model_copy(update={"servos": shape.servos})
     if look not in TRIAL_LOOKS:
         raise TrialError(f"unknown look {look!r}; known: {', '.join(TRIAL_LOOKS)}")
-    plan = TrialPlan(config, true_masks, max_seconds, look, wall_force)
+    if bench is not None:
+        from hardware.twin.own_phantom import with_own_phantom
+
+        config = with_own_phantom(config, bench)
+    plan = TrialPlan(config, true_masks, max_seconds, look, wall_force, bench is not None)
     # All policies meet a seed one after the other, so that a part of a campaign can already be compared.
     jobs: list[Job] = [(name, seed) for seed in parse_seeds(seeds) for name in policies]
     rows, interrupted = _run(plan, jobs, out, workers, scheduler)
@@ -204,6 +210,8 @@ def _described(plan: TrialPlan) -> dict[str, Any]:
         model_sha256 = hashlib.sha256(info.model_dump_json(exclude={"figures"}).encode()).hexdigest()
     described: dict[str, Any] = {"true_masks": plan.true_masks, "max_seconds": plan.max_seconds, "look": plan.look}
     described |= {} if plan.wall_force else {"wall_force": False}
+    if plan.own and (file := own_file(plan.config.twin.phantom)) is not None:
+        described["own_phantom"] = hashlib.sha256(file.read_bytes()).hexdigest()
     if not plan.config.servos.is_default:
         described["joints"] = [joint.model_dump(mode="json") for joint in plan.config.servos.joints]
     return described | {"model_sha256": model_sha256, "config": settings}

@@ -14,6 +14,7 @@ from app.commands.options import with_outputs
 from app.ui.display import check_display
 from core.config.files import settings_of_windows
 from core.config.models import Config
+from core.devices import UserError
 from core.perception import compiled
 from core.types import Reason
 from hardware.rig import RigKind, rig_config, start_ahead
@@ -40,8 +41,10 @@ def make_window(config: Config, kind: RigKind, maker: EngineMaker | None = None)
     """The window, not shown yet. There must be an application."""
     from app.operator.rig_engine import EngineMaker
     from app.operator.window import OperatorWindow
+    from hardware.twin.own_phantom import own_phantoms
 
-    return OperatorWindow(config, maker or EngineMaker(), kind, list(PHANTOM_TITLES.items()))
+    own = own_phantoms(config.twin.phantom, config.perception.bench)
+    return OperatorWindow(config, maker or EngineMaker(), kind, [*PHANTOM_TITLES.items(), *own])
 
 
 def run_window(
@@ -53,6 +56,7 @@ def run_window(
     lsl: bool = False,
     until_first_frame: bool = False,
     tour: bool = False,
+    bench: str | None = None,
 ) -> int:
     """Show the window until it is closed; returns the exit code. Raises UserError for what is wrong before it opens."""
     check_display()
@@ -61,6 +65,8 @@ def run_window(
     is_own = config_path is None and not until_first_frame  # a measurement does not depend on the user's settings
     config, kind = rig_config(rig, config_path, source, file.data if is_own else None)
     config = with_outputs(config, stream, lsl=lsl)
+    if bench is not None and kind is not RigKind.SIM:
+        raise UserError("--bench is for the twin: leave --rig and --source out")
     outputs: dict[OutputKind, LiveOutput] = {}
     if config.stream.foxglove or config.stream.lsl:
         from core.session.live_output import open_outputs
@@ -83,9 +89,12 @@ def run_window(
     from app.ui.i18n import tr
     from app.ui.layout_state import LayoutState, Parts, Switch, overlay_switches, toggling
     from app.ui.window_base import make_application, run_until_closed
+    from hardware.twin.own_phantom import with_own_phantom
 
     if is_own and kind is RigKind.SIM and "twin" not in file.data:
         config = with_kept_twin(config)
+    if bench is not None:
+        config = with_own_phantom(config, bench)
     finish_loading()
     application = make_application(config.window)
     maker = EngineMaker(ahead)

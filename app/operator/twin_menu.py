@@ -20,7 +20,7 @@ from app.ui.layout_state import layout_settings
 from core.config.models import Config, TwinConfig
 from hardware.rig import RigKind, kind_of
 from hardware.twin.catalog import BENCH_LOOK, BENCH_TITLE, LOOK_TITLES, LOOKS, RARE_TITLES, family_of, look_of
-from hardware.twin.phantom import PHANTOM_TITLES
+from hardware.twin.phantom import PHANTOM_TITLES, own_file
 
 _ANY = mark("Any of the ten &families")
 _SEED_MAX = 999_999
@@ -37,7 +37,9 @@ def with_kept_twin(config: Config) -> Config:
         twin = TwinConfig.model_validate(config.twin.model_dump() | kept)
     except ValidationError:
         return config
-    if twin.phantom not in PHANTOM_TITLES and re.fullmatch(r"random:\d{1,6}", twin.phantom) is None:
+    if (own := own_file(twin.phantom)) is not None and not own.is_file():
+        return config
+    if own is None and twin.phantom not in PHANTOM_TITLES and re.fullmatch(r"random:\d{1,6}", twin.phantom) is None:
         return config
     return config.model_copy(update={"twin": twin}) if twin.look is None or twin.look in LOOKS else config
 

@@ -31,7 +31,9 @@ from core.types import Image, Mask, Points
 
 FORMAT = 1
 INFO, EMPTY, NOISE, KNOWN, VESSEL = "bench.json", "empty.png", "noise.png", "known.png", "vessel.png"
-_FILES = frozenset({INFO, EMPTY, NOISE, KNOWN, VESSEL})
+_PICTURES = frozenset({EMPTY, NOISE, KNOWN, VESSEL})
+_FILES = frozenset({INFO, *_PICTURES, "phantom.json"})
+"""With the twin's phantom of this bench (``hardware/twin/own_phantom.py``); another vessel needs another one."""
 
 SHARP_SHARE = 0.9
 """Empty pictures that are less sharp than this share of the sharpest one are not averaged into it."""
@@ -447,7 +449,7 @@ def read_bench(folder: Path) -> Bench:
         raise BenchError(message("{path}: format {found} is of a newer version; update the program", path=path, found=info.format))
     files: dict[str, bytes] = {}
     for name, wanted in info.sha256.items():
-        if name not in _FILES - {INFO}:
+        if name not in _PICTURES:
             raise BenchError(message("{path}: names {name}, which no bench has; make the bench again", path=path, name=name))
         try:
             files[name] = (folder / name).read_bytes()

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from core.types import VesselGraph
+from hardware.twin.view import CameraView
 
 BOARD_MM = (200.0, 150.0)
+OWN, PHANTOM_FILE = "bench:", "phantom.json"
+"""How the name of the phantom of a bench begins, the bench's folder follows; and its file in there."""
 
 PHANTOM_TITLES = {
     "s_curve": "S-curve",
@@ -22,14 +26,23 @@ PHANTOM_TITLES = {
 """Titles of the named phantoms. Apart from ``phantoms``, which takes a second to load."""
 
 
+def own_file(name: str) -> Path | None:
+    """The file of the phantom of a bench, which need not be there; None for another phantom's name."""
+    return Path(name.removeprefix(OWN)) / PHANTOM_FILE if name.startswith(OWN) else None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Phantom:
-    """A phantom. ``graph`` is in mm with points every 0.5 mm or denser; the robot enters at node ``port`` (a leaf)."""
+    """A phantom. ``graph`` is in mm with points every 0.5 mm or denser; the robot enters at node ``port`` (a leaf).
+
+    ``view``: how the camera of the bench that it was made from sees it; None: as the look has it.
+    """
 
     name: str
     title: str
     graph: VesselGraph
     port: int
+    view: CameraView | None = None
 
     @property
     def targets(self) -> tuple[int, ...]:

@@ -540,7 +540,7 @@ PHANTOM_NAMES: tuple[str, ...] = tuple(PHANTOM_TITLES)
 
 
 def make_phantom(name: str) -> Phantom:
-    """The phantom called `name`: one of ``PHANTOM_NAMES`` or ``random:<seed>``.
+    """The phantom called `name`: one of ``PHANTOM_NAMES``, ``random:<seed>``, or ``bench:<folder>`` of a bench with a phantom.
 
     Raises
     ------
@@ -548,10 +548,14 @@ def make_phantom(name: str) -> Phantom:
         When there is no such phantom; the message lists the names.
     """
     kind, _, seed = name.partition(":")
+    if kind == "bench":
+        from hardware.twin.own_phantom import read_phantom
+
+        return read_phantom(name)
     if kind == "random" and seed.isdecimal():
         return random_phantom(int(seed))
     if name not in _NAMED:
-        raise ValueError(f"unknown phantom {name!r}; known: {', '.join(PHANTOM_NAMES)}, random:<seed>")
+        raise ValueError(f"unknown phantom {name!r}; known: {', '.join(PHANTOM_NAMES)}, random:<seed>, bench:<folder>")
     waypoints, radii, branches = _NAMED[name]
     sketch = Sketch()
     sketch.run(waypoints, radii)

@@ -52,7 +52,7 @@ class TrialPlan:
 
     ``true_masks``: the twin's masks in place of the network's. ``look`` of ``TRIAL_LOOKS``: every trial has another look, of any
     of the ten families or of the named one, or all have the default clear bench. ``wall_force``: whether the policy is told the
-    wall contact force, which real rigs do not measure.
+    wall contact force, which real rigs do not measure. ``own``: in the configured phantom, a bench's, not in random ones.
     """
 
     config: Config
@@ -60,6 +60,7 @@ class TrialPlan:
     max_seconds: float = 120.0
     look: str = RANDOM_LOOK
     wall_force: bool = True
+    own: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +116,7 @@ class Trial:
 
     def __init__(self, plan: TrialPlan, seed: int, policy: str, pipeline: Pipeline, masks: TrueMasks | None = None) -> None:
         config, own_seed = plan.config, FIRST_SEED + seed
-        phantom = make_phantom(f"random:{own_seed}")
+        phantom = make_phantom(config.twin.phantom if plan.own else f"random:{own_seed}")
         self._plan, self._seed, self._name = plan, seed, policy
         look = named_appearance(None if plan.look == RANDOM_LOOK else plan.look, own_seed)
         self._world = TwinWorld(

@@ -65,6 +65,13 @@ class CameraView:
         x, y = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
         return np.asarray(self.unproject(np.column_stack([x.ravel(), y.ravel()])).reshape(height, width, 2))
 
+    def fitted(self, size: tuple[int, int]) -> CameraView:
+        """The same view as a picture of another `size` (width, height), as large as fits in its middle."""
+        zoom = min(size[0] / self.size[0], size[1] / self.size[1])
+        place = np.diag([zoom, zoom, 1.0])
+        place[:2, 2] = [(new - 1 - zoom * (old - 1)) / 2 for new, old in zip(size, self.size, strict=True)]
+        return CameraView(place @ self.homography, size, self.distortion)
+
     @property
     def _center(self) -> np.ndarray:
         return np.array([(self.size[0] - 1) / 2, (self.size[1] - 1) / 2])

@@ -139,8 +139,11 @@ def make_view(appearance: Appearance, size: tuple[int, int], phantom: Phantom | 
     """The camera's view of the board for an image of `size` (width, height).
 
     The middle of the lumen (without a phantom: of the board) plus ``offset_mm`` lies in the middle of the image. With a `phantom`,
-    offset and zoom are reduced until the port and three quarters of the centerlines are in the picture.
+    offset and zoom are reduced until the port and three quarters of the centerlines are in the picture. A phantom's own view comes
+    before all that.
     """
+    if phantom is not None and phantom.view is not None:
+        return replace(phantom.view.fitted(size), distortion=appearance.distortion)
     points = None if phantom is None else np.vstack([edge.points for edge in phantom.graph.edges])
     middle = np.array(BOARD_MM) / 2 if points is None else (points.min(axis=0) + points.max(axis=0)) / 2
     offset, zoom = np.array(appearance.offset_mm), appearance.pixels_per_mm
