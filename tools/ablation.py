@@ -1,9 +1,8 @@
 """Ablation: what each step of the method is worth, from the paper taken literally to ours: ``python -m tools.ablation SET``.
 
-A variant is a configuration: the preset ``paper`` with some steps' settings as ours has them. The *cumulative* variants switch the
-steps on one after the other; each variant *without* a step is ours with that step alone switched back. All variants see the same
+A variant is a configuration: the preset ``paper`` with the settings of the first steps as ours has them. All variants see the same
 masks of the same frames. Each difference has a 95 % interval (paired percentile bootstrap over whole phantoms). ``--sequence`` also
-measures streams of the twin: errors, swaps of head and tail, jumps of the head, lag and jitter of theta.
+measures streams of the twin: errors, swaps of head and tail, jumps of the head, jitter of theta.
 """
 
 from __future__ import annotations
@@ -65,16 +64,14 @@ STEPS = (
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One row of the table. ``compared_with`` is the index of the row that its differences refer to (None: the first row)."""
+    """One row of the table; its differences refer to the row before."""
 
     name: str
-    kind: Literal["cumulative", "without"]
     config: PerceptionConfig
-    compared_with: int | None
 
 
 def make_variants(paper: PerceptionConfig, ours: PerceptionConfig, steps: Sequence[AblatedStep] = STEPS) -> list[Variant]:
-    """The cumulative variants from `paper` to ours, then ours without each of the steps.
+    """The variants from `paper` to ours.
 
     Parameters
     ----------
@@ -86,17 +83,10 @@ def make_variants(paper: PerceptionConfig, ours: PerceptionConfig, steps: Sequen
     ValueError
         When the two differ in a setting that no step of ``STEPS`` switches.
     """
-    by_step = _differences(paper, ours)
-    off = {step.name: by_step[step.name] for step in steps}
-    everything = [key for step in steps for key in off[step.name]]
-    variants = [Variant(PAPER, "cumulative", _switched(ours, paper, everything), None)]
-    for done, step in enumerate(steps, 1):
-        still_off = [key for later in steps[done:] for key in off[later.name]]
-        variants.append(Variant(f"+ {step.name}", "cumulative", _switched(ours, paper, still_off), done - 1))
-    last = len(variants) - 1
-    for step in steps:
-        variants.append(Variant(f"{OURS} without {step.name}", "without", _switched(ours, paper, off[step.name]), last))
-    return variants
+    off = _differences(paper, ours)
+    names = [PAPER, *(f"+ {step.name}" for step in steps)]
+    still_off = [[key for step in steps[done:] for key in off[step.name]] for done in range(len(names))]
+    return [Variant(name, _switched(ours, paper, keys)) for name, keys in zip(names, still_off, strict=True)]
 
 
 def _differences(paper: PerceptionConfig, ours: PerceptionConfig) -> dict[str, list[tuple[str, str]]]:
@@ -156,13 +146,6 @@ class SameMasks(Segmenter):
 
 
 JUMP_PX = 20.0
-LAGS = np.arange(-4.0, 8.01, 0.25)
-"""Lags that are tried, in frames."""
-LAG_CAP_DEG = 10.0
-"""Larger errors count like this one: a wrong branch says nothing about the lag."""
-MIN_LAG_SAMPLES = 30
-MIN_TURN_DEG = 0.1
-"""Where the true theta changes by less than this per frame, no lag can be told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,9 +195,8 @@ def stream_figures(streams: Sequence[Sequence[StreamFrame]]) -> dict[str, float 
     ``frames`` with a true pose; ``answered_share``; ``state_agreement`` with the true state, which knows no hysteresis;
     ``theta_median_deg``, ``theta_mean_deg``, ``head_median_px`` of the absolute errors; ``wrong_share`` of the answers, by more
     than 10 degrees or 15 px; ``swapped_frames``, answers that took the tail for the head; ``jumps``, answers whose head moved by
-    more than ``JUMP_PX`` other than the true head did since the answer before; ``theta_lag_frames``, the delay of the true theta
-    that fits the found one best (None: it moved too little to tell); ``theta_jitter_deg`` and ``head_jitter_px``, the robust
-    standard deviation of the error's change from frame to frame; ``state_changes`` and ``true_state_changes``.
+    more than ``JUMP_PX`` other than the true head did since the answer before; ``theta_jitter_deg`` and ``head_jitter_px``, the
+    robust standard deviation of the error's change from frame to frame; ``state_changes`` and ``true_state_changes``.
     """
     frames = [frame for stream in streams for frame in stream if frame.true_state is not None]
     answered = [frame for frame in frames if frame.state is not None]
@@ -234,7 +216,6 @@ def stream_figures(streams: Sequence[Sequence[StreamFrame]]) -> dict[str, float 
         "wrong_share": float(is_wrong.mean()) if len(theta) else None,
         "swapped_frames": sum(frame.is_swapped for frame in answered),
         "jumps": len(head_moves) - len(steady),
-        "theta_lag_frames": _lag(streams),
         "theta_jitter_deg": _spread(theta_moves, 1.4826),
         "head_jitter_px": _spread(steady, 1.0 / 1.1774),
         "state_changes": sum(_changes([f.state for f in stream]) for stream in streams),
@@ -296,42 +277,6 @@ def _pairs(values: Sequence[float | None]) -> list[tuple[float, float]]:
 def _changes(states: Sequence[str | None]) -> int:
     shown = [state for state in states if state is not None]
     return sum(a != b for a, b in zip(shown, shown[1:], strict=False))
-
-
-def _lag(streams: Sequence[Sequence[StreamFrame]]) -> float | None:
-    costs, moves = [], []
-    for stream in streams:
-        true = np.array([np.nan if f.true_theta_signed_deg is None else f.true_theta_signed_deg for f in stream], np.float64)
-        found = np.array([np.nan if f.theta_signed_deg is None else f.theta_signed_deg for f in stream], np.float64)
-        costs.append(_lag_costs(true, found))
-        moves += [abs(_turn(b, a)) for a, b in zip(true, true[1:], strict=False) if np.isfinite(a + b)]
-    cost = np.concatenate(costs) if costs else np.empty((0, len(LAGS)))
-    if len(cost) < MIN_LAG_SAMPLES or float(np.mean(moves)) < MIN_TURN_DEG:
-        return None
-    mean = cost.mean(axis=0)
-    best = int(np.argmin(mean))
-    if best in (0, len(LAGS) - 1):
-        return float(LAGS[best])
-    before, here, after = mean[best - 1 : best + 2].tolist()
-    curvature = before - 2.0 * here + after
-    shift = 0.5 * (before - after) / curvature if curvature > 0.0 else 0.0
-    return float(LAGS[best] + shift * (LAGS[1] - LAGS[0]))
-
-
-def _lag_costs(true: NDArray[np.float64], found: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Capped squared difference between the found theta and the true one of `LAGS` frames ago, shape (frames, lags)."""
-    first, last = int(np.ceil(LAGS[-1])), len(true) - 1 - int(np.ceil(-LAGS[0]))
-    rows = []
-    for frame in range(first, last + 1):
-        places = frame - LAGS
-        low = np.floor(places).astype(int)
-        high = np.minimum(low + 1, len(true) - 1)
-        turn = (true[high] - true[low] + 180.0) % 360.0 - 180.0
-        then = true[low] + (places - low) * turn
-        error = np.abs((found[frame] - then + 180.0) % 360.0 - 180.0)
-        if np.isfinite(error).all():
-            rows.append(np.minimum(error, LAG_CAP_DEG) ** 2)
-    return np.array(rows, np.float64).reshape(-1, len(LAGS))
 
 
 _FEED_MM_S = 12.0
@@ -451,15 +396,12 @@ class Figure:
         return self.low is not None and self.high is not None and (self.low > 0.0 or self.high < 0.0)
 
 
-def figures(
-    scores: Sequence[Sequence[FrameScore]], compared_with: Sequence[int | None], groups: Sequence[Hashable], seed: int = 0
-) -> list[dict[str, Figure]]:
-    """The table's numbers: for each variant and ``Measure.key`` a figure.
+def figures(scores: Sequence[Sequence[FrameScore]], groups: Sequence[Hashable], seed: int = 0) -> list[dict[str, Figure]]:
+    """The table's numbers: for each variant and ``AblationColumn.key`` a figure.
 
     Parameters
     ----------
     scores : for each variant the scores of the same frames in the same order.
-    compared_with : for each variant the index of the one that its differences refer to.
     groups : for each frame what it belongs to (its phantom); whole groups are drawn, see ``MIN_GROUPS``.
     seed : of the bootstrap.
     """
@@ -473,17 +415,17 @@ def figures(
         values = [column[measure.of] for column in columns]
         plain = [float(estimate(value, once, measure.quantile)[0]) for value in values]
         drawn = [estimate(value, weights, measure.quantile) for value in values]
-        for index, other in enumerate(compared_with):
-            table[index][measure.key] = _figure(plain, drawn, index, other)
+        for index in range(len(scores)):
+            table[index][measure.key] = _figure(plain, drawn, index)
     return table
 
 
-def _figure(plain: list[float], drawn: list[NDArray[np.float64]], index: int, other: int | None) -> Figure:
+def _figure(plain: list[float], drawn: list[NDArray[np.float64]], index: int) -> Figure:
     value = _finite(plain[index])
-    if other is None:
+    if index == 0:
         return Figure(value)
-    difference = _finite(plain[index] - plain[other])
-    differences = drawn[index] - drawn[other]
+    difference = _finite(plain[index] - plain[index - 1])
+    differences = drawn[index] - drawn[index - 1]
     defined = differences[np.isfinite(differences)]
     if difference is None or len(defined) < MIN_DEFINED * len(differences):
         return Figure(value, difference)
@@ -551,15 +493,6 @@ def _value(score: FrameScore, of: str) -> float:
     return float({"theta": theta, "head": head, "agreed": score.state == score.true_state, "wrong": wrong}[of])
 
 
-def refusals(scores: Sequence[FrameScore]) -> dict[str, int]:
-    """How often each reason was given for no answer, where the truth has a pose."""
-    counted: dict[str, int] = {}
-    for score in scores:
-        if score.expected and score.reason is not None:
-            counted[score.reason.value] = counted.get(score.reason.value, 0) + 1
-    return dict(sorted(counted.items(), key=lambda item: (-item[1], item[0])))
-
-
 _MINUS = "\N{MINUS SIGN}"
 _STREAM_COLUMNS = (
     ("frames", "frames"),
@@ -571,7 +504,6 @@ _STREAM_COLUMNS = (
     ("wrong_share", "wrong"),
     ("swapped_frames", "head-tail swaps"),
     ("jumps", f"jumps > {JUMP_PX:.0f} px"),
-    ("theta_lag_frames", "theta lag, frames"),
     ("theta_jitter_deg", "theta jitter, deg"),
     ("head_jitter_px", "head jitter, px"),
     ("state_changes", "state changes"),
@@ -583,7 +515,7 @@ def markdown(result: dict[str, Any]) -> str:
     """All tables, for a document or a terminal."""
     parts = []
     if "rows" in result:
-        brackets = f"the difference to the row before (below: to ours) and its 95 % bootstrap interval over {result['drawn']}"
+        brackets = f"the difference to the row before and its 95 % bootstrap interval over {result['drawn']}"
         parts.append(
             f"{result['set']}: {result['expected']} frames with a pose; the same masks for all rows ({result['masks']}); "
             f"in brackets {brackets}; * zero lies outside it.\n"
@@ -599,8 +531,6 @@ def markdown(result: dict[str, Any]) -> str:
 
 
 def _row_cells(row: dict[str, Any]) -> list[str]:
-    if "figures" not in row:
-        return [row["name"], row["note"], *[""] * len(MEASURES)]
     figures_of_row = [(Figure(**row["figures"][column.key]), column) for column in MEASURES]
     cells = [_number(figure.value, column) + _difference(figure, column) for figure, column in figures_of_row]
     return [row["name"], *cells, f"{row['after_network_ms']:.1f}"]
@@ -637,9 +567,6 @@ def _stream_cells(figures: dict[str, Any]) -> list[str]:
         else:
             cells.append(f"{value:.2f}".replace("-", _MINUS) if isinstance(value, float) else str(value))
     return cells
-
-
-ALONE = "needs a stream: each frame of the set stands alone (measure it with --sequence N)"
 
 
 def run_ablation(
@@ -685,9 +612,9 @@ def run_ablation(
             variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
             result |= _measure_set(samples, truth, variants, pipeline_of, masks, ours.working_size_px, seed)
         if sequence:
-            named = {variant.name: variant.config for variant in make_variants(paper, ours)}
+            literal, *_, untracked, _ = make_variants(paper, ours)
             result["stream"] = measure_streams(
-                {name: named[name] for name in (PAPER, f"{OURS} without {TRACKING}")} | {OURS: ours},
+                {PAPER: literal.config, f"{OURS} without {TRACKING}": untracked.config, OURS: ours},
                 pipeline_of,
                 masks,
                 live=None if true_masks else open_pipeline(ours),
@@ -753,19 +680,11 @@ def _measure_set(
     rows: list[dict[str, Any]] = [
         {
             "name": variant.name,
-            "kind": variant.kind,
-            "compared_with": None if variant.compared_with is None else variants[variant.compared_with].name,
             "figures": {key: asdict(figure) for key, figure in row.items()},
             "after_network_ms": float(np.median(latency_ms[place])),
-            "refused": refusals(scores[place]),
         }
-        for place, (variant, row) in enumerate(
-            zip(variants, figures(scores, [variant.compared_with for variant in variants], groups, seed), strict=True)
-        )
+        for place, (variant, row) in enumerate(zip(variants, figures(scores, groups, seed), strict=True))
     ]
-    last = next(place for place, row in enumerate(rows) if row["kind"] == "without")
-    rows.insert(last, {"name": f"+ {TRACKING}", "kind": "cumulative", "note": ALONE})
-    rows.append({"name": f"{OURS} without {TRACKING}", "kind": "without", "note": ALONE})
     expected = [group for group, score in zip(groups, scores[0], strict=True) if score.expected]
     drawn = f"{len(set(expected))} phantoms{'' if are_enough(expected) else ' (too few for intervals)'}"
     return {"frames": len(samples), "expected": len(expected), "drawn": drawn, "rows": rows}
