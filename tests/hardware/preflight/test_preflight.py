@@ -25,9 +25,7 @@ from core.perception.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOO
 from core.types import Frame, Image
 from hardware.cameras import realsense, sysfs
 from hardware.cameras.realsense import RealSenseInfo
-from hardware.preflight import checks as machine
-from hardware.preflight import checks as program
-from hardware.preflight import device_checks
+from hardware.preflight import checks, device_checks
 from hardware.preflight import model_checks as model
 from hardware.preflight.checks import Check
 from hardware.preflight.preflight import CHECKS, Level, driving_checks, level_of, run_checks
@@ -57,8 +55,8 @@ def _good(check: Check, detail: str = "") -> None:
 
 
 def test_only_python_3_11_will_do() -> None:
-    _good(program.check_python((3, 11, 9)), r"3\.11\.9")
-    _bad(program.check_python((3, 14, 0)), r"3\.14\.0", r"Python 3\.11")
+    _good(checks.check_python((3, 11, 9)), r"3\.11\.9")
+    _bad(checks.check_python((3, 14, 0)), r"3\.14\.0", r"Python 3\.11")
 
 
 @pytest.fixture
@@ -78,19 +76,19 @@ class _Installed(dict[str, str]):
 
 def test_packages_are_compared_with_the_lock(lock: Path) -> None:
     there = _Installed({"numpy": "2.4.6", "pyrealsense2": "2.54.2.5684", "torch": "2.13.0+cpu"})
-    _good(program.check_packages(lock, there), "^3 as pinned$")  # what tests need does not count, nor what set-up removes
+    _good(checks.check_packages(lock, there), "^3 as pinned$")  # what tests need does not count, nor what set-up removes
     there |= {"pyrealsense2": "2.55.1.6486"}
-    _bad(program.check_packages(lock, there), r"pyrealsense2 2\.55\.1\.6486 instead of 2\.54\.2\.5684", "make setup")
+    _bad(checks.check_packages(lock, there), r"pyrealsense2 2\.55\.1\.6486 instead of 2\.54\.2\.5684", "make setup")
     del there["numpy"]
-    _bad(program.check_packages(lock, there), r"numpy missing instead of 2\.4\.6; pyrealsense2", "make setup")
-    _bad(program.check_packages(lock.with_name("gone.lock"), there), "cannot be read", "restore")
+    _bad(checks.check_packages(lock, there), r"numpy missing instead of 2\.4\.6; pyrealsense2", "make setup")
+    _bad(checks.check_packages(lock.with_name("gone.lock"), there), "cannot be read", "restore")
 
 
 def test_the_list_of_libraries_is_the_one_of_set_up() -> None:
     text = (ROOT / "scripts" / "set_up.sh").read_text(encoding="utf-8")
     listed = re.search(r'^libraries="\n(.*?)^"', text, re.MULTILINE | re.DOTALL)
     assert listed
-    assert dict(line.split() for line in listed[1].splitlines()) == program.LIBRARIES
+    assert dict(line.split() for line in listed[1].splitlines()) == checks.LIBRARIES
 
 
 def test_a_missing_library_is_one_command() -> None:
@@ -98,14 +96,14 @@ def test_a_missing_library_is_one_command() -> None:
         if library.startswith("libxcb-c"):
             raise OSError(f"{library}: cannot open shared object file")
 
-    _good(program.check_libraries(lambda _: None), "12 can be loaded")
-    _bad(program.check_libraries(load), "missing: libxcb-cursor.so.0$", "sudo apt-get install .* libxcb-cursor0$")
+    _good(checks.check_libraries(lambda _: None), "12 can be loaded")
+    _bad(checks.check_libraries(load), "missing: libxcb-cursor.so.0$", "sudo apt-get install .* libxcb-cursor0$")
 
 
 def test_vendor_libraries_are_really_loaded(tmp_path: Path) -> None:
     broken = tmp_path / "libbroken.so"
     broken.write_bytes(b"\x7fELF but no more")
-    check = program.check_binaries([("OpenCV", broken), ("Qt", None)])
+    check = checks.check_binaries([("OpenCV", broken), ("Qt", None)])
     _bad(check, r"OpenCV: .*libbroken\.so.*; Qt: is not installed", "^make clean && make setup$")
 
 
@@ -124,8 +122,8 @@ _RENEW, _SHAPE = "make clean && make setup", "libxcb-shape.so.0: cannot open sha
 def test_what_a_vendor_library_lacks_is_one_command(problems: list[str], fix: str) -> None:
     """A library of the system has its package; what an installed package brings is mended by a new venv."""
     binaries = [(f"library {k}", Path(str(k))) for k in range(len(problems))]
-    _bad(program.check_binaries(binaries, lambda path: problems[int(str(path))]), "library 0: l", fix)
-    _good(program.check_binaries(binaries, lambda _: ""), "library 0.* can be loaded")
+    _bad(checks.check_binaries(binaries, lambda path: problems[int(str(path))]), "library 0: l", fix)
+    _good(checks.check_binaries(binaries, lambda _: ""), "library 0.* can be loaded")
 
 
 def _cut_short(tmp_path: Path) -> Path:
@@ -139,8 +137,8 @@ def _cut_short(tmp_path: Path) -> Path:
 
 def test_a_realsense_library_cut_short_ends_no_other_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cut = _cut_short(tmp_path)
-    assert "SIGBUS" in program.load_elsewhere(cut)
-    monkeypatch.setattr(program, "_binaries", lambda: [("RealSense", cut)])
+    assert "SIGBUS" in checks.load_elsewhere(cut)
+    monkeypatch.setattr(checks, "_binaries", lambda: [("RealSense", cut)])
     config = _rig(camera="realsense")
     for check in (device_checks.check_camera(config), device_checks.check_picture(config)):
         _bad(check, "library of RealSense cameras cannot be used: .*SIGBUS", "see the vendor libraries in main.py doctor")
@@ -151,40 +149,40 @@ def test_a_display(tmp_path: Path) -> None:
     def answers(display: str) -> bool:
         return display == ":5"
 
-    _bad(program.check_display({}, answers), "none", "xvfb-run")
-    _good(program.check_display({"DISPLAY": ":5"}, answers), "X11, :5")
-    _bad(program.check_display({"DISPLAY": ":6"}, answers), "no X server", "xvfb-run")
-    _good(program.check_display({"QT_QPA_PLATFORM": "offscreen"}, answers), "nothing is shown")
+    _bad(checks.check_display({}, answers), "none", "xvfb-run")
+    _good(checks.check_display({"DISPLAY": ":5"}, answers), "X11, :5")
+    _bad(checks.check_display({"DISPLAY": ":6"}, answers), "no X server", "xvfb-run")
+    _good(checks.check_display({"QT_QPA_PLATFORM": "offscreen"}, answers), "nothing is shown")
     wayland = {"WAYLAND_DISPLAY": "wayland-0", "XDG_RUNTIME_DIR": str(tmp_path)}
-    _bad(program.check_display(wayland, answers), "wayland-0", "desktop session")
+    _bad(checks.check_display(wayland, answers), "wayland-0", "desktop session")
     (tmp_path / "wayland-0").touch()
-    _good(program.check_display(wayland, answers), "Wayland")
+    _good(checks.check_display(wayland, answers), "Wayland")
 
 
 def test_no_x_server_is_noticed_by_connecting() -> None:
-    assert not program.x_server_answers(":6123")
+    assert not checks.x_server_answers(":6123")
 
 
 # --- the computer ----------------------------------------------------------------------------------------------------------------
 
 
 def test_cores_and_memory() -> None:
-    _good(machine.check_machine(4, lambda: (16.0, 9.0)), "4 cores, 16.0 GB")
-    _bad(machine.check_machine(1, lambda: (16.0, 9.0)), "^1 core, ", "2 cores or more")
-    _bad(machine.check_machine(4, lambda: (16.0, 0.4)), "0.4 GB free", "close other programs")
+    _good(checks.check_machine(4, lambda: (16.0, 9.0)), "4 cores, 16.0 GB")
+    _bad(checks.check_machine(1, lambda: (16.0, 9.0)), "^1 core, ", "2 cores or more")
+    _bad(checks.check_machine(4, lambda: (16.0, 0.4)), "0.4 GB free", "close other programs")
 
 
 def test_room_for_recordings(tmp_path: Path) -> None:
     config = RecordConfig(folder=str(tmp_path / "not" / "yet"))
-    _good(machine.check_disk(config, lambda _: (100_000_000_000, 0, 50_000_000_000)), "50.0 GB free of 100.0 GB")
-    _bad(machine.check_disk(config, lambda _: (100_000_000_000, 0, 5_000_000_000)), "5.0 GB free", r"7\.0 GB or more")
+    _good(checks.check_disk(config, lambda _: (100_000_000_000, 0, 50_000_000_000)), "50.0 GB free of 100.0 GB")
+    _bad(checks.check_disk(config, lambda _: (100_000_000_000, 0, 5_000_000_000)), "5.0 GB free", r"7\.0 GB or more")
     (tmp_path / "not").write_text("a file")
-    _bad(machine.check_disk(config), "is no folder", "record.folder")
+    _bad(checks.check_disk(config), "is no folder", "record.folder")
 
 
 def test_the_date() -> None:
-    _good(machine.check_clock(), "UTC")
-    _bad(machine.check_clock(lambda: 1e6), "1970.*date is wrong", "set-ntp")
+    _good(checks.check_clock(), "UTC")
+    _bad(checks.check_clock(lambda: 1e6), "1970.*date is wrong", "set-ntp")
 
 
 # --- the model -------------------------------------------------------------------------------------------------------------------
@@ -225,13 +223,12 @@ def test_a_model_that_has_lost_its_second_look_does_not_pass(copied: Path) -> No
     _bad(model.check_self_test(_segmentation(copied)), "not run: .*second_look", "restore")
 
 
-def test_an_eight_bit_network_that_a_processor_gets_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_shipped_model_passes_and_one_that_a_processor_gets_wrong_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _good(model.check_self_test(_segmentation("default")), "state . .true .., theta off by")
     monkeypatch.setattr(model, "_EIGHT_BIT_OFF", 1e-9)  # no eight-bit network is as exact as that
-    _bad(
-        model.check_self_test(_segmentation("default")),
-        "on this processor the eight-bit network is off by 0.00",
-        "precision to fp32",
-    )
+    _bad(model.check_self_test(_segmentation("default")), "the eight-bit network is off by 0.00", "precision to fp32")
 
 
 def test_the_second_looks_eight_bits_are_compared_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,10 +237,6 @@ def test_the_second_looks_eight_bits_are_compared_too(monkeypatch: pytest.Monkey
     off = iter((0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     monkeypatch.setattr(model, "_apart", lambda some, others: next(off) + 0.0 * apart(some, others))
     _bad(model.check_self_test(_segmentation("default")), "eight-bit network is off by 1.000", "precision to fp32")
-
-
-def test_the_shipped_model_passes_its_self_test() -> None:
-    _good(model.check_self_test(_segmentation("default")), "state . .true .., theta off by")
 
 
 def test_a_model_with_swapped_outputs_is_found(copied: Path) -> None:
@@ -518,22 +511,11 @@ def test_the_latency_of_an_ftdi_adapter(sys_: Path, dev: Path, text: str, ok: bo
         _bad(check, "^16 ms", f"echo 1 . sudo tee {timer}")
 
 
-@pytest.mark.parametrize(
-    ("baud", "bus_hz", "slow"),
-    [
-        (57_600, 50.0, "57600 baud: about 24 cycles a second instead of 50"),
-        (115_200, 50.0, "about 49 cycles"),
-        (1_000_000, 50.0, ""),
-    ],
-)
-def test_the_factorys_bus_speed_is_said_to_be_too_slow_and_how_to_change_it(baud: int, bus_hz: float, slow: str) -> None:
-    """It works, with 25 cycles a second instead of 50, and neither ``doctor`` nor the wizard said so."""
-    config = ServosConfig(port="/dev/none", baud=baud, bus_hz=bus_hz)
-    check = device_checks.check_bus_speed(config)
-    if slow:
+def test_the_factorys_bus_speed_is_said_to_be_too_slow_and_how_to_change_it() -> None:
+    for baud, slow in ((57_600, "57600 baud: about 24 cycles a second instead of 50"), (115_200, "about 49 cycles")):
+        check = device_checks.check_bus_speed(ServosConfig(port="/dev/none", baud=baud))
         _bad(check, slow, r"Baud Rate \(8\) of all seven to 1 Mbps, then servos.baud = 1000000")
-    else:
-        _good(check, "1000000 baud")
+    _good(device_checks.check_bus_speed(ServosConfig(port="/dev/none", baud=1_000_000)), "1000000 baud")
     _good(device_checks.check_bus_speed(ServosConfig()), "not configured")
 
 
@@ -676,11 +658,11 @@ def test_all_checks_are_made_one_after_the_other_and_named_as_in_the_table(tmp_p
         perception=_segmentation(tmp_path / "no model"),
         gamepad=GamepadConfig(enabled=False),
     )
-    checks = list(run_checks(config))
-    assert [check.name for check in checks] == list(CHECKS)
-    assert all(check.ok == (check.fix == "") for check in checks)
-    assert {check.name for check in checks if not check.ok} == {"model", "self-test"}
-    assert checks[0].to_json().keys() == {"name", "ok", "detail", "fix"}
+    made = list(run_checks(config))
+    assert [check.name for check in made] == list(CHECKS)
+    assert all(check.ok == (check.fix == "") for check in made)
+    assert {check.name for check in made if not check.ok} == {"model", "self-test"}
+    assert made[0].to_json().keys() == {"name", "ok", "detail", "fix"}
 
 
 # --- before driving ---------------------------------------------------------------------------------------------------------------

@@ -152,23 +152,11 @@ class Paper:
             MissingServo(joint.name, joint.id, self.now_s, 1, "silent")
             if place == self.missing
             else ServoState(
-                joint.name,
-                joint.id,
-                self.now_s,
-                0,
-                goals.get(joint.name, 0),
-                at_mm,
-                at_mm,
-                0.0,
-                8.0,
-                12.0,
-                hot_c,
-                HardwareError(0),
-                True,
-                False,
+                joint.name, joint.id, self.now_s, 0, goals.get(joint.name, 0), at_mm, at_mm, 0.0, 8.0, 12.0, hot_c,
+                HardwareError(0), torque=True, watchdog_tripped=False,
             )
             for place, (joint, at_mm) in enumerate(places)
-        )
+        )  # fmt: skip
         self.bus.read = lambda: states  # type: ignore[method-assign]
         self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
 
@@ -193,13 +181,6 @@ def test_a_stop_that_is_said_again_and_again_holds_once(paper: Paper) -> None:
         paper.now_s += 0.02
     assert paper.bus.told == ["hold"]
     assert paper.stopped
-
-
-def test_a_second_press_of_stop_holds_again(paper: Paper) -> None:
-    paper.hear(stop=True)
-    paper.now_s += 0.6
-    paper.hear(stop=True)
-    assert paper.bus.told == ["hold", "hold"]
 
 
 def test_a_stop_after_its_acknowledgement_is_a_new_one(paper: Paper) -> None:
@@ -485,12 +466,6 @@ def test_a_torque_off_that_failed_is_tried_until_the_servos_say_so(monkeypatch: 
     assert "cut the servos' power" not in paper.latched.detail
 
 
-def test_without_that_policy_the_wires_stay_under_tension(paper: Paper) -> None:
-    paper.hear(stop=True)
-    paper.turn()
-    assert "torque off" not in paper.bus.told
-
-
 def test_a_port_that_comes_back_owes_the_torque_off(monkeypatch: pytest.MonkeyPatch) -> None:
     paper = Paper(monkeypatch, torque_off_on_stop=True)
     paper.loop._lose_port()
@@ -671,8 +646,8 @@ def test_arming_looks_where_the_joints_are_now(paper: Paper) -> None:
     assert armed is None
 
 
-@pytest.mark.parametrize(("late", "told"), [(1, []), (2, []), (9, [])])
-def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int, told: list[str]) -> None:
+@pytest.mark.parametrize("late", [1, 9])
+def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int) -> None:
     """The guard takes in whole sets only: else one late answer would let a joint outside its envelope be armed."""
     reads = 0
 
@@ -689,7 +664,7 @@ def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int, tol
     paper.end.heartbeat = lambda: None  # type: ignore[attr-defined]
     paper.bus.read = read  # type: ignore[method-assign,assignment]
     paper.hear(request="arm")
-    assert paper.bus.told == told, "where a joint is that does not answer, nobody knows"
+    assert paper.bus.told == [], "where a joint is that does not answer, nobody knows"
     assert reads == min(late + 1, 3)
 
 

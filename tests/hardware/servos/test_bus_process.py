@@ -182,15 +182,6 @@ def test_hold_stops_and_disarm_refuses_orders(servos: SoftServoBus, armed: Servo
     assert _seen(armed, lambda s: s.phase is BusPhase.DISARMED).latched is None
 
 
-def test_it_counts_and_times_its_cycles(armed: ServoRobot) -> None:
-    status = _drive(armed, until=lambda status: status.cycle > 100)
-    assert 0.0 < status.times.work_p50_ms <= status.times.work_p99_ms
-    assert len(status.servos) == 7
-    report = armed.report()
-    assert report.port_open
-    assert report.misses == (0,) * 7
-
-
 def test_requests_that_cannot_be_done_say_why(armed: ServoRobot) -> None:
     with pytest.raises(NotReady, match="disarm before zeroing"):
         armed.zero()
@@ -200,10 +191,10 @@ def test_requests_that_cannot_be_done_say_why(armed: ServoRobot) -> None:
         armed.reboot(1)
 
 
-@pytest.mark.parametrize("key", ["bend", "pitch", "advance_mm_s", "delivery_mm_s"])
-def test_it_refuses_what_is_not_finite(robot: ServoRobot, key: str) -> None:
-    with pytest.raises(ValueError, match="not finite"):
-        robot.send(Command(**{key: math.nan}))
+def test_it_refuses_what_is_not_finite(robot: ServoRobot) -> None:
+    for key in ("bend", "pitch", "advance_mm_s", "delivery_mm_s"):
+        with pytest.raises(ValueError, match="not finite"):
+            robot.send(Command(**{key: math.nan}))
 
 
 def test_a_port_that_is_none_and_servos_that_are_not_there(servos: SoftServoBus) -> None:
@@ -458,31 +449,18 @@ def test_a_heartbeat_without_orders_holds_and_stays_armed(servos: SoftServoBus, 
 # --- bad orders ------------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [math.nan, math.inf])
-def test_an_order_that_is_not_finite_is_rejected_in_the_bus_process_too(
-    servos: SoftServoBus, armed: ServoRobot, number: float
-) -> None:
+def test_an_order_that_is_not_finite_is_rejected_in_the_bus_process_too(servos: SoftServoBus, armed: ServoRobot) -> None:
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 0.5)
     end_s = time.monotonic() + PATIENCE_S
     status = armed.bus_status()
     while status is not None and not status.rejections.get(RejectReason.NON_FINITE) and time.monotonic() < end_s:
         now_s = time.monotonic()
         armed._client.put_heartbeat(Heartbeat(now_s, Source.OPERATOR))
-        armed._client.put_order(BusOrder(Command(bend=number, advance_mm_s=number), Source.OPERATOR, now_s))
+        armed._client.put_order(BusOrder(Command(bend=math.nan, advance_mm_s=math.inf), Source.OPERATOR, now_s))
         time.sleep(0.02)
         status = armed.bus_status()
     assert status.rejections[RejectReason.NON_FINITE] > 0
     assert status.armed
-
-
-def test_whoever_is_not_permitted_is_not_followed(servos: SoftServoBus, armed: ServoRobot) -> None:
-    for _ in range(20):
-        armed.beat(Source.OPERATOR)
-        armed.send(FORWARD, source=Source.PROGRAM, captured_s=time.monotonic())
-        time.sleep(0.02)
-    assert servos.positions_mm()[4] == 0.0
-    status = armed.bus_status()
-    assert status.rejections[RejectReason.WRONG_SOURCE] > 0
 
 
 # --- faults of bus and servos ----------------------------------------------------------------------------------------------------
@@ -491,14 +469,11 @@ def test_whoever_is_not_permitted_is_not_followed(servos: SoftServoBus, armed: S
 @pytest.mark.parametrize(
     ("inject", "cause", "phase"),
     [
-        (lambda s: s.faults.mute(3), Cause.SERVO_SILENT, BusPhase.DISARMED),
         (lambda s: s.faults.crc(60), Cause.BUS_NOISE, BusPhase.DISARMED),
         (lambda s: s.modify_servo(2, lambda servo: servo.alert(32)), Cause.SERVO_ALERT, BusPhase.STOPPED),
-        (lambda s: s.modify_servo(5, lambda servo: servo.heat(75.0)), Cause.HOT, BusPhase.DISARMED),
-        (lambda s: s.modify_servo(5, lambda servo: setattr(servo, "supply_v", 10.0)), Cause.VOLTAGE_LOW, BusPhase.DISARMED),
         (lambda s: s.modify_servo(5, lambda servo: servo.freeze(True)), Cause.TRACKING, BusPhase.STOPPED),
     ],
-    ids=["21 silent", "22 noise", "23 overload", "24 hot", "24 voltage", "25 jam"],
+    ids=["22 noise", "23 overload", "25 jam"],
 )
 def test_faults_end_the_motion(
     servos: SoftServoBus, armed: ServoRobot, inject: Callable[[SoftServoBus], None], cause: Cause, phase: BusPhase
@@ -587,17 +562,6 @@ def test_after_a_strain_the_tendons_are_let_go_slowly(servos: SoftServoBus, arme
     assert _torques(servos) == [1] * 7
 
 
-def test_stop_holds_tendons_that_are_being_let_go(servos: SoftServoBus, armed: ServoRobot) -> None:
-    _bend(armed)
-    servos.modify_servo(1, lambda servo: servo.grind(STRAIN_MA))
-    _seen(armed, _latched(Cause.STRAINED))
-    armed.stop()
-    time.sleep(0.3)
-    at_mm = servos.positions_mm()[0]
-    time.sleep(0.3)
-    assert servos.positions_mm()[0] == pytest.approx(at_mm, abs=0.02)
-
-
 def test_fault_24_a_servo_that_overheats_is_let_go_slowly(servos: SoftServoBus, armed: ServoRobot) -> None:
     """It held the wires, got hotter, and shut itself down with a snap."""
     _bend(armed)
@@ -617,17 +581,7 @@ def test_fault_24_a_servo_that_overheats_is_let_go_slowly(servos: SoftServoBus, 
     assert _latched(Cause.HOT)(armed.bus_status())
 
 
-def test_servos_that_overheat_while_they_hold_after_a_stop_are_let_go_slowly(servos: SoftServoBus, armed: ServoRobot) -> None:
-    _bend(armed)
-    armed.stop()
-    _seen(armed, lambda status: status.phase is BusPhase.STOPPED)
-    servos.modify_servo(1, lambda servo: servo.heat(71.0))
-    _seen(armed, lambda status: all(at is not None and at <= 0.06 for at in _positions(status)[:4]))
-    assert armed.bus_status().phase is BusPhase.STOPPED
-    assert _torques(servos) == [1] * 7
-
-
-@pytest.mark.parametrize("startup", [0, 2, 3])
+@pytest.mark.parametrize("startup", [0, 3])
 def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot, startup: int) -> None:
     """It is silent for 0.3 s, and then has lost its zero, whatever Startup Configuration(60) brings back of its settings."""
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
@@ -850,16 +804,6 @@ def test_servos_of_a_dead_application_hold_are_watched_and_then_relaxed_and_swit
         assert not _lives(bus_pid)
 
 
-def test_a_servo_that_gets_hot_meanwhile_is_relaxed_at_once(servos: SoftServoBus) -> None:
-    with _bent(servos, 600.0) as (pid, bus_pid):
-        os.kill(pid, signal.SIGKILL)
-        time.sleep(2.0)
-        servos.modify_servo(2, lambda servo: servo.heat(72.0))
-        _wait_for(lambda: not _lives(bus_pid))
-        assert _torques(servos) == [0] * 7
-        assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
-
-
 def test_an_application_that_is_silent_for_so_long_finds_the_servos_switched_off(servos: SoftServoBus) -> None:
     robot = _robot(servos, unattended_s=2.5, **WATCHED)
     robot.connect()
@@ -950,12 +894,6 @@ def test_a_signal_relaxes_what_is_watched(servos: SoftServoBus) -> None:
         assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
 
 
-def test_a_watched_port_is_not_given_away_while_an_application_drives(servos: SoftServoBus, armed: ServoRobot) -> None:
-    with pytest.raises(PortTaken):
-        _robot(servos).connect()
-    assert _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0).armed
-
-
 def test_wires_are_relaxed_slowly_and_let_go_on_request(servos: SoftServoBus, armed: ServoRobot) -> None:
     _bend(armed)
     begun_s, from_mm = time.monotonic(), servos.positions_mm()[0]
@@ -963,14 +901,6 @@ def test_wires_are_relaxed_slowly_and_let_go_on_request(servos: SoftServoBus, ar
     assert time.monotonic() - begun_s > 0.9 * from_mm, "1 mm/s"
     assert _torques(servos) == [0] * 7
     assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
-
-
-def test_torque_off_does_not_wait_for_wires_that_are_relaxed(servos: SoftServoBus, armed: ServoRobot) -> None:
-    _bend(armed)
-    armed.relax(lambda: True)
-    armed.torque_off()
-    assert _torques(servos) == [0] * 7
-    assert servos.positions_mm()[0] > 0.5
 
 
 def test_stop_while_wires_are_relaxed_is_told(servos: SoftServoBus, armed: ServoRobot) -> None:

