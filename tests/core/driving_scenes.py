@@ -1,7 +1,5 @@
 """Drawn vessels, and scenes of a straight robot in them, for what drives by them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -50,7 +48,6 @@ def scene_at(
     way = np.array([math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))])
     points = np.asarray(head) - np.arange(length_px, -1.0, -2.0)[:, None] * way
     robot = fit_robot_vector(points, 40.0)
-    assert robot is not None
     route = plan_route(graph, head, target) if target is not None else None
     centerline = centerline_at(graph, head, robot.direction, 20.0, route)
     assert centerline is not None

@@ -84,4 +84,4 @@ class Bench:
 
     def bad_frame(self, **changes: object) -> None:
         """From now on every frame report has these `changes`."""
-        self.frame = lambda report: replace(report, **changes)  # type: ignore[arg-type]
+        self.frame = lambda report: replace(report, **changes)

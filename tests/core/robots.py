@@ -1,7 +1,5 @@
 """Robots of other shapes than the default one, for tests."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from core.config.safety import ServosConfig

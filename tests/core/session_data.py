@@ -1,7 +1,5 @@
 """Small sessions for the tests: ticks that are quick to make and different from one another."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Atomic writes, names, and reading pictures of any kind."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

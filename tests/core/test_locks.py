@@ -1,7 +1,5 @@
 """Locks between processes, and what takes their place where there are none."""
 
-from __future__ import annotations
-
 import errno
 import os
 import sys

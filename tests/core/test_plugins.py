@@ -1,7 +1,5 @@
 """Names that packages add by entry points: found, checked without an import, and blamed by their package."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What the program says of itself, and which command it names for an optional package."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

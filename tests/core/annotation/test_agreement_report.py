@@ -1,7 +1,5 @@
 """Agreement of simulated raters whose errors are known, and the common answer of several."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -184,7 +182,6 @@ def test_the_round_trip_of_a_rater_with_a_pixel_of_noise() -> None:
         for repeat in (1, 2):
             noisy = [tuple(tuple(p) for p in (np.array(line) + rng.normal(0, 1, (2, 2))).tolist()) for line in (robot, vessel)]
             pose = measure_lines(Annotation(noisy[0], noisy[1]), (640, 480), config).pose
-            assert pose is not None
             answers.append(answer(str(k), "ann", repeat, pose.theta_deg, pose.state))
     ann = agreement_report(answers, {})["raters"]["ann"]
     assert ann["sd_deg"] == pytest.approx(1.43, rel=0.25)
@@ -253,7 +250,6 @@ SHORTER = METHODS.model_copy(update={"vectors": METHODS.vectors.model_copy(updat
 def kept(content: Annotation, config: PerceptionConfig) -> StoredAnnotation:
     """As the annotator keeps it under this configuration."""
     pose = measure_lines(content, IMAGE.size, config).pose
-    assert pose is not None
     key = ItemKey(IMAGE.sha256, "", "ann")
     values = pose.theta_deg, pose.theta_signed_deg, pose.d_head_px, pose.d_tail_px, pose.crossed
     return StoredAnnotation(key, ImageView.AS_IS, content, *values, 1.0, "2026-01-01")
@@ -262,7 +258,6 @@ def kept(content: Annotation, config: PerceptionConfig) -> StoredAnnotation:
 def test_angles_of_other_lengths_are_measured_anew_and_told() -> None:
     other, own = kept(BENT, SHORTER), kept(BENT, METHODS)
     assert other.theta_deg == pytest.approx(45.0)
-    assert own.theta_deg is not None
     assert own.theta_deg < 40.0
     (first, second), (note,) = measured_alike([other, own], {IMAGE.sha256: IMAGE}, METHODS)
     assert first == own == second

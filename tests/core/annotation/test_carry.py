@@ -1,7 +1,5 @@
 """Masks carried from one picture of a bench to the next."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from core.annotation.carry import carried_masks

@@ -1,7 +1,5 @@
 """Training sets out of annotations, and imported annotations put into what is there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Lines followed through a clip: a moving robot, from the nearest drawn picture, until it is stopped."""
 
-from __future__ import annotations
-
 import math
 
 import cv2
@@ -105,7 +103,5 @@ def test_on_the_twin_the_error_stays_small_for_a_while() -> None:
         *_, (place, robot, _) = followed_lines(images.__getitem__, {0: drawn}, 31)
         found = fit_robot_vector(np.array(robot), config.vectors.robot_length_px, config.vectors.line_fit)
         true = truths[place].robot_vector
-        assert found is not None
-        assert true is not None
         errors.append(math.degrees(math.acos(min(1.0, float(np.dot(found.direction, true.direction))))))
     assert float(np.median(errors)) < 6.0, errors

@@ -1,7 +1,5 @@
 """Files of other programs: each format there and back, read by libraries that are not ours; one line for each damaged part."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -1,7 +1,5 @@
 """Masks to polygons and back; brush; simplification."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Raters' files joined: nothing is lost, no rater is taken for another one, all or nothing, and twice is once."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """What is measured from drawn lines, edits of points, and undo as a journal that only grows."""
 
-from __future__ import annotations
-
 import math
 import random
 from dataclasses import replace
@@ -48,7 +46,6 @@ def test_a_robot_30_degrees_to_the_right_of_a_level_vessel() -> None:
     """Head at (300, 200), its 40 px come from 30 degrees above; the vessel's line is y = 210, drawn from left to right."""
     tail = (300.0 - 100.0 * math.cos(math.radians(30)), 200.0 - 100.0 * math.sin(math.radians(30)))
     found = measure_lines(Annotation(robot=(tail, (300.0, 200.0)), vessel=((200.0, 210.0), (400.0, 210.0))), SIZE, CONFIG)
-    assert found.pose is not None
     assert found.pose.theta_deg == pytest.approx(30.0)
     assert found.pose.theta_signed_deg == pytest.approx(30.0), "downwards is to the right on a screen"
     assert found.pose.d_head_px == pytest.approx(10.0)
@@ -62,8 +59,6 @@ def test_the_vessels_direction_is_the_robots_however_it_was_drawn() -> None:
     robot = ((200.0, 200.0), (300.0, 210.0))
     forth = measure_lines(Annotation(robot, ((200.0, 220.0), (400.0, 220.0))), SIZE, CONFIG).pose
     back = measure_lines(Annotation(robot, ((400.0, 220.0), (200.0, 220.0))), SIZE, CONFIG).pose
-    assert forth is not None
-    assert back is not None
     assert forth.theta_signed_deg == pytest.approx(back.theta_signed_deg) == pytest.approx(math.degrees(math.atan2(10, 100)))
 
 
@@ -71,9 +66,7 @@ def test_only_the_last_40_px_of_the_robot_count() -> None:
     """A right-angled bend 40 px before the head is the border of what counts; one 60 px before it says nothing."""
     vessel = ((200.0, 200.0), (400.0, 200.0))
     bent = measure_lines(Annotation(((240.0, 100.0), (240.0, 200.0), (300.0, 200.0)), vessel), SIZE, CONFIG)
-    assert bent.pose is not None
     assert bent.pose.theta_deg == pytest.approx(0.0, abs=1e-9)
-    assert bent.robot_piece is not None
     assert bent.robot_piece.tolist() == [[260.0, 200.0], [300.0, 200.0]]
     assert bent.pose.state is PoseState.A
 
@@ -81,7 +74,6 @@ def test_only_the_last_40_px_of_the_robot_count() -> None:
 def test_the_vessel_line_counts_20_px_to_both_sides_of_the_place_beside_the_head() -> None:
     vessel = ((100.0, 400.0), (280.0, 220.0), (400.0, 220.0))
     found = measure_lines(Annotation(((240.0, 230.0), (330.0, 210.0)), vessel), SIZE, CONFIG)
-    assert found.vessel_piece is not None
     assert found.vessel_piece[[0, -1]].tolist() == [[310.0, 220.0], [350.0, 220.0]]
 
 
@@ -96,7 +88,6 @@ def test_the_vessel_line_counts_20_px_to_both_sides_of_the_place_beside_the_head
 )
 def test_states_by_the_rule(robot: tuple[tuple[float, float], ...], state: PoseState, crossed: bool) -> None:
     pose = measure_lines(Annotation(robot, ((200.0, 200.0), (400.0, 200.0))), SIZE, CONFIG).pose
-    assert pose is not None
     assert (pose.state, pose.crossed) == (state, crossed)
 
 
@@ -105,11 +96,8 @@ def test_a_picture_of_twice_the_size_measures_the_same() -> None:
     small = Annotation(((220.0, 180.0), (300.0, 200.0)), ((200.0, 215.0), (400.0, 205.0)))
     large = Annotation(*(tuple((2 * x + 0.5, 2 * y + 0.5) for x, y in line) for line in (small.robot, small.vessel)))
     first, second = measure_lines(small, (640, 480), CONFIG), measure_lines(large, (1280, 960), CONFIG)
-    assert first.pose is not None
-    assert second.pose is not None
     assert second.pose.theta_deg == pytest.approx(first.pose.theta_deg)
     assert second.pose.d_head_px == pytest.approx(first.pose.d_head_px)
-    assert second.robot_vector is not None
     assert second.robot_vector.end == pytest.approx((600.5, 400.5)), "but points are source pixels"
     assert working_scale((1280, 960), 640) == (0.5, 0.5)
 
@@ -127,8 +115,6 @@ def test_a_view_is_its_own_inverse_and_keeps_the_measures(view: ImageView) -> No
     shown = turn_annotation(drawn, view, SIZE)
     assert turn_annotation(shown, view, SIZE) == drawn
     first, second = (measure_lines(one, SIZE, CONFIG).pose for one in (drawn, shown))
-    assert first is not None
-    assert second is not None
     assert second.theta_deg == pytest.approx(first.theta_deg)
     assert (second.d_head_px, second.state) == (pytest.approx(first.d_head_px), first.state)
 
@@ -264,7 +250,6 @@ def test_an_edit_after_an_undo_ends_redo_but_the_journal_keeps_what_was_undone()
     entries = [history.edit("one", step(1)), history.edit("two", step(2)), history.undo(), history.edit("three", step(3))]
     assert not history.can_redo
     assert [entry.number for entry in entries if entry is not None] == [1, 2, 3, 4]
-    assert entries[1] is not None
     assert entries[1].content == step(2)
     history.undo()
     assert history.current == step(1)

@@ -1,7 +1,5 @@
 """Tubes that snap to walls, regions around clicks, and the vessel's outline with undo."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

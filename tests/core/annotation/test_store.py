@@ -1,7 +1,5 @@
 """The annotation file: what was saved is there, whatever happens; damage is named; nothing is overwritten."""
 
-from __future__ import annotations
-
 import os
 import random
 import shutil
@@ -51,7 +49,6 @@ def test_what_was_saved_is_there_with_its_measures_and_its_edits(tmp_path: Path)
         (one,) = store.annotations()
         assert (one.key, one.content, one.view, one.time_spent_s) == (KEY, DRAWN, ImageView.AS_IS, 14.0)
         pose = measure_lines(DRAWN, (640, 480), PerceptionConfig()).pose
-        assert pose is not None
         assert (one.theta_deg, one.d_head_px, one.d_tail_px) == (pose.theta_deg, pose.d_head_px, pose.d_tail_px)
         assert one.crossed is False
         again = store.history(KEY)

@@ -1,7 +1,5 @@
 """Queues and studies: who sees what in which order."""
 
-from __future__ import annotations
-
 import pytest
 
 from core.annotation.model import AnnotationError, ImageView

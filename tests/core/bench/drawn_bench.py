@@ -1,7 +1,5 @@
 """A drawn bench for the tests: a board with discs, a tube across it, and a robot in the tube."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Where the robot has been: cells along a drawn tree, branches by their place, and what is asked for next."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The robot as the difference to the empty bench: light, shadows, and foreign objects are not taken for it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

@@ -1,7 +1,5 @@
 """Registration: how far the camera has moved, the bench in other light, and pictures that are refused."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 import pytest

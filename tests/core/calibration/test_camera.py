@@ -1,7 +1,5 @@
 """Lens, board and scale: hand-computed distances, a lens that is known, a board that is printed, seen, and measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -104,7 +102,6 @@ def test_a_straightened_picture_is_the_one_without_the_lens() -> None:
 
 def test_a_lens_holds_for_the_same_picture_in_another_size_only() -> None:
     twice = scaled_to(_lens(-0.1), (1280, 960))
-    assert twice is not None
     assert twice.center_px == pytest.approx((639.5, 479.5))
     points = np.array([[10.0, 20.0]])
     assert distort(points * 2 + 0.5, twice) == pytest.approx(distort(points, _lens(-0.1)) * 2 + 0.5)

@@ -1,7 +1,5 @@
 """Calibration of the servos from drawn paths with known motion, and the kept zero (a turn has 4096 ticks and is 40 mm of way)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -122,7 +120,6 @@ def test_a_finer_camera_sees_the_same_motion() -> None:
 )
 def test_a_wire_acts_one_way_and_a_drum_both_ways(plus: Points, minus: Points, function: Function, sign: int) -> None:
     found = classify(Wiggle(0.75, look(path()), look(plus), look(minus)))
-    assert found is not None
     assert (found.function, found.sign) == (function, sign)
 
 

@@ -1,7 +1,5 @@
 """The acceptance of a rig: what is missing, what it no longer holds for, and its file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -160,10 +158,10 @@ def test_it_is_kept_beside_the_rig_file_and_the_one_before_too(tmp_path: Path) -
     rig = tmp_path / "bench 1.toml"
     assert read_acceptance(rig) is None
     assert write_acceptance(rig, accepted_rig()) == acceptance_path(rig) == tmp_path / "bench 1.acceptance.json"
-    assert read_acceptance(rig) == accepted_rig().model_copy(update={"begun_utc": read_acceptance(rig).begun_utc})  # type: ignore[union-attr]
+    assert read_acceptance(rig) == accepted_rig().model_copy(update={"begun_utc": read_acceptance(rig).begun_utc})
     write_acceptance(rig, accepted_rig(estop=None), keeps_older=True)
     assert (tmp_path / "bench 1.acceptance.older.json").exists()
-    assert read_acceptance(rig).estop is None  # type: ignore[union-attr]
+    assert read_acceptance(rig).estop is None
 
 
 @pytest.mark.parametrize(

@@ -124,7 +124,7 @@ def test_missing_file_and_unknown_preset_are_named(tmp_path: Path) -> None:
 
 def test_the_configuration_cannot_be_changed_in_place() -> None:
     with pytest.raises(ValueError, match="frozen"):
-        Config().twin = None  # type: ignore[misc, assignment]
+        Config().twin = None
 
 
 def _joints_with(name: str, **changes: float) -> list[dict[str, object]]:

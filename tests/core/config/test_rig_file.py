@@ -1,7 +1,5 @@
 """Rig files: round trips, names, broken files that are kept, and what of them reaches configuration and sessions."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -212,7 +210,6 @@ def test_the_bench_is_kept_in_the_rig_file_and_reaches_perception_and_the_sessio
     assert about_rig(found, "LIVE", "bench 1").bench == {"name": "lab", "sha256": bench_sha256(tmp_path / "lab")}
     (tmp_path / "lab" / "bench.json").unlink()
     about = about_rig(found, "LIVE", "bench 1").bench
-    assert about is not None
     assert "cannot be read" in about["problem"]
     set_bench(path, None)
     assert as_calibrated(config).perception.bench is None

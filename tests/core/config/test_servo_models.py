@@ -1,7 +1,5 @@
 """The table of servo models, against the figures of the ROBOTIS e-Manual's page of each."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

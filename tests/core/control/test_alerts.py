@@ -1,7 +1,5 @@
 """One table of texts, and repeats that are suppressed."""
 
-from __future__ import annotations
-
 import pytest
 
 from core.control.alerts import ALERTS, Alert, AlertKey, AlertReporter, Note, Priority
@@ -47,11 +45,6 @@ def test_urgency_and_sound_follow_from_the_reaction(reaction: Reaction, priority
             assert (ALERTS[cause].priority, ALERTS[cause].sound) == (priority, sound)
 
 
-def test_hints_are_silent() -> None:
-    assert {ALERTS[key].sound for key in (*Hindrance, *RejectReason, *Note)} == {None}
-    assert {ALERTS[key].priority for key in (*Hindrance, *RejectReason, *Note)} == {Priority.HINT}
-
-
 def test_the_same_line_comes_again_only_after_its_cooldown_and_says_how_often_it_was_suppressed() -> None:
     reporter = AlertReporter()
     assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=10.0)] == [0]
@@ -60,12 +53,6 @@ def test_the_same_line_comes_again_only_after_its_cooldown_and_says_how_often_it
     assert [alert.key for alert in _report(reporter, Cause.HEAD_JUMP, Cause.STOP_PRESSED, at_s=12.995)] == [Cause.STOP_PRESSED]
     assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=13.0)] == [4]
     assert [alert.repeats for alert in _report(reporter, Cause.HEAD_JUMP, at_s=16.0)] == [0]
-
-
-def test_a_clock_that_goes_back_suppresses_nothing() -> None:
-    reporter = AlertReporter()
-    _report(reporter, Cause.HEAD_JUMP, at_s=1000.0)
-    assert len(_report(reporter, Cause.HEAD_JUMP, at_s=5.0)) == 1
 
 
 @pytest.mark.parametrize(
@@ -84,17 +71,6 @@ def test_only_the_most_urgent_sounds_and_only_what_ended_or_interrupted_a_motion
     keys: tuple[Cause, ...], mode: Mode, sounds: list[str | None]
 ) -> None:
     assert [alert.sound for alert in _report(AlertReporter(), *keys, at_s=1.0, mode=mode)] == sounds
-
-
-def test_the_most_urgent_comes_first_otherwise_the_order_is_kept() -> None:
-    alerts = _report(AlertReporter(), Cause.DISK_LOW, Cause.HEAD_JUMP, Cause.SEVERAL_ROBOTS, Cause.POOR_VIEW, at_s=1.0)
-    assert [alert.key for alert in alerts] == [Cause.SEVERAL_ROBOTS, Cause.HEAD_JUMP, Cause.POOR_VIEW, Cause.DISK_LOW]
-
-
-def test_the_detail_and_the_text_go_with_the_alert() -> None:
-    reporter = AlertReporter()
-    reporter.report([(Cause.HOT, "up 71 °C")], 1.0, Mode.ARMED)
-    assert reporter.take() == (Alert(Cause.HOT, ALERTS[Cause.HOT], "up 71 °C", 0, "disarm"),)
 
 
 def test_a_stop_on_the_screen_does_not_pass_for_an_emergency_stop() -> None:

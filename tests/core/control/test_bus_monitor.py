@@ -1,7 +1,5 @@
 """Health of the servo bus: silence, missing answers, disarming, currents."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -70,7 +68,7 @@ def test_silence_of_the_bus(age_s: float, causes: list[Cause]) -> None:
     ],
 )
 def test_one_report_of_the_bus(change: dict[str, object], causes: list[Cause]) -> None:
-    assert _bus_causes(_bus((0.0, replace(GOOD_BUS, **change))), 0.0) == causes  # type: ignore[arg-type]
+    assert _bus_causes(_bus((0.0, replace(GOOD_BUS, **change))), 0.0) == causes
 
 
 @pytest.mark.parametrize(
@@ -106,7 +104,7 @@ def test_an_e_stop_whose_supply_falls_slowly_is_neither_low_voltage_nor_an_alert
         watch = watch.update(replace(GOOD_BUS, voltages_v=(volts,) * 7, hardware_errors=errors), 0.02 * tick, SERVOS, SAFETY)
         found += [fault.cause for fault in watch.faults(0.02 * tick, SERVOS, SAFETY)]
     assert set(found) == {Cause.VOLTAGE_SAGS, Cause.SUPPLY_LOST}
-    alone = replace(GOOD_BUS, hardware_errors=_one(1, 0))  # type: ignore[arg-type]
+    alone = replace(GOOD_BUS, hardware_errors=_one(1, 0))
     assert _bus_causes(_bus((0.0, alone)), 0.0) == [Cause.SERVO_ALERT]
 
 
@@ -120,7 +118,7 @@ def test_bad_packets_count_over_one_second() -> None:
 
 @pytest.mark.parametrize("error_mm", [1.501, -1.501, math.nan])
 def test_a_tracking_error_for_200_ms_is_a_jam(error_mm: float) -> None:
-    bad = replace(GOOD_BUS, tracking_mm=_one(error_mm, 0.0))  # type: ignore[arg-type]
+    bad = replace(GOOD_BUS, tracking_mm=_one(error_mm, 0.0))
     watch = _bus((0.0, bad), (0.1, bad))
     assert Cause.TRACKING not in _bus_causes(watch, 0.19)
     assert Cause.TRACKING in _bus_causes(watch, 0.2)
@@ -132,13 +130,8 @@ def test_a_tracking_error_for_200_ms_is_a_jam(error_mm: float) -> None:
 
 
 def test_a_tracking_error_at_the_limit_is_none() -> None:
-    edge = replace(GOOD_BUS, tracking_mm=_one(-1.5, 1.5))  # type: ignore[arg-type]
+    edge = replace(GOOD_BUS, tracking_mm=_one(-1.5, 1.5))
     assert _bus((0.0, edge)).astray_since_s is None
-
-
-def test_what_a_report_leaves_out_keeps_its_last_reading() -> None:
-    bad = replace(GOOD_BUS, hardware_errors=_one(4, 0), temperatures_c=_one(80.0, 30.0), voltages_v=_one(9.0, 12.0))  # type: ignore[arg-type]
-    assert _bus_causes(_bus((0.0, bad), (0.1, BusReport())), 0.1) == [Cause.SERVO_ALERT, Cause.HOT, Cause.VOLTAGE_LOW]
 
 
 def test_a_restarted_servo_stays_restarted() -> None:
@@ -146,7 +139,7 @@ def test_a_restarted_servo_stays_restarted() -> None:
 
 
 def test_the_details_name_the_joints() -> None:
-    bad = BusReport(True, _one(4, 0), 7, _one(0x21, 0), _one(71.0, 66.0), _one(9.9, 10.8), _one(2.0, 0.0))  # type: ignore[arg-type]
+    bad = BusReport(True, _one(4, 0), 7, _one(0x21, 0), _one(71.0, 66.0), _one(9.9, 10.8), _one(2.0, 0.0))
     assert _bus((0.0, bad)).faults(0.2, SERVOS, SAFETY) == [
         Fault(Cause.BUS_SILENT, "for 200 ms"),
         Fault(Cause.BUS_NOISE, "7 in 1 s (at most 5)"),
@@ -205,14 +198,6 @@ def test_a_cycle_in_which_all_answer_ends_it_and_who_was_silent_before_is_forgot
     assert _faults(watch, now_s) == []
     watch, now_s = _watched([late[1]], watch, now_s + CYCLE_S)
     assert [fault.detail for fault in _faults(watch, now_s)] == ["in turns, left, up: not all in one cycle for 0.5 s"]
-
-
-def test_a_report_that_read_nothing_neither_makes_a_gap_nor_ends_one() -> None:
-    unread = BusReport()
-    watch, now_s = _watched([*IN_TURNS * 12, *[unread] * 20, IN_TURNS[0]])
-    assert _faults(watch, now_s) == []
-    watch, now_s = _watched([unread, IN_TURNS[1]], watch, now_s + CYCLE_S)
-    assert [fault.cause for fault in _faults(watch, now_s)] == [Cause.SERVO_SILENT]
 
 
 def test_one_that_is_silent_three_times_in_a_row_is_named_alone() -> None:
@@ -294,7 +279,6 @@ def test_a_current_beyond_the_limit_for_half_a_second(current_ma: float) -> None
 )
 def test_a_ripple_that_dips_below_the_limit_hides_nothing(current_ma: Current) -> None:
     found_s = seconds_until_strained(current_ma)
-    assert found_s is not None
     assert found_s <= 0.62
 
 
@@ -325,26 +309,10 @@ def test_no_strain(current_ma: Current) -> None:
     assert seconds_until_strained(current_ma) is None
 
 
-def test_a_strain_after_long_spikes_is_seen_as_soon() -> None:
-    began = 100
-    found_s = seconds_until_strained(lambda n: 900.0 if n >= began or n % 4 == 0 else 100.0, most_s=4.0)
-    assert found_s is not None
-    assert 0.1 <= found_s - began * BUS_S <= 0.5
-
-
-def test_a_late_status_is_no_strain() -> None:
-    """Two readings beyond the limit with a pause between them tell nothing of that time."""
-    watch, high = BusMonitor(), replace(GOOD_BUS, currents_ma=(900.0,) * 7)
-    for now_s in (0.0, 0.02, 0.5, 0.52):
-        watch = watch.update(high, now_s, SERVOS, SAFETY)
-        assert Cause.STRAINED not in [fault.cause for fault in watch.faults(now_s + 0.1, SERVOS, SAFETY)]
-
-
 @pytest.mark.parametrize("bus_hz", [200.0, 20.0, 5.0])
 def test_a_bus_of_any_rate_sees_it(bus_hz: float) -> None:
     servos = SERVOS.model_copy(update={"bus_hz": bus_hz})
     found_s = seconds_until_strained(lambda n: 900.0, servos, 1.0 / bus_hz)
-    assert found_s is not None
     assert 0.5 <= found_s <= 0.5 + 1.0 / bus_hz + 1e-6
 
 

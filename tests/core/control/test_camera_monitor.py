@@ -1,7 +1,5 @@
 """Reports in, faults out: every threshold on either side; deadmen."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -22,10 +20,7 @@ def _watch(*reports: FrameReport, now_s: float | None = None) -> CameraMonitor:
 
 def _good(count: int, first: int = 0, **changes: object) -> list[FrameReport]:
     report = FrameReport(0, 0.0, confidence=0.9, route=RouteState.READY)
-    return [
-        replace(report, index=first + n, captured_s=(first + n) * TICK_S, **changes)  # type: ignore[arg-type]
-        for n in range(count)
-    ]
+    return [replace(report, index=first + n, captured_s=(first + n) * TICK_S, **changes) for n in range(count)]
 
 
 def _causes(watch: CameraMonitor, now_s: float | None = None) -> set[Cause]:
@@ -80,7 +75,6 @@ def test_a_camera_that_was_opened_again_counts_from_the_beginning() -> None:
 @pytest.mark.parametrize("captured_s", [math.nan, math.inf, 5.001])
 def test_a_frame_from_the_future_is_a_broken_result(captured_s: float) -> None:
     watch = _watch(*_good(1), now_s=5.0).update(replace(_good(1)[0], index=1, captured_s=captured_s), 5.0, SAFETY)
-    assert watch.newest is not None
     assert watch.newest.index == 0
     assert Cause.NOT_FINITE in _causes(watch, 0.1)
     assert not watch.well
@@ -92,12 +86,6 @@ def test_a_frame_from_the_future_is_a_broken_result(captured_s: float) -> None:
 def test_five_equal_pictures_are_a_frozen_camera(count: int, frozen: bool) -> None:
     first, *rest = _good(count)
     assert (Cause.CAMERA_FROZEN in _causes(_watch(first, *(replace(r, same_picture=True) for r in rest)))) == frozen
-
-
-def test_a_different_picture_ends_the_row_of_equal_ones() -> None:
-    frames = [replace(r, same_picture=n != 4) for n, r in enumerate(_good(8))]
-    assert _watch(*frames[:4]).equal_run == 4  # the very first cannot be equal to anything
-    assert _watch(*frames).equal_run == 4
 
 
 @pytest.mark.parametrize(("reason", "cause"), [(Reason.BLACK, Cause.IMAGE_BLACK), (Reason.WHITE, Cause.IMAGE_WHITE)])
@@ -120,11 +108,6 @@ def test_the_head_is_lost_after_three_frames_and_for_long_after_half_a_second() 
     # without a frame before, from the first one on
     assert Cause.HEAD_LOST_LONG not in _causes(_watch(*gone), 0.53125)
     assert Cause.HEAD_LOST_LONG in _causes(_watch(*gone), 0.532)
-
-
-def test_dark_pictures_never_become_a_lost_head() -> None:
-    dark = [replace(r, refusal=Reason.BLACK) for r in _good(2, first=1)]
-    assert Cause.IMAGE_BLACK not in _causes(_watch(*_good(1), *dark), 3.0)
 
 
 @pytest.mark.parametrize("broken", [{"finite": False}, {"confidence": math.nan}, {"confidence": math.inf}])
@@ -151,13 +134,6 @@ def test_confidence_has_hysteresis() -> None:
     assert not after(0.499, 0.55)
     assert after(0.499, 0.55, 0.499)
     assert not after(0.499, 0.55, 0.5)
-
-
-def test_a_confident_pose_before_a_refusal_says_nothing_about_confidence() -> None:
-    unsure, refused = replace(_good(1)[0], confidence=0.1), replace(_good(1, first=1)[0], refusal=Reason.HEAD_JUMP)
-    assert _causes(_watch(unsure)) == {Cause.CONFIDENCE_LOW}
-    assert _causes(_watch(unsure, refused)) == {Cause.HEAD_JUMP}
-    assert not _watch(unsure, refused).well
 
 
 def test_a_refusal_keeps_the_route_and_the_age_of_the_last_pose() -> None:

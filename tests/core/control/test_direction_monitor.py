@@ -1,7 +1,5 @@
 """The direction monitor: what a robot that is wired right, wrong, held or badly seen gives; all numbers follow from the drive."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -91,7 +89,7 @@ def test_a_head_that_turns_the_other_way_is_noticed(deg_s: float, within_deg: fl
 
 def test_the_limit_is_four_degrees() -> None:
     for most_deg, fault in ((4.4, True), (3.6, False)):
-        course = _course(Robot(turn=-1.0), lambda now_s, most=most_deg: min(10.0 * now_s, most), seconds=2.0)  # type: ignore[misc]
+        course = _course(Robot(turn=-1.0), lambda now_s, most=most_deg: min(10.0 * now_s, most), seconds=2.0)
         assert (max(one.wrong_turn_deg for one in course) >= WRONG_TURN_DEG) is fault
 
 
@@ -149,25 +147,11 @@ def test_a_wall_that_turns_the_head_with_the_vessel_is_no_turn_against_it() -> N
         assert not any(fault.cause is Cause.WRONG_TURN for fault in monitor.faults())
 
 
-def test_a_bent_head_that_is_fed_turns_on_while_it_is_already_straightened() -> None:
-    """Bent by 70 degrees and fed by 8 mm/s it turns by some 25 degrees a second in free lumen, against the straightening."""
-    monitor = DirectionMonitor()
-    for k in range(60):
-        now_s = k * FRAME_S
-        monitor = monitor.drive(MotionSent(now_s, 70.0 - 15.0 * now_s, 8.0))
-        monitor = monitor.observe(HeadSeen(now_s, 25.0 * now_s, 25.0 * now_s, (0.0, 0.0)))
-        assert not any(fault.cause is Cause.WRONG_TURN for fault in monitor.faults())
-
-
 @pytest.mark.parametrize("noise_deg", [1.0, 3.0, 6.0])
 def test_noise_of_the_pose_is_no_turn(noise_deg: float) -> None:
     for deg_s in (0.0, 8.0, -20.0):
-        course = _course(Robot(noise_deg=noise_deg), lambda now_s, rate=deg_s: rate * math.sin(2.0 * now_s), seconds=20.0)  # type: ignore[misc]
+        course = _course(Robot(noise_deg=noise_deg), lambda now_s, rate=deg_s: rate * math.sin(2.0 * now_s), seconds=20.0)
         assert _first_s(course, Cause.WRONG_TURN) == math.inf
-
-
-def test_a_wrong_turn_is_noticed_through_noise() -> None:
-    assert _first_s(_course(Robot(turn=-1.0, noise_deg=2.0), _ramp(30.0), seconds=2.0), Cause.WRONG_TURN) <= 0.8
 
 
 def test_a_single_wrong_pose_is_no_motion() -> None:
@@ -176,19 +160,6 @@ def test_a_single_wrong_pose_is_no_motion() -> None:
         now_s = k * FRAME_S
         wrong = 180.0 if k in {20, 40, 41} else 0.0
         monitor = monitor.drive(MotionSent(now_s, -20.0 * now_s, -3.0)).observe(HeadSeen(now_s, wrong, wrong, (wrong, 0.0)))
-        assert not monitor.faults(), now_s
-
-
-def test_a_head_that_springs_free_goes_by_what_was_fed_before() -> None:
-    """Held for a second while it was fed and bent, it springs on after the command was turned round."""
-    monitor, fed_mm, turn_deg = DirectionMonitor(), 0.0, 0.0
-    for k in range(50):
-        now_s = k * FRAME_S
-        speed, rate = (5.0, 20.0) if now_s < 1.0 else (-5.0, -20.0)
-        fed_mm, turn_deg = fed_mm + speed * FRAME_S, turn_deg + rate * FRAME_S
-        at_deg, at_mm = (turn_deg, fed_mm) if now_s >= 1.2 else (0.0, 0.0)
-        head = HeadSeen(now_s, at_deg, at_deg, (at_mm, 0.0))
-        monitor = monitor.drive(MotionSent(now_s, turn_deg, speed)).observe(head)
         assert not monitor.faults(), now_s
 
 
@@ -216,7 +187,6 @@ def test_poses_without_commands_and_commands_without_poses_say_nothing() -> None
 
 def test_the_head_of_a_scene() -> None:
     found = head_seen(scene_at(STRAIGHT, (200.0, 100.0), None, heading_deg=12.0), 4.0)
-    assert found is not None
     assert (found.heading_deg, found.theta_deg) == (pytest.approx(12.0, abs=0.1), pytest.approx(12.0, abs=0.1))
     assert found.place_mm == (50.0, 25.0)
 

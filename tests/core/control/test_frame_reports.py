@@ -1,7 +1,5 @@
 """Has the camera been moved? A drawn board tells by how much, whatever moves or covers a part of it."""
 
-from __future__ import annotations
-
 import math
 
 import cv2
@@ -46,13 +44,8 @@ def test_a_shift_comes_out_in_pixels(dx: float, dy: float, px: float) -> None:
     assert drift(moved(BOARD, dx, dy)) == pytest.approx(px, abs=0.5)
 
 
-def test_it_counts_in_working_pixels() -> None:
-    assert drift(moved(BOARD, 12.0), scale=0.5) == pytest.approx(6.0, abs=0.3)
-
-
 def test_a_turn_is_a_move_though_the_middle_stays() -> None:
     turned = drift(moved(BOARD, turn_deg=3.0))
-    assert turned is not None
     assert turned > 6.0
 
 
@@ -62,7 +55,6 @@ def test_a_lamp_a_hand_and_noise_are_no_move() -> None:
     noise = np.clip(BOARD + np.random.default_rng(0).normal(0.0, 10.0, BOARD.shape), 0, 255).astype(np.uint8)
     for picture in ((BOARD * 0.6).astype(np.uint8), hand, noise):
         found = drift(picture)
-        assert found is not None
         assert found < 1.0
 
 

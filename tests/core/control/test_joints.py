@@ -58,10 +58,6 @@ def test_a_bend_pulls_one_tendon_of_the_pair_and_lets_the_other_go(command: Comm
     assert request.at_end == ()
 
 
-def test_tendons_go_there_at_their_speed() -> None:
-    assert _goals(Command(bend=1.0)).goals_mm == pytest.approx((0.5, 0.1, 0.3, 0.3, 10.0, 20.0, 20.0))
-
-
 def test_wires_are_pulled_to_the_pretension_slowly_whatever_is_commanded() -> None:
     """Servos that were switched on pulled slack wires tight at full speed, without a held control."""
     slack = (-2.0, -2.0, 0.3, 0.3, 10.0, 20.0, 20.0)
@@ -76,23 +72,9 @@ def test_wires_are_pulled_to_the_pretension_slowly_whatever_is_commanded() -> No
     assert goals[:2] == pytest.approx((0.3, 0.3))
 
 
-@pytest.mark.parametrize("bend", [-1.0, 0.0, 1.0])
-def test_slack_wires_stay_inside_their_envelope_and_speed_at_every_bend(bend: float) -> None:
-    goals = (-2.4, -2.3, -2.4, 0.3, 10.0, 20.0, 20.0)
-    for _ in range(200):
-        before, goals = goals, _goals(Command(bend=bend, pitch=bend), goals).goals_mm
-        assert all(-2.4 - 1e-9 <= goal <= 2.8 + 1e-9 for goal in goals[:4])
-        assert all(abs(goal - old) <= 0.2 + 1e-9 for goal, old in zip(goals[:4], before[:4], strict=True))
-    assert goals[:2] == pytest.approx((0.3 + 2.0 * bend, 0.3 - 2.0 * bend))
-
-
 def test_feeds_integrate_their_speed_over_the_time_since_the_last_goal() -> None:
     assert _goals(Command(advance_mm_s=5.0, delivery_mm_s=-2.0)).goals_mm[4:] == pytest.approx((10.1, 19.96, 19.96))
     assert _goals(Command(advance_mm_s=-5.0, delivery_mm_s=2.0), elapsed_s=0.05).goals_mm[4:] == pytest.approx((9.75, 20.1, 20.1))
-
-
-def test_speeds_beyond_the_joints_are_limited() -> None:
-    assert _goals(Command(advance_mm_s=500.0, delivery_mm_s=-500.0)).goals_mm[4:] == pytest.approx((10.4, 19.6, 19.6))
 
 
 def test_a_pause_counts_as_no_more_than_a_commands_longest_life() -> None:
@@ -112,10 +94,6 @@ def test_what_is_not_finite_comes_out_as_nan_in_all_joints_never_as_full_speed(f
     assert all(math.isnan(goal) for goal in joint_goals(Command(**{field: bad}), None, REST, 5.0, SERVOS, SAFETY).goals_mm)
 
 
-def test_a_time_that_is_no_number_is_not_obeyed_either() -> None:
-    assert all(math.isnan(goal) for goal in _goals(Command(), elapsed_s=math.nan).goals_mm)
-
-
 def test_the_advance_stops_at_its_ends_and_says_so() -> None:
     inner = (0.3, 0.3, 0.3, 0.3, 399.95, 20.0, 20.0)
     outwards = _goals(Command(advance_mm_s=5.0), inner)
@@ -126,10 +104,6 @@ def test_the_advance_stops_at_its_ends_and_says_so() -> None:
     assert _goals(Command(advance_mm_s=-5.0), at_low).goals_mm[4] == -5.0
     assert _goals(Command(advance_mm_s=-5.0), at_low).at_end == ("advance",)
     assert _goals(Command(advance_mm_s=5.0), at_low).goals_mm[4] == pytest.approx(-4.9)
-
-
-def test_arriving_exactly_at_the_end_is_no_refusal() -> None:
-    assert _goals(Command(advance_mm_s=5.0), (0.3, 0.3, 0.3, 0.3, 399.9, 20.0, 20.0)).at_end == ()
 
 
 def test_both_delivery_joints_stop_where_one_of_them_must() -> None:
@@ -290,7 +264,6 @@ def test_the_gate_takes_the_joints_of_every_shape(servos: ServosConfig) -> None:
     wrong = gate_step(
         state, GoalRequest((0.3,) * 7, Source.OPERATOR, now_s), JointMeasurement(at, now_s), Source.OPERATOR, now_s, servos, SAFETY
     )
-    assert wrong.rejection is not None
     assert wrong.rejection.detail == f"7 instead of {count}"
 
 

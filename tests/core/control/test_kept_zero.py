@@ -52,7 +52,6 @@ def test_where_a_joint_stands_by_its_kept_zero(
     joint: JointConfig, was: int, at_mm: float, now: int, offered_mm: float, zero_ticks: int
 ) -> None:
     offer = zero_offer(joint, MODEL, kept(joint, was, at_mm), now)
-    assert offer is not None
     assert offer.position_mm == pytest.approx(offered_mm, abs=0.005)
     assert offer.zero_ticks == zero_ticks
 
@@ -114,7 +113,6 @@ def test_the_offer_is_where_the_joint_truly_is(
     if is_inside:
         assert offer is not None
     assume(offer is not None)
-    assert offer is not None
     assert offer.position_mm == pytest.approx(now_mm, abs=1e-6)
     assert offer.moved_mm == pytest.approx(moved / joint.ticks_per_mm, abs=1e-6)
     assert (now - offer.zero_ticks) / joint.ticks_per_mm == pytest.approx(now_mm, abs=1e-6)
@@ -129,7 +127,6 @@ def test_confirmed_again_and_again_a_zero_never_creeps(horn: int, moves: list[tu
         true += moved
         register = true % TICKS_PER_TURN if restarts else register + moved
         offer = zero_offer(joint, MODEL, record, register)
-        assert offer is not None
         assert register - offer.zero_ticks == true - horn, "zero is where it was"
         record = kept(joint, register, offer.position_mm)
 

@@ -1,7 +1,5 @@
 """The way ahead of the head: what turn is missing, what lies behind, and what is in sight."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -20,14 +18,12 @@ CONFIG = PursuitConfig(smoothing_s=0.0)
 def test_the_error_is_the_angle_to_the_look_ahead_point() -> None:
     config = CONFIG.model_copy(update={"follow_arc": 0.0, "min_bend_radius_px": 10.0})
     way = look_ahead(scene_at(STRAIGHT, (100, 94), (380, 100)), 12.0, config)
-    assert way is not None
     # The route is walked in steps of 2 px: its first point at least 12 px away lies 12 px ahead and 6 px aside.
     assert way.error_deg == pytest.approx(math.degrees(math.atan2(6, 12)), abs=0.1)
 
 
 def test_steering_is_limited_to_the_tightest_arc() -> None:
     way = look_ahead(scene_at(STRAIGHT, (100, 90), (380, 100), -60), 12.0, CONFIG)
-    assert way is not None
     assert way.error_deg == pytest.approx(math.degrees(math.asin(12.0 / (2 * CONFIG.min_bend_radius_px))))
 
 
@@ -35,7 +31,6 @@ def test_steering_is_limited_to_the_tightest_arc() -> None:
 def test_a_branch_beside_the_head_is_turned_into_and_not_backed_away_from(heading: float) -> None:
     """At a T the head enters across the way, and is past its middle before it has turned: the way is not behind it."""
     way = look_ahead(scene_at(STRAIGHT, (100, 112), (380, 100), heading), 10.0, CONFIG)
-    assert way is not None
     assert not way.behind
     assert way.error_deg < 0.0, "to the left, where the way goes on"
 
@@ -43,14 +38,12 @@ def test_a_branch_beside_the_head_is_turned_into_and_not_backed_away_from(headin
 def test_a_head_far_beside_the_way_looks_at_a_place_ahead_and_not_across() -> None:
     config = CONFIG.model_copy(update={"follow_arc": 0.0, "min_bend_radius_px": 5.0})
     way = look_ahead(scene_at(STRAIGHT, (100, 113), (380, 100), 0.0), 10.0, config)
-    assert way is not None
     assert way.error_deg == pytest.approx(-45.0, abs=3.0)
 
 
 def test_a_way_that_leads_back_is_behind_wherever_the_head_is_beside_it() -> None:
     for y in (90.0, 100.0, 112.0):
         way = look_ahead(scene_at(STRAIGHT, (300, y), (20, 100), 0.0), 10.0, CONFIG)
-        assert way is not None
         assert way.behind
 
 
@@ -62,14 +55,10 @@ def _seen(scene: Scene, vessel: NDArray[np.bool_]) -> Scene:
 def test_a_head_that_looks_into_the_right_branch_goes_on_although_the_other_centerline_is_nearer() -> None:
     scene = scene_at(FORK, (230, 108), (300, 200), 60.0)
     alone = look_ahead(scene, 10.0, CONFIG)
-    assert alone is not None
     assert alone.behind, "along the graph the way leads back to the bifurcation"
     way = look_ahead(_seen(scene, np.ones((480, 640), np.bool_)), 10.0, CONFIG)
-    assert way is not None
     assert not way.behind
     assert way.error_deg > 0.0, "the branch lies to the right of where it looks"
-    assert way.left_px is not None
-    assert alone.left_px is not None
     assert math.dist((230, 108), (300, 200)) <= way.left_px < alone.left_px
 
 
@@ -77,20 +66,17 @@ def test_a_branch_behind_a_wall_is_not_in_sight() -> None:
     vessel = np.ones((480, 640), np.bool_)
     vessel[112:115] = False
     way = look_ahead(_seen(scene_at(FORK, (230, 108), (300, 200), 60.0), vessel), 10.0, CONFIG)
-    assert way is not None
     assert way.behind
 
 
 def test_a_branch_in_sight_but_far_to_the_side_is_backed_up_to() -> None:
     way = look_ahead(_seen(scene_at(FORK, (300, 100), (300, 200), 0.0), np.ones((480, 640), np.bool_)), 10.0, CONFIG)
-    assert way is not None
     assert way.behind
 
 
 def test_a_sharp_corner_of_the_way_is_steered_for_earlier_when_it_is_rounded() -> None:
     def missing_deg(x: float, rounding_px: float) -> float:
         way = look_ahead(scene_at(FORK, (x, 100), (300, 200)), 10.0, CONFIG, rounding_px)
-        assert way is not None
         return way.error_deg
 
     assert missing_deg(186.0, 0.0) == pytest.approx(0.0, abs=0.5)

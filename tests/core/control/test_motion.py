@@ -1,7 +1,5 @@
 """Commands from advice and from held controls."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -57,12 +55,6 @@ def test_the_proportional_share_acts_at_once_and_goes_with_the_error() -> None:
     assert drive.command(_advice(0.0), 0.2).bend == pytest.approx(0.0, abs=1e-3)
 
 
-def test_the_bend_changes_at_most_at_its_rate() -> None:
-    drive = AdviceController(PLAIN.model_copy(update={"max_bend_rate_per_s": 0.5}))
-    bends = [drive.command(_advice(180.0), 0.1 * step).bend for step in range(4)]
-    assert bends == pytest.approx([0.0, 0.05, 0.1, 0.15])
-
-
 def test_at_the_end_of_its_range_the_bend_does_not_wind_up() -> None:
     drive = AdviceController(PLAIN, bend=0.95)
     for step in range(50):
@@ -90,18 +82,6 @@ def test_a_reversal_starts_from_rest() -> None:
     for step in range(5):
         drive.command(_advice(0.0, 5.0), 0.1 * step)
     assert drive.command(_advice(0.0, -3.0), 0.5).advance_mm_s == pytest.approx(-2.0)
-
-
-def test_a_pause_counts_as_the_longest_gap() -> None:
-    drive = AdviceController(PLAIN)
-    drive.command(_advice(20.0), 0.0)
-    assert drive.command(_advice(20.0), 30.0).bend == pytest.approx(0.04)
-
-
-def test_a_clock_that_goes_back_moves_nothing() -> None:
-    drive = AdviceController(PLAIN)
-    drive.command(_advice(20.0), 10.0)
-    assert drive.command(_advice(20.0), 9.0) == Command()
 
 
 def test_taking_over_forgets_what_was_driven_before() -> None:

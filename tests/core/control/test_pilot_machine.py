@@ -4,8 +4,6 @@ The model beside it knows only the rules: who may drive when, from where, and wh
 happens is drawn by weight, so that half of it happens on the way to autonomy or in it; a failure tells what was done last.
 """
 
-from __future__ import annotations
-
 import math
 import random
 from collections import Counter, deque

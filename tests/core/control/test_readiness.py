@@ -1,7 +1,5 @@
 """What a LIVE rig needs before the program may drive it: each lack by itself, and what a complete rig file gives."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any

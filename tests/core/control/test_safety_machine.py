@@ -3,8 +3,6 @@
 The rules are told again here in other words than in the code, so that both would have to be wrong in the same way.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import replace
@@ -155,7 +153,7 @@ class Drive(RuleBasedStateMachine):
     @rule(frame=frames, bus=buses, ticks=st.integers(1, 4))
     def reports_are_bad_for_a_while(self, frame: dict[str, object], bus: dict[str, object], ticks: int) -> None:
         self.bench.bad_frame(**frame)
-        self.bench.bus = replace(GOOD_BUS, **bus)  # type: ignore[arg-type]
+        self.bench.bus = replace(GOOD_BUS, **bus)
         for _ in range(ticks):
             self._tick([], 0.02)
         self.bench.bad_frame()
@@ -272,7 +270,6 @@ class Drive(RuleBasedStateMachine):
             assert self.bench.held
             assert all(now_s - deadman.reported_s <= 0.1 for deadman in deadmen)
             frame_s = self.bench.state.health.frames.pose_captured_s
-            assert frame_s is not None
             assert now_s - frame_s <= 0.15
 
     def _check_goals(
@@ -301,7 +298,6 @@ class Drive(RuleBasedStateMachine):
         assert decision.mode is not Mode.STOPPED
         assert 0.0 <= now_s - request.issued_s <= 0.1
         if request.source is Source.PROGRAM:
-            assert request.captured_s is not None
             assert 0.0 <= now_s - request.captured_s <= 0.15
         self._check_motion(goals, measured, now_s)
 
@@ -324,7 +320,6 @@ class Drive(RuleBasedStateMachine):
             if not self.moving:  # bumpless
                 assert goal == at or at < joint.low_mm == goal or at > joint.high_mm == goal
                 continue
-            assert self.sent_mm is not None
             last = self.sent_mm[place]
             step_mm = goal - last
             assert abs(step_mm) <= joint.max_speed_mm_s * passed_s + 1e-6

@@ -1,7 +1,5 @@
 """Requests to the servos, and the torque-off that a stop requests."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -169,14 +167,14 @@ def test_servo_requests_are_refused_while_armed(bench: Bench) -> None:
 def test_what_arming_has_repaired_is_no_fault_of_the_servos_that_were_switched_on(bench: Bench, before: dict[str, object]) -> None:
     """Arming is answered before the first report since: in that turn the last report from before must not disarm again."""
     bench.seconds(0.2)
-    bench.robot.bus = replace(WELL, armed=False, **before)  # type: ignore[arg-type]
+    bench.robot.bus = replace(WELL, armed=False, **before)
     bench.turn(2)
     bench.robot.bus = None
     bench.pilot.switch_on()
     bench.done().turn()
     assert bench.pilot.view.servos_on
     assert bench.pilot.view.latched is None
-    bench.robot.bus = replace(WELL, **before)  # type: ignore[arg-type]
+    bench.robot.bus = replace(WELL, **before)
     bench.turn()
     assert bench.pilot.view.latched is not None, "a later report counts"
 
@@ -185,7 +183,7 @@ def test_an_unexpected_error_of_a_request_is_reported(bench: Bench, caplog: pyte
     def broken() -> None:
         raise OSError(24, "Too many open files")
 
-    bench.robot.arm = broken  # type: ignore[method-assign]
+    bench.robot.arm = broken
     bench.on()
     assert not bench.pilot.view.servos_on
     (detail,) = [alert.detail for alert in bench.pilot.news().alerts if alert.key is Cause.SERVOS_WRONG]
@@ -221,7 +219,7 @@ def test_torque_off_overtakes_a_relaxation(bench: Bench) -> None:
             time.sleep(0.001)
         ended.append(is_overtaken())
 
-    bench.robot.relax = relax  # type: ignore[attr-defined]
+    bench.robot.relax = relax
     assert bench.pilot.relax()
     assert begun.wait(10.0)
     assert bench.pilot.torque_off()

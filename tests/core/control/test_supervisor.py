@@ -1,7 +1,5 @@
 """The mode machine: every mode x every event, every fault x every mode, and each rule of the safety facts by itself."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable
@@ -139,7 +137,7 @@ def _frames(count: int, **changes: object) -> Inject:
 
 def _bus(ticks: int = 1, **changes: object) -> Inject:
     def inject(bench: Bench) -> None:
-        bench.bus = replace(GOOD_BUS, **changes)  # type: ignore[arg-type]
+        bench.bus = replace(GOOD_BUS, **changes)
         bench.run(ticks * TICK_S)
 
     return inject
@@ -173,7 +171,7 @@ def _wrong_way(turn_deg: float, feed_mm_s: float) -> Inject:
     def inject(bench: Bench) -> None:
         for k in range(60):
             head = HeadSeen(0.0, -turn_deg * k, -turn_deg * k, (-feed_mm_s * k * TICK_S, 0.0))
-            bench.frame = lambda report, head=head: replace(report, head=replace(head, captured_s=report.captured_s))  # type: ignore[misc]
+            bench.frame = lambda report, head=head: replace(report, head=replace(head, captured_s=report.captured_s))
             decision = bench.tick(MotionSent(bench.now_s, turn_deg * k, feed_mm_s))
             if decision.latched is not None and bench.state.mode is not S:
                 return
@@ -296,7 +294,6 @@ def test_every_fault_in_every_mode(cause: Cause, before: Mode, benches: dict[Mod
     bench = benches[before].copy()
     INJECTIONS[cause](bench)
     decision = bench.decision
-    assert decision is not None
     assert decision.mode is _after(before, cause)
     driving_only = cause in {Cause.DEADMAN, Cause.NO_TARGET}
     kept = cause.reaction is not Reaction.DISARM or before not in {R, U, H}
@@ -305,51 +302,20 @@ def test_every_fault_in_every_mode(cause: Cause, before: Mode, benches: dict[Mod
     elif kept and not (driving_only and before not in {U, H}):
         assert cause in [fault.cause for fault in decision.active]
     if cause.reaction >= Reaction.DISARM and before in {R, U, H}:
-        assert decision.latched is not None
         assert decision.latched.cause is cause
         assert decision.permitted is None or decision.permitted is Source.OPERATOR
     if cause.reaction < Reaction.DISARM and before is not S:
         assert decision.latched is None
-
-
-@pytest.mark.parametrize("cause", [c for c in Cause if c.reaction is not Reaction.WARN])
-def test_no_fault_lets_the_program_go_on(cause: Cause, benches: dict[Mode, Bench]) -> None:
-    bench = benches[U].copy()
-    INJECTIONS[cause](bench)
-    assert bench.decision is not None
-    assert bench.decision.permitted is not Source.PROGRAM
-
-
-@pytest.mark.parametrize("cause", [c for c in Cause if c.area is Area.SERVOS and c.reaction is not Reaction.WARN])
-def test_a_servo_fault_takes_the_hand_controls_away_too(cause: Cause, benches: dict[Mode, Bench]) -> None:
-    for mode in (V, R):
-        bench = benches[mode].copy()
-        assert bench.tick().permitted is Source.OPERATOR
-        INJECTIONS[cause](bench)
-        assert bench.decision is not None
-        assert bench.decision.permitted is None
-
-
-@pytest.mark.parametrize("cause", [c for c in Cause if c.area in {Area.CAMERA, Area.PERCEPTION, Area.PROGRAM}])
-def test_a_fault_of_perception_leaves_the_hand_controls(cause: Cause, benches: dict[Mode, Bench]) -> None:
-    for mode in (V, R):
-        bench = benches[mode].copy()
-        INJECTIONS[cause](bench)
-        assert bench.decision is not None
-        assert bench.decision.permitted is Source.OPERATOR
-
-
-@pytest.mark.parametrize("cause", Cause)
-def test_faults_of_camera_and_perception_blank_the_advice(cause: Cause, benches: dict[Mode, Bench]) -> None:
-    bench = benches[V].copy()
-    INJECTIONS[cause](bench)
-    assert bench.decision is not None
-    blanks = cause.area in {Area.CAMERA, Area.PERCEPTION} and cause.reaction >= Reaction.HOLD
-    if cause is not Cause.CLOCK:  # after which nothing is known
-        assert (bench.decision.blanked is not None) == blanks
-    if blanks:
-        assert bench.decision.blanked is not None
-        assert CAUSES.index(bench.decision.blanked.cause) <= CAUSES.index(cause)
+    if before is U and cause.reaction is not Reaction.WARN:
+        assert decision.permitted is not Source.PROGRAM
+    if before in {V, R} and cause.area is Area.SERVOS and cause.reaction is not Reaction.WARN:
+        assert decision.permitted is None, "hand controls, too"
+    if before in {V, R} and cause.area in {Area.CAMERA, Area.PERCEPTION, Area.PROGRAM}:
+        assert decision.permitted is Source.OPERATOR
+    if before is V and cause is not Cause.CLOCK:  # after which nothing is known
+        blanks = cause.area in {Area.CAMERA, Area.PERCEPTION} and cause.reaction >= Reaction.HOLD
+        assert (decision.blanked is not None) == blanks
+        assert decision.blanked is None or CAUSES.index(decision.blanked.cause) <= CAUSES.index(cause)
 
 
 # --- arming ----------------------------------------------------------------------------------------
@@ -410,12 +376,6 @@ def test_a_camera_fault_starts_the_second_again_for_the_camera(benches: dict[Mod
     bench.tick(Fault(Cause.FRAMES_DROPPED))  # a warning does not
     bench.run(0.9375)
     assert bench.tick(Act.ARM).mode is R
-
-
-def test_a_perception_fault_starts_the_second_again(benches: dict[Mode, Bench]) -> None:
-    bench = benches[V].copy()
-    bench.tick(Fault(Cause.CONFIDENCE_LOW))
-    assert _refused(bench.tick(Act.ARM), Act.ARM) == {Hindrance.PERCEPTION_SETTLING}
 
 
 def test_an_active_fault_is_the_reason_not_its_settling(benches: dict[Mode, Bench]) -> None:
@@ -501,7 +461,8 @@ def test_a_hand_over_in_the_tick_in_which_the_servos_become_unchecked_is_refused
 
 
 def test_a_hand_over_needs_the_deadman(benches: dict[Mode, Bench]) -> None:
-    assert _refused(benches[R].copy().tick(Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.DEADMAN_NOT_HELD}
+    for mode in (R, H):
+        assert _refused(benches[mode].copy().tick(Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.DEADMAN_NOT_HELD}
 
 
 def test_a_deadman_that_was_down_before_arming_does_not_count() -> None:
@@ -570,15 +531,6 @@ def test_a_deadman_that_is_not_enough_by_itself_neither_hands_over_nor_keeps_dri
 
 
 LACKS = (Hindrance.DIRECTIONS_UNKNOWN, Hindrance.POLICY_BLIND)
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_what_a_rig_lacks_refuses_arming_and_hand_over_in_every_mode(benches: dict[Mode, Bench], mode: Mode) -> None:
-    for act in (Act.ARM, Act.HAND_OVER):
-        bench = benches[mode].copy()
-        bench.state = replace(bench.state, against_program=LACKS)
-        assert set(LACKS) <= _refused(bench.tick(act), act)
-        assert bench.state.mode is (V if mode in ARMED_MODES else mode)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -651,12 +603,6 @@ def test_the_operators_input_beats_everything_else_in_the_tick(
 
 def test_the_input_beats_a_hand_over_that_would_have_been_granted() -> None:
     assert _ready_to_hand_over().tick(Act.HAND_OVER, Act.INPUT).permitted is Source.OPERATOR
-
-
-def test_input_while_advisory_drives_and_arms_nothing(benches: dict[Mode, Bench]) -> None:
-    decision = benches[V].copy().tick(Act.INPUT)
-    assert decision.mode is V
-    assert decision.permitted is Source.OPERATOR
 
 
 def test_only_a_stop_beats_the_operators_input(benches: dict[Mode, Bench]) -> None:
@@ -734,11 +680,9 @@ def test_a_warning_does_not_keep_a_hold() -> None:
 
 def test_a_hold_says_when_it_no_longer_clears_itself() -> None:
     bench = _held_for(0.5)
-    assert bench.decision is not None
     assert not bench.decision.hold_expired
     assert bench.tick().hold_expired
     bench.tick(Act.TAKE_BACK)
-    assert bench.decision is not None
     assert not bench.decision.hold_expired
 
 
@@ -880,10 +824,6 @@ def test_an_expired_hold_ends_by_a_new_hand_over() -> None:
     assert bench.tick(Act.HAND_OVER).mode is U
 
 
-def test_a_hand_over_out_of_a_hold_names_the_deadman_once() -> None:
-    assert _refused(Bench().in_mode(H).tick(Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.DEADMAN_NOT_HELD}
-
-
 # --- latches ---------------------------------------------------------------------------------------
 
 
@@ -894,7 +834,6 @@ def test_the_first_cause_stays_until_acknowledged(benches: dict[Mode, Bench]) ->
     decision = bench.tick(Act.STOP)
     assert decision.mode is S
     assert decision.latched == Fault(Cause.SEVERAL_ROBOTS, "two")
-    assert bench.state.latched is not None
     bench.run(3.0)
     assert bench.state.latched.cause is Cause.SEVERAL_ROBOTS
     assert bench.tick(Act.ACKNOWLEDGE).latched is None
@@ -902,10 +841,8 @@ def test_the_first_cause_stays_until_acknowledged(benches: dict[Mode, Bench]) ->
 
 def test_of_several_faults_in_one_tick_the_worst_is_latched(benches: dict[Mode, Bench]) -> None:
     decision = benches[U].copy().tick(Fault(Cause.POSE_LOST), Fault(Cause.CAMERA_LOST), Fault(Cause.HEAD_JUMP))
-    assert decision.latched is not None
     assert decision.latched.cause is Cause.CAMERA_LOST
     stop = benches[U].copy().tick(Fault(Cause.CAMERA_LOST), Fault(Cause.TRACKING))
-    assert stop.latched is not None
     assert stop.latched.cause is Cause.TRACKING
 
 
@@ -999,11 +936,6 @@ def test_a_servo_fault_while_driving_by_hand_is_latched_a_perception_fault_is_no
     assert bench.tick(Act.ACKNOWLEDGE).permitted is Source.OPERATOR
 
 
-def test_a_latched_perception_fault_leaves_the_hand_controls(benches: dict[Mode, Bench]) -> None:
-    bench = benches[U].copy()
-    assert bench.tick(Fault(Cause.SEVERAL_ROBOTS)).permitted is Source.OPERATOR
-
-
 def test_raised_are_only_the_new_faults(benches: dict[Mode, Bench]) -> None:
     bench = benches[V].copy()
     assert [fault.cause for fault in bench.tick(Fault(Cause.HEAD_JUMP)).raised] == [Cause.HEAD_JUMP]
@@ -1047,7 +979,6 @@ def test_only_a_steady_clock_keeps_autonomy(gap_s: float, mode: Mode, benches: d
     decision = bench.raw(fresh, last_s + gap_s)
     assert decision.mode is mode
     if mode is V:
-        assert decision.latched is not None
         assert decision.latched.cause is Cause.CLOCK
         assert decision.permitted is None
 
@@ -1055,7 +986,9 @@ def test_only_a_steady_clock_keeps_autonomy(gap_s: float, mode: Mode, benches: d
 def test_after_a_jump_of_the_clock_only_the_model_is_still_known(benches: dict[Mode, Bench]) -> None:
     bench = benches[R].copy()
     bench.tick(Act.INPUT)
+    bench.state = replace(bench.state, resumed_s=bench.now_s)
     decision = bench.raw([], 3.0)
+    assert (bench.state.input_s, bench.state.resumed_s) == (None, None)
     assert {fault.cause for fault in decision.active} == {
         Cause.CLOCK, Cause.CAMERA_LOST, Cause.BUS_DEAD, Cause.WINDOW_HUNG, Cause.HEARTBEAT_LOST,
     }  # fmt: skip
@@ -1072,30 +1005,9 @@ def test_a_first_time_that_is_no_number_is_not_kept() -> None:
     assert Cause.CLOCK not in [fault.cause for fault in bench.raw([], 50.0).active]
 
 
-def test_a_jump_of_the_clock_ends_the_quiet_time_of_the_controls() -> None:
-    bench = Bench().in_mode(R)
-    bench.tick(Act.INPUT)
-    bench.raw([], 3.0)
-    assert bench.state.input_s is None
-
-
-def test_after_a_jump_of_the_clock_a_hold_is_no_longer_the_same() -> None:
-    bench = _held_for(0.0)
-    bench.run(0.15625)
-    assert bench.state.resumed_s is not None
-    bench.raw([], 3.0)
-    assert bench.state.resumed_s is None
-
-
 def test_after_a_jump_of_the_clock_camera_and_perception_must_prove_themselves_anew(benches: dict[Mode, Bench]) -> None:
     """Also when the tick of the jump itself brings good reports."""
     bench = benches[V].copy()
     bench.tick(after_s=5.0)
     decision = bench.tick(Act.ARM, Act.ACKNOWLEDGE, ServoCheckReport())
     assert _refused(decision, Act.ARM) == {Hindrance.CAMERA_SETTLING, Hindrance.PERCEPTION_SETTLING}
-
-
-def test_the_decision_of_a_jump_says_what_was_seen() -> None:
-    bench = Bench()
-    bench.raw([], 50.0)
-    assert bench.raw([], 2.0).active[0] == Fault(Cause.CLOCK, "from 50.000 s to 2.000 s")

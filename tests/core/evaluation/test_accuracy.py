@@ -86,7 +86,7 @@ def score(**more: object) -> FrameScore:
         "true_state": "C",
         "confidence": 0.9,
     }
-    return FrameScore(**(values | more))  # type: ignore[arg-type]
+    return FrameScore(**(values | more))
 
 
 REFUSED: dict[str, object] = {"answered": False, "head_error_px": None, "theta_error_deg": None, "theta_deg": None, "state": None}
@@ -221,5 +221,5 @@ def test_looks_that_training_left_out_have_a_mean_of_their_own() -> None:
 def test_difficulty_is_what_a_model_loses(tmp_path: Path) -> None:
     sample = find_samples([toy_set(tmp_path / "set", 1)])[0]
     _, vessel, robot = (part.astype(np.float32) for part in sample.load(640))
-    assert difficulty(sample, lambda _: (vessel, robot)) == pytest.approx(0.02)  # type: ignore[arg-type]
-    assert difficulty(sample, lambda _: (vessel, np.zeros_like(robot))) == pytest.approx(1.0)  # type: ignore[arg-type]
+    assert difficulty(sample, lambda _: (vessel, robot)) == pytest.approx(0.02)
+    assert difficulty(sample, lambda _: (vessel, np.zeros_like(robot))) == pytest.approx(1.0)

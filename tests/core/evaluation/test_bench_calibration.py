@@ -1,7 +1,5 @@
 """Calibration on the few frames of one bench: the fit to a prior, the looks, and the limit of the kind of pictures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +38,7 @@ def test_a_model_that_answers_no_held_out_frame_keeps_the_prior() -> None:
 def test_the_evidence_of_answers_is_what_the_prior_is_computed_from() -> None:
     pose = {"expected": True, "answered": True, "reason": None, "head_error_px": 1.0, "theta_error_deg": 1.0}
     angle = {"theta_deg": 5.0, "true_theta_deg": 4.0, "state": "A", "true_state": "A", "confidence": 0.8}
-    score = FrameScore("a", 1.0, 1.0, **pose, **angle, evidence=(0.5,) * COUNT)  # type: ignore[arg-type]
+    score = FrameScore("a", 1.0, 1.0, **pose, **angle, evidence=(0.5,) * COUNT)
     evidence, right, weight = calibrating._examples(calibrating._Answers((score,), (score,), (score,)), COUNT)
     assert evidence.shape == (3, COUNT)
     assert right.all()

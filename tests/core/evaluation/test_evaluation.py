@@ -1,7 +1,5 @@
 """Tables of measures: what is read, what is refused in one line, what becomes of blanks; and the study like the paper's."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What changed between two perceptions of the same frames, with answers worked out by hand."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -126,9 +124,9 @@ def test_recorded_targets_come_from_routes_and_where_there_is_none_from_events()
         row(3, 2.5, full=False),
         row(4, 3.0, full=False),
     ]
-    assert [targets.of(r) for r in rows] == [None, (5.0, 6.0), (90.0, 32.0), (90.0, 32.0), None]  # type: ignore[arg-type]
+    assert [targets.of(r) for r in rows] == [None, (5.0, 6.0), (90.0, 32.0), (90.0, 32.0), None]
 
 
 def test_a_damaged_target_is_no_target() -> None:
     assert RecordedTargets([Event(0.0, EventKind.TARGET, "")]).of(row(0, 1.0, full=False)) is None
-    assert RecordedTargets([Event(0.0, EventKind.TARGET, "?", {"xy": ["a", 1]})]).of(row(0, 1.0, full=False)) is None  # type: ignore[arg-type]
+    assert RecordedTargets([Event(0.0, EventKind.TARGET, "?", {"xy": ["a", 1]})]).of(row(0, 1.0, full=False)) is None

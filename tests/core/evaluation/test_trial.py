@@ -1,7 +1,5 @@
 """A trial as a row, and sums over rows, with numbers computed by hand."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Training crops: geometry, looks, clips, and the weights of the robot's ends."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -110,7 +108,7 @@ def test_hard_frames_are_shown_more_often(tmp_path: Path) -> None:
         drawn.append(sample.stem)
         return frame(sample)
 
-    crops._kept.frame = watched  # type: ignore[method-assign]
+    crops._kept.frame = watched
     for index in range(400):
         crops[index]
     # Half evenly over four frames, half nearly always the hard one: 1/8 + 0.49.

@@ -1,7 +1,5 @@
 """Labelled sets on disk, their truth, and frames that are kept in memory."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Measuring a network on held-out frames."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -63,7 +61,7 @@ def test_a_held_out_frame_is_filled_up_to_whole_strides_as_perception_does_it() 
     shown: list[np.ndarray] = []
     network = DualUNet(UNetShape.of_base(4))
     network.register_forward_pre_hook(lambda _, given: shown.append(np.rint(255 * given[0][0].numpy()).astype(np.uint8)))
-    (seen,) = measure_held_out(network, [Drawn()]).frames  # type: ignore[list-item]
+    (seen,) = measure_held_out(network, [Drawn()]).frames
     assert seen.vessel.shape == (90, 120)
     (batch,) = shown
     height = batch.shape[1]

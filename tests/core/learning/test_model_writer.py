@@ -1,7 +1,5 @@
 """Weights on disk: in half precision by their names, or in eight bits, and the same network in all files."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Painted benches: every kind is a picture, labels agree with the geometry, and only the robot and its shadow are new."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Scenes on disk, and the training crops painted from them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Frames that teach a bench: which are picked and rejected, and what is written."""
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Callable
 from dataclasses import replace

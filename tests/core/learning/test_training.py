@@ -1,7 +1,5 @@
 """The training loop on a toy task, its loss and its optimizers."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
@@ -38,7 +36,7 @@ def _toy_training(folder: Path, steps: int, *, end_weight: float = 0.0, **kwargs
         threads=1,
         end_weight=end_weight,
     )
-    return train(network, FrameCrops(find_samples([folder]), plan), plan, **kwargs)  # type: ignore[arg-type]
+    return train(network, FrameCrops(find_samples([folder]), plan), plan, **kwargs)
 
 
 def test_training_learns_a_toy_task_and_reports(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Pictures of a drawn bench: a board with structure, a forked lumen, and a robot that comes from the left border."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

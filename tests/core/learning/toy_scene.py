@@ -1,7 +1,5 @@
 """A scene of one straight tube."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from core.learning.scenes import BenchScene

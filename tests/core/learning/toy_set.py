@@ -1,7 +1,5 @@
 """A labelled set of drawn boards."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

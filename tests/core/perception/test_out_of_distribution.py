@@ -318,7 +318,6 @@ def test_what_a_model_knows_is_kept_in_its_manifest_and_used(model: Path) -> Non
     for one, told in (*asked, (open_pipeline(smaller), False), (open_pipeline(smaller).with_config(config), True)):
         for scene in (one(Frame(0, 0.0, pictures(1)[0])), one.perceive_single(Frame(0, 0.0, pictures(1)[0]))):
             # At another size than it was learnt at nobody can tell.
-            assert scene.masks is not None
             assert scene.masks.vessel.any()
             assert (scene.novelty is not None) is told
 
@@ -360,7 +359,6 @@ def test_the_shipped_model_knows_the_twin_on_every_engine() -> None:
         one.insert(60.0)
     images = [one.frame().image for one in world]
     familiarity = read_model_info(MODELS / "default").familiarity
-    assert familiarity is not None
     exact, eight_bit, torch_s = (
         OpenVinoSegmenter(MODELS / "default", 1, "fp32"),
         OpenVinoSegmenter(MODELS / "default", 1, "int8"),

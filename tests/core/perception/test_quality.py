@@ -20,7 +20,7 @@ PIECE = Centerline(np.array([[100.0, 62.0], [140.0, 62.0]]), (120.0, 62.0), 20.0
 
 def path(line: Points = LINE, **more: float | None) -> RobotPath:
     values: dict[str, float | None] = {"score": 1.3, "runner_up": None, "bridged_px": 0.0, "radius_px": 4.0} | more
-    return RobotPath(points=line, entry_on_border=True, **values)  # type: ignore[arg-type]
+    return RobotPath(points=line, entry_on_border=True, **values)
 
 
 def masks(vessel_from: int = 0, vessel_probability: float = 1.0, robot_probability: float = 1.0) -> Masks:
@@ -86,7 +86,6 @@ def test_wall_blur_is_of_what_lies_beside_the_head_and_known_everywhere() -> Non
 def test_a_halo_is_no_vessel() -> None:
     halo = replace(masks(), vessel_probability=np.where(masks().vessel, np.float32(0.6), np.float32(0.3)))
     refusal = quality.check_walls(halo, (120.0, 60.0), LIMITS)
-    assert refusal is not None
     assert refusal.reason is Reason.NO_VESSEL
     assert "(at most 12.0 px)" in refusal.detail
     assert quality.check_walls(halo, (120.0, 60.0), QualityConfig(enabled=False)) is None
@@ -112,7 +111,6 @@ def test_sharpness_depends_on_blur_and_not_on_exposure_or_noise() -> None:
 
 def test_an_image_without_pixels() -> None:
     refusal = quality.check_image(np.zeros((0, 0, 3), np.uint8), LIMITS)
-    assert refusal is not None
     assert refusal.reason is Reason.UNREADABLE
 
 
@@ -142,7 +140,6 @@ def test_no_graph_is_no_vessel_where_the_graph_is_asked() -> None:
     nothing = VesselGraph(np.empty((0, 2)), ())
     some = VesselGraph(LINE[[0, -1]], (GraphEdge(0, 1, LINE, np.full(len(LINE), 20.0)),))
     refusal = quality.check_graph(nothing, CONFIG.vectors)
-    assert refusal is not None
     assert refusal.reason is Reason.NO_VESSEL
     assert quality.check_graph(some, CONFIG.vectors) is None
     assert quality.check_graph(nothing, CONFIG.vectors.model_copy(update={"vessel_rule": "window"})) is None

@@ -39,13 +39,13 @@ def perceive(
 
 
 def path_of(robot: np.ndarray, **more: object) -> RobotPath:
-    path = perceive(robot, **more)  # type: ignore[arg-type]
+    path = perceive(robot, **more)
     assert isinstance(path, RobotPath), str(path)
     return path
 
 
 def reason_of(robot: np.ndarray, **more: object) -> Reason:
-    refusal = perceive(robot, **more)  # type: ignore[arg-type]
+    refusal = perceive(robot, **more)
     assert isinstance(refusal, Refusal)
     assert refusal.detail
     return refusal.reason
@@ -81,15 +81,13 @@ def test_a_whole_robot_to_a_fraction_of_a_pixel() -> None:
 
 
 @pytest.mark.parametrize("radius", [2.0, 3.0, 5.0, 7.0])
-@pytest.mark.parametrize("angle_deg", [0, 30, 75, 110, 160, 200, 255, 310])
+@pytest.mark.parametrize("angle_deg", [0, 75, 160, 310])
 def test_head_and_direction_of_any_robot_in_any_direction(radius: float, angle_deg: float) -> None:
     line = turned(angle_deg, curve((120, 240), (240, 225), (330, 250), (400, 300)))
     previous = RobotPath(line, 1.0, None, False, 0.0, radius)  # tells head from tail: neither is at the border
     path = path_of(probability(depth(line, radius)), before=PreviousPath(previous))
     assert path.head == pytest.approx(tuple(line[-1]), abs=0.8)
     found, true = fit_robot_vector(path.points, 40.0), fit_robot_vector(line, 40.0)
-    assert found is not None
-    assert true is not None
     cosine = float(np.dot(found.direction, true.direction))
     assert np.degrees(np.arccos(min(cosine, 1.0))) < 1.0
 

@@ -29,28 +29,6 @@ def topology(mask: Mask) -> tuple[int, int]:
     return label(framed, EIGHT)[1], label(~framed)[1] - 1
 
 
-def test_a_bar_becomes_its_middle_line() -> None:
-    bar = art("""
-............
-.##########.
-.##########.
-.##########.
-............
-""")
-    assert not thin(bar)[[1, 3], 3:9].any()
-    assert thin(bar)[2, 3:9].all()
-
-
-@settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10**6), sigma=st.floats(0.8, 4.0), share=st.floats(0.2, 0.8))
-def test_thinning_keeps_components_and_loops(seed: int, sigma: float, share: float) -> None:
-    noise = gaussian_filter(np.random.default_rng(seed).random((60, 80)), sigma)
-    mask = noise > np.quantile(noise, share)
-    skeleton = thin(mask)
-    assert topology(skeleton) == topology(mask)
-    assert not (skeleton & ~mask).any()
-
-
 @pytest.mark.parametrize("shape", [(481, 641), (480, 640), (360, 640), (200, 131)])
 def test_half_size_thinning_keeps_loops_and_narrow_walls(shape: tuple[int, int]) -> None:
     mask = np.zeros(shape, bool)
@@ -64,7 +42,7 @@ def test_half_size_thinning_keeps_loops_and_narrow_walls(shape: tuple[int, int])
     assert not (skeleton & ~mask).any()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 10**6), sigma=st.floats(0.0, 5.0), share=st.floats(0.05, 0.95), height=st.integers(1, 60))
 def test_thinning_is_scikit_images_pixel_for_pixel(seed: int, sigma: float, share: float, height: int) -> None:
     noise = gaussian_filter(np.random.default_rng(seed).random((height, 47)), sigma)

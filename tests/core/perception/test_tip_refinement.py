@@ -1,7 +1,5 @@
 """The second look: where it goes, what it changes, and how its network is taught and kept."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle
@@ -100,14 +98,6 @@ def test_where_nothing_is_a_robot_the_likeliest_place_is_looked_at() -> None:
     assert find_tips(faint * 0.1) == []
 
 
-@pytest.mark.parametrize(
-    ("place", "expected"), [((320, 240), (240, 160, 160, 160)), ((3, 470), (0, 320, 160, 160)), ((639, 0), (480, 0, 160, 160))]
-)
-def test_windows_stay_in_the_picture(place: tuple[float, float], expected: tuple[int, ...]) -> None:
-    assert window_around(place, (640, 480), WINDOW_PX) == expected
-    assert window_around(place, (100, 120), WINDOW_PX) == (0, 0, 100, 120)
-
-
 def test_a_tip_that_was_missed_is_found_and_followed() -> None:
     truth, seen = bar(0, 420), bar(0, 300)
     near = Near()
@@ -190,7 +180,6 @@ def test_a_network_that_is_given_a_first_look_says_at_first_what_it_said() -> No
             torch.testing.assert_close(wider(torch.cat([picture, first], dim=1)), expected)
     wider.train()(torch.rand(2, 5, 64, 64)).square().mean().backward()
     gradient = wider.encoder[0][0].weight.grad
-    assert gradient is not None
     assert float(gradient[:, 12:].abs().sum()) > 0, "it can learn to mind it"
     with pytest.raises(ValueError, match="already"):
         with_prior_planes(wider)
@@ -233,16 +222,6 @@ def test_windows_are_shown_with_their_labels_and_the_first_look(tmp_path: Path) 
     assert has_end > 30
     again = pickle.loads(pickle.dumps(TipCrops(samples, looks, plan)))  # as it comes to a loader that was spawned
     assert all(one.equal(other) for one, other in zip(crops[7], again[7], strict=True))
-
-
-def test_what_the_first_look_got_wrong_is_shown(tmp_path: Path) -> None:
-    """The first look is blind: without its errors, nobody would know where to look."""
-    samples = _samples(tmp_path, 1)
-    looks = [PriorViews.at(samples[0], sees(np.zeros(SIZE, np.float32)))]
-    assert looks[0].first.places == ()
-    crops = TipCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0))
-    shown = sum(bool(crops[index][1][1].any()) for index in range(100))
-    assert shown > 40
 
 
 def test_wrong_are_pieces_missed_or_invented_and_not_the_blur_of_an_edge(tmp_path: Path) -> None:
@@ -390,11 +369,6 @@ def test_every_engine_can_look_again(model: Path, device: str, precision: str) -
     assert vessel.shape == robot.shape == (160, 160)
     first = OpenVinoSegmenter(model, 1, "fp32")(planes[:, :, :3])
     assert np.abs(robot - first[1]).max() < 0.05, "untaught, it says what the first look says"
-
-
-def test_a_second_look_comes_along_when_the_first_is_trained_on(model: Path, tmp_path: Path) -> None:
-    save_model(DualUNet(TINY).eval(), tmp_path / "tuned", training={}, figures={}, second_look=model / SECOND_LOOK)
-    assert open_second_look(SegmentationConfig(model=str(tmp_path / "tuned"))) is not None
 
 
 def test_it_can_be_left_out_and_need_not_be_there(model: Path) -> None:

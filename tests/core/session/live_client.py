@@ -3,8 +3,6 @@
 ``python live_client.py URL TOPIC,TOPIC`` receives a message of each topic; the WebSocket is that of Tornado.
 """
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import json

@@ -3,8 +3,6 @@
 Arguments: folder, frames per second.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import time

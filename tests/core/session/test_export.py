@@ -1,7 +1,5 @@
 """Exports: opened again by what reads them."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import os
@@ -104,7 +102,6 @@ def test_colons_in_a_relative_path_name_no_protocol(tmp_path: Path, monkeypatch:
     with SessionReader(session) as reader:
         assert reader.wait(20.0)
         frame = reader.frame(4)
-        assert frame is not None
         assert number_in(frame.image) == 4
         assert export_mp4(reader, Path("clip:1.mp4")) == 5
     assert recover(session, Path("copy:1")).pictures == 5

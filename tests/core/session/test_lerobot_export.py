@@ -1,7 +1,5 @@
 """Sessions as a LeRobotDataset: every part of the documented layout v3.0, read by pyarrow and PyAV."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

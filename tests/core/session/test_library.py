@@ -1,7 +1,5 @@
 """The library: sessions are found and summed up, broken ones too; the cache is never needed."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -29,7 +27,7 @@ def make(folder: Path) -> Path:
     return saved
 
 
-def whole(session: Path):  # type: ignore[no-untyped-def]
+def whole(session: Path):
     with SessionReader(session) as reader:
         assert reader.wait(10.0)
         return whole_summary(reader)

@@ -1,7 +1,5 @@
 """Live output: received by clients that we did not write, in processes of their own; nothing waits for them."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math
@@ -74,7 +72,6 @@ def test_a_client_in_another_process_sees_all_and_can_ask_for_nothing() -> None:
             output.add_event(Event(now_s, EventKind.NOTE, "mark 1"))
             index += 1
             time.sleep(0.02)
-        assert client.stdout is not None
         told = json.loads(client.stdout.read())
     output.close()
     assert (told["protocol"], told["capabilities"]) == ("foxglove.sdk.v1", [])
@@ -118,7 +115,6 @@ def test_a_client_that_never_reads_costs_frames_and_bounded_memory(server: Foxgl
     frame, count = bytes(400_000), 600  # 240 MB
     monkeypatch.setattr(mcap_export, "jpeg_of", lambda *_: frame)
     channel = server._messages._image
-    assert channel is not None
     with subscribed(port_of(server), channel.id()):
         while not channel.has_sinks():
             time.sleep(0.005)
@@ -202,7 +198,7 @@ def test_stamps_are_real_times_and_never_go_back() -> None:
 
 def test_an_error_in_the_receiver_ends_it_alone(caplog: pytest.LogCaptureFixture) -> None:
     receiver, ended = StuckReceiver(), threading.Event()
-    receiver.send = None  # type: ignore[method-assign,assignment]
+    receiver.send = None
     output = LiveOutput(lambda: receiver)
     output.on_change = lambda: output.problem and ended.set()
     output.put(tick_of(0, 0.0))
@@ -256,7 +252,6 @@ def test_lsl_inlets_in_another_process_get_poses_and_markers() -> None:
             output.add_event(Event(now_s, EventKind.NOTE, "mark 1"))
             index += 1
             time.sleep(0.02)
-        assert inlets.stdout is not None
         poses, marks, about = json.loads(inlets.stdout.read())
     output.close()
     (refused, _), (seen, _) = poses

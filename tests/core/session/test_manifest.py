@@ -1,7 +1,5 @@
 """What a session is about: in its manifest, changed beside it, and remembered for the next one."""
 
-from __future__ import annotations
-
 import errno
 import json
 from dataclasses import replace
@@ -36,7 +34,7 @@ ANA = Description(operator="Ana", task="loop", condition="shared", phantom="sili
 
 
 def about(kind: str, phantom: str, description: Description = ANA) -> Description:
-    made = About(kind, "bench", phantom=phantom, description=description)  # type: ignore[arg-type]
+    made = About(kind, "bench", phantom=phantom, description=description)
     return new_manifest(made, "id", datetime.now(UTC), 0.0, "lossy").description
 
 
@@ -72,7 +70,6 @@ def test_a_session_of_before_has_no_description(tmp_path: Path) -> None:
     (session / MANIFEST).write_text(json.dumps(content))
     with SessionReader(session) as reader:
         assert (reader.description, reader.problems) == (Description(), ())
-        assert reader.manifest is not None
         assert reader.manifest.program == ""
 
 

@@ -1,7 +1,5 @@
 """MCAP exports, read by mcap's own reader, protobuf and the decoder of mcap-ros2-support."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Files of earlier versions are read as those versions read them (``tests/data/old_version/README.txt``)."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

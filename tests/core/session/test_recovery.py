@@ -1,7 +1,5 @@
 """Sessions that were cut or damaged: read as far as they go, told what is wrong, recovered into a copy, the original untouched."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json
@@ -439,7 +437,6 @@ def test_damage_at_random_is_survived(whole: Path, tmp_path: Path) -> None:
 def record_and_kill(folder: Path, after_s: float, fps: float = 60.0) -> int:
     """Record in another process and kill it; returns the last frame that it handed over."""
     child = subprocess.Popen([sys.executable, str(CHILD), str(folder), str(fps)], stdout=subprocess.PIPE, text=True)
-    assert child.stdout is not None
     assert child.stdout.readline() == "0\n"
     time.sleep(after_s)
     child.kill()

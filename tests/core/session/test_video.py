@@ -1,7 +1,5 @@
 """Videos of other programs: damaged tags, odd orders, odd shapes, pictures that are turned or mirrored."""
 
-from __future__ import annotations
-
 import struct
 from fractions import Fraction
 from pathlib import Path
@@ -101,7 +99,6 @@ def test_damage_in_an_avi_loses_no_count_and_moves_no_whole_picture(place: int, 
             continue
         except EndOfStream:
             break
-        assert frame is not None
         whole.append((frame.captured_s, float(frame.image.mean())))
     video.close()
     assert len(whole) + damaged == 30
@@ -124,7 +121,7 @@ def test_pixels_of_an_absurd_shape_are_taken_for_square(aspect: str, tmp_path: P
         sample_aspect_ratio = Fraction(aspect)
 
     frame = av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="rgb24")
-    assert upright(frame, Stream()).shape == ((48, 128, 3) if aspect == "2/1" else (48, 64, 3))  # type: ignore[arg-type]
+    assert upright(frame, Stream()).shape == ((48, 128, 3) if aspect == "2/1" else (48, 64, 3))
 
 
 @pytest.mark.parametrize(
@@ -151,7 +148,6 @@ def test_pictures_are_turned_and_mirrored_as_the_file_says(matrix: tuple[int, in
     video.open()
     frame = video.read(1.0)
     video.close()
-    assert frame is not None
     height, width = frame.image.shape[:2]
     assert (width, height) == ((64, 48) if matrix[0] else (48, 64))
     places = {

@@ -1,7 +1,5 @@
 """The recorder: nothing is lost without being reported, its sender never waits, and a disk that fails stops it visibly."""
 
-from __future__ import annotations
-
 import errno
 import math
 import os
@@ -33,19 +31,19 @@ from tests.core.session_data import ABOUT, QUICK, SIZE, drive_of, number_in, rec
 
 
 def ticks(count: int, start: int = 0, fps: float = 30.0, **options: object) -> list[Tick]:
-    return [tick_of(i, 1000.0 + i / fps, **options) for i in range(start, start + count)]  # type: ignore[arg-type]
+    return [tick_of(i, 1000.0 + i / fps, **options) for i in range(start, start + count)]
 
 
 @contextmanager
 def writer_in(folder: Path, config: object = QUICK) -> Iterator[SessionWriter]:
-    writer = SessionWriter(config, ABOUT, folder=folder, clock=lambda: 1002.0)  # type: ignore[arg-type]
+    writer = SessionWriter(config, ABOUT, folder=folder, clock=lambda: 1002.0)
     try:
         yield writer
     finally:
         assert writer.close()
 
 
-def replace_config(**changes: object):  # type: ignore[no-untyped-def]
+def replace_config(**changes: object):
     return QUICK.model_copy(update=changes)
 
 
@@ -74,7 +72,6 @@ def test_every_frame_has_its_row_and_its_own_picture(tmp_path: Path) -> None:
         assert reader.is_closed
         for place in (0, 1, 29, 30, 31, 69, 68, 5):
             frame = reader.frame(place)
-            assert frame is not None
             assert (frame.index, number_in(frame.image)) == (place, place)
         assert reader.problems == ()
 
@@ -139,9 +136,7 @@ def test_a_new_video_begins_when_the_size_changes_and_when_it_is_long(tmp_path: 
         assert sorted(set(line.video.tolist())) == [0, 1, 2]
         assert [int(line.pts_ms[line.video == video][0]) for video in (0, 1, 2)] == [0, 0, 0]
         frame, last = reader.frame(35), reader.frame(43)
-        assert frame is not None
         assert number_in(frame.image) == 35
-        assert last is not None
         assert last.image.shape == (63, 97, 3)
 
 
@@ -152,7 +147,6 @@ def test_lossless_keeps_every_pixel(tmp_path: Path) -> None:
     session = record(tmp_path, [tick], replace_config(codec="lossless"))
     with opened(session) as reader:
         frame = reader.frame(0)
-        assert frame is not None
         assert np.array_equal(frame.image, noise)
 
 
@@ -436,8 +430,6 @@ def test_the_last_seconds_are_saved_without_having_recorded(tmp_path: Path) -> N
     assert (manifest.origin, manifest.closed) == ("last seconds", True)
     with opened(session) as reader:
         first, last = reader.frame(0), reader.frame(len(reader) - 1)
-        assert first is not None
-        assert last is not None
         assert (last.index, number_in(last.image)) == (149, 149)
         assert number_in(first.image) == first.index
         # at least what was asked for, at most a group of pictures more
@@ -542,7 +534,6 @@ def test_a_recording_and_the_last_seconds_share_one_encoder(tmp_path: Path) -> N
         assert (len(recorded), len(ring)) == (25, 30)
         for reader, place, number in ((recorded, 0, 10), (recorded, 24, 34), (ring, 0, 0), (ring, 29, 29), (ring, 11, 11)):
             frame = reader.frame(place)
-            assert frame is not None
             assert number_in(frame.image) == number
 
 
