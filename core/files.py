@@ -113,10 +113,7 @@ class ImageError(UserError):
 def read_image(path: Path) -> Image:
     """The picture as RGB uint8 (H, W, 3); of an animation its first image.
 
-    Raises
-    ------
-    ImageError
-        Missing, empty, truncated, not a picture, or larger than ``MAX_PIXELS``.
+    Raises ImageError: missing, empty, truncated, not a picture, or larger than ``MAX_PIXELS``.
     """
     try:
         data = path.read_bytes()

@@ -63,20 +63,17 @@ def agreement_report(
 ) -> dict[str, Any]:
     """Agreement within and between raters.
 
+    Returns a dictionary. ``raters``: each rater's first against second measure (``angle`` with limits of agreement and ICC,
+    ``state`` with kappa), and the SD of one measure, over all repeats. ``within``: that SD over all raters. ``pairs``: two raters'
+    first measures of the same images, likewise. ``between``: over all raters that measured the same images, SD of a rater's measure
+    about the image's mean, and ICC(2,1). Undefined figures: None.
+
     Parameters
     ----------
     annotations : finished ones of one study.
     names : image names by SHA-256, for the list of measures.
     seed : of the bootstrap intervals.
     groups : session or phantom of each image by SHA-256, None: not known; images of one are alike, and drawn together.
-
-    Returns
-    -------
-    dict
-        ``raters``: each rater's first against second measure (``angle`` with limits of agreement and ICC, ``state`` with kappa),
-        and the SD of one measure, over all repeats. ``within``: that SD over all raters. ``pairs``: two raters' first measures of
-        the same images, likewise. ``between``: over all raters that measured the same images, SD of a rater's measure about the
-        image's mean, and ICC(2,1). Undefined figures: None.
     """
     draw = _Draw(seed, groups or {})
     table = {(one.key.rater, one.key.sha256, one.key.repeat): one for one in annotations}
@@ -312,14 +309,11 @@ def measured_alike(
 ) -> tuple[list[StoredAnnotation], list[str]]:
     """The annotations with angle, side and distances of their lines as `config` fits them; states stay as they were given.
 
+    Returns the annotations, and a note for the reader where some of the angles were others when they were drawn.
+
     Parameters
     ----------
     images : by SHA-256; annotations of others stay as they were kept.
-
-    Returns
-    -------
-    tuple
-        The annotations, and a note for the reader where some of the angles were others when they were drawn.
     """
     alike = [_measured(one, images[one.key.sha256].size, config) if one.key.sha256 in images else one for one in annotations]
     others = sum(not _is_same(was.theta_deg, now.theta_deg) for was, now in zip(annotations, alike, strict=True))

@@ -41,22 +41,16 @@ def export_training_set(
 ) -> tuple[int, list[str]]:
     """Write ``images/``, ``masks/`` and ``truth.jsonl`` as ``train --data`` and ``evaluate`` read them.
 
+    Raises AnnotationError: the folder is not empty or cannot be written, or there is nothing to write; the images were measured in
+    several studies; or `go_on`, asked before each image, is False.
+
+    Returns the number of frames written, and one line for each annotated image that was left out. An image with only one of the two
+    masks is left out: without its mask a robot that is there would be taught as background.
+
     Parameters
     ----------
     annotations : whose masks count, of any study.
     measured : finished answers of one study, whose angles and states go along; None: those among `annotations`.
-
-    Returns
-    -------
-    tuple
-        Number of frames written, and one line for each annotated image that was left out. An image with only one of the two masks
-        is left out: without its mask a robot that is there would be taught as background.
-
-    Raises
-    ------
-    AnnotationError
-        The folder is not empty or cannot be written, or there is nothing to write; the images were measured in several studies; or
-        `go_on`, asked before each image, is False.
     """
     sources = mask_source(annotations)
     here = {image.sha256: image for image in images}
@@ -178,10 +172,8 @@ def split_own_frames(
     The held-out images are neighbours in the order of names: pictures of one video are alike, and one between two that are trained
     on would not be independent. Angles and states go along where they are of one study.
 
-    Raises
-    ------
-    AnnotationError
-        Too few images with both masks are here, `out` is not empty, or cannot be written; or `go_on` has become False.
+    Raises AnnotationError: too few images with both masks are here, `out` is not empty, or cannot be written; or `go_on` has become
+    False.
     """
     here = {image.sha256: image for image in images}
     complete = sorted((sha256 for sha256 in _complete(annotations) if sha256 in here), key=lambda one: str(here[one].path))

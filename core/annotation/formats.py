@@ -71,15 +71,12 @@ class Format:
 def read_files(paths: Iterable[Path], images: Iterable[FoundImage]) -> tuple[list[Imported], list[str]]:
     """Read files of the formats in ``FORMATS``, told apart by ending and content.
 
+    Returns what was read, and one line for each thing that was not.
+
     Parameters
     ----------
     paths : files.
     images : those that the annotations may belong to; a file's image is found among them by its name.
-
-    Returns
-    -------
-    tuple
-        What was read, and one line for each thing that was not.
     """
     read = _Reading(images)
     for path in paths:

@@ -244,15 +244,13 @@ def image_sha256(path: Path) -> str:
 class AnnotationStore:
     """One open annotation file. Its methods may be called from any thread, and each is one transaction.
 
+    Raises AnnotationError: from every method: file missing, damaged, locked, of another kind or of a newer version, or the disk
+    full.
+
     Parameters
     ----------
     path : the file; it is made unless it exists.
     read_only : the file must exist then.
-
-    Raises
-    ------
-    AnnotationError
-        From every method: file missing, damaged, locked, of another kind or of a newer version, or the disk full.
     """
 
     def __init__(self, path: Path, *, read_only: bool = False) -> None:

@@ -116,14 +116,12 @@ def bench_from_pictures(
     They may differ in noise, exposure and focus, and other things may lie in one of them: where sharp pictures differ, the
     median of three or more counts, and of two the place is not known.
 
+    Raises BenchError: pictures of different size or of different benches, all of them out of focus, or a mask that cannot be a
+    vessel.
+
     Parameters
     ----------
     vessel : the lumen, drawn at the pictures' size, bool (H, W).
-
-    Raises
-    ------
-    BenchError
-        Pictures of different size or of different benches, all of them out of focus, or a mask that cannot be a vessel.
     """
     if not pictures:
         raise BenchError("a bench needs a picture of the empty bench")
@@ -176,17 +174,14 @@ def bench_from_frames(
 ) -> Bench:
     """The bench as most of the frames show it, with the robot in another place in each, where no empty picture can be taken.
 
+    Raises BenchError: fewer than three frames, of different sizes or benches, or the robot lies still.
+
     Parameters
     ----------
     frames : RGB uint8 (H, W, 3), of one size.
     vessel : the lumen, drawn at the frames' size, bool (H, W).
     robots : a network's robot probability (h, w) of each frame at working size; without them a place where the robot lies in all
         frames is taken for the empty bench.
-
-    Raises
-    ------
-    BenchError
-        Fewer than three frames, of different sizes or benches, or the robot lies still.
     """
     if len(frames) < _LEAST_FRAMES:
         raise BenchError(message("{count} frames are too few: move the robot to three places", count=len(frames)))

@@ -111,14 +111,12 @@ class _Level:
 def register(image: Image, bench: Bench, previous: BenchView | None = None) -> BenchView | Refusal:
     """The bench as it must look in `image` (h, w, 3), a picture at working size.
 
+    Returns a refusal (BENCH_MOVED, OTHER_BENCH) where the camera was moved by more than ``MAX_SHIFT_PX``, ``MAX_ROTATION_DEG`` or
+    ``MAX_SCALING``, the drawn vessel was moved on its board, or the picture is not of this bench.
+
     Parameters
     ----------
     previous : of an earlier picture of the same camera; its place is tried first, and kept where the picture is still there.
-
-    Returns
-    -------
-    A refusal (BENCH_MOVED, OTHER_BENCH) where the camera was moved by more than ``MAX_SHIFT_PX``, ``MAX_ROTATION_DEG`` or
-    ``MAX_SCALING``, the drawn vessel was moved on its board, or the picture is not of this bench.
     """
     height, width = bench.empty.shape[:2]
     if image.shape != bench.empty.shape:

@@ -92,15 +92,12 @@ def undistorted(image: Image, places: NDArray[np.int16], shares: NDArray[np.uint
 def fit_lens(views: Sequence[BoardView], size: tuple[int, int]) -> LensConfig:
     """The lens that makes all boards flat, by least squares.
 
+    Raises LensError: too few points, or no lens explains them.
+
     Parameters
     ----------
     views : pictures of the same camera; their points should reach far into the picture's corners.
     size : (width, height) of the pictures.
-
-    Raises
-    ------
-    LensError
-        Too few points, or no lens explains them.
     """
     count = sum(len(view.pixels) for view in views)
     if not views or count < _MIN_POINTS:
@@ -196,10 +193,7 @@ def board_bitmap(spec: BoardSpec, pixels_per_square: int = 32) -> NDArray[np.uin
 def find_board(image: Image, spec: BoardSpec) -> BoardView:
     """The board's inner corners in a picture (H, W, 3).
 
-    Raises
-    ------
-    BoardError
-        Fewer than twelve corners are seen, or all of them lie in a line.
+    Raises BoardError: fewer than twelve corners are seen, or all of them lie in a line.
     """
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) if image.ndim == 3 else image
     corners, ids, markers, _ = _detector(spec).detectBoard(grey)
@@ -275,10 +269,7 @@ def scale_of_board(views: Sequence[BoardView], size: tuple[int, int]) -> ScaleCo
 def scale_of_clicks(first: Point, second: Point, length_mm: float, size: tuple[int, int]) -> ScaleConfig:
     """The scale from a known length between two places of the picture.
 
-    Raises
-    ------
-    ScaleError
-        The length is not positive, or the places are too near to each other.
+    Raises ScaleError: the length is not positive, or the places are too near to each other.
     """
     if not (math.isfinite(length_mm) and length_mm > 0.0):
         raise ScaleError("give the length between the two places in millimetres")

@@ -53,10 +53,7 @@ class Look:
     ``scale`` is working pixels per source pixel: measurements are in working pixels, in which the network's noise does not depend
     on the camera's resolution.
 
-    Raises
-    ------
-    HeadNotSeen
-        Fewer than three paths were found, or they are too short to have a direction.
+    Raises HeadNotSeen: fewer than three paths were found, or they are too short to have a direction.
     """
 
     paths: tuple[Points, ...]
@@ -335,10 +332,7 @@ def classify(wiggle: Wiggle) -> ServoFinding | None:
 def assign(found: Mapping[int, ServoFinding]) -> tuple[Assignment, ...]:
     """Names for seven servos by id, in the order of ``JOINT_NAMES``.
 
-    Raises
-    ------
-    NotIdentified
-        A function is missing, or several servos have the same one.
+    Raises NotIdentified: a function is missing, or several servos have the same one.
     """
     wanted: tuple[tuple[Function, tuple[JointName, ...]], ...] = (
         (Function.RIGHT, ("right",)),
@@ -485,10 +479,7 @@ def taut_at_mm(steps: Sequence[TautReading]) -> float:
     The head stays while the wire is slack, and then follows it: sideways in proportion to the pull; out of the image plane by a
     shortening that grows with its square, whose root is linear, too. So the start of the line is fitted, without a threshold.
 
-    Raises
-    ------
-    NeverTaut
-        Fewer than two steps moved the head, or all of them did: then it was taut somewhere before the first.
+    Raises NeverTaut: fewer than two steps moved the head, or all of them did: then it was taut somewhere before the first.
     """
     sideways = max(abs(step.move.lateral_px) for step in steps) >= _ENOUGH_SIDEWAYS_PX
     least = _LEAST_SIDEWAYS_PX if sideways else math.sqrt(_LEAST_SHORTENING_PX)

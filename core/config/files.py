@@ -136,20 +136,14 @@ _HEAD = "# LumenPilot's settings: only what differs from the defaults. Every key
 def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
     """Write what differs from the defaults, atomically, also when the power goes.
 
+    Raises ConfigError: the file cannot be written; the old one is as it was.
+
+    Returns nothing, or one line about where the old file is kept.
+
     Parameters
     ----------
     path : the file, made if it is missing; a link is followed.
     seen : the text that the file had when the change of `config` began; None: not read.
-
-    Returns
-    -------
-    str
-        Empty, or one line about where the old file is kept.
-
-    Raises
-    ------
-    ConfigError
-        The file cannot be written; the old one is as it was.
     """
     path = Path(os.path.realpath(path))
     try:

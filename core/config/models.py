@@ -509,10 +509,7 @@ def _one_line(path: str, error: ValidationError) -> str:
 def load_config(path: Path | None = None, preset: str | None = None, overrides: dict[str, Any] | None = None) -> Config:
     """The configuration from its layers: default, `preset`, the user's file at `path`, `overrides` (nested dictionaries).
 
-    Raises
-    ------
-    ConfigError
-        With file, key and allowed range in one line.
+    Raises ConfigError: with file, key and allowed range in one line.
     """
     data: dict[str, Any] = {}
     layers = [RESOURCES / "config" / "default.toml"]

@@ -109,11 +109,8 @@ def predict(scene: Scene, advice: Advice, horizon_s: float, pixels_per_mm: float
 
     Forwards the head follows an arc that has turned by ``steer_deg`` at its end; backwards it comes back along the robot.
 
-    Returns
-    -------
-    Points
-        (N, 2) in working px, N >= 2, from the head onwards; 16 px long at least. None without a pose, and when the advice is to
-        stay.
+    Returns points (N, 2) in working px, N >= 2, from the head onwards; 16 px long at least. None without a pose, and when the
+    advice is to stay.
     """
     if scene.pose is None or scene.path is None:
         return None

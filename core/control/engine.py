@@ -67,12 +67,8 @@ class Engine:
         A lost camera that reconnects by itself does not end the turns, and one that is lost for good only where there is no
         pilot: an operator with a robot in a vessel must be able to bring it back by hand. ``problem`` then says what is wrong.
 
-        Raises
-        ------
-        EndOfStream
-            A recording is over.
-        DeviceError
-            The camera is lost for good and there is no pilot, or driving failed.
+        Raises EndOfStream: a recording is over. Raises DeviceError: the camera is lost for good and there is no pilot, or driving
+        failed.
         """
         if self._loop is not None and self._loop.failure is not None:
             raise DeviceError(self._loop.failure)

@@ -272,17 +272,14 @@ def gate_step(
 ) -> GateStep:
     """One tick of the gate.
 
+    Returns either a rejection with a hold, or goals of all joints inside every limit, with a record of what was limited.
+
     Parameters
     ----------
     state : as returned by the last tick.
     request, measurement : the newest ones, or None.
     permitted : the source that the supervisor permits now.
     now_s : monotonic clock of the frames and commands.
-
-    Returns
-    -------
-    GateStep
-        Either a rejection with a hold, or goals of all joints inside every limit, with a record of what was limited.
     """
     if measurement is not None and _not_all_numbers(measurement.positions_mm, servos) is None:
         if permitted is Source.PROGRAM:

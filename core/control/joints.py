@@ -100,18 +100,15 @@ def joint_goals(
 ) -> JointRequest:
     """The goals of a command now.
 
+    All goals are NaN when a number of the command or the time is not finite: the gate rejects NaN by name, while a clamp
+    would turn it into full speed (``min(1.0, nan)`` is 1.0). A pause counts as the maximal age of a command at most.
+
     Parameters
     ----------
     command : bend and pitch beyond -1..1 and speeds beyond the joint's are limited.
     last : what the gate sent last in this motion (``GateState.sent``); None after a start or a hold: then the goals are the
         measured positions, as the first goal moves nothing.
     measured_mm : positions of the joints.
-
-    Returns
-    -------
-    JointRequest
-        All goals are NaN when a number of the command or the time is not finite: the gate rejects NaN by name, while a clamp
-        would turn it into full speed (``min(1.0, nan)`` is 1.0). A pause counts as the maximal age of a command at most.
     """
     numbers = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s, command.rotation_deg_s, now_s)
     if not all(math.isfinite(number) for number in numbers):
@@ -377,17 +374,14 @@ def limited_goal(
 ) -> Goal:
     """The goal nearest to `asked_mm` that the joint's limits allow, and the tightest limit that was applied.
 
+    The goal is inside envelope and step. It lies further from `last_mm` than the speed allows only when the joint was moved
+    away from its goal; the gate then rejects it.
+
     Parameters
     ----------
     last_mm, speed_mm_s : last goal, inside the envelope, and its speed.
     passed_s : time since the last goal.
     margin_speed_share : of the full speed, on the way outwards inside the warn margin.
-
-    Returns
-    -------
-    tuple
-        The goal is inside envelope and step. It lies further from `last_mm` than the speed allows only when the joint was moved
-        away from its goal; the gate then rejects it.
     """
     direction = 1.0 if asked_mm > last_mm else -1.0
     to_end_mm = joint.high_mm - last_mm if direction > 0 else last_mm - joint.low_mm

@@ -243,17 +243,14 @@ def summarise_looks(
 ) -> dict[str, Any]:
     """The main figures of every family of looks, errors as medians, and their means over the looks.
 
+    Returns ``looks`` (figures by family), ``mean_over_looks`` and, where some were left out, ``mean_over_looks_left_out``.
+
     Parameters
     ----------
     scores : of the frames.
     looks : family of every frame, by its stem.
     unseen : families that training has left out; their mean is separate.
     confident_from : as ``summarise`` has it.
-
-    Returns
-    -------
-    dict
-        ``looks``: figures by family; ``mean_over_looks`` and, where some were left out, ``mean_over_looks_left_out``.
     """
     rows: dict[str, dict[str, Any]] = {}
     for look in sorted({looks[score.stem] for score in scores}):

@@ -227,10 +227,8 @@ class BenchCalibration:
     def run(self, on_progress: Progress, should_stop: Callable[[], bool] = lambda: False) -> TeachingResult | None:
         """Calibrate, and write it to the model; None when stopped, and the model is unchanged then.
 
-        Raises
-        ------
-        OutOfDistributionError, DatasetError, ModelError
-            The frames do not allow it, cannot be read, or the model cannot be written.
+        Raises OutOfDistributionError, DatasetError, ModelError: the frames do not allow it, cannot be read, or the model cannot be
+        written.
         """
         self._done, self._on_progress = 0, on_progress
         truth = poses_of_masks(self._held_out, self._tolerant("never"))

@@ -50,10 +50,7 @@ def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: d
 
     `evidence` is with or without the threshold sensitivity, but the same in all rows.
 
-    Raises
-    ------
-    CalibrationError
-        Too few right or wrong answers to learn from.
+    Raises CalibrationError: too few right or wrong answers to learn from.
     """
     if min(sum(right), len(right) - sum(right)) < _LEAST:
         found = f"{sum(right)} right and {len(right) - sum(right)} wrong answers"
@@ -196,10 +193,7 @@ def signatures_in(
 ) -> Iterator[tuple[KnownPicture, Signature] | None]:
     """Each picture with its signature; None where it cannot be read, is refused before the network sees it, or shows no vessel.
 
-    Raises
-    ------
-    OutOfDistributionError
-        The segmenter tells no signatures.
+    Raises OutOfDistributionError: the segmenter tells no signatures.
     """
     for picture in pictures:
         try:
@@ -238,10 +232,7 @@ def fit_out_of_distribution(
     The limit is what 995 of 1000 pictures keep to (of few, the one at the largest distance) when each half of the groups is judged
     by a fit to the other half: pictures that were fitted to would make it too narrow.
 
-    Raises
-    ------
-    OutOfDistributionError
-        There are less than ``LEAST``, or all are the same.
+    Raises OutOfDistributionError: there are less than ``LEAST``, or all are the same.
     """
     _check_number(len(signatures), "pictures show a vessel")
     first = _first_half(pictures)

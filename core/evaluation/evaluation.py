@@ -115,10 +115,7 @@ def read_measurements(path: Path) -> list[Measurement]:
 
     Commas, semicolons or tabs separate cells, as the header shows; where it is not the comma, numbers may have a decimal comma.
 
-    Raises
-    ------
-    EvaluationError
-        With file, line and column in one line. An image that is there twice is refused: it would count twice.
+    Raises EvaluationError: with file, line and column in one line. An image that is there twice is refused: it would count twice.
     """
     try:
         data = path.read_bytes()
@@ -241,18 +238,14 @@ def angle_pairs(rows: Sequence[Measurement]) -> AnglePairs:
 def evaluate(rows: Sequence[Measurement], seed: int = 0) -> dict[str, Any]:
     """The content of ``metrics.json``.
 
+    Returns ``no_robot`` (images without one, and on how many of them the algorithm gave a pose), ``images``, ``intervals`` (what
+    the bootstrap draws), ``angle``, ``state``, ``manual`` (the two manual measures against each other) and ``notes``: one sentence
+    for each thing that a reader should know. Undefined figures: None, and a note says why.
+
     Parameters
     ----------
     rows : images, measured by hand and by the algorithm; each statistic takes those that have what it needs.
     seed : of the bootstrap intervals.
-
-    Returns
-    -------
-    dict
-        ``no_robot`` (images without one, and on how many of them the algorithm gave a pose), ``images``, ``intervals`` (what the
-        bootstrap draws), ``angle``, ``state``, ``manual`` (the two manual measures against
-        each other) and ``notes``: one sentence for each thing that a reader should know. Undefined figures: None, and a note
-        says why.
     """
     pairs = angle_pairs(rows)
     twice_rows = [row for row in rows if row.angle_1 is not None and row.angle_2 is not None]

@@ -98,18 +98,15 @@ def bootstrap_rows(
 ) -> dict[str, list[float] | None]:
     """95 % intervals of statistics of rows.
 
+    Returns name -> [low, high], or None where n < 2, there are fewer groups than ``MIN_GROUPS``, or the statistic is undefined too
+    often.
+
     Parameters
     ----------
     statistics : takes the columns, each of shape (R, n), and gives statistics of shape (R,) by name.
     columns : one array of shape (n,) per column; rows are drawn whole.
     seed : the same seed gives the same intervals.
     group : of each row, as ``members`` numbers them: whole groups are drawn. None: single rows.
-
-    Returns
-    -------
-    dict
-        Name -> [low, high], or None where n < 2, there are fewer groups than ``MIN_GROUPS``, or the statistic is undefined too
-        often.
     """
     n = len(columns[0])
     if n < 2 or are_too_few(group):
@@ -144,14 +141,11 @@ def _draws(n: int, group: Group, rng: np.random.Generator) -> Iterator[NDArray[n
 def icc_absolute(ratings: Floats) -> Floats:
     """Intraclass correlation ICC(2,1): two-way random effects, absolute agreement, single measure.
 
+    Returns an array of shape (...); NaN where all ratings are equal, or there is only one subject.
+
     Parameters
     ----------
     ratings : shape (..., n, k): n subjects, each measured by k raters.
-
-    Returns
-    -------
-    array
-        Shape (...); NaN where all ratings are equal, or there is only one subject.
 
     References
     ----------
@@ -238,16 +232,13 @@ def _repeat_statistics(first_deg: Floats, second_deg: Floats, spread: Floats) ->
 def within_subject(measures: Sequence[Sequence[Sequence[float]]], seed: int = 0, group: Group = None) -> dict[str, Any]:
     """The within-subject standard deviation of one measure: the root of the mean variance of a rater's repeats of an image.
 
+    Returns ``n`` images with repeats, ``sd_deg`` (None where n is 0) and ``ci95``, its interval.
+
     Parameters
     ----------
     measures : by image, by rater: the measures of it, in degrees. A single measure says nothing.
     seed : of the bootstrap interval; whole images are drawn, or whole groups of them.
     group : of each image, as in ``bootstrap_rows``.
-
-    Returns
-    -------
-    dict
-        ``n`` images with repeats, ``sd_deg`` (None where n is 0) and ``ci95``, its interval.
     """
     squares = np.array([sum(float(np.var(own)) * len(own) for own in image if len(own) > 1) for image in measures], np.float64)
     freedom = np.array([sum(len(own) - 1 for own in image if len(own) > 1) for image in measures], np.float64)
@@ -325,15 +316,12 @@ def fowlkes_mallows_pairs(true: Sequence[str], found: Sequence[str]) -> float | 
 def table_statistics(tables: NDArray[np.int64]) -> dict[str, Floats]:
     """Statistics of many confusion tables at once, for the bootstrap (scikit-learn does one at a time, from labels).
 
+    Returns name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages; one that occurs
+    without a hit counts as 0.
+
     Parameters
     ----------
     tables : shape (R, k, k), rows manual, columns algorithm, each with at least one count.
-
-    Returns
-    -------
-    dict
-        Name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages; one that occurs
-        without a hit counts as 0.
     """
     n = tables.sum((1, 2)).astype(np.float64)
     hits = np.diagonal(tables, axis1=1, axis2=2).astype(np.float64)
@@ -367,20 +355,17 @@ def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0
 
     They are of the bootstrap, that of the accuracy as ``share_interval`` says.
 
+    Returns what ``metrics.json`` has. ``labels`` are those that occur on either side; ``confusion`` has manual rows and algorithm
+    columns. Precision of a class that the algorithm never gave: None, which counts as 0 in the averages (else never to find a class
+    would be better than to find a part of it); recall of a class without a manual label: None, left out of them.
+    ``fowlkes_mallows_pairs`` is the pair-counting index, ``fowlkes_mallows_macro`` the mean over the classes of ``sqrt(precision *
+    recall)``, the formula of the paper's table, with 0 for a class without a hit.
+
     Parameters
     ----------
     manual, algorithm : labels of the same n images.
     seed : of the bootstrap.
     group : of each image, as in ``bootstrap_rows``.
-
-    Returns
-    -------
-    dict
-        As ``metrics.json`` has it. ``labels`` are those that occur on either side; ``confusion`` has manual rows and algorithm
-        columns. Precision of a class that the algorithm never gave: None, which counts as 0 in the averages (else never to find a
-        class would be better than to find a part of it); recall of a class without a manual label: None, left out of them.
-        ``fowlkes_mallows_pairs`` is the pair-counting index, ``fowlkes_mallows_macro`` the mean over the classes of
-        ``sqrt(precision * recall)``, the formula of the paper's table, with 0 for a class without a hit.
     """
     n, labels = len(manual), sorted(set(manual) | set(algorithm))
     if n == 0:

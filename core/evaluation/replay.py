@@ -215,12 +215,9 @@ class ReplayTally:
     def to_json(self) -> dict[str, Any]:
         """As plain JSON values; None where there is nothing to count.
 
-        Returns
-        -------
-        dict
-            ``frames``; ``theta_change_deg`` and ``head_shift_px`` (n, mean, median, p95, max of the absolute change, source
-            pixels); ``states`` with ``labels``, ``matrix`` (rows before, columns after, "-" is no pose) and ``changed``;
-            ``refusals`` gained and lost by reason; ``confidence`` and ``latency_ms`` before and after.
+        Returns ``frames``; ``theta_change_deg`` and ``head_shift_px`` (n, mean, median, p95, max of the absolute change, source
+        pixels); ``states`` with ``labels``, ``matrix`` (rows before, columns after, "-" is no pose) and ``changed``; ``refusals``
+        gained and lost by reason; ``confidence`` and ``latency_ms`` before and after.
         """
         return {
             "frames": self.frames,

@@ -167,16 +167,13 @@ def save_model(
 ) -> ModelInfo:
     """Write ONNX and manifest. The folder appears whole or not at all; an older model of that name is replaced last.
 
+    Raises ModelError: the folder is something else than a model, or cannot be written.
+
     Parameters
     ----------
     examples : typical RGB images at working size, or all planes of the input, from which an eight-bit copy learns ranges and
         rounding; none: there is no copy.
     second_look : folder of a tip refinement's network that is copied into the new one.
-
-    Raises
-    ------
-    ModelError
-        The folder is something else than a model, or cannot be written.
     """
     with _put_in_place(folder) as scratch:
         network = rounded(network)
@@ -221,10 +218,7 @@ def save_with_second_look(base: Path, network: DualUNet, folder: Path, **kwargs:
 def install_model(made: Path, folder: Path, bench: Path | None = None) -> None:
     """Copy a finished model to its place, with the folder of its bench in it; an older model of that name is replaced last.
 
-    Raises
-    ------
-    ModelError
-        The model is damaged, the folder is something else than a model, or cannot be written.
+    Raises ModelError: the model is damaged, the folder is something else than a model, or cannot be written.
     """
     info = read_model_info(made)
     near = second_look_of(made)
@@ -242,10 +236,7 @@ def install_model(made: Path, folder: Path, bench: Path | None = None) -> None:
 def changed(folder: Path) -> Iterator[Path]:
     """A copy of a model to work on, which takes its place in the end; whatever goes wrong leaves the model as it was.
 
-    Raises
-    ------
-    ModelError
-        The model is damaged, or cannot be written.
+    Raises ModelError: the model is damaged, or cannot be written.
     """
     read_model_info(folder)
     if (near := second_look_of(folder)) is not None:
@@ -394,10 +385,7 @@ def _update(folder: Path, changes: dict[str, Any]) -> None:
 def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:
     """Replace the eight-bit copy of a model's network by one made from `examples`; figures measured before are dropped.
 
-    Raises
-    ------
-    ModelError
-        The model is damaged, or there is no picture of the network's stride or more among the examples.
+    Raises ModelError: the model is damaged, or there is no picture of the network's stride or more among the examples.
     """
     network = load_network(folder)[0]
     cuts = whole_strides(examples, network.shape.stride)
@@ -428,10 +416,7 @@ def renew_eight_bit(folder: Path, images: Sequence[Image], on_progress: Callable
 
     Its calibration does not hold any more. `on_progress` is given the share that is done, 0..1.
 
-    Raises
-    ------
-    ModelError
-        The model is damaged, or sees nothing of a robot in these pictures.
+    Raises ModelError: the model is damaged, or sees nothing of a robot in these pictures.
     """
     # In fp32: the copies that are there may be damaged, or the reason for new ones.
     config = SegmentationConfig(model=str(folder), precision="fp32")

@@ -170,10 +170,7 @@ class FrameSelection:
     def pictures(self) -> list[TeachingPicture]:
         """The pictures kept, in their order.
 
-        Raises
-        ------
-        TeachingError
-            There are no pictures, they are of another bench, or the robot lies still in all of them.
+        Raises TeachingError: there are no pictures, they are of another bench, or the robot lies still in all of them.
         """
         if not self._kept:
             if self.refused:
@@ -283,11 +280,8 @@ def structure_of(image: Image, empty: Image, known: Mask, noise: NDArray[np.floa
 
     `noise` : standard deviation of one picture's pixels, (h, w), grey levels.
 
-    Returns
-    -------
-    tuple
-        The focus: the median over cells, 1 where both are alike; noise does not count. And the share of cells that are hidden: they
-        show less than ``_HIDDEN`` of it.
+    Returns the focus (the median over cells, 1 where both are alike; noise does not count), and the share of cells that are hidden:
+    they show less than ``_HIDDEN`` of it.
     """
     seen, there = _fine_structure(image), _fine_structure(empty)
     floor = np.float32(_NOISE_SHARE) * noise / (cv2.cvtColor(empty, cv2.COLOR_RGB2GRAY).astype(np.float32) + np.float32(_SHADE))
@@ -319,10 +313,7 @@ def check(frames: Sequence[TeachingFrame], bench: Bench, *, has_pictures: bool =
 
     `has_pictures`: the bench is made from empty pictures, which may wrongly show the robot.
 
-    Raises
-    ------
-    TeachingError
-        An empty picture shows the robot.
+    Raises TeachingError: an empty picture shows the robot.
     """
     usable = [frame for frame in frames if not frame.reason]
     if not usable:
@@ -416,10 +407,7 @@ def _check_empty(frames: Sequence[TeachingFrame], bench: Bench) -> None:
 def choose(frames: Sequence[TeachingFrame], count: int) -> list[TeachingFrame]:
     """The `count` most diverse frames that are not rejected, a quarter of them held out, in their order.
 
-    Raises
-    ------
-    TeachingError
-        Too few frames are usable; the message names the most frequent reason.
+    Raises TeachingError: too few frames are usable; the message names the most frequent reason.
     """
     usable = [frame for frame in frames if not frame.reason]
     if len(usable) < FEWEST:
@@ -484,10 +472,7 @@ def write_teaching_set(
 
     A network that was trained on other frames is removed: it may have learnt from those that are held out now.
 
-    Raises
-    ------
-    TeachingError
-        The folder is something else, or cannot be written.
+    Raises TeachingError: the folder is something else, or cannot be written.
     """
     if folder.exists() and not is_teaching_set(folder) and (not folder.is_dir() or any(folder.iterdir())):
         raise TeachingError(f"{folder}: exists and holds no frames of a bench; choose another --out")
@@ -534,10 +519,7 @@ def _is_split_as(folder: Path, chosen: Sequence[TeachingFrame]) -> bool:
 def read_teaching_set(folder: Path) -> TeachingSet:
     """A set as it is now: frames whose pictures were removed count as rejected, and masks may have been corrected.
 
-    Raises
-    ------
-    TeachingError, DatasetError, BenchError
-        It is damaged, or too few frames are left.
+    Raises TeachingError, DatasetError, BenchError: it is damaged, or too few frames are left.
     """
     path = folder / _STATE
     try:

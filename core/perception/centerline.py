@@ -293,6 +293,8 @@ def centerline_at(
     route passes, only those that follow it are candidates. The cost changes smoothly with head and direction, so that a small
     disturbance changes the choice only where two branches fit equally well; ``ambiguity`` measures how near that is.
 
+    Returns the piece, or None when the graph is empty or ends too soon (less than ``MIN_PIECE_SHARE`` of the wanted length).
+
     Parameters
     ----------
     graph : vessel centerlines.
@@ -301,10 +303,6 @@ def centerline_at(
     half_length_px : arc length of the piece to each side of the nearest point; cut short where the vessel ends.
     route : the operator's route; it decides between branches where it passes the head.
     vessel : its mask (h, w), if known: edges beyond a wall from the head are not beside it.
-
-    Returns
-    -------
-    The piece, or None when the graph is empty or ends too soon (less than ``MIN_PIECE_SHARE`` of the wanted length).
     """
     projections = project_on_edges(graph, head, half_length_px, vessel)
     incidence = incidence_of(graph)

@@ -413,6 +413,8 @@ def find(
     each start the longest branch is kept (shortened by the cost of its turns at junctions), and the best scored of these is the
     robot.
 
+    Returns ``RobotPath``, or ``Refusal`` with NO_ROBOT, TOO_SHORT, SEVERAL_ROBOTS, GAP_TOO_LONG or AMBIGUOUS_PATH.
+
     Parameters
     ----------
     skeletons : with the robot's gaps repaired.
@@ -421,10 +423,6 @@ def find(
     vessel : the vessel graph; its ends tell tail from head where the image border does not.
     port : where the robot is inserted, if known.
     before : of a stream; the last frame's path decides between nearly equal candidates.
-
-    Returns
-    -------
-    ``RobotPath``, or ``Refusal`` with NO_ROBOT, TOO_SHORT, SEVERAL_ROBOTS, GAP_TOO_LONG or AMBIGUOUS_PATH.
     """
     traced = trace(skeletons.robot)
     if not traced.chains:

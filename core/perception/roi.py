@@ -254,15 +254,13 @@ class VesselAverage:
     def add(self, vessel: Probability, robot: Probability, cells: NDArray[np.float32], noise: float) -> Probability:
         """Add a full frame, and return the mean of all that are kept, each where the picture has not changed since.
 
+        Returns the vessel's probability (h, w), a new array.
+
         Parameters
         ----------
         vessel, robot : probabilities (h, w), upright.
         cells : of the picture (h / 8, w / 8, 3), see ``cells_of``.
         noise : mean difference of cells, in grey levels, without any change.
-
-        Returns
-        -------
-        The vessel's probability (h, w), a new array.
         """
         height, width = cells.shape[:2]
         share = cv2.resize(np.asarray(robot >= np.float32(0.5), np.float32), (width, height), interpolation=cv2.INTER_AREA)

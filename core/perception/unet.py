@@ -145,10 +145,7 @@ class DualUNet(nn.Module):
 def with_prior_planes(network: DualUNet) -> DualUNet:
     """A copy of `network` that also takes probabilities (5 planes), with weights of 0 for them.
 
-    Raises
-    ------
-    ValueError
-        The network takes them already.
+    Raises ValueError: the network takes them already.
     """
     if network.shape.inputs != 3:
         raise ValueError("the network takes probabilities already")

@@ -110,20 +110,14 @@ def export_mp4(
 ) -> int:
     """Pictures of the rows from `first` to `last` (not included; None: all) as H.264, at the times when they were captured.
 
+    Raises SessionError: no picture at all, or the file cannot be written or is there already.
+
+    Returns the number of pictures written; rows whose picture is lost are left out.
+
     Parameters
     ----------
     draw : burns in what it likes; None: the plain pictures. All pictures take the size of the first one.
     on_row : called after every row.
-
-    Returns
-    -------
-    int
-        Pictures written; rows whose picture is lost are left out.
-
-    Raises
-    ------
-    SessionError
-        No picture at all, or the file cannot be written or is there already.
     """
     reader.wait()
     written = 0

@@ -269,15 +269,12 @@ class EncodedFrame:
 class SessionFiles:
     """A session folder being written by one thread.
 
+    Raises SessionError: the folder cannot be made.
+
     Parameters
     ----------
     parent : where the folder is made.
     first_s : time of the first frame on the frames' clock; `now_s` is the same clock now, by which it becomes a date.
-
-    Raises
-    ------
-    SessionError
-        When the folder cannot be made.
     """
 
     def __init__(

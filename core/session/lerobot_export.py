@@ -59,13 +59,9 @@ Stats = dict[str, dict[str, NDArray[Any]]]
 def export_lerobot(reader: SessionReader, path: Path, *, on_row: Callable[[], None] = lambda: None) -> int:
     """Write a session as a new dataset, or as the next episode of the one that is there; returns its frames.
 
-    Raises
-    ------
-    SessionError
-        Nothing was driven in it or no picture is left; the folder is no such dataset, has this session already, or was made with
-        another robot or picture size, or cannot be written. What was there is unchanged then.
-    UserError
-        pyarrow is not installed.
+    Raises SessionError: nothing was driven in it or no picture is left; the folder is no such dataset, has this session already, or
+    was made with another robot or picture size, or cannot be written. What was there is unchanged then. Raises UserError: pyarrow
+    is not installed.
     """
     from core.program import need_package
 

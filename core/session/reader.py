@@ -358,10 +358,8 @@ class SessionReader:
     It opens at once; rows become available as they are read in the background, an hour of them in some seconds. ``wait`` waits
     for all of them. Rows are counted as they are readable: ``row(0)`` is the first good one.
 
-    Raises
-    ------
-    SessionError
-        When the folder is no session, or one of a newer version. A damaged manifest or description is only named in `problems`.
+    Raises SessionError: the folder is no session, or one of a newer version. A damaged manifest or description is only named in
+    `problems`.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -200,10 +200,8 @@ class _Salvage:
 def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda _: None) -> Recovery:
     """Repair a session into a copy beside it, or in `into`: ``<name>_recovered``. `on_bytes` is called with progress.
 
-    Raises
-    ------
-    SessionError
-        Not a session, being recorded or recovered, recovered before, nothing left in it, or the copy cannot be written.
+    Raises SessionError: not a session, being recorded or recovered, recovered before, nothing left in it, or the copy cannot be
+    written.
     """
     session = Path(os.path.abspath(session))  # "." and ".." have names, too
     check_is_session(session)
@@ -234,10 +232,7 @@ def recover(session: Path, into: Path | None = None, on_bytes: OnBytes = lambda 
 def expected_loss(session: Path, on_bytes: OnBytes = lambda _: None) -> Recovery:
     """What `recover` would find, without writing anything. Pictures count as there when their packets are: none is decoded.
 
-    Raises
-    ------
-    SessionError
-        Not a session, being recorded, of a newer version, or nothing left in it.
+    Raises SessionError: not a session, being recorded, of a newer version, or nothing left in it.
     """
     session = Path(os.path.abspath(session))  # "." and ".." have names, too
     check_is_session(session)

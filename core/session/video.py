@@ -330,19 +330,13 @@ def remux(source: Path, target: Path, rows: Mapping[int, int]) -> tuple[set[int]
 
     A time that no row has is possible where rows are missing, or soon after the last row; others are damaged.
 
+    Raises VideoError: the target cannot be written. A source that cannot be read is a problem in the result.
+
+    Returns the times (ms) of the pictures that were kept, and what was wrong, a line each.
+
     Parameters
     ----------
     rows : time (ms) of a picture -> number of its row, in order.
-
-    Returns
-    -------
-    tuple
-        Times (ms) of the pictures that were kept, and what was wrong, a line each.
-
-    Raises
-    ------
-    VideoError
-        The target cannot be written. A source that cannot be read is a problem in the result.
     """
     kept: set[int] = set()
     problems: list[str] = []
