@@ -9,37 +9,9 @@ from tests.core.drawing import curve
 CORNER = np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 40.0]])
 
 
-def test_arc_length_is_the_distance_walked() -> None:
-    assert geometry.arc_length(CORNER).tolist() == [0.0, 30.0, 70.0]
-
-
-def test_resampling_keeps_both_ends_and_spaces_evenly() -> None:
-    even = geometry.resample(CORNER, 10.0)
-    assert even.tolist() == [[0, 0], [10, 0], [20, 0], [30, 0], [30, 10], [30, 20], [30, 30], [30, 40]]
-
-
 def test_a_cut_keeps_inner_corners_and_is_clamped_to_the_ends() -> None:
     assert geometry.cut(CORNER, 20.0, 35.0).tolist() == [[20, 0], [30, 0], [30, 5]]
     assert geometry.cut(CORNER, -5.0, 500.0).tolist() == CORNER.tolist()
-
-
-@pytest.mark.parametrize(
-    ("point", "distance", "position", "foot"),
-    [((10.0, 5.0), 5.0, 10.0, (10.0, 0.0)), ((33.0, 44.0), 5.0, 70.0, (30.0, 40.0)), ((-3.0, -4.0), 5.0, 0.0, (0.0, 0.0))],
-)
-def test_the_nearest_place_lies_on_a_segment_not_on_a_vertex(
-    point: tuple[float, float], distance: float, position: float, foot: tuple[float, float]
-) -> None:
-    assert geometry.nearest(CORNER, point) == (pytest.approx(distance), pytest.approx(position), pytest.approx(foot))
-
-
-def test_smoothing_keeps_the_ends_and_leaves_a_straight_line_alone() -> None:
-    line = np.column_stack([np.linspace(0, 50, 26), np.linspace(10, 35, 26)])
-    np.testing.assert_allclose(geometry.smooth(line, 3.0), line, atol=1e-9)
-    staircase = line + np.tile([[0.0, 0.5], [0.0, -0.5]], (13, 1))
-    smoothed = geometry.smooth(staircase, 3.0)
-    np.testing.assert_allclose(smoothed[[0, -1]], staircase[[0, -1]], atol=1e-9)
-    assert np.abs(smoothed[9:-9] - line[9:-9]).max() < 0.1
 
 
 def test_smoothing_that_keeps_bends_leaves_a_circle_where_it_is() -> None:
@@ -63,11 +35,6 @@ def test_the_ends_of_a_bend_and_short_bends_are_kept_better_than_by_a_gaussian(c
     kept, drawn = (np.abs(40.0 - np.hypot(*geometry.smooth(arc, 4.5, keeps_bends=keeps).T)).max() for keeps in (True, False))
     assert kept < 0.25
     assert kept <= drawn + 1e-9
-
-
-def test_a_map_is_sampled_between_pixels_and_beyond_its_border() -> None:
-    ramp = np.tile(np.arange(8, dtype=np.float32), (6, 1))
-    assert geometry.sample(ramp, np.array([[2.5, 3.0], [-4.0, 1.0], [20.0, 1.0]])).tolist() == [2.5, 0.0, 7.0]
 
 
 @pytest.mark.parametrize("values", [[3.0], [4.0, 1.0], [5.0, 2.0, 9.0], [1.0, 8.0, 2.0, 4.0]])

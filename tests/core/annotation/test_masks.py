@@ -75,13 +75,6 @@ def test_painting_again_and_again_wears_nothing_away() -> None:
     assert (found & line).sum() == line.sum()
 
 
-def test_a_stroke_is_as_wide_as_the_brush() -> None:
-    stroke = np.array([[10.0, 24.0], [50.0, 24.0]])
-    found = fill(paint((), MaskTarget.VESSEL, stroke, 4.0, SIZE, erase=False), MaskTarget.VESSEL, SIZE)
-    assert found[:, 30].sum() == pytest.approx(9, abs=1)
-    assert not found[:, 4].any()
-
-
 def shoelace(points: np.ndarray) -> float:
     """The area of a polygon (N, 2)."""
     (x0, y0), (x1, y1) = points.T, np.roll(points, -1, axis=0).T

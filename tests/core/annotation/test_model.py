@@ -62,21 +62,6 @@ def test_the_vessels_direction_is_the_robots_however_it_was_drawn() -> None:
     assert forth.theta_signed_deg == pytest.approx(back.theta_signed_deg) == pytest.approx(math.degrees(math.atan2(10, 100)))
 
 
-def test_only_the_last_40_px_of_the_robot_count() -> None:
-    """A right-angled bend 40 px before the head is the border of what counts; one 60 px before it says nothing."""
-    vessel = ((200.0, 200.0), (400.0, 200.0))
-    bent = measure_lines(Annotation(((240.0, 100.0), (240.0, 200.0), (300.0, 200.0)), vessel), SIZE, CONFIG)
-    assert bent.pose.theta_deg == pytest.approx(0.0, abs=1e-9)
-    assert bent.robot_piece.tolist() == [[260.0, 200.0], [300.0, 200.0]]
-    assert bent.pose.state is PoseState.A
-
-
-def test_the_vessel_line_counts_20_px_to_both_sides_of_the_place_beside_the_head() -> None:
-    vessel = ((100.0, 400.0), (280.0, 220.0), (400.0, 220.0))
-    found = measure_lines(Annotation(((240.0, 230.0), (330.0, 210.0)), vessel), SIZE, CONFIG)
-    assert found.vessel_piece[[0, -1]].tolist() == [[310.0, 220.0], [350.0, 220.0]]
-
-
 @pytest.mark.parametrize(
     ("robot", "state", "crossed"),
     [

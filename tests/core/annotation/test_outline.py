@@ -60,12 +60,6 @@ def test_a_faint_wall_is_carried_by_the_other_one() -> None:
     assert dice(found, true) > 0.94
 
 
-def test_a_vessel_that_tapers_narrows_the_tube() -> None:
-    true = drawn_tube(MIDDLE, np.linspace(13.0, 8.0, len(MIDDLE)))
-    found = snapped_tube(picture(true.area(SIZE)), MIDDLE, np.full(len(MIDDLE), 10.5))
-    assert found.radius[3] > 11.5 and found.radius[-4] < 9.3
-
-
 def test_a_drag_to_the_border_leads_out_of_the_picture() -> None:
     points = np.column_stack([np.arange(0.0, 400.0, 4.0), np.full(100, 60.0)])
     true = vessel(points)

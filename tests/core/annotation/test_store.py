@@ -215,7 +215,7 @@ def test_kill_9_loses_nothing_that_was_saved(tmp_path: Path) -> None:
     known(path).close()
     rng = random.Random(1)
     told = 0
-    kills = int(os.environ.get("LUMENPILOT_KILLS", "15"))
+    kills = int(os.environ.get("LUMENPILOT_KILLS", "8"))
     for _ in range(kills):
         reading, writing = os.pipe()
         child = os.fork()

@@ -127,10 +127,6 @@ def test_what_acts_both_ways_sideways_is_not_named() -> None:
     assert classify(Wiggle(0.75, look(path()), look(path(15.0)), look(path(-15.0)))) is None
 
 
-def test_nothing_seen_is_nothing_found() -> None:
-    assert classify(Wiggle(3.0, look(path()), look(path()), look(path()))) is None
-
-
 def _sheathed(length_px: int) -> Image:
     image = BLANK.copy()
     image[236:245, :290] = 30
@@ -269,13 +265,6 @@ def test_out_of_the_picture_the_root_of_the_shortening_is_the_line() -> None:
     assert taut_at_mm(steps) == pytest.approx(0.2, abs=0.01)
 
 
-def test_a_head_that_goes_by_half_pixels_is_followed_back_by_what_it_did_before() -> None:
-    """Taut at 1.5 mm; seen in pixels its way has steps, and the line through those after the first one alone starts at 1.1 mm."""
-    seen = (-0.02, -0.06, 0.03, -0.04, -0.2, -0.02, -0.45, -0.51, -0.51, -0.52, -0.53, -1.01, -1.53)
-    steps = [TautReading(1.18 + 0.06 * index, _move(longer_px=longer)) for index, longer in enumerate(seen)]
-    assert taut_at_mm(steps) == pytest.approx(1.5, abs=0.25)
-
-
 def test_a_wire_that_was_never_slack_is_told() -> None:
     steps = [
         TautReading(at, _move(-20.0 * (at - 0.2))) for at in (0.3, 0.36, 0.42, 0.48)
@@ -306,18 +295,3 @@ def test_a_feed_that_goes_another_way_than_it_was_sent_is_told(mm_per_px: float,
     line = feed_disagreement(findings, assign(findings), servos, scale, (640, 480))
     assert bool(line) is bool(told)
     assert told in line
-
-
-def test_a_way_too_short_to_tell_says_nothing() -> None:
-    """0.75 mm are 3 px, and a look is off by one."""
-    fed = classify(Wiggle(0.75, look(path()), look(path(length_px=304.0)), look(path(length_px=296.0))))
-    assert fed is not None
-    findings = {servo_id: ServoFinding(function, 1, "") for servo_id, function in ALL.items()} | {1: fed}
-    scale = ScaleConfig(mm_per_px=0.25, size_px=(640, 480), method="board", uncertainty_share=0.01)
-    assert feed_disagreement(findings, assign(findings), ServosConfig(), scale, (640, 480)) == ""
-
-
-def test_where_nobody_has_seen_the_feed_nothing_is_said() -> None:
-    findings = {servo_id: ServoFinding(function, 1, "") for servo_id, function in ALL.items()}
-    scale = ScaleConfig(mm_per_px=0.25, size_px=(640, 480), method="board", uncertainty_share=0.01)
-    assert feed_disagreement(findings, assign(findings), ServosConfig(), scale, (640, 480)) == ""

@@ -149,24 +149,9 @@ def test_limits_that_contradict_each_other_are_refused(section: type[BaseModel],
         section.model_validate(values)
 
 
-def test_a_whole_number_is_a_number_and_a_mark_at_the_beginning_is_none(tmp_path: Path) -> None:
-    path = tmp_path / "my.toml"
-    path.write_bytes(b"\xef\xbb\xbf[perception.pose]\nd_allow_px = 7\n")
-    assert load_config(path).perception.pose.d_allow_px == 7.0
-
-
 def test_a_name_that_is_no_text_is_one_clear_error() -> None:
     with pytest.raises(ConfigError, match=r"command line: 'm\\udcff' is no text in UTF-8; rename that file or folder"):
         load_config(overrides=choose_model("m\udcff"))
-
-
-def test_a_file_that_is_nested_too_deeply_is_one_short_line(tmp_path: Path) -> None:
-    for depth in (120, 250, 900):
-        path = _write(tmp_path, "[" + ".".join(["a"] * depth) + "]\nb = 1\n")
-        with pytest.raises(ConfigError) as raised:
-            load_config(path)
-        assert str(raised.value).startswith(str(path))
-        assert len(str(raised.value)) < len(str(path)) + 120
 
 
 # ---- the thresholds of gate and supervisor

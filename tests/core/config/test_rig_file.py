@@ -29,7 +29,7 @@ from core.config.rig_file import (
     write_rig,
 )
 from core.config.safety import TENDONS
-from core.session.manifest import Manifest, about_rig
+from core.session.manifest import about_rig
 from tests.core.bench.drawn_bench import board
 
 MADE = datetime(2025, 3, 4, 5, 6, 7, tzinfo=UTC)
@@ -241,13 +241,6 @@ def test_a_rig_without_a_model_does_not_keep_the_one_of_the_rig_before(tmp_path:
     assert with_rig(chosen, read_rig(plain), plain).perception.segmentation.model == "own"
 
 
-def test_a_session_tells_its_calibration_again() -> None:
-    manifest = Manifest(id="x", kind="LIVE", started_utc=MADE, started_monotonic_s=0.0)
-    assert manifest.known is None
-    assert manifest.model_copy(update={"calibration": KNOWN.model_dump(mode="json")}).known == KNOWN
-    assert manifest.model_copy(update={"calibration": {"of": "a newer version"}}).known is None
-
-
 def test_a_session_keeps_the_calibration() -> None:
     path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
     about = about_rig(with_rig(load_config(), read_rig(path), path), "SIM", "bench 1")
@@ -268,15 +261,6 @@ def test_the_insertion_port_leaves_the_older_calibration_where_it_is() -> None:
     for share in (0.1, 0.2):
         set_port(path, PortConfig(x_share=share, y_share=0.6))
     assert read_rig(path.with_name("bench 1.older.toml")).calibration == KNOWN
-
-
-def test_saving_again_keeps_the_older_one() -> None:
-    write_rig(make_rig(load_config(), "bench 1", None))
-    path = write_rig(make_rig(load_config(), "bench 1", KNOWN))
-    older = path.with_name("bench 1.older.toml")
-    assert read_rig(older).calibration is None
-    assert read_rig(path).calibration == KNOWN
-    assert [one.path for one in list_rigs()] == [path]
 
 
 def test_a_disk_that_does_not_take_it_is_one_line(tmp_path: Path) -> None:

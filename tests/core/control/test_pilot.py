@@ -120,13 +120,6 @@ def test_a_share_of_full_speed_holds_for_all_controls_together(bench: Bench) -> 
     assert bent.bend - bench.robot.sent[-1][1].bend == pytest.approx(0.2 * 1.2 * PERIOD_S)
 
 
-def test_a_slow_touch_ends_autonomy_as_any_other(bench: Bench) -> None:
-    bench.pilot.hand_speed(0.0)
-    bench.handed_over().turn(10).jog = Jog(advance=1.0)
-    bench.turn()
-    assert bench.mode is Mode.ARMED
-
-
 def test_a_window_that_says_no_more_lets_go(bench: Bench) -> None:
     bench.on().jog = Jog(advance=1.0)
     bench.seconds(0.2)
@@ -591,14 +584,6 @@ def test_another_destination_ends_the_hand_over_and_the_old_advice_is_not_follow
     assert bench.mode is Mode.ARMED
     assert bench.alerts() == {Note.NEW_TARGET}
     assert all(source is not Source.PROGRAM for source, _, _ in bench.robot.sent[sent:])
-
-
-def test_a_destination_chosen_while_driving_by_hand_changes_nothing_else(bench: Bench) -> None:
-    bench.armed().alerts()
-    bench.pilot.target_changed()
-    bench.turn()
-    assert bench.mode is Mode.ARMED
-    assert bench.alerts() == set()
 
 
 def pilot_after(bench: Bench, left_over: LeftOver | None) -> Bench:

@@ -11,7 +11,7 @@ from core.control.camera_monitor import RouteState
 from core.control.frame_reports import FrameReports
 from core.control.look_ahead import LookAhead
 from core.control.policies import RandomOperator, make_policy
-from core.control.pursuit import ContactLimit, FeedMonitor, Pursuit, RetryCounter, StallMonitor, speed_word
+from core.control.pursuit import ContactLimit, FeedMonitor, Pursuit, speed_word
 from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene, Speed
 from tests.core.driving_scenes import BEND, FORK, STRAIGHT, scene_at, status
 
@@ -393,27 +393,6 @@ def test_a_frame_that_is_refused_says_nothing_of_where_the_destination_lies() ->
     assert told == [RouteState.NONE, RouteState.BEHIND, *[RouteState.NONE] * 5, RouteState.BEHIND, RouteState.BEHIND]
 
 
-def test_stall_tells_only_after_its_time_and_only_without_progress() -> None:
-    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
-    assert not stall.update(100.0, (0, 0), 5.0, 5.0), "what was before it began to watch does not count"
-    assert not stall.update(100.0, (0, 0), 5.0, 0.5)
-    assert stall.update(98.0, (2, 0), 5.0, 0.5)  # 2 px of the 15 px that were fed
-    assert stall.lost_mm == pytest.approx(5.0)
-    assert not stall.update(98.0, (2, 0), 5.0, 0.5)
-    assert not stall.update(88.0, (2, 0), 5.0, 0.5)  # 10 of 15
-    assert not stall.update(None, (2, 0), 5.0, 5.0)
-
-
-@pytest.mark.parametrize(("rest_s", "is_told"), [(0.2, True), (0.4, False)])
-def test_only_a_real_rest_lets_stall_watch_anew(rest_s: float, is_told: bool) -> None:
-    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
-    told = []
-    for _ in range(4):
-        told += [stall.update(100.0, (0, 0), 5.0, 0.1) for _ in range(5)]
-        told += [stall.update(100.0, (0, 0), 0.0, 0.1) for _ in range(round(rest_s / 0.1))]
-    assert any(told) is is_told
-
-
 def fed(feed: FeedMonitor, frames_s: list[float], bus_s: float, speed_mm_s: float = 6.0) -> list[tuple[float, float]]:
     """What is known of a feed of `speed_mm_s` at each frame, of statuses that come every `bus_s`."""
     found, before_s = [], frames_s[0]
@@ -435,51 +414,9 @@ def test_the_feed_is_known_though_frames_and_statuses_do_not_come_in_step(fps: f
     assert sum(way for _, way in found) == pytest.approx(6.0 * (frames_s[-1] - frames_s[0]), abs=6.0 * 2 * bus_s)
 
 
-def test_a_robot_that_tells_nothing_any_more_is_not_taken_to_be_fed() -> None:
-    feed = FeedMonitor()
-    fed(feed, [1.0, 1.1, 1.2], 0.1)
-    still = RobotStatus(1.2, 7.2, 0.0, (0.0,) * 4, (0.0,) * 4)
-    assert [feed.update(still, 0.0, 0.1)[0] for _ in range(8)][-1] == 0.0
-    late = RobotStatus(9.0, 70.0, 0.0, (0.0,) * 4, (0.0,) * 4)
-    assert feed.update(late, 0.0, 0.1) == (0.0, 0.0)
-    assert feed.update(None, 4.0, 0.1) == (4.0, 0.4)
-
-
 def way(left_px: float | None, target: tuple[float, float] | None = (380.0, 100.0)) -> LookAhead:
     """As it is where only the target and the way left to it matter."""
     return LookAhead((0.0, 0.0), np.zeros((2, 2)), left_px, target if left_px is not None else None, 0.0, False, 0.0, None, 0.0)
-
-
-@pytest.mark.parametrize("blind_s", [0.1, 0.2])
-def test_frames_without_a_way_hide_no_stall(blind_s: float) -> None:
-    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
-    told = []
-    for k in range(60):
-        told.append(stall.update(None if 0 < k % 9 <= round(blind_s / 0.1) else 100.0, (0, 0), 5.0, 0.1))
-    assert sum(told) >= 4
-    assert not any(stall.update(None, (0, 0), 5.0, 0.1) for _ in range(30)), "without a target it cannot tell"
-
-
-def test_tries_count_where_the_head_stood_and_no_farther_place_that_one_frame_saw() -> None:
-    tries = RetryCounter()
-    counts = []
-    for left_px in (200.0, 198.0, None, 197.0, 150.0, 149.0, 148.0):
-        tries.update(way(left_px))
-        tries.update(way(60.0))  # one frame beside a branch
-        tries.add(way(left_px))
-        counts.append(tries.count)
-    assert counts == [1, 2, 2, 3, 1, 2, 3]
-    tries.update(way(None))
-    assert tries.count == 3
-    tries.update(way(100.0, (5.0, 5.0)))
-    assert tries.count == 0, "another target"
-
-
-def test_a_head_that_slides_sideways_is_not_stuck() -> None:
-    stall = StallMonitor(PursuitConfig(stuck_s=1.0, stuck_share=0.2, pixels_per_mm=3.0))
-    assert not stall.update(100.0, (50, 0), 5.0, 0.5)
-    assert not stall.update(100.0, (50, 1), 5.0, 0.5)
-    assert not stall.update(99.0, (50, 4), 5.0, 0.5)
 
 
 def test_the_contact_limit_rises_where_the_head_presses_and_falls_back_farther_on() -> None:

@@ -238,13 +238,6 @@ def test_a_torque_off_that_waits_when_the_program_ends_is_still_done(bench: Benc
     assert bench.robot.calls.count("torque off") == 1
 
 
-def test_a_torque_off_that_is_done_is_not_done_again_at_the_end(bench: Bench) -> None:
-    bench.seconds(0.2)
-    bench.pilot.torque_off()
-    bench.done().pilot.close()
-    assert bench.robot.calls.count("torque off") == 1
-
-
 def test_servos_that_were_switched_on_after_a_failed_torque_off_keep_their_torque_at_the_end(bench: Bench) -> None:
     bench.seconds(0.2)
     _fail(bench, "torque_off", _NOT_PROVEN)
@@ -429,9 +422,3 @@ def test_a_torque_release_is_retried_after_ten_seconds_and_at_once_after_another
     assert release.is_due(RETRY_S + 0.01, is_bus_lost=True, is_busy=False)
     release.handle(_CONFIRM)
     assert not release.is_due(99.0, is_bus_lost=True, is_busy=False)
-
-
-def test_without_the_setting_a_stop_requests_no_torque_release() -> None:
-    release = TorqueRelease(is_enabled=False)
-    release.handle(_REQUEST)
-    assert release.state is ReleaseState.IDLE

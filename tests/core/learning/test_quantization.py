@@ -1,9 +1,7 @@
 """The eight-bit copy of a network: close to the original, stored and verified beside it, chosen by the configuration."""
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +9,7 @@ import torch
 
 from core.config.models import SegmentationConfig
 from core.learning.model_writer import changed, save_model, write_eight_bit
-from core.learning.quantization import EightBitUNet, _Conv, _Moments, _rounded
+from core.learning.quantization import EightBitUNet, _Conv, _Moments
 from core.perception.inference import OpenVinoSegmenter, open_segmenter
 from core.perception.model_file import ONNX_INT8, ModelError, read_model_info
 from core.perception.unet import DualUNet, UNetShape
@@ -60,33 +58,6 @@ def test_the_copy_answers_like_the_original() -> None:
     assert not torch.equal(original, eight_bit), "nothing was quantised"
 
 
-def test_no_level_of_a_picture_is_lost() -> None:
-    copy = EightBitUNet(_network()).eval()
-    copy.learn(_batches(2))
-    levels = (torch.arange(256).float() / 255 - 128 / 255) * 4
-    assert torch.allclose(copy.input_steps(levels), levels, atol=1e-6)
-
-
-def test_the_original_stays_as_it_was() -> None:
-    network = _network()
-    before = {name: value.clone() for name, value in network.state_dict().items()}
-    EightBitUNet(network).eval().learn(_batches(2))
-    assert all(torch.equal(value, before[name]) for name, value in network.state_dict().items())
-
-
-def test_weights_that_see_the_same_make_good_what_one_of_them_loses_by_rounding() -> None:
-    """Neighbouring pixels are alike: four inputs that always agree need only the sum of their weights to be right."""
-    torch.manual_seed(1)
-    weight, scale = torch.rand(50, 4) - 0.5, torch.full((50,), 0.1)
-    alike = torch.ones(4, 4, dtype=torch.float64) + 1e-3 * torch.eye(4, dtype=torch.float64)
-    whole = _rounded(weight, scale, alike)
-    nearest = torch.round(weight / 0.1) * 0.1
-    assert torch.allclose(whole / 0.1, torch.round(whole / 0.1), atol=1e-5)
-    lost, lost_by_nearest = ((weight - one).sum(1).abs() for one in (whole, nearest))
-    assert float(lost.max()) < 0.051  # half a step, as of a single weight
-    assert float(lost.mean()) < 0.6 * float(lost_by_nearest.mean())
-
-
 @pytest.mark.parametrize("transposed", [False, True])
 def test_what_rounding_loses_on_average_goes_into_the_bias(transposed: bool) -> None:
     torch.manual_seed(2)
@@ -122,21 +93,6 @@ def test_rounding_together_loses_less_than_rounding_each_to_its_nearest(transpos
         together.round_weights()
         lost = [float((part(maps[1:]) - plain(maps[1:])).pow(2).mean()) for part in (nearest, together)]
     assert lost[1] < 0.5 * lost[0]
-
-
-@pytest.mark.parametrize("planes", [3, 5])
-def test_moving_the_zero_onto_a_level_changes_nothing(planes: int) -> None:
-    torch.manual_seed(5)
-    network = DualUNet(replace(TINY, inputs=planes)).eval()
-    first: Any = EightBitUNet(network).encoder[0]
-    first = first.convolutions[0]
-    first.moments = _Moments()  # weights as they are
-    levels = torch.randint(0, 256, (1, planes, 32, 32)).float() / 255
-    with torch.no_grad():
-        moved = first(torch.nn.functional.pixel_unshuffle((levels - 128 / 255) * 4, 2))
-        before: Any = network.encoder[0]
-        expected = before[:3](torch.nn.functional.pixel_unshuffle((levels - 0.5) * 4, 2))
-    assert torch.allclose(moved[..., 1:-1, 1:-1], expected[..., 1:-1, 1:-1], atol=1e-5)
 
 
 def test_an_eight_bit_copy_needs_a_picture_and_changes_nothing_without(folder: Path, tmp_path: Path) -> None:

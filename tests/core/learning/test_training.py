@@ -14,7 +14,7 @@ from core.learning.dataset import (
     find_samples,
     write_mask,
 )
-from core.learning.training import LoaderLost, TrainingProgress, computes_in_bf16, loss_of, make_optimizers, orthogonalised, train
+from core.learning.training import LoaderLost, TrainingProgress, computes_in_bf16, loss_of, orthogonalised, train
 from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape
 from tests.core.learning.toy_set import toy_set
@@ -165,21 +165,6 @@ def test_orthogonalised_directions_have_singular_values_near_one() -> None:
         assert float(values.max() / values.min()) < 2.5
 
 
-def test_gathered_rounds_are_the_newton_schulz_iteration() -> None:
-    import torch
-
-    torch.manual_seed(0)
-    for shape in ((12, 60), (60, 12)):
-        # Nearly of rank three, as directions are late in training.
-        matrix = torch.randn(shape[0], 3) @ torch.randn(3, shape[1]) + 1e-3 * torch.randn(shape)
-        x = (matrix if shape[0] < shape[1] else matrix.T) / matrix.norm()
-        for _ in range(5):
-            gram = x @ x.T
-            x = 3.4445 * x + (-4.7750 * gram + 2.0315 * gram @ gram) @ x
-        expected = x if shape[0] < shape[1] else x.T
-        assert float((orthogonalised(matrix) - expected).norm() / expected.norm()) < 1e-3
-
-
 @pytest.mark.parametrize(
     ("able", "expected"),
     [({}, False), ({"avx512_f": True}, False), ({"avx512_bf16": True}, True), ({"amx_bf16": True, "avx512_bf16": False}, True)],
@@ -190,14 +175,6 @@ def test_bf16_is_used_only_where_it_is_native(monkeypatch: pytest.MonkeyPatch, a
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: able)
     assert computes_in_bf16(torch.device("cpu")) is expected
     assert computes_in_bf16(torch.device("cuda"))
-
-
-def test_the_kernels_go_to_muon_and_the_rest_to_adamw() -> None:
-    network = DualUNet(UNetShape((4, 8, 8, 8, 8), (4, 8, 8, 8), 1, 2))
-    muon, adamw = make_optimizers(network, 1e-2, 1e-4)
-    sizes = [sum(p.numel() for group in o.param_groups for p in group["params"]) for o in (muon, adamw)]
-    assert sum(sizes) == sum(p.numel() for p in network.parameters())
-    assert all(p.ndim == 4 and p.shape[2:] == (3, 3) for group in muon.param_groups for p in group["params"])
 
 
 @pytest.mark.parametrize("end_weight", [0.0, 4.0])

@@ -87,11 +87,6 @@ def test_a_camera_that_was_moved_far_and_another_bench_are_refused_by_name(bench
         assert scene.refusal.reason is reason
 
 
-def test_an_empty_bench_has_no_robot(bench: Bench) -> None:
-    scene = single(picture(None, seed=5), bench)
-    assert scene.refusal.reason is Reason.NO_ROBOT
-
-
 class Unfamiliar(Blind):
     """Sees the tube and a robot in pictures that it does not know."""
 

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from core.learning.model_writer import save_model
-from core.perception.inference import OpenVinoSegmenter, TorchSegmenter, _without_vessel
+from core.perception.inference import OpenVinoSegmenter, TorchSegmenter
 from core.perception.segmentation import OrientationAverage, Segmenter
 from core.perception.unet import DualUNet, UNetShape
 
@@ -83,40 +83,6 @@ def test_the_robot_alone_is_the_robot_that_is_seen_beside_the_vessel(undecided: 
     assert np.abs(alone[0] - alone[1]).mean() > 0.005, "another picture, another answer"
     again = segment(pictures()[0])
     assert [plane.shape for plane in again] == [(70, 128)] * 2, "and both can be had as before"
-
-
-def test_the_robot_alone_leaves_the_vessels_decoder_out(undecided: Path) -> None:
-    segment = OpenVinoSegmenter(undecided, 1, "fp32")
-    counts = [
-        sum(node.get_type_name() == "Convolution" for node in model.get_ordered_ops())
-        for model in (segment._model, segment._robot_model)
-    ]
-    # ten of the encoder; four and the output of each decoder
-    assert counts == [10 + 2 * 5, 10 + 5]
-
-
-def test_a_network_of_another_shape_is_asked_for_both() -> None:
-    import openvino
-    from openvino import opset13
-
-    picture = opset13.parameter([1, 3, 16, 16], np.float32, name="picture")
-    kernels = opset13.constant(np.zeros((2, 3, 1, 1), np.float32))
-    logits = opset13.convolution(picture, kernels, [1, 1], [0, 0], [0, 0], [1, 1])
-    joined = opset13.concat([picture, picture], axis=1)
-    flat = opset13.parameter([4], np.float32, name="flat")
-    one = opset13.strided_slice(picture, [0, 0, 0, 0], [1, 1, 16, 16], [1, 1, 1, 1], [0, 0, 0, 0], [0, 0, 0, 0])
-    two = opset13.concat([one, one], axis=1)
-    for end, given in (
-        (opset13.sigmoid(logits), picture),  # no two masks that were joined
-        (opset13.sigmoid(joined), picture),  # something else that was
-        (opset13.sigmoid(opset13.concat([one, one], axis=2)), picture),
-        (opset13.sigmoid(opset13.concat([flat, flat], axis=0)), flat),
-        (opset13.softmax(two, 1), picture),
-        (two, picture),
-    ):
-        model = openvino.Model([end], [given], "other")
-        assert _without_vessel(model) is model
-    assert _without_vessel(openvino.Model([opset13.sigmoid(two)], [picture], "ours")) is not model
 
 
 @pytest.mark.parametrize(("fold", "planes"), [(1, 3), (4, 3), (2, 5)])

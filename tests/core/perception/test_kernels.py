@@ -101,13 +101,6 @@ def test_an_array_of_another_kind_is_a_type_error_and_compiles_nothing(points: n
         compiled.arc_length(points)
 
 
-def test_an_index_beyond_an_array_is_an_index_error() -> None:
-    with pytest.raises(IndexError):
-        compiled.thin(np.ones(30, np.uint8), 6, np.array([29]), np.zeros(256, np.uint8))
-    with pytest.raises(IndexError):
-        compiled.point_at(np.zeros((0, 2)), np.zeros(1), np.zeros(1))
-
-
 def test_every_kernel_is_compiled_before_it_is_called() -> None:
     compiled.load()
     kernels = [value for value in vars(compiled).values() if hasattr(value, "nopython_signatures")]
@@ -194,8 +187,3 @@ print("numba" in sys.modules)
     root = Path(__file__).parents[3]
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=root)
     assert done.stdout.split() == ["False", "True"], done.stderr
-
-
-def test_an_unknown_kernel_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="has no attribute 'circles'"):
-        compiled.circles  # noqa: B018

@@ -57,14 +57,6 @@ def test_both_engines_see_the_same_at_any_size(model: Path) -> None:
         np.testing.assert_allclose(a, b, atol=2e-4)
 
 
-def test_results_are_not_overwritten_by_the_next_call(model: Path) -> None:
-    segmenter = OpenVinoSegmenter(model, 1)
-    first = segmenter(np.zeros((64, 64, 3), np.uint8))[0]
-    kept = first.copy()
-    segmenter(np.full((64, 64, 3), 255, np.uint8))
-    np.testing.assert_array_equal(first, kept)
-
-
 @pytest.mark.parametrize("engine", [OpenVinoSegmenter, TorchSegmenter])
 @pytest.mark.parametrize("damage", ["cut", "flip", "missing", "empty"])
 def test_a_damaged_file_is_one_clear_error(model: Path, engine: type, damage: str) -> None:
@@ -165,14 +157,6 @@ def test_a_package_that_does_not_load_is_one_clear_error(
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(ModelError, match=words):
         load_network(model)
-
-
-def test_figures_are_added_without_touching_the_rest(model: Path) -> None:
-    before = read_model_info(model)
-    write_figures(model, {"theta_median_deg": 0.5})
-    after = read_model_info(model)
-    assert after.figures == {"theta_median_deg": 0.5}
-    assert after.weights_sha256 == before.weights_sha256
 
 
 @pytest.mark.parametrize(
@@ -284,15 +268,6 @@ def test_a_new_model_is_on_the_disk_before_the_old_one_goes(model: Path, monkeyp
     save_model(DualUNet(TINY).eval(), model, training={}, figures={})
     assert {f"on disk: {name}" for name in (ONNX, INFO)} <= set(done[: done.index("aside")])
     assert done[done.index("moved") :] == ["moved", f"on disk: {model.parent.name}", "old one deleted"]
-
-
-def test_a_manifest_is_on_the_disk_before_it_takes_the_old_ones_place(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    done: list[str] = []
-    sync, rename = os.fsync, os.replace
-    monkeypatch.setattr(os, "fsync", lambda handle: (done.append("on disk"), sync(handle))[1])
-    monkeypatch.setattr(os, "replace", lambda source, target: (done.append("moved"), rename(source, target))[1])
-    write_figures(model, {"robot_dice": 0.5})
-    assert done[:2] == ["on disk", "moved"]
 
 
 def test_figures_that_cannot_be_stored_are_one_clear_error(model: Path) -> None:

@@ -84,11 +84,6 @@ def test_few_pictures_are_enough_for_a_limit_that_holds_for_new_ones() -> None:
     assert (familiarity.distance(known(500, seed=4)) / familiarity.limit > 1.0).mean() < 0.05
 
 
-def test_too_few_are_said() -> None:
-    with pytest.raises(OutOfDistributionError, match=f"{LEAST - 1} pictures show a vessel; {LEAST} are needed"):
-        fitted(known(LEAST - 1))
-
-
 @pytest.mark.parametrize("told", [True, False])
 def test_pictures_of_one_phantom_do_not_vouch_for_each_other(told: bool) -> None:
     """Thirty phantoms, sixteen nearly equal pictures of each: told of, the limit holds for other phantoms; else it would not."""

@@ -109,11 +109,6 @@ def test_sharpness_depends_on_blur_and_not_on_exposure_or_noise() -> None:
     assert quality.sharpness(noisy) < 2 * values[3] + 0.02
 
 
-def test_an_image_without_pixels() -> None:
-    refusal = quality.check_image(np.zeros((0, 0, 3), np.uint8), LIMITS)
-    assert refusal.reason is Reason.UNREADABLE
-
-
 def test_empty_masks_say_which() -> None:
     found, nothing = masks(), np.zeros(SHAPE, bool)
     assert quality.check_masks(found) is None
@@ -290,11 +285,3 @@ def test_a_head_beside_the_border_that_touches_it_in_single_frames_is_in_view() 
         mask = probability(depth(line + [[0.0, 0.0], [2.0, 0.0]], 4.0)) >= 0.5
         memory = track(path(line), mask, memory, step / 30, CONFIG)
         assert check_in_view(memory, CONFIG) is None
-
-
-def test_a_head_beside_the_border_that_does_not_meet_it_is_in_view() -> None:
-    line = np.array([[20.0, 6.0], [600.0, 6.0]])  # runs along the border, 2 px of background beside it
-    mask = probability(depth(line, 3.6)) >= 0.5
-    assert track(path(line), mask, TrackedPath(path(line), 0.0), 0.1, CONFIG).border_s is None
-    left_border = TrackedPath(path(line), 0.0, -1.0, -0.1)
-    assert track(path(line), mask, left_border, 0.1, CONFIG).border_s is None

@@ -137,12 +137,6 @@ def test_a_phantom_that_moves_is_looked_at_whole(pipeline: Pipeline, network: Co
     assert see(pipeline, 0.1, picture(300, shift=(0, 6))).window is not None
 
 
-def test_another_brightness_of_all_of_it_is_no_change(pipeline: Pipeline, network: Colours) -> None:
-    see(pipeline, 0.0, picture(300))
-    see(pipeline, 0.05, picture(300, light=15))
-    assert network.shown == [WHOLE, WINDOW]
-
-
 def grainy(image: Image, seed: int, levels: float = 16.0) -> Image:
     """With noise whose grain is some pixels wide, as in an X-ray: as many levels of it do not average out over a cell."""
     grain = cv2.GaussianBlur(np.random.default_rng(seed).normal(0, 1, image.shape[:2]), (0, 0), 1.6)
@@ -371,17 +365,6 @@ def test_a_clear_tube_that_was_moved_leaves_no_ghost() -> None:
     np.testing.assert_array_equal(standing.add(after, nothing, cells_of(walls[1]), 0.0) >= 0.5, after >= 0.5)
 
 
-def test_the_robot_does_not_change_the_vessel_under_it() -> None:
-    """Its body is as large as a changed picture, in time."""
-    standing, nothing = VesselAverage(), np.zeros((480, 640), np.float32)
-    for head_x, value in ((100, 1.0), (550, 0.0)):
-        image = picture(head_x)
-        robot = Colours()(image)[1]
-        standing.begin(is_turned=True)
-        mean = standing.add(nothing + np.float32(value), robot, cells_of(image), 0.0)
-    assert (mean == 0.5).all()
-
-
 def test_a_look_that_is_broken_does_not_count(averaging: Pipeline, biased: Biased) -> None:
     whole_looks(averaging, 0.5)
     biased.is_broken = True
@@ -430,24 +413,3 @@ def test_the_mean_is_of_the_newest_look_in_each_orientation() -> None:
     standing.reset()
     standing.begin(is_turned=True)
     assert float(standing.add(found + np.float32(0.25), found, STILL, 0.0)[0, 0]) == 0.25
-
-
-def test_noise_and_light_are_no_other_vessel() -> None:
-    rng = np.random.default_rng(0)
-    standing, nothing = VesselAverage(), np.zeros((480, 640), np.float32)
-    for value, light, noise in ((0.6, 0, 0), (1.0, 15, 12), (0.6, -10, 12), (1.0, 0, 12)):
-        image = np.clip(picture(300, light=light) + rng.normal(0, noise, (480, 640, 3)), 0, 255).astype(np.uint8)
-        standing.begin(is_turned=True)
-        mean = standing.add(nothing + np.float32(value), nothing, cells_of(image), 2.5)
-    assert np.isclose(mean, 0.8).mean() > 0.98
-
-
-def test_another_picture_and_another_size_are_another_vessel() -> None:
-    for other in (np.random.default_rng(1).integers(0, 255, WHOLE, np.uint8), np.zeros((240, 320, 3), np.uint8)):
-        standing = VesselAverage()
-        for image, value in ((picture(300), 1.0), (cv2.GaussianBlur(other, (0, 0), 6.0) * 8, 0.25)):
-            found = np.full(image.shape[:2], value, np.float32)
-            standing.begin(is_turned=True)
-            mean = standing.add(found, np.zeros_like(found), cells_of(image), 0.0)
-        assert (mean == 0.25).all()
-        assert standing.is_gathering

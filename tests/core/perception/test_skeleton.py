@@ -74,29 +74,6 @@ def test_ends_are_where_the_papers_convolution_gives_eleven() -> None:
     assert sorted(end_pixels(skeleton)) == [(1, 1), (4, 5), (7, 1)]
 
 
-def test_an_end_around_a_corner_is_one_too() -> None:
-    hook = art("""
-.....
-.###.
-.#...
-.....
-""")
-    assert sorted(end_pixels(hook)) == [(1, 2), (3, 1)]
-
-
-def test_walking_back_stops_at_a_junction() -> None:
-    fork = art("""
-.#.......#
-..#.....#.
-...#...#..
-....#.#...
-.....#....
-.....#....
-""")
-    assert BranchWalker(fork).back((1, 0), 10) == [(1, 0), (2, 1), (3, 2), (4, 3)] or len(BranchWalker(fork).back((1, 0), 10)) <= 6
-    assert BranchWalker(fork).back((1, 0), 2) == [(1, 0), (2, 1), (3, 2)]
-
-
 def test_a_branch_leaves_through_its_end() -> None:
     row = np.zeros((9, 30), bool)
     row[4, 5:25] = True

@@ -168,13 +168,6 @@ def test_an_end_that_jumped_teaches_nothing(stream: Stream, is_doubted: bool) ->
     assert np.array_equal(left, moved) is is_doubted
 
 
-def test_what_is_known_to_be_none_is_so_after_an_end_that_jumped(stream: Stream) -> None:
-    stream.advance(100, 160, TEXT)
-    stream.see(_stretch((0, 60), TEXT), None)
-    stream.lookalikes.distrust()
-    assert np.array_equal(stream.see(_stretch((0, 161), TEXT), 161), _stretch((0, 161)))
-
-
 def test_a_part_that_was_robot_is_robot_for_as_long_as_it_is_seen(stream: Stream) -> None:
     """The robot rests, and glare cuts its tip off for half a minute. Then the glare's edge creeps along the body."""
     stream.advance(240, 300)
@@ -201,26 +194,10 @@ def test_what_was_not_seen_for_long_is_forgotten(stream: Stream) -> None:
     assert np.array_equal(stream.see(mask, 160), mask)
 
 
-def test_another_size_begins_again(stream: Stream) -> None:
-    stream.advance(100, 160, TEXT)
-    stream.lookalikes.remove(np.zeros((50, 60), np.bool_), np.zeros((50, 60, 3), np.uint8), stream.now_s)
-    mask = _stretch((0, 160), TEXT)
-    assert np.array_equal(stream.see(mask, 160), mask)
-
-
 def test_a_stream_that_is_wound_back_begins_anew(stream: Stream) -> None:
     stream.advance(100, 160, TEXT)
     mask = _stretch((0, 160), TEXT)
     assert np.array_equal(stream.see(mask, 160, after_s=-1.0), mask)
-
-
-def test_without_an_answer_lately_nothing_is_learnt(stream: Stream) -> None:
-    """Between two answers far apart anything can have happened."""
-    stream.see(_stretch((0, 120), TEXT), 120)
-    for x in range(140, 240, 20):
-        stream.see(_stretch((0, x)), x, after_s=1.0)
-        mask = _stretch((0, x), TEXT)
-        assert np.array_equal(stream.see(mask, None, after_s=1.0), mask)
 
 
 def test_it_can_be_switched_off() -> None:
@@ -329,16 +306,6 @@ def test_another_way_of_a_moment_is_not_taken(memory: RouteMemory, other: Route)
     assert left.length_px == pytest.approx(260.0, abs=2.0)
     assert memory.update(other, head, TARGET, cut, CONFIG.memory_s + 0.1) is other, "what lasts is true: perhaps the way was none"
     assert memory.update(other, head, TARGET, cut, CONFIG.memory_s + 0.2) is other
-
-
-@pytest.mark.parametrize("other", [DETOUR, SHORT_CUT], ids=["detour", "short cut"])
-def test_nor_is_it_when_the_way_was_not_found_for_long(memory: RouteMemory, other: Route) -> None:
-    head, cut = (120.0, 100.0), _vessel((200, 212))
-    assert isinstance(memory.update(WHY, head, TARGET, cut, 5.0), Route)
-    left = memory.update(other, head, TARGET, cut, 5.03)
-    assert left is not other
-    assert memory.update(_route(120.0), head, TARGET, _vessel(), 5.3) is not left
-    assert memory.update(other, head, TARGET, cut, 5.6) is not other, "it has been seen to be none meanwhile"
 
 
 _ARC = np.linspace(0.0, np.pi, 100)

@@ -352,9 +352,6 @@ def test_an_island_in_a_junction_stays_a_loop() -> None:
         np.testing.assert_allclose(edge.points[-1], graph.nodes[edge.end])
 
 
-LIMIT = np.array(SIZE) - 1.0
-
-
 def vessel(line: Points, radius: float) -> Mask:
     return np.asarray(depth(line, radius) >= 0.0)
 
@@ -382,16 +379,3 @@ def test_a_vessel_that_ends_in_a_bend_bends_to_its_end(radius: float, around_px:
     assert aside.max() < 1.2
     assert np.hypot(*(found[-1] - line[-1])) < 0.6 * radius, "it ends where it ended"
     assert np.hypot(*np.diff(found, axis=0).T).max() < 3.0
-
-
-def test_it_goes_on_to_the_border_that_cuts_it_off() -> None:
-    line = np.column_stack([np.arange(200.0, 700.0, 2.0), np.linspace(200.0, 260.0, 250)])
-    found = led_on(line[line[:, 0] < 625.0], 12.0, vessel(line, 12.0))
-    assert found[-1, 0] == pytest.approx(LIMIT[0], abs=0.5)
-    assert np.abs(found[:, 1] - np.interp(found[:, 0], line[:, 0], line[:, 1])).max() < 0.8
-
-
-def test_where_no_wall_is_seen_it_goes_on_as_it_was() -> None:
-    line = bend(0.0, 100.0)
-    found = led_on(line, 14.0, np.ones((SIZE[1], SIZE[0]), np.bool_))
-    assert np.abs(np.hypot(*(found - [320.0, 240.0]).T) - 100.0).max() < 2.0

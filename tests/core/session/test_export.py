@@ -143,16 +143,6 @@ def test_a_drive_without_links_takes_an_export_too(session: Path, tmp_path: Path
     assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
 
 
-def test_a_drive_that_takes_no_file_in_the_end_keeps_no_empty_one(
-    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(os, "link", no_links)
-    monkeypatch.setattr(Path, "replace", no_links)
-    with SessionReader(session) as reader, pytest.raises(SessionError, match="cannot be written"):
-        export_csv(reader, tmp_path / "x.csv")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_file_that_was_made_while_exporting_is_not_overwritten(session: Path, tmp_path: Path) -> None:
     out = tmp_path / "x.csv"
     with SessionReader(session) as reader, pytest.raises(SessionError, match="was made by something else meanwhile"):

@@ -180,17 +180,6 @@ def test_ros2_messages_are_decoded_by_their_definitions(session: Path, tmp_path:
 
 
 @pytest.mark.parametrize("export", [export_mcap, export_ros2])
-def test_nothing_is_overwritten_and_nothing_half_is_left(session: Path, tmp_path: Path, export: Any) -> None:
-    (tmp_path / "there.mcap").write_text("mine")
-    with SessionReader(session) as reader:
-        with pytest.raises(SessionError, match="there already"):
-            export(reader, tmp_path / "there.mcap")
-        with pytest.raises(SessionError, match="cannot be written"):
-            export(reader, tmp_path / "there.mcap" / "in a file.mcap")
-    assert [path.name for path in tmp_path.iterdir()] == ["there.mcap"]
-
-
-@pytest.mark.parametrize("export", [export_mcap, export_ros2])
 def test_a_full_disk_is_said_and_leaves_nothing(
     session: Path, tmp_path: Path, export: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

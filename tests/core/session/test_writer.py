@@ -246,22 +246,6 @@ def test_driving_is_recorded_though_the_camera_gives_no_picture(tmp_path: Path) 
     ]
 
 
-def test_what_the_recorder_dropped_is_told_in_what_the_ring_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with writer_in(tmp_path, replace_config(ring_s=5.0)) as writer:
-        for tick in ticks(3):
-            writer.put(tick)
-        wait_for(lambda: writer.pictures_waiting == 0)
-        writer._dropped += 7
-        for tick in ticks(3, start=10):
-            writer.put(tick)
-        writer.save_last()
-        wait_for(lambda: writer.status().saved is not None)
-    session = saved(writer)
-    with opened(session) as reader:
-        assert [row.dropped_rows for place in range(len(reader)) if (row := reader.row(place))] == [0, 0, 0, 7, 7, 7]
-    assert read_manifest(session).counts.dropped == 7
-
-
 def test_saving_the_last_seconds_twice_or_of_nothing_stops_no_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go = threading.Event()
     close = SessionFiles.close
