@@ -50,9 +50,7 @@ def scene_at(
     robot = fit_robot_vector(points, 40.0)
     route = plan_route(graph, head, target) if target is not None else None
     centerline = centerline_at(graph, head, robot.direction, 20.0, route)
-    assert centerline is not None
     vessel = fit_vessel_vector(centerline)
-    assert vessel is not None
     pose = measure_pose(robot, vessel, Config().perception.pose)
     path = RobotPath(points, 1.0, None, True, 0.0, 3.5)
     return Scene(

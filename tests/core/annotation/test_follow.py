@@ -97,7 +97,6 @@ def test_on_the_twin_the_error_stays_small_for_a_while() -> None:
             images.append(world.frame().image)
             truths.append(world.truth())
         path = truths[0].robot_path
-        assert path is not None
         length = float(geometry.arc_length(path)[-1])
         drawn = Annotation(tuple(map(tuple, geometry.cut(path, length - 60.0, length).tolist())), VESSEL)
         *_, (place, robot, _) = followed_lines(images.__getitem__, {0: drawn}, 31)

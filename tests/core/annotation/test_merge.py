@@ -32,7 +32,6 @@ def answer(store: AnnotationStore, key: ItemKey, *contents: Annotation) -> None:
     history = store.history(key)
     for content in contents:
         entry = history.edit("draw", content)
-        assert entry is not None
         store.save(key, ImageView.AS_IS, entry, content, measure_lines(content, (640, 480), PerceptionConfig()), 5.0)
 
 

@@ -34,7 +34,6 @@ def known(path: Path) -> AnnotationStore:
 
 def save(store: AnnotationStore, history: History, content: Annotation, key: ItemKey = KEY, spent_s: float = 1.0) -> None:
     entry = history.edit("edit", content)
-    assert entry is not None
     store.save(key, ImageView.AS_IS, entry, content, measure_lines(content, (640, 480), PerceptionConfig()), spent_s)
 
 

@@ -138,7 +138,6 @@ def test_the_network_adds_what_differs_a_little_beside_the_difference(bench: Ben
     faint = tuple(int(level) - 14 for level in board()[130, 100])  # one side of the robot nearly looks like the bench
     image = noisy(with_line(with_line(board(), (0, 127), (200, 135), faint), *ROBOT), 2.0, 3)
     view = register(image, bench)
-    assert isinstance(view, BenchView)
     difference = robot_by_difference(image, view)
     side = line((20, 129), (180, 136), 1)
     assert (difference.probability[side] >= 0.5).mean() < 0.3

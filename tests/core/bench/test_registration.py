@@ -6,7 +6,7 @@ import pytest
 
 from core.bench.bench import Bench, bench_from_pictures
 from core.bench.registration import BenchView, register
-from core.types import Image, Reason, Refusal
+from core.types import Image, Reason
 from tests.core.bench.drawn_bench import SIZE, board, noisy, tube, with_line
 
 
@@ -43,7 +43,6 @@ def test_a_moved_camera_is_realigned(bench: Bench, shift: tuple[float, float], r
 @pytest.mark.parametrize(("shift", "rotation_deg"), [((13.0, 0.0), 0.0), ((0.0, -30.0), 0.0), ((0.0, 0.0), 3.0)])
 def test_a_camera_that_was_moved_too_far_is_named(bench: Bench, shift: tuple[float, float], rotation_deg: float) -> None:
     found = register(noisy(moved(board(), shift, rotation_deg)[0], 2.0, 2), bench)
-    assert isinstance(found, Refusal)
     assert found.reason is Reason.BENCH_MOVED
     assert "at most 10 px" in found.detail
 
@@ -66,7 +65,6 @@ def test_a_vessel_that_was_moved_on_its_board_is_named(by: int) -> None:
     seen(noisy(with_robot, 2.0, 2), bench)
     seen(noisy(moved(with_robot, (6.0, -7.5))[0], 2.0, 2), bench)
     found = register(noisy(with_line(tube_at(150 + by), (150 + by, 0), (154 + by, 150)), 2.0, 2), bench)
-    assert isinstance(found, Refusal)
     assert found.reason is Reason.BENCH_MOVED
     assert "the vessel alone" in found.detail
 
@@ -74,7 +72,6 @@ def test_a_vessel_that_was_moved_on_its_board_is_named(by: int) -> None:
 def test_another_bench_is_named(bench: Bench) -> None:
     for picture in (noisy(board(8, 40), 2.0, 2), np.full((SIZE[1], SIZE[0], 3), 128, np.uint8), board()[:200]):
         found = register(picture, bench)
-        assert isinstance(found, Refusal)
         assert found.reason is Reason.OTHER_BENCH
 
 

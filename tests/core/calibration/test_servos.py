@@ -287,7 +287,6 @@ def test_a_wire_that_is_hung_out_is_told() -> None:
 def test_a_feed_that_goes_another_way_than_it_was_sent_is_told(mm_per_px: float, told: str) -> None:
     """3 mm both ways are 12 px at 0.25 mm/px; the scale is one of pictures half as large."""
     fed = classify(Wiggle(3.0, look(path()), look(path(length_px=312.0)), look(path(length_px=288.0))))
-    assert fed is not None
     findings = {servo_id: ServoFinding(function, 1, "") for servo_id, function in ALL.items()} | {1: fed}
     scale = ScaleConfig(mm_per_px=2.0 * mm_per_px, size_px=(320, 240), method="board", uncertainty_share=0.01)
     servos = ServosConfig()

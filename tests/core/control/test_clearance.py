@@ -93,9 +93,7 @@ def advice(advance_mm_s: float, steer_deg: float = 0.0) -> Advice:
 
 
 def predicted(advance_mm_s: float, steer_deg: float = 0.0, points: Points = LEVEL) -> Points:
-    found = predict(robot_scene(points), advice(advance_mm_s, steer_deg), 2.0, 3.0)
-    assert found is not None
-    return found
+    return predict(robot_scene(points), advice(advance_mm_s, steer_deg), 2.0, 3.0)
 
 
 def direction_deg(first: np.ndarray, second: np.ndarray) -> float:

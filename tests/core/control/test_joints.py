@@ -286,7 +286,6 @@ def test_no_commands_lead_out_of_the_limits_and_the_gate_rejects_none_of_them(
             request = GoalRequest(wanted.goals_mm, Source.OPERATOR, now_s)
             step = gate_step(state, request, JointMeasurement(at, now_s), Source.OPERATOR, now_s, servos, SAFETY)
             assert step.rejection is None, step.rejection
-            assert step.goals_mm is not None
             for joint, goal, here in zip(servos.joints, step.goals_mm, at, strict=True):
                 assert joint.low_mm - 1e-9 <= goal <= joint.high_mm + 1e-9
                 assert abs(goal - here) <= joint.max_step_mm + 1e-9

@@ -758,7 +758,6 @@ def _spoilt(points: Points, value: float) -> Points:
 def test_any_number_that_is_none_holds_and_the_policy_is_not_asked(bench: Bench, part: str, value: float) -> None:
     def spoil(scene: Scene) -> Scene:
         path, line, route, pose = scene.path, scene.centerline, scene.route, scene.pose
-        assert pose is not None
         changes: dict[str, dict[str, Any]] = {
             "path": {"path": replace(path, points=_spoilt(path.points, value))},
             "path radius": {"path": replace(path, radius_px=value)},
@@ -857,7 +856,6 @@ def test_a_turn_that_fails_ends_the_turns_with_its_reason() -> None:
     turned.wait(1)
     turned.fails = True
     loop._thread.join(10.0)
-    assert loop.failure is not None
     assert "RuntimeError: no more" in loop.failure
     loop.close()
     assert turned.closed

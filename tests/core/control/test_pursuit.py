@@ -18,34 +18,28 @@ from tests.core.driving_scenes import BEND, FORK, STRAIGHT, scene_at, status
 CONFIG, WORDS = PursuitConfig(smoothing_s=0.0), AdviceConfig()
 
 
-def advise(pursuit: Pursuit, scene: Scene, told: RobotStatus | None = None, *, followed: bool = True) -> Advice:
-    advice = pursuit(scene, told, followed=followed)
-    assert advice is not None
-    return advice
-
-
 def test_in_the_middle_and_along_it_goes_fast_and_straight() -> None:
-    advice = advise(Pursuit(CONFIG, WORDS), scene_at(STRAIGHT, (100, 100), (380, 100)))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 100), (380, 100)))
     assert (advice.speed, advice.advance_mm_s) == (Speed.FAST, WORDS.fast_mm_s)
     assert advice.steer_deg == pytest.approx(0.0, abs=0.2)
 
 
 @pytest.mark.parametrize(("y", "heading", "sign"), [(94, 0, 1), (106, 0, -1), (100, 20, -1), (100, -20, 1)])
 def test_it_turns_towards_the_route(y: float, heading: float, sign: int) -> None:
-    advice = advise(Pursuit(CONFIG, WORDS), scene_at(STRAIGHT, (100, y), (380, 100), heading))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, y), (380, 100), heading))
     assert math.copysign(1, advice.steer_deg) == sign
 
 
 def test_a_bend_ahead_slows_it_down() -> None:
-    advice = advise(Pursuit(CONFIG, WORDS), scene_at(BEND, (190, 100), (260, 290)))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(BEND, (190, 100), (260, 290)))
     assert 0 < advice.advance_mm_s < WORDS.fast_mm_s
     assert advice.why == "a bend ahead"
 
 
 def test_a_bifurcation_ahead_slows_it_down_even_straight_on() -> None:
-    advice = advise(Pursuit(CONFIG, WORDS), scene_at(FORK, (165, 100), (390, 100)))
+    advice = Pursuit(CONFIG, WORDS)(scene_at(FORK, (165, 100), (390, 100)))
     assert (advice.speed, advice.why) == (Speed.MODERATE, "a bifurcation ahead")
-    far = advise(Pursuit(CONFIG, WORDS), scene_at(FORK, (100, 100), (390, 100)))
+    far = Pursuit(CONFIG, WORDS)(scene_at(FORK, (100, 100), (390, 100)))
     assert far.speed is Speed.FAST
 
 
@@ -53,7 +47,7 @@ def test_the_more_the_head_must_turn_the_slower_and_never_by_a_jump() -> None:
     pointing = PursuitConfig(smoothing_s=0.0, follow_arc=0.0, min_bend_radius_px=5.0)  # the error is the heading
     errors_deg, speeds = [], []
     for heading in np.arange(0.0, 40.0, 0.25):
-        advice = advise(Pursuit(pointing, WORDS), scene_at(STRAIGHT, (100, 100), (380, 100), float(heading)))
+        advice = Pursuit(pointing, WORDS)(scene_at(STRAIGHT, (100, 100), (380, 100), float(heading)))
         errors_deg.append(abs(advice.steer_deg))
         speeds.append(advice.advance_mm_s)
     small = np.array(errors_deg) < CONFIG.slow_steer_deg
@@ -77,7 +71,7 @@ def _pressed(pursuit: Pursuit, forces_n: list[float], fed_mm: float) -> list[flo
     found = []
     for k, force_n in enumerate(forces_n):
         scene = scene_at(STRAIGHT, (100 + 3 * fed_mm * k, 100), (380, 100), time_s=0.1 * k)
-        advice = advise(pursuit, scene, status(force_n, 50.0 + fed_mm * k))
+        advice = pursuit(scene, status(force_n, 50.0 + fed_mm * k))
         found.append(advice.advance_mm_s)
     return found
 
@@ -97,7 +91,7 @@ def test_contact_backs_off_for_a_while() -> None:
     speeds, insertion_mm = [], 50.0
     for k in range(1, 12):  # the advice is followed; longer, and this head that never moves would be stuck
         scene = scene_at(STRAIGHT, (100, 100), (380, 100), time_s=0.1 * k)
-        advice = advise(pursuit, scene, status(0.3 if k == 1 else 0.0, insertion_mm))
+        advice = pursuit(scene, status(0.3 if k == 1 else 0.0, insertion_mm))
         speeds.append(advice.advance_mm_s)
         insertion_mm += 0.1 * advice.advance_mm_s
     assert speeds[0] == -WORDS.fast_mm_s
@@ -119,7 +113,7 @@ def _missing(pursuit: Pursuit, times: int, target: Point = (20, 100), x: float =
             for _ in range(60):
                 time_s += 0.1
                 graph_heading = 180.0 if turned else 0.0
-                advice = advise(pursuit, scene_at(STRAIGHT, (x, 100), target, graph_heading, time_s), status(0.0, insertion_mm))
+                advice = pursuit(scene_at(STRAIGHT, (x, 100), target, graph_heading, time_s), status(0.0, insertion_mm))
                 insertion_mm += 0.1 * advice.advance_mm_s
                 said.append(advice.why)
                 if turned and not advice.why.startswith("backing off"):
@@ -144,7 +138,7 @@ def test_who_drives_on_by_hand_after_it_gave_up_is_advised_again() -> None:
     assert "take over" in _missing(pursuit, CONFIG.most_misses)[-1]
     said = []
     for k in range(25):
-        advice = advise(pursuit, scene_at(STRAIGHT, (200 - k, 100), (20, 100), 180.0, 100.0 + 0.1 * k), status(0.0, 20.0 + 0.3 * k))
+        advice = pursuit(scene_at(STRAIGHT, (200 - k, 100), (20, 100), 180.0, 100.0 + 0.1 * k), status(0.0, 20.0 + 0.3 * k))
         said.append(advice.why)
     assert "take over" in said[5]
     assert "take over" not in said[-1]
@@ -152,8 +146,7 @@ def test_who_drives_on_by_hand_after_it_gave_up_is_advised_again() -> None:
 
 def test_after_a_miss_it_turns_into_the_branch_earlier() -> None:
     def asked(pursuit: Pursuit, x: float, time_s: float, insertion_mm: float) -> Advice:
-        advice = advise(pursuit, scene_at(FORK, (x, 100), (300, 200), time_s=time_s), status(0.0, insertion_mm))
-        return advice
+        return pursuit(scene_at(FORK, (x, 100), (300, 200), time_s=time_s), status(0.0, insertion_mm))
 
     pursuit = Pursuit(CONFIG, WORDS)
     x, time_s, insertion_mm, said = 250.0, 0.0, 50.0, ""
@@ -179,7 +172,7 @@ def _blocked(pursuit: Pursuit, seconds: float, contact_n: float | None = None, f
         time_s = 10.0 + k / fps
         if math.floor(time_s / 0.02) * 0.02 > told.time_s:
             told = replace(status(contact_n, insertion_mm), time_s=math.floor(time_s / 0.02) * 0.02)
-        advice = advise(pursuit, scene_at(STRAIGHT, (100, 100), (380, 100), time_s=time_s), told)
+        advice = pursuit(scene_at(STRAIGHT, (100, 100), (380, 100), time_s=time_s), told)
         insertion_mm += advice.advance_mm_s / fps
         said.append(advice.why)
         fed_mm.append(insertion_mm - 50.0)
@@ -201,7 +194,7 @@ def test_a_route_that_is_missing_in_single_frames_hides_no_blocked_head(every_s:
         scene = scene_at(STRAIGHT, (100, 100), (380, 100), time_s=10.0 + k / fps)
         if k % round(every_s * fps) == 7:
             scene = replace(scene, route=None)
-        advice = advise(pursuit, scene, replace(status(None, insertion_mm), time_s=10.0 + k / fps))
+        advice = pursuit(scene, replace(status(None, insertion_mm), time_s=10.0 + k / fps))
         insertion_mm += advice.advance_mm_s / fps
         said.append(advice.why)
     assert said[-1] == f"came no farther in {CONFIG.most_tries} tries: take over, or choose another destination"
@@ -212,7 +205,7 @@ def test_a_robot_that_cannot_go_back_is_said_to_be_until_it_moves() -> None:
     pursuit, said = Pursuit(CONFIG, WORDS), []
     for k in range(200):
         told = replace(status(None, 50.0 if k < 150 else 50.0 - 0.4 * (k - 149)), time_s=0.1 * k)
-        advice = advise(pursuit, scene_at(STRAIGHT, (200, 100), (20, 100), time_s=0.1 * k), told)
+        advice = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), time_s=0.1 * k), told)
         said.append((advice.advance_mm_s, advice.why))
     stranded = (0.0, "the robot cannot go back any farther: take over, or choose another destination")
     assert stranded not in said[:25]
@@ -225,7 +218,7 @@ def test_an_operator_who_does_not_go_back_is_neither_stranded_nor_misses_anythin
     pursuit, said = Pursuit(CONFIG, WORDS), []
     for k in range(300):
         told = replace(status(None, 50.0 + 0.1 * k * fed_mm_s), time_s=0.1 * k)
-        advice = advise(pursuit, scene_at(STRAIGHT, (200, 100), (20, 100), time_s=0.1 * k), told, followed=False)
+        advice = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), time_s=0.1 * k), told, followed=False)
         said.append(advice.why)
     assert set(said[20:]) == {"backing off: the way to the target branches off behind the head"}
     assert pursuit._misses.count == 1
@@ -235,9 +228,7 @@ def test_another_destination_is_another_matter_to_a_robot_that_could_not_go_back
     pursuit, said = Pursuit(CONFIG, WORDS), []
     for k in range(100):
         target = (20, 100) if k < 80 else (60, 100)
-        advice = advise(
-            pursuit, scene_at(STRAIGHT, (200, 100), target, time_s=0.1 * k), replace(status(None, 50.0), time_s=0.1 * k)
-        )
+        advice = pursuit(scene_at(STRAIGHT, (200, 100), target, time_s=0.1 * k), replace(status(None, 50.0), time_s=0.1 * k))
         said.append(advice.why)
     assert "cannot go back" in said[79]
     assert "cannot go back" not in said[85]
@@ -255,9 +246,9 @@ def test_after_a_pause_no_single_frame_decides() -> None:
     pursuit = Pursuit(CONFIG, WORDS)
     for k, x in ((0, 100.0), (1, 103.0), (40, 200.0)):  # seen again after a while, far on
         at = replace(status(None, 50.0 + x / 3), time_s=0.1 * k)
-        advice = advise(pursuit, scene_at(STRAIGHT, (x, 100), (380, 100), time_s=0.1 * k), at)
+        advice = pursuit(scene_at(STRAIGHT, (x, 100), (380, 100), time_s=0.1 * k), at)
         assert advice.advance_mm_s > 0
-    behind = advise(pursuit, scene_at(STRAIGHT, (200, 100), (20, 100), time_s=4.4))
+    behind = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), time_s=4.4))
     assert "looking again" in behind.why
 
 
@@ -282,7 +273,7 @@ def test_a_missed_branch_is_backed_out_of_until_it_lies_well_ahead() -> None:
     seen = []
     x = 230.0
     for frame in range(300):
-        advice = advise(pursuit, scene_at(FORK, (x, 100), (290, 190), time_s=0.1 * frame))
+        advice = pursuit(scene_at(FORK, (x, 100), (290, 190), time_s=0.1 * frame))
         seen.append((x, advice.advance_mm_s))
         if advice.advance_mm_s > 0:
             break

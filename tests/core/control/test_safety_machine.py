@@ -382,6 +382,5 @@ def test_an_honest_source_is_never_rejected_however_long_it_drives(command: Comm
         )
         assert step.rejection is None
         sent, gate = step.goals_mm, step.state
-        assert sent is not None
         at = [here + 0.4 * (goal - here) for here, goal in zip(at, sent, strict=True)]
     assert at[4] == pytest.approx(400.0 if command.advance_mm_s > 0 else -5.0, abs=0.01)

@@ -131,7 +131,6 @@ def test_copies_of_an_image_make_no_interval_narrower() -> None:
     errors = rng.normal(0.0, 5.0, 20)
     manual = rng.uniform(20.0, 160.0, 20)
     group = members([place for place in range(20) for _ in range(16)])
-    assert group is not None
     once = angle_metrics(manual, manual + errors)
     alone = angle_metrics(np.repeat(manual, 16), np.repeat(manual + errors, 16))
     whole = angle_metrics(np.repeat(manual, 16), np.repeat(manual + errors, 16), group=group)

@@ -119,7 +119,6 @@ def swings(network: DrawnNetwork) -> tuple[float, float]:
     scene = Pipeline(network, CONFIG, single=CalibratedSegmenter(network, sensitivity=True)).perceive_single(frame())
     assert reason(scene) is None
     assert list(scene.latency_ms) == [*STAGES[:-1], "sensitivity", "total"]
-    assert scene.evidence is not None
     named = dict(zip(ConfidenceFeatures.names(), scene.evidence, strict=True))
     return named["theta_swing"], named["head_swing"]
 
@@ -166,7 +165,6 @@ def test_in_a_stream_what_is_known_to_be_no_robot_does_not_lower_the_confidence(
         for k, x in enumerate(range(270, 411, 5)):
             network.draw(VESSEL[VESSEL[:, 0] <= x], *others)
             scene = pipeline(frame(k * FRAME_S))
-        assert scene.evidence is not None
         told.append((scene.evidence, scene.pose.confidence))
         if others:
             assert scene.masks.robot_probability[:, 420:450].max() > 0.9, "it is still shown"

@@ -93,7 +93,6 @@ def test_a_window_is_looked_at_beside_the_vessel_that_is_known() -> None:
     assert len(network.told) == 2
     for scene, vessel in zip(scenes[1:], network.told, strict=True):
         assert scene.pose is not None
-        assert scene.window is not None
         x, y, width, height = scene.window
         np.testing.assert_array_equal(vessel, scene.masks.vessel_probability[y : y + height, x : x + width])
 

@@ -363,7 +363,6 @@ def test_more_looks_than_there_are_windows_for_are_refused(looks: int) -> None:
 def test_every_engine_can_look_again(model: Path, device: str, precision: str) -> None:
     config = SegmentationConfig.model_validate({"model": str(model), "device": device, "precision": precision, "threads": 1})
     near = open_second_look(config)
-    assert near is not None
     planes = stack_planes(np.full((160, 160, 3), 90, np.uint8), np.zeros((160, 160), np.float32), np.ones((160, 160), np.float32))
     vessel, robot = near(planes)
     assert vessel.shape == robot.shape == (160, 160)

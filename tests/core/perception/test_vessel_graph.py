@@ -228,7 +228,6 @@ def test_a_symmetric_fork_goes_on_smoothly_and_alike_into_both_branches() -> Non
 def theta_through(graph: VesselGraph, place: Point, heading: Point) -> float:
     """By how many degrees the vessel's direction beside a head there differs from the robot's."""
     found = centerline_at(graph, place, heading, 20.0)
-    assert found is not None
     vector = fit_vessel_vector(found)
     turn = np.arctan2(*vector.direction[::-1]) - np.arctan2(*heading[::-1])
     return float(np.degrees((turn + np.pi) % (2 * np.pi) - np.pi))

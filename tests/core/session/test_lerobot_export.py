@@ -25,7 +25,6 @@ def session(folder: Path, begin: int, times: list[int]) -> Path:
     ticks = []
     for k in times:
         tick = tick_of(begin + k, 1000.0 + k / FPS + 0.004 * (k % 2), full=k % 2 == 1)
-        assert tick.status is not None
         ticks.append(
             replace(tick, sent=Command(0.1 * (k % 5), advance_mm_s=1.0 * k), status=replace(tick.status, insertion_mm=5.0 + k))
         )

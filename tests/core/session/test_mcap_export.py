@@ -37,9 +37,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
         time_s = 1000.0 + i / 10
         writer.put(tick_of(i, time_s, full=i >= 20), drive_of(time_s), status)
     assert writer.close()
-    saved = writer.status().saved
-    assert saved is not None
-    return saved
+    return writer.status().saved
 
 
 Found = dict[str, list[tuple[int, Any]]]

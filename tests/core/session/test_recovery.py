@@ -341,7 +341,6 @@ def test_a_session_that_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
     writer.put(tick_of(0, time.monotonic()))
     wait_for(lambda: writer.status().frames == 1)
     folder = writer.status().folder
-    assert folder is not None
     assert find_cut_sessions(tmp_path) == ()
     with pytest.raises(SessionError, match="being recorded"):
         recover(folder)

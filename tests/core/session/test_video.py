@@ -77,7 +77,6 @@ def damage(path: Path, place: int) -> None:
     with av.open(str(path)) as container:
         packet = [packet for packet in container.demux(video=0) if packet.size][place]
         content, position = bytes(packet), packet.pos
-    assert position is not None
     data = path.read_bytes()
     begin = data.index(content, position)
     path.write_bytes(data[:begin] + bytes(len(content)) + data[begin + len(content) :])

@@ -48,9 +48,7 @@ def replace_config(**changes: object):
 
 
 def saved(writer: SessionWriter) -> Path:
-    session = writer.status().saved
-    assert session is not None
-    return session
+    return writer.status().saved
 
 
 @contextmanager
@@ -96,7 +94,6 @@ def test_until_it_ends_properly_the_manifest_says_so_and_the_session_is_held(tmp
         writer.put(tick_of(0, 1000.0))
         wait_for(lambda: writer.status().frames == 1)
         session = writer.status().folder
-        assert session is not None
         assert not read_manifest(session).closed
         assert is_being_written(session)
         assert writer.status().recording
@@ -563,7 +560,6 @@ def test_with_the_disk_nearly_full_it_warns_and_before_it_is_full_it_ends(tmp_pa
         wait_for(lambda: "disk full" in writer.status().problem)
         assert not writer.status().recording
         session = writer.status().folder
-        assert session is not None
     assert read_manifest(session).closed
     assert "disk full" in read_manifest(session).ended
 
@@ -621,7 +617,6 @@ def test_an_unexpected_failure_ends_the_recorder_visibly(tmp_path: Path, caplog:
         assert "recording stopped" in writer.status().problem
         wait_for(lambda: not writer.put(tick_of(2, 1000.2)))
     session = writer.status().folder
-    assert session is not None
     assert read_manifest(session).closed
 
 
