@@ -1,6 +1,8 @@
 """Drawn vessels, and scenes of a straight robot in them, for what drives by them."""
 
 import math
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -45,6 +47,11 @@ def scene_at(
     graph: VesselGraph, head: Point, target: Point | None, heading_deg: float = 0.0, time_s: float = 0.0, length_px: float = 60.0
 ) -> Scene:
     """A straight robot that points along `heading_deg` (0: right, 90: down)."""
+    return replace(_scene(graph, head, target, heading_deg, length_px), captured_s=time_s)
+
+
+@cache
+def _scene(graph: VesselGraph, head: Point, target: Point | None, heading_deg: float, length_px: float) -> Scene:
     way = np.array([math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))])
     points = np.asarray(head) - np.arange(length_px, -1.0, -2.0)[:, None] * way
     robot = fit_robot_vector(points, 40.0)
@@ -54,7 +61,7 @@ def scene_at(
     pose = measure_pose(robot, vessel, Config().perception.pose)
     path = RobotPath(points, 1.0, None, True, 0.0, 3.5)
     return Scene(
-        0, time_s, (640, 480), 1.0, path=path, vessel_graph=graph, route=route, centerline=centerline,
+        0, 0.0, (640, 480), 1.0, path=path, vessel_graph=graph, route=route, centerline=centerline,
         robot_vector=robot, vessel_vector=vessel, pose=pose,
     )  # fmt: skip
 
