@@ -156,11 +156,6 @@ class OwnFrames:
     problems: tuple[str, ...] = ()
 
 
-def count_complete(annotations: Sequence[StoredAnnotation]) -> int:
-    """Images with both masks."""
-    return len(_complete(annotations))
-
-
 def split_own_frames(
     annotations: Sequence[StoredAnnotation],
     images: Sequence[FoundImage],

@@ -176,11 +176,6 @@ class VesselOutline:
         action = "erase vessel mask" if erase else "paint vessel mask"
         self._change(action, lambda masks: paint(masks, MaskTarget.VESSEL, stroke, radius_px, self.size, erase=erase))
 
-    def add_polygon(self, points: Points) -> None:
-        """A closed outline (N, 2) of at least three points."""
-        outline = MaskPolygon(MaskTarget.VESSEL, tuple((float(x), float(y)) for x, y in points.tolist()))
-        self._change("draw vessel mask", lambda masks: (*masks, outline))
-
     def _change(self, action: str, change: Callable[[Polygons], Polygons]) -> None:
         now = self._history.current
         self._history.edit(action, replace(now, masks=change(now.masks)))

@@ -16,8 +16,6 @@ PAPER_IMAGES = 48
 PAPER_LABELS = ("B", "C", "D")
 PAPER_CONFUSION = ((12, 1, 0), (2, 23, 1), (0, 1, 4))
 """Rows manual, columns algorithm: the only table that gives all of the paper's figures of states."""
-MANUAL_SD_DEG = 1.5
-"""Assumed standard deviation of one manual measure: the paper measured twice, but gives no repeatability."""
 
 PAPER: dict[str, Any] = {
     "angle": {

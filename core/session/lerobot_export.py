@@ -53,8 +53,6 @@ _POSE = ("theta_signed_deg", "c_head_px", "c_tail_px", "head_x_px", "head_y_px",
 _TARGET = ("target_x_px", "target_y_px")
 """The end of the route; 0 without one, which ``has_target`` tells."""
 
-Stats = dict[str, dict[str, NDArray[Any]]]
-
 
 def export_lerobot(reader: SessionReader, path: Path, *, on_row: Callable[[], None] = lambda: None) -> int:
     """Write a session as a new dataset, or as the next episode of the one that is there; returns its frames.

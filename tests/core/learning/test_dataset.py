@@ -1,15 +1,12 @@
 """Labelled sets on disk, their truth, and frames that are kept in memory."""
 
-import errno
 import json
-import os
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from core.files import read_image
 from core.learning import dataset
 from core.learning.dataset import (
     DatasetError,
@@ -207,30 +204,6 @@ def test_a_truth_in_another_coding_is_one_clear_error(tmp_path: Path) -> None:
         read_truth(tmp_path)
     (tmp_path / "truth.jsonl").write_bytes(b'\xef\xbb\xbf{"stem": "a"}\n')
     assert list(read_truth(tmp_path)) == ["a"], "editors of Windows begin with a mark"
-
-
-def test_masks_are_readable_pictures(tmp_path: Path) -> None:
-    write_mask(tmp_path / "m.png", np.eye(4, dtype=bool))
-    assert read_image(tmp_path / "m.png")[:, :, 0].tolist() == (np.eye(4) * 255).tolist()
-
-
-def test_a_picture_is_written_as_a_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "m.png"
-    write_mask(path, np.eye(4, dtype=bool))
-    before = path.read_bytes()
-
-    def full(self: Path, _: Path) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
-
-    monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(OSError, match=r"m\.png"):
-        write_mask(path, np.zeros((4, 4), bool))
-    assert {one: one.read_bytes() for one in tmp_path.iterdir()} == {path: before}
-
-
-def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="none"):
-        write_mask(tmp_path / "none" / "m.png", np.eye(4, dtype=bool))
 
 
 def test_frames_are_trained_on_at_working_size(tmp_path: Path) -> None:
