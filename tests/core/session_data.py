@@ -12,7 +12,7 @@ from core.control.drive_view import DriveView
 from core.control.faults import Cause, Fault
 from core.control.gate import Source
 from core.control.modes import Hindrance, Mode
-from core.session.manifest import About
+from core.session.manifest import About, Event
 from core.session.writer import SessionWriter
 from core.types import (
     Advice,
@@ -116,12 +116,22 @@ def drive_of(time_s: float, mode: Mode = Mode.ARMED) -> DriveView:
     )
 
 
-def record(folder: Path, ticks: Iterable[Tick], config: RecordConfig = QUICK) -> Path:
-    """Record ticks into a session in `folder`; returns the session."""
+def record(
+    folder: Path,
+    ticks: Iterable[Tick],
+    config: RecordConfig = QUICK,
+    *,
+    driven: bool = False,
+    bus: object = None,
+    events: Iterable[Event] = (),
+) -> Path:
+    """Record ticks into a session in `folder`, `driven` with ``drive_of``, and events after them; returns the session."""
     writer = SessionWriter(config, ABOUT, folder=folder, clock=lambda: 1000.0)
     writer.start()
     for tick in ticks:
-        assert writer.put(tick)
+        assert writer.put(tick, drive_of(tick.frame.captured_s) if driven else None, bus)
+    for event in events:
+        writer.add_event(event)
     assert writer.close()
     status = writer.status()
     assert not status.problem, status.problem

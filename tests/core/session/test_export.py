@@ -13,9 +13,8 @@ from core.session.export import export_csv, export_mp4
 from core.session.manifest import SessionError
 from core.session.reader import SessionReader
 from core.session.recovery import recover
-from core.session.writer import SessionWriter
 from core.types import Image, Tick
-from tests.core.session_data import ABOUT, QUICK, drive_of, number_in, record, tick_of
+from tests.core.session_data import number_in, record, tick_of
 
 COUNT = 40
 
@@ -23,13 +22,8 @@ COUNT = 40
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Forty frames, the camera's clock standing still once; from frame 20 on with all that a scene can have."""
-    writer = SessionWriter(QUICK, ABOUT, folder=tmp_path_factory.mktemp("session"), clock=lambda: 1000.0)
-    writer.start()
-    for i in range(COUNT):
-        time_s = 1000.0 + i / 10
-        writer.put(tick_of(i, time_s, full=i >= 20), drive_of(time_s))
-    assert writer.close()
-    return writer.status().saved
+    ticks = (tick_of(i, 1000.0 + i / 10, full=i >= 20) for i in range(COUNT))
+    return record(tmp_path_factory.mktemp("session"), ticks, driven=True)
 
 
 def test_csv_has_a_line_a_frame_and_blanks_where_something_is_missing(session: Path, tmp_path: Path) -> None:

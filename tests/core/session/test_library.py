@@ -15,14 +15,8 @@ from tests.core.session_data import ABOUT, QUICK, record, tick_of, wait_for
 
 def make(folder: Path) -> Path:
     """Four rows: two in state D, two without a pose; a fault that came twice."""
-    writer = SessionWriter(QUICK, ABOUT, folder=folder, clock=lambda: 1000.0)
-    writer.start()
-    for k in range(4):
-        assert writer.put(tick_of(k, 1000.0 + k / 2, full=k < 2))
-    for time_s in (1000.5, 1001.0):
-        writer.add_event(Event(time_s, EventKind.FAULT, "camera lost"))
-    assert writer.close()
-    return writer.status().saved
+    events = [Event(time_s, EventKind.FAULT, "camera lost") for time_s in (1000.5, 1001.0)]
+    return record(folder, (tick_of(k, 1000.0 + k / 2, full=k < 2) for k in range(4)), events=events)
 
 
 def whole(session: Path):

@@ -18,11 +18,10 @@ from mcap_ros2.decoder import DecoderFactory
 from core.session.manifest import SessionError, read_manifest
 from core.session.mcap_export import export_mcap, export_ros2
 from core.session.reader import SessionReader
-from core.session.writer import SessionWriter
 from core.types import Command
 from hardware.servos.bus_ipc import IssuedGoals
 from tests.app.bus_status import bus, servo
-from tests.core.session_data import ABOUT, QUICK, drive_of, number_in, record, tick_of
+from tests.core.session_data import QUICK, number_in, record, tick_of
 
 COUNT = 40
 
@@ -30,14 +29,9 @@ COUNT = 40
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Forty frames of a robot with servos; from frame 20 on with all that a scene can have."""
-    writer = SessionWriter(QUICK, ABOUT, folder=tmp_path_factory.mktemp("session"), clock=lambda: 1000.0)
-    writer.start()
     status = bus(sent=IssuedGoals((0.5,) * 7, Command(), 1000.0, None))
-    for i in range(COUNT):
-        time_s = 1000.0 + i / 10
-        writer.put(tick_of(i, time_s, full=i >= 20), drive_of(time_s), status)
-    assert writer.close()
-    return writer.status().saved
+    ticks = (tick_of(i, 1000.0 + i / 10, full=i >= 20) for i in range(COUNT))
+    return record(tmp_path_factory.mktemp("session"), ticks, driven=True, bus=status)
 
 
 Found = dict[str, list[tuple[int, Any]]]
