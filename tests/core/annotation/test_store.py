@@ -264,7 +264,7 @@ def test_damaged_files_end_in_one_line_and_salvage_reads_what_is_readable(tmp_pa
             save(store, History(), Annotation(note=f"note {number}"), ItemKey(SHA, "", f"rater {number}"))
     data, rng = whole.read_bytes(), random.Random(2)
     refused = salvaged = 0
-    for case in range(int(os.environ.get("LUMENPILOT_FUZZ", "60"))):
+    for case in range(int(os.environ.get("LUMENPILOT_FUZZ", "20"))):
         path, target = tmp_path / "damaged.sqlite", tmp_path / f"salvaged_{case}.sqlite"
         path.write_bytes(_damaged(data, rng))
         before = path.read_bytes()
@@ -281,8 +281,8 @@ def test_damaged_files_end_in_one_line_and_salvage_reads_what_is_readable(tmp_pa
             assert "\n" not in str(error)
         target.unlink(missing_ok=True)
         assert path.read_bytes() == before, "the damaged file is as it was"
-    assert refused > 5
-    assert salvaged > 40 * 20
+    assert refused > 2
+    assert salvaged > 40 * 7
 
 
 _PAGE = 4096

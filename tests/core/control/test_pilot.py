@@ -722,7 +722,7 @@ def test_an_expired_hold_does_not_excuse_a_destination_behind_the_robot(bench: B
     bench.handed_over().held = False
     bench.seconds(0.3)
     bench.scene = _behind
-    bench.seconds(30.0)
+    bench.seconds(3.0)
     assert bench.mode is Mode.HOLD
     assert Hindrance.DESTINATION_BEHIND in bench.pilot.view.against_hand_over
     bench.alerts()
