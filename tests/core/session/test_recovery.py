@@ -423,9 +423,10 @@ def test_damage_at_random_is_survived(whole: Path, tmp_path: Path) -> None:
 
 
 def record_and_kill(folder: Path, after_s: float, fps: float = 60.0) -> int:
-    """Record in another process and kill it; returns the last frame that it handed over."""
+    """Record in another process and kill it; returns how many frames it said to have written."""
     child = subprocess.Popen([sys.executable, str(CHILD), str(folder), str(fps)], stdout=subprocess.PIPE, text=True)
-    assert child.stdout.readline() == "0\n"
+    while child.stdout.readline() == "0\n":
+        pass
     time.sleep(after_s)
     child.kill()
     rest = child.stdout.read()
@@ -435,18 +436,17 @@ def record_and_kill(folder: Path, after_s: float, fps: float = 60.0) -> int:
     return int(whole_lines[-1]) if whole_lines else 0
 
 
-def test_a_recording_that_is_killed_loses_a_row_and_half_a_second_at_most(tmp_path: Path) -> None:
+def test_a_recording_that_is_killed_loses_no_written_row_and_half_a_second_at_most(tmp_path: Path) -> None:
     dice = random.Random(4)
     earlier = record(tmp_path, (tick_of(i, 1000.0 + i / FPS) for i in range(5)))
     before = fingerprint(earlier)
     for _ in range(int(os.environ.get("LUMENPILOT_KILLS", "2"))):
-        last = record_and_kill(tmp_path, dice.uniform(0.3, 1.2))
+        written = record_and_kill(tmp_path, dice.uniform(0.3, 1.2))
         (found,) = find_cut_sessions(tmp_path)
         done = recover(found.folder)
         rows, pictures = checked(found.folder, done)
         assert rows == list(range(len(rows)))
-        # what waits in the queue at that moment is a frame or two; the machine may be busy
-        assert len(rows) >= last - 3
+        assert len(rows) >= written
         assert pictures == rows[: len(pictures)]
         assert (len(rows) - len(pictures)) / 60.0 <= 0.5
         assert done.loss.seconds <= 0.5
