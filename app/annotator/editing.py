@@ -121,7 +121,7 @@ class MaskMode(Enum):
         mark("Paint the mask instead of moving its points"),
         mark(
             "Drag paints, Shift + drag or right drag takes away · wheel or [ ] size, Ctrl + wheel zoom · Insert and Delete paint "
-            "at the cross · T back to points"
+            "at the cross · S fewer points · T back to points"
         ),
     )
     TUBE = ModeText(

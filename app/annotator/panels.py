@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
+from pathlib import Path
 from typing import Protocol
 
 from PySide6.QtCore import QAbstractListModel, QModelIndex, QPersistentModelIndex, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen
+from PySide6.QtGui import QColor, QFontMetrics, QImage, QImageReader, QPainter, QPen, QPixmap
 from PySide6.QtWidgets import (
     QAbstractButton,
     QButtonGroup,
@@ -27,8 +29,9 @@ from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import STATE_MEANING, STATE_TITLE, side, tip
 from app.ui.theme import ON_PICTURE
+from app.ui.workers import Worker
 from app.widgets.basics import column, line, name_list
-from app.widgets.painting import CENTER, NONE, Painted, PaintedWidget, draw_box, draw_text
+from app.widgets.painting import CENTER, NONE, Painted, PaintedWidget, draw_box, draw_fitted, draw_text
 from app.widgets.state_badge import paint_state
 from core.annotation.model import ANSWERED, AngleProvenance, Annotation, MaskTarget, Readout, Status
 from core.types import PoseState
@@ -283,6 +286,8 @@ class AnnotationHeader(QWidget):
 
 
 _ROW = 30
+_PICTURE = QSize(40, 26)
+"""Room of the small picture in a row."""
 _WORD = {
     Status.NEW: mark("new"),
     Status.BEGUN: mark("begun"),
@@ -341,11 +346,19 @@ class Filter(Enum):
 
 
 class QueueModel(QAbstractListModel):
-    """Rows of name, status, masks, and what is particular about the lines."""
+    """Rows of name, status, masks, and what is particular about the lines; small pictures are read when they are in sight.
 
-    def __init__(self, names: list[str], items: Items) -> None:
+    Parameters
+    ----------
+    paths : of the pictures; empty: none is shown.
+    """
+
+    def __init__(self, names: list[str], items: Items, paths: Sequence[Path] = ()) -> None:
         super().__init__()
-        self._names, self.items = names, items
+        self._names, self.items, self.paths = names, items, paths
+        self._pictures: dict[int, QPixmap] = {}
+        self._reading = Worker("thumbnails", self, behind=True)
+        self._reading.done.connect(self._on_read)
 
     def rowCount(self, parent: _Index = QModelIndex()) -> int:  # noqa: B008 - Qt's own signature
         return 0 if parent.isValid() else len(self._names)
@@ -360,7 +373,16 @@ class QueueModel(QAbstractListModel):
             masks = tr(", with masks") if self.items.content(row).masks else ""
             said = [tr(_WORD[self.items.status(row)]), *(tr(word) for word in self.particulars(row))]
             return f"{row + 1}: {self._names[row]}: {', '.join(said)}{masks}"
+        if role == Qt.ItemDataRole.DecorationRole and self.paths:
+            if row not in self._pictures:
+                self._pictures[row] = QPixmap()
+                self._reading.submit(row, partial(_thumbnail, self.paths[row]), urgent=True)
+            return self._pictures[row]
         return None
+
+    def _on_read(self, row: int, picture: QImage) -> None:
+        self._pictures[row] = QPixmap.fromImage(picture)
+        self.update_row(row)
 
     def particulars(self, row: int) -> list[str]:
         """Words on lines that are short, or were not drawn by hand."""
@@ -373,8 +395,15 @@ class QueueModel(QAbstractListModel):
         self.dataChanged.emit(index, index)
 
 
+def _thumbnail(path: Path) -> QImage:
+    """A small picture; a null one where Qt cannot read the file."""
+    reader = QImageReader(str(path))
+    reader.setScaledSize(reader.size().scaled(_PICTURE * 2, Qt.AspectRatioMode.KeepAspectRatio))  # sharp on a fine screen, too
+    return reader.read()
+
+
 class _QueueRow(QStyledItemDelegate):
-    """Number, name, particulars of the lines, masks of vessel and robot, and the answer: a tick, or a word."""
+    """Number, small picture, name, particulars of the lines, masks of vessel and robot, and the answer: a tick, or a word."""
 
     def sizeHint(self, option: QStyleOptionViewItem, index: _Index) -> QSize:
         return QSize(120, _ROW)
@@ -409,7 +438,13 @@ class _QueueRow(QStyledItemDelegate):
                 colour = theme.ROBOT if target is MaskTarget.ROBOT else theme.VESSEL
                 draw_box(painter, QRectF(right - 10, box.center().y() - 5, 10, 10), 3, theme.colour(colour, 0.8))
                 right -= 14
-        name = QRectF(box.left() + 44, box.top(), max(0.0, right - box.left() - 48), box.height())
+        left = box.left() + 40
+        picture = index.data(Qt.ItemDataRole.DecorationRole)
+        if picture is not None:
+            place = QRectF(left, box.center().y() - _PICTURE.height() / 2, _PICTURE.width(), _PICTURE.height())
+            draw_fitted(painter, place, picture)
+            left = place.right() + 8
+        name = QRectF(left, box.top(), max(0.0, right - left), box.height())
         draw_text(painter, name, index.data(), name_font, name_colour, elided=True)
         painter.restore()
 

@@ -160,7 +160,10 @@ class AnnotatorPanels(QWidget):
         self.header = AnnotationHeader(who)
         self.light = LightSliders()
         self.note = NoteField(tr("Note on this image  (M)"))
-        self.queue = QueueList(QueueModel(names, model))
+        paths = (
+            () if model.blind else [item.image.path for item in model.items]
+        )  # a picture that returns mirrored is not to be known
+        self.queue = QueueList(QueueModel(names, model, paths))
         left = column((self.header, 0), (self.canvas, 1), (self.bar, 0), spacing=_LEFT_GAP)
         right = column(
             (Card(tr("Angle to the vessel"), self.readout), 0),

@@ -35,7 +35,7 @@ from app.ui.window_base import WindowFrame
 from app.ui.workers import ChildProcess, command_of
 from app.widgets.basics import Card, Columns, column, holder, line, name_list, set_window_margins, side, text_button
 from app.widgets.messages import Offer, OfferButton, OfferStrip, Toast
-from app.widgets.painting import CENTER, RIGHT, draw_box, draw_text, text_width
+from app.widgets.painting import CENTER, RIGHT, draw_box, draw_fitted, draw_text, text_width
 from app.widgets.shortcut_page import KeyPage
 from core.session.exporters import PLUGINS as EXPORTERS
 from core.session.library import SessionSummary
@@ -112,11 +112,8 @@ class SessionDelegate(QStyledItemDelegate):
 
 def _paint_picture(painter: QPainter, place: QRectF, picture: object) -> None:
     draw_box(painter, place, 4, theme.ON_PICTURE.INK)
-    if isinstance(picture, QPixmap) and not picture.isNull():
-        size = picture.size().scaled(place.size().toSize(), Qt.AspectRatioMode.KeepAspectRatio)
-        target = QRectF(0, 0, size.width(), size.height())
-        target.moveCenter(place.center())
-        painter.drawPixmap(target, picture, QRectF(picture.rect()))
+    if isinstance(picture, QPixmap):
+        draw_fitted(painter, place, picture)
 
 
 def _paint_head(painter: QPainter, room: QRectF, summary: SessionSummary) -> None:

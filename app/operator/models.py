@@ -142,11 +142,12 @@ class ModelMenu(QObject):
 
     def _add(self, model: InstalledModel, is_current: bool) -> None:
         own = tr(", own") if model.is_own else ""
-        action = QAction(f"{model.name.replace('&', '&&')}{own}:  {model.figures}", self._menu)
+        problem = f":  {model.problem}" if model.problem else ""
+        action = QAction(f"{model.name.replace('&', '&&')}{own}{problem}", self._menu)
         action.setCheckable(True)
         action.setChecked(is_current)
         action.setEnabled(not model.problem)
-        action.setToolTip(str(model.folder))
+        action.setToolTip(f"{model.figures}\n{model.folder}")
         action.triggered.connect(partial(self._on_chosen, model.name))
         self._group.addAction(action)
         self._menu.insertAction(self._below, action)

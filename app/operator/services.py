@@ -28,6 +28,7 @@ from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
 from app.ui.i18n import mark, tr
 from app.ui.texts import OperatorStep
 from app.widgets.messages import Offer, OfferButton
+from core.annotation.store import DEFAULT_NAME
 from core.config.models import sessions_folder
 from core.config.rig_file import RigFileError, set_bench
 from core.control.modes import ARMED_MODES, Mode
@@ -237,8 +238,13 @@ class WindowServices(QObject):
             self.training.raise_()
             return
         session = self.after.session
-        start = default_store([session]).parent if session is not None else sessions_folder(self._window.rig.config.record.folder)
+        folder = sessions_folder(self._window.rig.config.record.folder)
+        store = default_store([session]) if session is not None else folder / DEFAULT_NAME
+        start = next(place for place in store.parents if place.is_dir())
         dialog = QFileDialog(self._window, tr("Annotations to train on"), str(start), tr("Annotations (*.sqlite)"))
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        if store.is_file():
+            dialog.selectFile(str(store))
         dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
         dialog.fileSelected.connect(lambda path: self.open_training(Path(path)))
         dialog.finished.connect(dialog.deleteLater)

@@ -479,7 +479,7 @@ class SettingsDialog(QDialog):
         if Effect.RIG in effects:
             parts.append(tr("some act when the rig is started again"))
         if Effect.PROGRAM in effects:
-            parts.append(tr("some at the next start of the program"))
+            parts.append(tr("some when the program is started again"))
         return "; ".join(parts)
 
     # ---- searching

@@ -224,6 +224,7 @@ class TrainingDialog(QDialog):
         self.setLayout(column(heading, self._form(), *cards, self._line, foot, margins=(16, 12, 16, 12)))
         self.job.changed.connect(self._on_changed)
         self._on_changed(self.job.state)
+        self.job.count()
 
     def _form(self) -> QHBoxLayout:
         self.name.setMaxLength(40)
@@ -293,10 +294,11 @@ class TrainingDialog(QDialog):
 
 def _words(state: TrainingState) -> str:
     if state.phase is TrainingPhase.IDLE:
-        return tr(
+        how = tr(
             "The masks become two sets: one to learn from, and a fifth of the pictures that stays out and shows whether it helped. "
             "It runs at low priority, and the new model is used only when you choose it."
         )
+        return f"{tr_text(state.line)} {how}" if state.line else how
     if state.phase is not TrainingPhase.RUNNING or not state.step:
         return tr_text(state.line)
     left = ""

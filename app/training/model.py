@@ -34,6 +34,8 @@ REMEMBER = 80
 """Frames of the twin that are made first, in half a minute, and shown as often as the new ones (docs/method.md)."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 _END_WITHIN_MS = 3000
+_COUNT = "count"
+"""Key of the job that counts."""
 
 Collect = Callable[[], tuple[Sequence[StoredAnnotation], Sequence[FoundImage]]]
 """Reads the annotations and finds their images; called in a thread, may raise UserError."""
@@ -123,8 +125,19 @@ class TrainingJob(QObject):
         self._is_closed = threading.Event()
         self._outcome: dict[str, Any] = {}
         self._work = Worker("preparing a training", self)
-        self._work.done.connect(self._on_prepared)
-        self._work.failed.connect(lambda _key, line: self._fail(tr("Not started: {why}", why=tr_text(line))))
+        self._work.done.connect(lambda key, found: self._on_counted(found) if key == _COUNT else self._on_prepared(found))
+        self._work.failed.connect(self._on_failed)
+
+    def count(self) -> None:
+        """Say, before a training begins, how many pictures there are to learn from."""
+        collect = self._collect
+
+        def count() -> str:
+            from core.annotation.exchange import trainable  # loads statistics, which a window does not need before
+
+            return tr("{count} pictures have both masks.", count=len(trainable(*collect())))
+
+        self._work.submit(_COUNT, count)
 
     def start(self, request: TrainingRequest) -> None:
         """Write the sets, then train; a request that makes no sense is refused with one line."""
@@ -174,7 +187,17 @@ class TrainingJob(QObject):
     def _fail(self, line: str) -> None:
         self._show(replace(self.state, phase=TrainingPhase.FAILED, line=line, left_s=None))
 
-    def _on_prepared(self, _key: object, frames: OwnFrames) -> None:
+    def _on_counted(self, line: str) -> None:
+        if self.state.phase is TrainingPhase.IDLE:
+            self._show(replace(self.state, line=line))
+
+    def _on_failed(self, key: object, line: str) -> None:
+        if key == _COUNT:
+            self._on_counted(line)
+        else:
+            self._fail(tr("Not started: {why}", why=tr_text(line)))
+
+    def _on_prepared(self, frames: OwnFrames) -> None:
         if self._is_closed.is_set():
             return
         request, out = self._request, own_models() / self._request.name

@@ -170,13 +170,7 @@ def split_own_frames(
     Raises AnnotationError: too few images with both masks are here, `out` is not empty, or cannot be written; or `go_on` has become
     False.
     """
-    here = {image.sha256: image for image in images}
-    complete = sorted((sha256 for sha256 in _complete(annotations) if sha256 in here), key=lambda one: str(here[one].path))
-    if len(complete) < FEWEST:
-        missing = FEWEST - len(complete)
-        have = f"{len(complete)} {'image has' if len(complete) == 1 else 'images have'} both a vessel and a robot mask"
-        how = "draw them with keys 3 and 4, or take over and correct the algorithm's with G"
-        raise AnnotationError(f"{have}, and training needs {FEWEST}: {missing} more ({how})")
+    complete = trainable(annotations, images)
     count = max(_FEWEST_HELD_OUT, len(complete) // _HELD_OUT_SHARE)
     begin = (len(complete) - count) // 2
     held_out = set(complete[begin : begin + count])
@@ -190,6 +184,18 @@ def split_own_frames(
         counts[name], found = export_training_set(chosen, here_of, out / name, go_on, measured=measured)
         problems += found
     return OwnFrames(out / "train", out / "held_out", counts["train"], counts["held_out"], tuple(problems))
+
+
+def trainable(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage]) -> list[str]:
+    """SHA-256 of the images with both masks, in the order of their paths. Raises AnnotationError: too few."""
+    here = {image.sha256: image for image in images}
+    complete = sorted((sha256 for sha256 in _complete(annotations) if sha256 in here), key=lambda one: str(here[one].path))
+    if len(complete) < FEWEST:
+        missing = FEWEST - len(complete)
+        have = f"{len(complete)} {'image has' if len(complete) == 1 else 'images have'} both a vessel and a robot mask"
+        how = "draw them with keys 3 and 4, or take over and correct the algorithm's with G"
+        raise AnnotationError(f"{have}, and training needs {FEWEST}: {missing} more ({how})")
+    return complete
 
 
 def _complete(annotations: Sequence[StoredAnnotation]) -> list[str]:

@@ -299,8 +299,8 @@ class QualityConfig(ConfigSection):
     )
     max_bridged_share: Share = Field(0.4, description="repaired length over path length")
     max_ambiguity: Share = Field(0.8, description="how near the second best path may come to the best one")
-    min_confidence: Share = Field(0.3, description="below it there is no answer")
-    confident_from: Share = Field(0.5, description="an answer that is less sure than this is shown as unsure")
+    min_confidence: Share = Field(0.3, description="an answer with less confidence is not given")
+    confident_from: Share = Field(0.5, description="an answer with less confidence is shown as unsure")
     max_novelty: float = Field(
         1.25,
         gt=0.0,
@@ -415,7 +415,7 @@ class WindowConfig(ConfigSection):
 
     theme: Literal["dark", "light", "system"] = Field("dark", description="of all windows; system = as the desktop has it")
     language: Literal["auto", "en", "zh"] = Field(
-        "auto", description="of all windows; auto = as the system says, en = English, zh = Chinese (simplified)"
+        "auto", description="of all windows; auto = the system's, en = English, zh = Chinese (simplified)"
     )
     pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; empty: LumenPilot in Pictures")
 

@@ -508,6 +508,7 @@ def test_a_record_that_is_damaged_comes_back_from_its_journal(make: MakeRater) -
 def test_progress_and_status(rater: Rater) -> None:
     queue = rater.window.panels.queue
     assert queue.progress_text == "0 of 3 done, 3 left"
+    rater.qtbot.waitUntil(lambda: not queue._model.index(2).data(Qt.ItemDataRole.DecorationRole).isNull(), timeout=30_000)
     rater.press(Key.Key_X, Key.Key_N)
     assert queue.progress_text == "1 of 3 done, 2 left"
     rater.press(Key.Key_N, Key.Key_U)
@@ -526,6 +527,7 @@ def test_a_blind_study_hides_the_algorithm_and_the_names(make: MakeRater) -> Non
     assert rater.model.proposal is None
     assert rater.canvas.editor.drawing.proposal is None
     assert ".png" not in rater.window.panels.header._title.text()
+    assert rater.window.panels.queue._model.index(0).data(Qt.ItemDataRole.DecorationRole) is None  # it would show what is mirrored
     assert len(rater.model.items) == 6
 
 

@@ -173,6 +173,8 @@ def test_a_name_that_makes_no_sense_is_refused(name: str, why: str, tmp_path: Pa
 
 def test_what_fails_in_the_process_is_said(qtbot: QtBot, tmp_path: Path) -> None:
     job = job_on(annotate_masks(tmp_path / "images", FEWEST), tmp_path)
+    job.count()
+    qtbot.waitUntil(lambda: job.state.line == "6 pictures have both masks.", timeout=LONG_MS)
     job.start(TrainingRequest("own_1", "no_such_model"))
     ended(job, qtbot)
     assert job.state.phase is TrainingPhase.FAILED
@@ -187,6 +189,7 @@ def test_the_dialog_says_how_it_goes(qtbot: QtBot, tmp_path: Path) -> None:
     assert dialog.name.text() == "own_1"
     assert dialog.init.itemData(0) == "default"
     assert "only when you choose it" in dialog.line
+    qtbot.waitUntil(lambda: dialog.line.startswith("2 images have both"), timeout=LONG_MS)
     dialog.start.click()
     assert not dialog.start.isEnabled()
     qtbot.waitUntil(lambda: not dialog.is_busy, timeout=LONG_MS)
