@@ -92,6 +92,11 @@ Choose = Callable[[int], Sequence[int]]
 """Which of so many pictures of a video."""
 
 
+def extracted_pictures(session: Path) -> list[Path]:
+    """The pictures that were extracted from a session."""
+    return sorted(session.glob(f"*{_FRAMES_SUFFIX}/*.png"))
+
+
 def recording_of(folder: Path) -> Path | None:
     """The session that the pictures of a folder were extracted from, or the folder itself for those of one video; None: unknown."""
     if folder.name.endswith(_FRAMES_SUFFIX) and is_of_session(folder.with_name(f"{folder.name.removesuffix(_FRAMES_SUFFIX)}.mkv")):
@@ -415,7 +420,7 @@ def read_annotated(
     files = image_files(paths, frames, reuse=True)
     with AnnotationStore(store_path, read_only=True) as store:
         annotations = store.annotations()
-        images, problems = _known_images(files, store)
+        images, problems = known_images(files, store)
         print_warnings([*store.problems, *problems])
     annotated, here = {one.key.sha256 for one in annotations}, {image.sha256 for image in images}
     if here and not annotated <= here:
@@ -423,7 +428,7 @@ def read_annotated(
     return annotations, images
 
 
-def _known_images(files: Sequence[Path], store: AnnotationStore) -> tuple[list[FoundImage], list[str]]:
+def known_images(files: Sequence[Path], store: AnnotationStore) -> tuple[list[FoundImage], list[str]]:
     """Those of the files whose content the store knows, and what could not be read."""
     records = store.images()
     found: dict[str, FoundImage] = {}

@@ -101,7 +101,8 @@ class Course:
     """The rows of a session over time: ``times_s`` (N,) from the first row, monotonic; ``first_s`` on the recorded clock.
 
     ``rows`` are the session's row numbers; ``states``, ``modes`` and ``theta_deg`` as in ``Timeline``; ``gaps`` are places before
-    which frames are lost. Of a replay: its angles, and the places where it begins to differ.
+    which frames are lost. Of a replay: its angles, and the places where it begins to differ. ``by_hand`` (M, 2) has the times and
+    signed angles of annotated frames.
     """
 
     first_s: float
@@ -113,6 +114,7 @@ class Course:
     gaps: NDArray[np.int64]
     other_theta_deg: NDArray[np.float64] | None = None
     differs: NDArray[np.int64] | None = None
+    by_hand: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.times_s)

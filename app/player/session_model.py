@@ -8,11 +8,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
 from app.player.course import Course, course_of
 from app.player.replayed import Replayed
-from app.ui.i18n import tr
+from app.ui.i18n import tr, tr_text
 from app.ui.snapshot import Origin, SnapshotWriter
 from app.ui.workers import QueuedCallback, Worker
 from app.widgets.overlay_image import draw_overlay
@@ -78,6 +80,7 @@ class PlayedSession(QObject):
         self.events: tuple[Event, ...] = ()
         """In the order of their times."""
         self.replayed: Replayed | None = None
+        self._by_hand: NDArray[np.float64] | None = None
         self._is_written: bool | None = None
         self._losses: list[str] | None = None
         self._problems: list[str] | None = None
@@ -86,6 +89,11 @@ class PlayedSession(QObject):
         self._poll_timer = QTimer(self, interval=_POLL_MS)
         self._poll_timer.timeout.connect(self._poll)
         self._files, self._clips = Worker("player work", self), Worker("clip", self)
+        self._measured = Worker("angles by hand", self, behind=True)
+        self._measured.done.connect(self._on_done)
+        self._measured.failed.connect(
+            lambda _key, line: self.message.emit(tr("No angles by hand: {why}", why=tr_text(line)), False)
+        )
         self._files.done.connect(self._on_done)
         self._files.failed.connect(self._on_failed)
         self._clips.done.connect(self._on_clip_ended)
@@ -98,6 +106,7 @@ class PlayedSession(QObject):
         """Begin to poll, and read the events and the results of a replay."""
         reader = self._reader
         self._files.submit("events", lambda: (reader.events, is_being_written(reader.folder)))
+        self._measured.submit("by hand", partial(angles_by_hand, reader.folder))
         if replay is not None:
             self._files.submit("replay", lambda: Replayed(replay, name_of(reader.folder)))
         self._poll_timer.start()
@@ -124,6 +133,7 @@ class PlayedSession(QObject):
         self._report_problems(is_all=is_all)
 
     def _with_replay(self, course: Course) -> Course:
+        course = replace(course, by_hand=self._by_hand)
         if self.replayed is None:
             return course
         differs = self.replayed.changed(course.rows, course.theta_deg, course.states)
@@ -152,6 +162,11 @@ class PlayedSession(QObject):
                 self.message.emit(tr("{count} results of the replay cannot be read", count=result.skipped), True)
             self.course = self._with_replay(self.course)
             self.compared.emit()
+        elif key == "by hand":
+            if not isinstance(result, np.ndarray):
+                return
+            self._by_hand = result
+            self.course = self._with_replay(self.course)
         elif isinstance(result, Description):
             self.described.emit(result)
             self.message.emit(tr("Kept beside the session"), False)
@@ -245,9 +260,25 @@ class PlayedSession(QObject):
     def shut_down(self) -> bool:
         """Finish notes and snapshots, cancel the clip; False when the disk does not answer."""
         self.cancel_clip()
+        self._measured.stop(finish=False)
         for worker in (self._files, self._clips):
             worker.stop(finish=True)
         return self._snapshots.finish() & self._files.wait(_STOP_WITHIN_MS) & self._clips.wait(_STOP_WITHIN_MS)
+
+
+def angles_by_hand(session: Path) -> NDArray[np.float64] | None:
+    """Times from the first row (s) and signed angles (degrees) of the annotated frames of a session, (N, 2); None: no angle."""
+    from app.annotator.comparison import angles_over_time  # loads statistics
+    from app.annotator.sources import default_store, extracted_pictures, known_images
+    from core.annotation.store import AnnotationStore
+
+    path, pictures = default_store([session]), extracted_pictures(session)
+    if not pictures or not path.is_file():
+        return None
+    with AnnotationStore(path, read_only=True) as store:
+        rows = angles_over_time(store.annotations(), known_images(pictures, store)[0])
+    found = [(row["time_s"], row["theta_signed_deg"]) for row in rows if None not in (row["time_s"], row["theta_signed_deg"])]
+    return np.array(found, np.float64) if found else None
 
 
 def _add_note(folder: Path, event: Event) -> Event:

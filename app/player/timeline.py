@@ -101,6 +101,8 @@ _LEAST_SPAN_S = 0.5
 _STEPS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600)
 _ANGLE_RANGES = (20.0, 45.0, 90.0, 180.0)
 _MARK_REACH_PX = 7.0
+_BY_HAND_PX = 2.5
+"""Radius of the point of an angle that was measured by hand."""
 _CROWDED = 3.0
 """With more rows a pixel than this a curve is drawn as ``extents``."""
 
@@ -346,6 +348,12 @@ class TimelineView(QWidget):
         if course.other_theta_deg is not None:
             self._paint_curve(painter, course, course.other_theta_deg / most, lane, theme.SKY)
         self._paint_curve(painter, course, course.theta_deg / most, lane, theme.THETA)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.TEXT))
+        for time_s, theta_deg in course.by_hand if course.by_hand is not None else ():
+            if lane.left() <= (x := self._x(float(time_s))) <= lane.right():
+                share = min(max(float(theta_deg) / most, -1.0), 1.0)
+                painter.drawEllipse(QPointF(x, middle - share * (lane.height() / 2 - 2)), _BY_HAND_PX, _BY_HAND_PX)
 
     def _paint_curve(self, painter: QPainter, course: Course, values: NDArray[np.float64], lane: QRectF, colour_name: str) -> None:
         """`values` of -1..1."""
@@ -461,6 +469,10 @@ class TimelineView(QWidget):
             ]
         if course.modes[place] >= 0:
             parts.append(tr(tuple(Mode)[course.modes[place]].value))
+        if course.by_hand is not None:
+            away_px = np.abs(course.by_hand[:, 0] - time_s) * (self.width() - _LEFT) / self._span_s
+            if away_px.min() <= 2 * _BY_HAND_PX:
+                parts.append(tr("by hand {angle}", angle=signed_degrees(float(course.by_hand[away_px.argmin(), 1]), 1)))
         return "  ".join(parts)
 
     def _event_near(self, place: QPointF) -> Event | None:

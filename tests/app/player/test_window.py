@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import subprocess
 import sys
@@ -11,17 +12,21 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import av
+import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton
 from pytestqt.qtbot import QtBot
 
+from app.annotator.sources import default_store, session_rows
 from app.player import session_model
 from app.player.course import JumpKind
 from app.player.window import PlayerWindow
 from app.ui.description_form import DescriptionDialog
 from app.ui.texts import signed_degrees
+from core.annotation.model import Annotation, History, ImageView, measure_lines
+from core.annotation.store import AnnotationStore, ItemKey, find_images
 from core.config.models import Config
 from core.control.modes import Mode
 from core.session.codec import scene_to_json
@@ -608,6 +613,30 @@ def replayed_file(session: Path, out: Path, *, name: str | None = None) -> Path:
             lines.append(json.dumps(record))
     out.write_text("\n".join([*lines, "{ nonsense"]) + "\n")
     return out
+
+
+def test_angles_by_hand_are_shown_beside_the_recording(open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot) -> None:
+    copy = tmp_path / session.name
+    shutil.copytree(session, copy)
+    pictures = session_rows(copy, "12,50")
+    with AnnotationStore(default_store([copy])) as store:
+        images, _ = find_images(pictures, store)
+        for image, down_px in zip(images, (10.0, 0.0), strict=True):
+            content = Annotation(((100.0, 100.0), (160.0, 100.0 + down_px)), ((60.0, 90.0), (240.0, 90.0)))
+            entry = History().edit("draw", content)
+            assert entry is not None
+            measured = measure_lines(content, image.record.size, Config().perception)
+            store.save(ItemKey(image.sha256, "", "ann", 1), ImageView.AS_IS, entry, content, measured, 1.0)
+    window = open_player(copy)
+    until(qtbot, lambda: window.session.is_whole and window.session.course.by_hand is not None)
+    by_hand = window.session.course.by_hand
+    assert by_hand is not None
+    assert by_hand[:, 0] == pytest.approx([1.2, 5.0])
+    assert np.abs(by_hand[:, 1]) == pytest.approx([math.degrees(math.atan2(10.0, 60.0)), 0.0])
+    timeline = window.panels.timeline
+    assert "by hand" in timeline.text_at(timeline._x(1.2))
+    assert "by hand" not in timeline.text_at(timeline._x(3.0))
+    timeline.grab()
 
 
 def test_a_replay_is_shown_beside_the_recording(open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot) -> None:
