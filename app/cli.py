@@ -50,6 +50,10 @@ COMMANDS = {
         "app.commands.phantom",
         "Your own bench as a phantom of the twin: from its vessel, an outline, a drawing, or centerlines.",
     ),
+    "rehearse": (
+        "app.commands.rehearse",
+        "Rehearse the way to a target of your own bench in the twin, before the real robot moves.",
+    ),
     "trial": (
         "app.commands.trial",
         "Closed-loop trials in the bench twin: a policy drives the robot to a target that it has never seen.",

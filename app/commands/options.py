@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -57,6 +58,14 @@ def check_masks(model: str | None, *, true_masks: bool) -> None:
     """Raise UserError for a `model` that ``--true-masks`` would not use."""
     if true_masks and model is not None:
         raise UserError("--true-masks looks through no network: leave --model out")
+
+
+def point_option(text: str) -> tuple[float, float]:
+    """The place that ``X,Y`` names. Raises UserError."""
+    match = re.fullmatch(r"\s*(-?\d+(?:\.\d+)?)\s*,\s*(-?\d+(?:\.\d+)?)\s*", text)
+    if match is None:
+        raise UserError(f"{text}: give a place as X,Y, in pixels of the bench's picture")
+    return float(match[1]), float(match[2])
 
 
 def with_outputs(config: Config, stream: int | None, *, lsl: bool) -> Config:

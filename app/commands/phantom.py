@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import typer
 
-from app.commands.options import JsonOption
+from app.commands.options import JsonOption, point_option
 from app.commands.progress import console
 from core.config.calibration import ScaleConfig
 from core.config.rig_file import find_rig, has_rig
@@ -45,7 +45,7 @@ def phantom(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Make the twin's phantom of your own bench. It is kept in the bench's folder; gui, trial and synth take it with --bench."""
+    """Make the twin's phantom of your own bench, kept in the bench's folder, for --bench of gui, trial, synth, rehearse."""
     from hardware.twin.own_phantom import PhantomError, filled, mask_of_csv, phantom_of_mask, view_of_scale, write_phantom
 
     if sum(one is not None for one in (outline, svg, table)) > 1 or (picture is not None and outline is None):
@@ -67,7 +67,13 @@ def phantom(
         raise PhantomError(
             "no scale: calibrate the rig and name it with --rig, or give --width-mm, the width that the picture shows"
         )
-    made = phantom_of_mask(filled(vessel), view_of_scale(scale, (width, height)), f"{OWN}{folder}", title, _point(port) or port_px)
+    made = phantom_of_mask(
+        filled(vessel),
+        view_of_scale(scale, (width, height)),
+        f"{OWN}{folder}",
+        title,
+        point_option(port) if port is not None else port_px,
+    )
     write_phantom(made.phantom, folder)
     graph, view = made.phantom.graph, made.phantom.view
     assert view is not None
@@ -122,15 +128,6 @@ def _calibrated(rig: str | None, size: tuple[int, int] | None) -> tuple[ScaleCon
     scale = known.scale if known is not None and known.scale is not None and known.scale.fits(size) else None
     entry = known.port if known is not None else None
     return scale, None if entry is None else (entry.x_share * (size[0] - 1), entry.y_share * (size[1] - 1))
-
-
-def _point(text: str | None) -> Point | None:
-    if text is None:
-        return None
-    match = re.fullmatch(r"\s*(-?\d+(?:\.\d+)?)\s*,\s*(-?\d+(?:\.\d+)?)\s*", text)
-    if match is None:
-        raise UserError(f"{text}: give a place as X,Y, in pixels of the bench's picture")
-    return float(match[1]), float(match[2])
 
 
 def mask_of_svg(path: Path, size: tuple[int, int] | None) -> tuple[Mask, ScaleConfig | None]:

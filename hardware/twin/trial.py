@@ -17,6 +17,7 @@ from core.config.models import Config
 from core.control.direction_monitor import DirectionMonitor, MotionSent, head_seen
 from core.control.motion import AdviceController
 from core.control.policies import Policy, make_policy
+from core.devices import UserError
 from core.evaluation.accuracy import TrueMasks
 from core.evaluation.trial import Row, TrialLog, TrialSample, trial_row
 from core.perception.centerline import plan_route
@@ -25,6 +26,7 @@ from core.types import Advice, Command, Frame, Point, Points, Scene, Speed
 from hardware.twin.catalog import RANDOM_LOOK
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
+from hardware.twin.physics import DriveProperties
 from hardware.twin.rendering.appearance import named_appearance
 from hardware.twin.truth import RouteFollower
 from hardware.twin.view import CameraView
@@ -52,7 +54,8 @@ class TrialPlan:
 
     ``true_masks``: the twin's masks in place of the network's. ``look`` of ``TRIAL_LOOKS``: every trial has another look, of any
     of the ten families or of the named one, or all have the default clear bench. ``wall_force``: whether the policy is told the
-    wall contact force, which real rigs do not measure. ``own``: in the configured phantom, a bench's, not in random ones.
+    wall contact force, which real rigs do not measure. ``own``: in the configured phantom, a bench's, not in random ones;
+    ``target_px``: to the place in the vessel that is nearest to this one of the picture, not to a random end.
     """
 
     config: Config
@@ -61,6 +64,11 @@ class TrialPlan:
     look: str = RANDOM_LOOK
     wall_force: bool = True
     own: bool = False
+    target_px: Point | None = None
+
+
+class TargetError(UserError):
+    """There is no way to the place that was chosen; one line says why."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +92,23 @@ def choose_target(phantom: Phantom, view: CameraView, seed: int) -> Target:
     if not whole:
         return max(targets, key=lambda t: t.at_mm)
     return whole[int(np.random.default_rng([seed, 30011]).integers(len(whole)))]
+
+
+def target_near(phantom: Phantom, view: CameraView, click_px: Point) -> Target:
+    """The place on the way to an end that is nearest to a click. Raises TargetError beside the vessel, or at its port."""
+    x, y = view.unproject(np.array([click_px]))[0].tolist()
+    graph = phantom.graph
+    if min(geometry.nearest(edge.points, (x, y))[0] - float(edge.radius.max()) for edge in graph.edges) > 0.0:
+        raise TargetError(f"the target ({click_px[0]:.0f}, {click_px[1]:.0f}) is not in the vessel; click into its lumen")
+    routes = [(node, RouteFollower(phantom, node).route) for node in phantom.targets]
+    node, route = min(routes, key=lambda found: geometry.nearest(found[1], (x, y))[0])
+    along = geometry.arc_length(route)
+    at_mm = min(geometry.nearest(route, (x, y), along)[1], float(along[-1]) - _BEFORE_END_MM)
+    if at_mm < _START_MM + REACHED_MM:
+        raise TargetError(f"the target is {at_mm:.0f} mm from the port, where the robot begins; choose one further in")
+    point = geometry.point_at(route, along, np.array([at_mm]))
+    (x, y), (across, down) = point[0].tolist(), view.project(point)[0].tolist()
+    return Target(node, route, at_mm, (x, y), (across, down))
 
 
 def _target_at(phantom: Phantom, view: CameraView, node: int) -> Target:
@@ -111,10 +136,19 @@ def start_mm(phantom: Phantom, target: Target) -> float:
 class Trial:
     """One trial; ``run`` returns its row.
 
-    `pipeline` is reset. `masks` is the segmentation of the pipeline when it runs on true masks, else None.
+    `pipeline` is reset; None where ``_perceive`` is another one. `masks` is the segmentation of the pipeline when it runs on true
+    masks, else None. `drive` is the play of the wires.
     """
 
-    def __init__(self, plan: TrialPlan, seed: int, policy: str, pipeline: Pipeline, masks: TrueMasks | None = None) -> None:
+    def __init__(
+        self,
+        plan: TrialPlan,
+        seed: int,
+        policy: str,
+        pipeline: Pipeline | None,
+        masks: TrueMasks | None = None,
+        drive: DriveProperties | None = None,
+    ) -> None:
         config, own_seed = plan.config, FIRST_SEED + seed
         phantom = make_phantom(config.twin.phantom if plan.own else f"random:{own_seed}")
         self._plan, self._seed, self._name = plan, seed, policy
@@ -127,11 +161,17 @@ class Trial:
             seed=own_seed,
             servos=config.servos,
             safety=config.safety,
+            drive=drive,
         )
-        self.target = choose_target(phantom, self._world.view, own_seed)
+        view = self._world.view
+        self.target = (
+            choose_target(phantom, view, own_seed) if plan.target_px is None else target_near(phantom, view, plan.target_px)
+        )
+        self._start_mm = start_mm(phantom, self.target)
         self._camera = TwinCamera(self._world, lock_step=True)
         self._pipeline, self._masks = pipeline, masks
-        pipeline.reset()
+        if pipeline is not None:
+            pipeline.reset()
         self._policy: Policy = make_policy(policy, config, own_seed)
         self._drive = AdviceController(config.policy.drive)
         self._direction = DirectionMonitor()
@@ -149,7 +189,7 @@ class Trial:
     def run(self) -> Row:
         """Run until the target is reached or the trial has failed."""
         world = self._world
-        world.insert(start_mm(world.phantom, self.target), target=self.target.node)
+        world.insert(self._start_mm, target=self.target.node)
         world.robot.connect()
         start_s = world.physics.time_s
         outcome = ""
@@ -171,7 +211,7 @@ class Trial:
     def _run_frame(self, start_s: float) -> str:
         """Process one frame; returns the outcome, "" while the trial goes on."""
         frame = self._read()
-        scene = self._pipeline(frame, self.target.click_px)
+        scene = self._perceive(frame)
         status = self._world.robot.status()
         advice = self._policy(scene, status if self._plan.wall_force else replace(status, wall_contact_n=None))
         if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
@@ -184,6 +224,10 @@ class Trial:
         if len(self._log.forces_n) % _MEASURE_EVERY == 1:
             self._measure(scene, time_s, status.insertion_mm, contact_n)
         return self._outcome(time_s, advice)
+
+    def _perceive(self, frame: Frame) -> Scene:
+        assert self._pipeline is not None
+        return self._pipeline(frame, self.target.click_px)
 
     def _read(self) -> Frame:
         if self._masks is None:

@@ -133,7 +133,7 @@ def truth_of(
     if robot_points_mm is None or len(robot_points_mm) < 2:
         return Truth(scale, Reason.NO_ROBOT)
     axis = np.asarray(robot_points_mm, np.float64)
-    path = _visible_path(_with_caps(axis, radius_mm), view, scale)
+    path = visible_path(with_caps(axis, radius_mm), view, scale)
     if path is None:
         return Truth(scale, Reason.NO_ROBOT)
     tail, head = _point(path[0]), _point(path[-1])
@@ -183,7 +183,7 @@ def _refusal(
     return Reason.NO_VESSEL if vessel is None else None
 
 
-def _with_caps(axis: Points, radius_mm: float) -> Points:
+def with_caps(axis: Points, radius_mm: float) -> Points:
     """The robot's line extended at both ends by the radius of its round caps, to the mask's edge."""
     keep = np.concatenate([[True], np.any(np.diff(axis, axis=0) != 0, axis=1)])
     axis = axis[keep]
@@ -195,7 +195,7 @@ def _with_caps(axis: Points, radius_mm: float) -> Points:
     return np.vstack([start, axis, end])
 
 
-def _visible_path(line_mm: Points, view: CameraView, scale: float) -> Points | None:
+def visible_path(line_mm: Points, view: CameraView, scale: float) -> Points | None:
     """The last stretch of the line within the picture, in working px; None when the head itself is not in the picture."""
     if len(line_mm) < 2:
         return None

@@ -29,7 +29,7 @@ from hardware.simulated_clock import STEP_S, WorldClock
 from hardware.twin.actuation import DirectJoints
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
-from hardware.twin.physics import TwinPhysics
+from hardware.twin.physics import DriveProperties, TwinPhysics
 from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
 from hardware.twin.rendering.renderer import RenderedFrame, Renderer
 from hardware.twin.truth import RouteFollower, Truth, true_graph, truth_of
@@ -140,6 +140,7 @@ class TwinWorld:
         servos: ServosConfig | None = None,
         safety: SafetyConfig | None = None,
         clock: WorldClock | None = None,
+        drive: DriveProperties | None = None,
     ) -> None:
         self.config = config
         self._clock = clock
@@ -149,7 +150,7 @@ class TwinWorld:
         self._perception = perception or PerceptionConfig()
         size = (config.image_width_px, config.image_height_px)
         self.view = make_view(self.appearance, size, self.phantom)
-        self.physics = TwinPhysics(self.phantom, seed, tendons_deg=[joint.angle_deg or 0.0 for joint in servos.tendons])
+        self.physics = TwinPhysics(self.phantom, seed, drive, tendons_deg=[joint.angle_deg or 0.0 for joint in servos.tendons])
         self.robot = TwinRobot(self.physics)
         self._renderer = Renderer(self.phantom, self.appearance, size, seed)
         self._frame_index = 0

@@ -21,8 +21,8 @@ from tests.core.session_data import record, tick_of
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
-    "gui", "perceive", "synth", "train", "teach", "calibrate", "annotate", "evaluate", "phantom", "trial", "benchmark", "record",
-    "replay", "trigger", "play", "library", "doctor", "desktop", "session", "rig",
+    "gui", "perceive", "synth", "train", "teach", "calibrate", "annotate", "evaluate", "phantom", "rehearse", "trial", "benchmark",
+    "record", "replay", "trigger", "play", "library", "doctor", "desktop", "session", "rig",
 )  # fmt: skip
 INNER = {
     "session": ("info", "describe", "recover", "export"),

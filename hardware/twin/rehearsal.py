@@ -1,0 +1,201 @@
+"""Rehearsal: many runs to one target of a bench's own phantom, with other friction, stiffness, start and play in each.
+
+Perception is simulated from the truth, with noise, and nothing is painted: a run takes a tenth of the time of one with pictures.
+Before that, the geometry alone tells which branches on the way turn off more sharply than the head bends.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core import geometry
+from core.config.models import Config
+from core.evaluation.trial import Row
+from core.perception.centerline import centerline_at, plan_route
+from core.perception.pose import measure_pose
+from core.perception.vectors import fit_robot_vector, fit_vessel_vector
+from core.types import Frame, Image, Point, Points, Reason, Refusal, RobotPath, Scene
+from hardware.twin.phantom import Phantom
+from hardware.twin.physics import MAX_PULL_MM, ROBOT_RADIUS_MM, STEERABLE_MM, DriveProperties
+from hardware.twin.trial import FIRST_SEED, Target, Trial, TrialPlan
+from hardware.twin.truth import true_graph, visible_path, with_caps
+
+BEND_DEG_PER_MM = 47.0
+"""Bend of the head per millimetre of pull, as measured in the twin."""
+SPEEDS = (1.0, 0.7, 0.5)
+"""Shares of the configured speeds that are tried, the next one only where the one before fails the limits."""
+LEAST_SHARE, FORCE_P95_N, FORCE_MAX_N = 0.95, 0.15, 0.5
+"""A speed is recommended where so many runs arrive, and the wall force stays below these."""
+PLAY_MM, SLACK_MM, START_MM = (0.03, 0.2), (0.0, 0.06), 5.0
+"""Spread of the play and of the slack of the wires, and of the insertion at the start to both sides; uniform."""
+HEAD_PX, MISSING = 1.5, 0.05
+"""Error of the head, median, and share of frames without an answer, where nothing was measured: as on taught benches."""
+_MEMORY_S, _GAP_S = 0.3, 0.2
+"""Time over which an error of the head stays, and mean length of a time without answers."""
+_LINE_PX = 40.0
+"""Length of the robot's end over which an error of the head fades out."""
+_NICENESS = 10
+_BIN_MM = 10.0
+"""Length of the pieces of the way among which the weakest is looked for."""
+_BLANK: Image = np.zeros((1, 1, 3), np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class SharpTurn:
+    """A branch that turns off more sharply than the head bends there: ``turn_deg`` over the length of the head."""
+
+    point_mm: Point
+    turn_deg: float
+    limit_deg: float
+
+
+def sharp_turns(phantom: Phantom, target: Target) -> list[SharpTurn]:
+    """The branches on the way to the target that are too sharp.
+
+    A head of full bend turns by 94 degrees. In a wide lumen it tilts away first, by the angle that the free width leaves over its
+    length. Turns are taken from 7 mm before a junction to 15 mm behind it. Of 48 trials (seeds 100 to 147), this names the way of
+    the one that did not arrive, and no other.
+    """
+    graph, along = phantom.graph, geometry.arc_length(target.route)
+    degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
+    found = []
+    for node in np.flatnonzero(degree >= 3).tolist():
+        x, y = graph.nodes[node].tolist()
+        away, at, _ = geometry.nearest(target.route, (x, y), along)
+        if away > 0.5 or at > target.at_mm:
+            continue
+        places = geometry.point_at(target.route, along, at + np.array([-12.0, -6.0, -2.0, 10.0, 20.0]))
+        turn = _turn_deg(places[2] - places[0], places[4] - places[3])
+        edge = min(graph.edges, key=lambda one: geometry.nearest(one.points, (float(places[1, 0]), float(places[1, 1])))[0])
+        radius = float(edge.radius[np.argmin(np.linalg.norm(edge.points - places[1], axis=1))])
+        tilt = math.degrees(math.atan2(2.0 * max(0.0, radius - ROBOT_RADIUS_MM), STEERABLE_MM))
+        limit = BEND_DEG_PER_MM * MAX_PULL_MM - tilt
+        if turn > limit:
+            found.append(SharpTurn((x, y), turn, limit))
+    return found
+
+
+def _turn_deg(before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+    return abs(math.degrees(math.atan2(before[0] * after[1] - before[1] * after[0], float(before @ after))))
+
+
+@dataclass(frozen=True, slots=True)
+class RehearsalPlan:
+    """``trial`` has phantom and target; ``head_px`` and ``missing`` are perception's errors; ``speed`` is a share."""
+
+    trial: TrialPlan
+    head_px: float = HEAD_PX
+    missing: float = MISSING
+    speed: float = 1.0
+
+
+def rehearse_once(plan: RehearsalPlan, seed: int) -> Row:
+    """One run, at low priority."""
+    os.setpriority(os.PRIO_PROCESS, 0, _NICENESS)
+    return Rehearsal(plan, seed).run()
+
+
+class Rehearsal(Trial):
+    """One run of a rehearsal: a trial with a drawn play and start, which perceives without pictures."""
+
+    def __init__(self, plan: RehearsalPlan, seed: int) -> None:
+        rng = np.random.default_rng([FIRST_SEED + seed, 60013])
+        drive = DriveProperties(backlash_mm=float(rng.uniform(*PLAY_MM)), dead_zone_mm=float(rng.uniform(*SLACK_MM)))
+        trial = replace(plan.trial, config=slowed(plan.trial.config, plan.speed))
+        super().__init__(trial, seed, trial.config.policy.name, None, drive=drive)
+        self._start_mm = max(5.0, self._start_mm + float(rng.uniform(-START_MM, START_MM)))
+        self._eye, self._rng = plan, rng
+        view = self._world.view
+        self._scale = trial.config.perception.working_size_px / max(view.size)
+        self._graph = true_graph(self._world.phantom, view, self._scale)
+        self._error_px, self._is_blind = rng.normal(0.0, 1.0, 2), False
+
+    def _read(self) -> Frame:
+        self._world.advance(1.0 / self._world.config.frames_per_second)
+        return Frame(len(self._log.forces_n), self._world.physics.time_s, _BLANK)
+
+    def _perceive(self, frame: Frame) -> Scene:
+        """The true scene, with errors."""
+        config, world = self._plan.config.perception, self._world
+        period_s = 1.0 / world.config.frames_per_second
+        missing = min(self._eye.missing, 0.9)
+        change = period_s / _GAP_S * (1.0 if self._is_blind else missing / (1.0 - missing))
+        self._is_blind ^= bool(self._rng.random() < change)
+        scene = Scene(frame.index, frame.captured_s, world.view.size, self._scale)
+        radius_mm = world.appearance.robot_radius_mm
+        path = visible_path(with_caps(world.physics.robot_points_mm(), radius_mm), world.view, self._scale)
+        if path is None or self._is_blind:
+            return replace(scene, refusal=Refusal(Reason.LOW_CONFIDENCE))
+        path = self._with_error(path, period_s)
+        radius_px = radius_mm * world.view.pixels_per_mm(world.physics.head_mm) * self._scale
+        robot = RobotPath(path, 1.0, None, True, 0.0, radius_px)
+        line = fit_robot_vector(path, config.vectors.robot_length_px)
+        route = plan_route(self._graph, robot.head, scene.to_working(self.target.click_px))
+        centerline = None
+        if line is not None:
+            centerline = centerline_at(self._graph, robot.head, line.direction, config.vectors.vessel_half_length_px, route)
+        vessel = fit_vessel_vector(centerline) if centerline is not None else None
+        scene = replace(scene, path=robot, vessel_graph=self._graph, route=route, centerline=centerline)
+        if line is None or vessel is None:
+            return replace(scene, refusal=Refusal(Reason.NO_VESSEL))
+        return replace(scene, robot_vector=line, vessel_vector=vessel, pose=measure_pose(line, vessel, config.pose))
+
+    def _with_error(self, path: Points, period_s: float) -> Points:
+        """The robot's path with its end displaced."""
+        keep = math.exp(-period_s / _MEMORY_S)
+        self._error_px = keep * self._error_px + math.sqrt(1.0 - keep * keep) * self._rng.normal(0.0, 1.0, 2)
+        along = geometry.arc_length(path)
+        share = np.clip(1.0 - (along[-1] - along) / _LINE_PX, 0.0, 1.0)
+        return np.asarray(
+            path + share[:, None] * self._error_px * (self._eye.head_px / 1.1774)
+        )  # median of a Rayleigh distribution
+
+
+def slowed(config: Config, share: float) -> Config:
+    """The configuration with this share of all advised speeds."""
+    names = ("slowest_mm_s", "slow_mm_s", "moderate_mm_s", "fast_mm_s")
+    advice = config.advice.model_copy(update={name: share * getattr(config.advice, name) for name in names})
+    return config.model_copy(update={"advice": advice})
+
+
+def is_good(summary: Mapping[str, Any]) -> bool:
+    """Whether the sums over runs (``summarise``) meet the limits of a recommended speed."""
+    p95, most = summary["wall_force_p95_n"] or 0.0, summary["wall_force_max_n"] or 0.0
+    return bool(summary["reached_share"] >= LEAST_SHARE and p95 <= FORCE_P95_N and most <= FORCE_MAX_N)
+
+
+def weakest_place(rows: Sequence[Mapping[str, Any]], route: Points) -> dict[str, Any] | None:
+    """Where on the way runs ended before the target, or else where the wall force is largest (95th percentile); None: nowhere."""
+    along = geometry.arc_length(route)
+
+    def place(x: float, y: float) -> int:
+        return int(geometry.nearest(route, (x, y), along)[1] // _BIN_MM)
+
+    ends = [
+        place(row["track"]["x_mm"][-1], row["track"]["y_mm"][-1]) for row in rows if not row["reached"] and row["track"]["x_mm"]
+    ]
+    forces: dict[int, list[float]] = {}
+    for row in rows:
+        track = row["track"]
+        for x, y, force in zip(track["x_mm"], track["y_mm"], track["wall_contact_n"], strict=True):
+            forces.setdefault(place(x, y), []).append(force)
+    worst = {number: float(np.percentile(values, 95)) for number, values in forces.items()}
+    if not worst:
+        return None
+    number = max(set(ends), key=ends.count) if ends else max(worst, key=worst.__getitem__)
+    at = (number + 0.5) * _BIN_MM
+    points = geometry.point_at(route, along, at + np.array([-10.0, -5.0, 0.0, 5.0, 10.0]))
+    return {
+        "point_mm": points[2].tolist(),
+        "along_mm": round(at, 1),
+        "turn_deg": round(_turn_deg(points[1] - points[0], points[4] - points[3]), 1),
+        "ended_here": ends.count(number),
+        "wall_force_p95_n": round(worst.get(number, 0.0), 4),
+    }

@@ -1,0 +1,89 @@
+"""Rehearsal: the target, branches that are too sharp, a run without pictures, the weakest place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from core.config.models import Config
+from core.types import GraphEdge, VesselGraph
+from hardware.twin.phantom import Phantom
+from hardware.twin.rehearsal import HEAD_PX, Rehearsal, RehearsalPlan, is_good, sharp_turns, slowed, weakest_place
+from hardware.twin.trial import TargetError, TrialPlan, target_near
+from hardware.twin.view import CameraView
+
+VIEW = CameraView(np.diag([3.2, 3.2, 1.0]), (640, 480))
+
+
+def forked(turn_deg: float, radius_mm: float) -> Phantom:
+    """A straight trunk to the right, and a branch at 60 mm."""
+    turn = np.radians(turn_deg)
+    fork, end, tip = (60.0, 75.0), (140.0, 75.0), (60.0 + 50.0 * np.cos(turn), 75.0 + 50.0 * np.sin(turn))
+    edges = tuple(
+        GraphEdge(a, b, np.linspace(start, stop, 200), np.full(200, radius_mm))
+        for a, b, start, stop in ((0, 1, (0.0, 75.0), fork), (1, 2, fork, end), (1, 3, fork, tip))
+    )
+    return Phantom("forked", "Forked", VesselGraph(np.array([(0.0, 75.0), fork, end, tip]), edges), 0, VIEW)
+
+
+def test_the_target_lies_in_the_vessel_nearest_to_the_click() -> None:
+    phantom = forked(50.0, 5.0)
+    target = target_near(phantom, VIEW, (3.2 * 100, 3.2 * 77))
+    assert (target.node, target.at_mm) == (2, pytest.approx(100, abs=0.5))
+    assert target.click_px == pytest.approx((320, 240), abs=1.0)
+    with pytest.raises(TargetError, match="not in the vessel"):
+        target_near(phantom, VIEW, (320, 100))
+    with pytest.raises(TargetError, match="from the port"):
+        target_near(phantom, VIEW, (3.2 * 10, 240))
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "radius_mm", "count"),
+    [(70.0, 3.0, 0), (70.0, 7.0, 1), (85.0, 3.0, 1), (50.0, 7.0, 0)],
+)
+def test_a_branch_is_too_sharp_by_its_turn_and_the_lumen_s_width(turn_deg: float, radius_mm: float, count: int) -> None:
+    phantom = forked(turn_deg, radius_mm)
+    x, y = VIEW.project(phantom.graph.nodes[3:4])[0] - (0, 10)
+    found = sharp_turns(phantom, target_near(phantom, VIEW, (x, y)))
+    assert len(found) == count
+    if found:
+        assert found[0].turn_deg == pytest.approx(turn_deg, abs=1.0) and found[0].point_mm == pytest.approx((60, 75))
+    assert sharp_turns(phantom, target_near(phantom, VIEW, (320, 240))) == []  # straight on
+
+
+def test_a_run_is_the_same_for_its_seed_and_perceives_with_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hardware.twin.trial.make_phantom", lambda _name: forked(50.0, 5.0))
+    config = Config()
+    plan = RehearsalPlan(TrialPlan(config, max_seconds=0.7, look="bench", wall_force=False, own=True, target_px=(320.0, 240.0)))
+    rows = [Rehearsal(replace(plan, missing=missing), 3).run() for missing in (0.0, 0.0, 0.9)]
+    assert rows[0] == rows[1] and rows[0]["outcome"] == "time out"
+    assert rows[0]["answered_share"] == 1.0 and rows[2]["answered_share"] < 0.5
+    assert 0.2 * HEAD_PX < rows[0]["head_error_median_px"] < 4.0 * HEAD_PX
+
+
+def test_slower_is_a_share_of_all_advised_speeds() -> None:
+    config = Config()
+    assert slowed(config, 0.5).advice.fast_mm_s == 0.5 * config.advice.fast_mm_s
+
+
+def row(reached: bool, x_mm: list[float], forces_n: list[float]) -> dict[str, Any]:
+    return {"reached": reached, "track": {"x_mm": x_mm, "y_mm": [75.0] * len(x_mm), "wall_contact_n": forces_n}}
+
+
+def test_the_weakest_place_is_where_runs_end_or_else_where_the_force_is() -> None:
+    route = np.column_stack([np.linspace(0.0, 140.0, 400), np.full(400, 75.0)])
+    good = row(True, [20, 45, 95], [0.0, 0.3, 0.1])
+    place = weakest_place([good], route)
+    assert place is not None and (place["along_mm"], place["wall_force_p95_n"], place["ended_here"]) == (45.0, 0.3, 0)
+    place = weakest_place([good, row(False, [20, 62], [0.0, 0.1])], route)
+    assert place is not None and (place["along_mm"], place["ended_here"]) == (65.0, 1)
+    assert weakest_place([], route) is None
+
+
+def test_a_speed_is_good_within_the_limits() -> None:
+    sums = {"reached_share": 0.96, "wall_force_p95_n": 0.1, "wall_force_max_n": 0.3}
+    assert is_good(sums)
+    assert not any(is_good(sums | bad) for bad in ({"reached_share": 0.9}, {"wall_force_p95_n": 0.2}, {"wall_force_max_n": 0.6}))
