@@ -1,8 +1,9 @@
-"""``python -m tools.benchmarks window|player|recording|stream``: pace of the windows, cost of recording and live stream."""
+"""``python -m tools.benchmarks window|player|recording|stream|follow``: pace of windows, costs, drift of followed lines."""
 
 from __future__ import annotations
 
 import json
+import math
 import multiprocessing
 import os
 import subprocess
@@ -31,7 +32,10 @@ from app.operator.window import OperatorWindow
 from app.player.window import PlayerWindow
 from app.ui.texts import OperatorStep
 from app.ui.window_base import make_application, quit_on_signal
-from core.config.models import Config, PursuitConfig, TwinConfig, choose_model, load_config
+from core import geometry
+from core.annotation.follow import followed_lines
+from core.annotation.model import Annotation
+from core.config.models import Config, PerceptionConfig, PursuitConfig, TwinConfig, choose_model, load_config
 from core.control.drive_view import DriveView
 from core.control.look_ahead import look_ahead
 from core.control.modes import DRIVING_MODES, Mode
@@ -40,6 +44,7 @@ from core.devices import UserError
 from core.evaluation.metrics import MIN_GROUPS, RESAMPLES
 from core.perception.centerline import plan_route
 from core.perception.pipeline import Pipeline, open_pipeline
+from core.perception.vectors import fit_robot_vector
 from core.session.codec import row_of
 from core.session.files import EncodedFrame, SessionFiles
 from core.session.live_output import FoxgloveServer, LiveOutput
@@ -50,6 +55,9 @@ from core.session.writer import SessionWriter
 from core.system import begin_as_worker
 from core.types import Frame, Image, Point, Scene, Tick
 from hardware.rig import rig_config
+from hardware.twin.phantoms import make_phantom
+from hardware.twin.rendering.appearance import named_appearance
+from hardware.twin.truth import RouteFollower
 from hardware.twin.world import TwinWorld
 from tools.run import run_tool
 
@@ -57,6 +65,7 @@ FRAMES_PER_SECOND = 30.0
 _BLOCK = 30  # frames with and without a recording in turn: a second, so that a busy moment of the computer affects both alike
 _WARM_UP = 10  # frames
 _STEPS = 24  # pictures of the stream, one way
+_DRAWN_PX = 60.0  # length of the robot's line that is followed
 
 
 def measure_recording(config: Config, frames: int) -> dict[str, Any]:
@@ -529,6 +538,44 @@ def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
     return watch.result()
 
 
+def measure_follow(clips: int, after: Sequence[int] = (10, 30, 60)) -> dict[str, Any]:
+    """Errors of lines that are followed on clips of the twin, so many pictures after the drawn one: direction and head."""
+    vectors = PerceptionConfig().vectors
+    degrees: dict[int, list[float]] = {count: [] for count in after}
+    heads_px: dict[int, list[float]] = {count: [] for count in after}
+    for seed in range(1, 2 * clips, 2):
+        images, truths = _clip(seed, max(after) + 1)
+        path = truths[0].robot_path
+        length = float(geometry.arc_length(path)[-1])
+        drawn = Annotation(tuple(map(tuple, geometry.cut(path, length - _DRAWN_PX, length).tolist())))
+        for place, robot, _ in followed_lines(images.__getitem__, {0: drawn}, len(images)):
+            found = fit_robot_vector(np.array(robot), vectors.robot_length_px, vectors.line_fit)
+            if place in after and found is not None:
+                cosine = float(np.dot(found.direction, truths[place].robot_vector.direction))
+                degrees[place].append(math.degrees(math.acos(min(1.0, cosine))))
+                heads_px[place].append(math.dist(robot[-1], truths[place].robot_path[-1]))
+    return {
+        f"after {count} pictures": {"direction_deg": quantiles(degrees[count]), "head_px": quantiles(heads_px[count])}
+        for count in after
+    }
+
+
+def _clip(seed: int, count: int) -> tuple[list[Image], list[Any]]:
+    """Pictures of a robot that is driven along a random phantom, a thirtieth of a second apart, and the truth about them."""
+    phantom = make_phantom(f"random:{seed}")
+    world = TwinWorld(TwinConfig(), phantom=phantom, appearance=named_appearance(None, seed), seed=seed)
+    follower = RouteFollower(phantom, phantom.targets[0])
+    world.insert(45.0, target=phantom.targets[0])
+    world.robot.connect()
+    images, truths = [], []
+    for _ in range(count):
+        world.robot.send(follower.command(world.physics.robot_points_mm(), 4.0, 1 / FRAMES_PER_SECOND))
+        world.advance(1 / FRAMES_PER_SECOND)
+        images.append(world.frame().image)
+        truths.append(world.truth())
+    return images, truths
+
+
 def window(
     seconds: Annotated[float, typer.Argument(min=5.0, max=3600.0, help="from the first picture on")],
     json: JsonOption = False,
@@ -573,5 +620,13 @@ def stream(
     print_figures(measure_stream(load_config(config, None, choose_model(model)), blocks), json, "stream")
 
 
+def follow(
+    clips: Annotated[int, typer.Option(min=1, max=200, help="of the twin, two seconds each")] = 8,
+    json: JsonOption = False,
+) -> None:
+    """How far lines that are followed through a clip are off (Ctrl+F in the annotator)."""
+    print_figures(measure_follow(clips), json, "follow")
+
+
 if __name__ == "__main__":
-    run_tool(window, player, recording, stream)
+    run_tool(window, player, recording, stream, follow)

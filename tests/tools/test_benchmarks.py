@@ -52,3 +52,10 @@ def test_a_long_session_is_made_opened_and_sought_in(qtbot: QtBot, tmp_path: Pat
     assert found["rows"] == 60
     assert found["seek_ms"]["p50"] > 0.0
     assert 0.0 < found["opens_s"] <= found["known_s"]
+
+
+@pytest.mark.slow
+def test_lines_that_are_followed_stay_near_the_robot() -> None:
+    found = benchmarks.measure_follow(3, (30,))["after 30 pictures"]
+    assert found["direction_deg"]["p50"] < 3.0
+    assert found["head_px"]["p50"] < 5.0

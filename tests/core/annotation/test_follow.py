@@ -6,16 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from core import geometry
 from core.annotation.follow import followed_lines
 from core.annotation.model import Annotation
-from core.config.models import PerceptionConfig, TwinConfig
-from core.perception.vectors import fit_robot_vector
 from core.types import Image
-from hardware.twin.phantoms import make_phantom
-from hardware.twin.rendering.appearance import named_appearance
-from hardware.twin.truth import RouteFollower
-from hardware.twin.world import TwinWorld
 
 BACKGROUND = cv2.GaussianBlur(np.random.default_rng(1).integers(60, 200, (160, 200, 3), np.uint8), (0, 0), 2.0)
 VESSEL = ((20.0, 100.0), (180.0, 100.0))
@@ -77,30 +70,3 @@ def test_it_can_be_stopped_and_bears_lines_beside_the_picture() -> None:
     found = list(followed_lines(picture, keys, 10, lambda: next(left)))
     assert [place for place, *_ in found] == [1, 2]
     assert list(followed_lines(picture, {0: Annotation(vessel=VESSEL)}, 3)) == [], "no robot to follow"
-
-
-@pytest.mark.slow
-def test_on_the_twin_the_error_stays_small_for_a_while() -> None:
-    """Direction of the robot against the truth, 30 pictures after the drawn one; 60 pictures are in the module's words."""
-    config = PerceptionConfig()
-    errors = []
-    for seed in (1, 3, 5):
-        phantom = make_phantom(f"random:{seed}")
-        world = TwinWorld(TwinConfig(), phantom=phantom, appearance=named_appearance(None, seed), seed=seed)
-        follower = RouteFollower(phantom, phantom.targets[0])
-        world.insert(45.0, target=phantom.targets[0])
-        world.robot.connect()
-        images, truths = [], []
-        for _ in range(31):
-            world.robot.send(follower.command(world.physics.robot_points_mm(), 4.0, 1 / 30))
-            world.advance(1 / 30)
-            images.append(world.frame().image)
-            truths.append(world.truth())
-        path = truths[0].robot_path
-        length = float(geometry.arc_length(path)[-1])
-        drawn = Annotation(tuple(map(tuple, geometry.cut(path, length - 60.0, length).tolist())), VESSEL)
-        *_, (place, robot, _) = followed_lines(images.__getitem__, {0: drawn}, 31)
-        found = fit_robot_vector(np.array(robot), config.vectors.robot_length_px, config.vectors.line_fit)
-        true = truths[place].robot_vector
-        errors.append(math.degrees(math.acos(min(1.0, float(np.dot(found.direction, true.direction))))))
-    assert float(np.median(errors)) < 6.0, errors
