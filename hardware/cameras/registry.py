@@ -35,14 +35,6 @@ class FoundCamera:
     device: str | None = None
 
 
-def _nothing_found() -> Sequence[FoundCamera]:
-    return ()
-
-
-def _no_library() -> None:
-    """Nothing to check."""
-
-
 @dataclass(frozen=True, slots=True)
 class CameraKind:
     """What can be done with a value of ``rig.camera``. Cameras that are made are not open yet.
@@ -59,9 +51,9 @@ class CameraKind:
     title: str
     live: Callable[[CameraConfig], Camera] | None = None
     recorded: Callable[[Path, RigConfig], Camera] | None = None
-    find: Callable[[], Sequence[FoundCamera]] = _nothing_found
+    find: Callable[[], Sequence[FoundCamera]] = lambda: ()
     check: Callable[[CameraConfig], Check] | None = None
-    check_library: Callable[[], None] = _no_library
+    check_library: Callable[[], None] = lambda: None
 
 
 _LIBREALSENSE = "pyrealsense2"

@@ -279,7 +279,7 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from hardware.twin.dataset import SynthPlan, write_set
 
     out = tmp_path_factory.mktemp("synth") / "set"
-    write_set(SynthPlan(out, 6, 77, (640, 480)))
+    write_set(SynthPlan(out, 3, 77, (640, 480)))
     return out
 
 
@@ -289,7 +289,7 @@ def done(frames: Path) -> dict[str, Any]:
 
 
 def test_there_is_a_row_for_each_step(done: dict[str, Any], frames: Path) -> None:
-    assert (done["frames"], done["masks"]) == (6, "true masks")
+    assert (done["frames"], done["masks"]) == (3, "true masks")
     assert [row["name"] for row in done["rows"]] == [PAPER, *(f"+ {step.name}" for step in STEPS[:-1])]
     by_name = {row["name"]: row for row in done["rows"]}
     extension = by_name["+ end extension"]["figures"]["head_median_px"]
@@ -303,11 +303,11 @@ def test_there_is_a_row_for_each_step(done: dict[str, Any], frames: Path) -> Non
 
 
 def test_streams_of_the_twin_are_measured_with_and_without_tracking() -> None:
-    stream = run_ablation(None, true_masks=True, sequence=8, phantoms=("s_curve", "tree"))["stream"]
-    assert (stream["phantoms"], stream["frames_each"]) == (["s_curve", "tree"], 4)
+    stream = run_ablation(None, true_masks=True, sequence=4, phantoms=("s_curve", "tree"))["stream"]
+    assert (stream["phantoms"], stream["frames_each"]) == (["s_curve", "tree"], 2)
     assert [row["name"] for row in stream["rows"]] == [PAPER, f"{OURS} without tracking", OURS]
     for row in stream["rows"]:
-        assert row["figures"]["frames"] == 8
+        assert row["figures"]["frames"] == 4
         assert row["figures"]["swapped_frames"] == row["figures"]["jumps"] == 0
     assert "head-tail swaps" in markdown({"stream": stream, "masks": "true masks"})
 

@@ -1,5 +1,6 @@
 """Labelled sets from the twin: complete, repeatable, continued after an interruption, disjoint by seed."""
 
+import itertools
 import json
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -126,16 +127,16 @@ def test_painted_benches_have_exact_labels() -> None:
 def test_a_look_is_shown_with_several_poses() -> None:
     plan = SynthPlan(Path("unused"), 50, 3, size=(320, 240), poses=3)
     assert (plan.episodes, plan.frames_of(0), plan.frames_of(1)) == (2, 48, 2)
-    frames = list(dataset.episode_frames(plan, 0))
+    frames = list(itertools.islice(dataset.episode_frames(plan, 0), 12))
     vessels = [np.packbits(frame.picture.vessel).tobytes() for frame in frames]
     families = [frame.truth["family"] for frame in frames]
-    for first in range(0, 48, 3):
+    for first in range(0, 12, 3):
         assert len(set(vessels[first : first + 3])) == len(set(families[first : first + 3])) == 1
-    assert len(set(vessels)) == 16, "each look has a view of its own"
+    assert len(set(vessels)) == 4, "each look has a view of its own"
     robots = {np.packbits(frame.picture.robot).tobytes() for frame in frames if frame.truth["robot_visible"]}
     assert len(robots) == sum(frame.truth["robot_visible"] for frame in frames)
-    alone = list(dataset.episode_frames(replace(plan, count=16, poses=1), 0))
-    assert np.array_equal(alone[0].picture.vessel, frames[0].picture.vessel), "the first look is the same"
+    alone = next(dataset.episode_frames(replace(plan, count=16, poses=1), 0))
+    assert np.array_equal(alone.picture.vessel, frames[0].picture.vessel), "the first look is the same"
 
 
 def test_a_pose_is_shown_once_however_many_there_are() -> None:

@@ -21,7 +21,7 @@ from hardware.twin.phantoms import (
     smooth_channel,
 )
 
-RANDOM_SEEDS = range(12)
+RANDOM_SEEDS = range(4)
 ALL = [*PHANTOM_NAMES, *(f"random:{seed}" for seed in RANDOM_SEEDS)]
 ENDS = {
     "s_curve": 1, "y_branch": 2, "tree": 5, "aortic_arch": 5, "tortuous": 1, "cerebral_siphon": 3, "parallel_channels": 3,

@@ -19,7 +19,6 @@ import psutil
 import pytest
 
 from core.config.models import Config, load_config
-from core.config.rig_file import RigFileError
 from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
@@ -42,7 +41,7 @@ def twin() -> Iterator[RemoteTwin]:
 
 
 def next_frame(twin: RemoteTwin) -> Frame:
-    until_s = time.monotonic() + 20.0
+    until_s = time.monotonic() + 120.0
     while time.monotonic() < until_s:
         frame = twin.read(0.5)
         if frame is not None:
@@ -60,7 +59,7 @@ def test_what_is_packed_is_unpacked() -> None:
         assert unpack_status(pack_status(status)) == status
 
 
-def test_frames_come_in_order_and_each_once(twin: RemoteTwin) -> None:
+def test_frames_come_in_order_and_each_once_with_the_truth_until_it_is_closed(twin: RemoteTwin) -> None:
     asked_s, before_s = twin.clock(), time.monotonic()
     frames = [next_frame(twin) for _ in range(4)]
     indices = [frame.index for frame in frames]
@@ -70,12 +69,11 @@ def test_frames_come_in_order_and_each_once(twin: RemoteTwin) -> None:
     assert [frame.captured_s for frame in frames] == sorted(frame.captured_s for frame in frames)
     assert before_s <= (frames[-1].published_s or 0.0) <= time.monotonic(), "on the real clock"
     assert not np.array_equal(frames[0].image, frames[-1].image), "noise of a camera"
-
-
-def test_the_truth_comes_through(twin: RemoteTwin) -> None:
-    next_frame(twin)
     assert twin.status().insertion_mm == pytest.approx(40.0, abs=2.0)
     assert twin.status().wall_contact_n is not None
+    pid = twin._process.pid
+    twin.close()
+    assert not psutil.pid_exists(pid)
 
 
 def test_a_process_that_is_gone_is_a_device_error(twin: RemoteTwin) -> None:
@@ -84,13 +82,6 @@ def test_a_process_that_is_gone_is_a_device_error(twin: RemoteTwin) -> None:
     with pytest.raises(DeviceError, match=r"the bench twin stopped.*F5"):
         for _ in range(200):
             twin.read(0.05)
-
-
-def test_closing_ends_the_process(twin: RemoteTwin) -> None:
-    pid = twin._process.pid
-    twin.close()
-    assert not psutil.pid_exists(pid)
-    twin.close()
 
 
 def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
@@ -150,14 +141,6 @@ def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, 
 
 
 @pytest.mark.usefixtures("no_process_stays_behind")
-def test_what_was_started_ahead_of_a_rig_whose_file_is_gone_is_ended(tmp_path: Path) -> None:
-    ahead = start_ahead(CONFIG)
-    assert ahead is not None
-    with pytest.raises(RigFileError):
-        open_rig(load_config(overrides={"rig": {"file": str(tmp_path / "gone.toml")}}), ahead)
-
-
-@pytest.mark.usefixtures("no_process_stays_behind")
 def test_what_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     open_before = psutil.Process().num_fds()
     ahead = start_ahead(CONFIG)
@@ -196,7 +179,7 @@ def test_an_application_that_ends_before_it_needs_a_process_leaves_none_behind(
 ) -> None:
     process = start()
     process.socket.shutdown(socket.SHUT_RDWR)
-    assert process.wait(20.0)
+    assert process.wait(120.0)
     assert process.exit_code() == 0
     process.discard()
     assert capfd.readouterr() == ("", "")
@@ -206,7 +189,7 @@ def test_an_application_that_ends_before_it_needs_a_process_leaves_none_behind(
 def test_a_twin_that_died_while_it_waited_is_replaced() -> None:
     prestarted = start_twin()
     os.kill(prestarted.pid, signal.SIGKILL)
-    assert prestarted.wait(10.0)
+    assert prestarted.wait(60.0)
     twin = RemoteTwin(CONFIG, 40.0, prestarted)
     try:
         assert twin._process.pid != prestarted.pid

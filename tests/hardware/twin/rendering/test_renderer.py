@@ -143,7 +143,7 @@ def test_painting_a_window_equals_painting_the_whole(family: str, monkeypatch: p
     assert difference.max() <= 1
 
 
-@pytest.mark.parametrize("size", [(161, 97), (97, 161), (1280, 720), (64, 64)])
+@pytest.mark.parametrize("size", [(161, 97), (97, 161), (1280, 720)])
 def test_any_size(size: tuple[int, int]) -> None:
     picture = Renderer(PHANTOM, Appearance(), size).render(_robot())
     assert picture.image.shape == (size[1], size[0], 3)
@@ -162,7 +162,7 @@ def _contrast(picture: RenderedFrame, without: RenderedFrame) -> float:
 @pytest.mark.parametrize("family", [*LOOK_FAMILIES, *RARE_FAMILIES])
 def test_every_family_shows_the_robot_it_labels(family: str) -> None:
     contrasts = []
-    for seed in range(8):
+    for seed in range(3):
         appearance = replace(random_appearance(seed, family), noise=0.0, jpeg_quality=0)
         renderer = Renderer(PHANTOM, appearance, (320, 240), seed)
         contrasts.append(_contrast(renderer.render(_robot()), renderer.render(None)))
@@ -172,7 +172,7 @@ def test_every_family_shows_the_robot_it_labels(family: str) -> None:
 
 @pytest.mark.parametrize("family", [*LOOK_FAMILIES, *RARE_FAMILIES])
 def test_every_family_shows_the_vessel_it_labels(family: str) -> None:
-    for seed in range(6):
+    for seed in range(2):
         appearance = replace(random_appearance(seed, family), noise=0.0, jpeg_quality=0, cables=0, labels=0, objects=0, dust=0)
         picture = Renderer(PHANTOM, appearance, (320, 240), seed).render(None)
         mask = picture.vessel.astype(np.uint8)
@@ -243,7 +243,7 @@ def test_random_appearance_is_a_function_of_seed_and_family() -> None:
     assert random_appearance(11) == random_appearance(11)
     assert random_appearance(11) != random_appearance(12)
     assert all(random_appearance(4, family).family == family for family in (*LOOK_FAMILIES, *RARE_FAMILIES))
-    drawn = [random_appearance(seed) for seed in range(400)]
+    drawn = [random_appearance(seed) for seed in range(150)]
     assert {appearance.family for appearance in drawn} == set(LOOK_FAMILIES)
     assert {appearance.robot_look for appearance in drawn} == set(ROBOT_LOOKS)
     with pytest.raises(ValueError, match="unknown look family 'glass'; known: silicone_white"):
@@ -251,7 +251,7 @@ def test_random_appearance_is_a_function_of_seed_and_family() -> None:
 
 
 def test_the_device_is_three_to_ten_pixels_wide() -> None:
-    for seed in range(300):
+    for seed in range(100):
         appearance = random_appearance(seed)
         assert 2.9 <= 2 * appearance.robot_radius_mm * appearance.pixels_per_mm <= 10.1
         assert 2.0 <= appearance.pixels_per_mm <= 4.5

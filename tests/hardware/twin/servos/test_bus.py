@@ -71,14 +71,6 @@ def test_no_bytes_make_the_parser_fail(chunks: list[bytes]) -> None:
     assert parser.feed(PING) == [InstructionPacket(1, 1, b"")]
 
 
-@given(
-    st.lists(st.sampled_from([b"\xff", b"\xfd", b"\xff\xff\xfd", b"\xff\xff\xfd\x00\x01", b"\x00", PING, PING[:-1]]), max_size=40)
-)
-def test_no_half_packets_make_the_parser_fail(pieces: list[bytes]) -> None:
-    parser = PacketParser()
-    assert all(found == InstructionPacket(1, 1, b"") for piece in pieces for found in parser.feed(piece))
-
-
 @given(st.binary(min_size=1, max_size=40), st.integers(1, 7))
 def test_a_packet_is_found_however_it_is_cut(data: bytes, size: int) -> None:
     stream = b"\x00\xff\xff" + packet(5, b"\x03" + data) + b"\xff" + PING
@@ -87,9 +79,9 @@ def test_a_packet_is_found_however_it_is_cut(data: bytes, size: int) -> None:
     assert found == [InstructionPacket(5, 3, data), InstructionPacket(1, 1, b"")]
 
 
-@pytest.mark.parametrize("at", range(len(PING)))
-def test_a_packet_with_a_wrong_byte_is_ignored(at: int) -> None:
-    assert PacketParser().feed(PING[:at] + bytes([PING[at] ^ 0x10]) + PING[at + 1 :]) == []
+def test_a_packet_with_a_wrong_byte_is_ignored() -> None:
+    for at in range(len(PING)):
+        assert PacketParser().feed(PING[:at] + bytes([PING[at] ^ 0x10]) + PING[at + 1 :]) == []
 
 
 def test_a_bare_header_inside_begins_a_new_packet() -> None:
@@ -192,12 +184,6 @@ def test_a_new_goal_behind_it_is_reached_by_braking_first() -> None:
     assert places[-1] == 0.0
 
 
-def test_without_torque_nothing_moves_and_no_current_flows() -> None:
-    motor = ServoMotor(7.0)
-    assert _run(motor, MotorGoal(False, 1000), 0.2)[-1] == 7.0
-    assert motor.current_ma(MotorGoal(False, 1000)) == 0.0
-
-
 def test_load_is_current() -> None:
     """1 N at a drum of 40 mm a turn is 6.366 mN m, by 1.78 N m/A 3.6 mA, beside the 8 mA of standing still."""
     bus = SoftServoBus(CONFIG)
@@ -230,16 +216,6 @@ def test_a_jam_ends_in_overload_and_without_torque() -> None:
     servo.freeze(False)
     servo.restart(silent_s=0.0)
     assert servo.answer(3, 64, data=b"\1").error == 0
-
-
-def test_freed_from_a_jam_it_starts_from_where_it_is() -> None:
-    servo = _armed(SoftServo(1, 1020, 100))
-    servo.freeze(True)
-    _goal(servo, 600)
-    servo.advance(0.4)
-    servo.freeze(False)
-    servo.advance(0.42)
-    assert 100 <= servo.table["present_position"] < 150
 
 
 def test_heat_and_voltage_become_errors() -> None:
@@ -278,14 +254,6 @@ def test_a_silent_line_trips_the_watchdog_which_holds_and_locks_the_goals() -> N
     assert _goal(servo, 5) == RANGE
     assert servo.answer(3, 98, data=b"\0").error == 0
     assert _goal(servo, 5) == 0
-
-
-def test_any_packet_feeds_the_watchdog() -> None:
-    servo = _armed(SoftServo(1, 1020, 0), watchdog=10)
-    for tick in range(100):
-        servo.advance(tick * 0.1)
-        servo.feed_watchdog()
-    assert servo.table["watchdog"] == 10
 
 
 def test_a_restart_takes_the_turns_and_the_ram_and_keeps_the_eeprom() -> None:
@@ -393,11 +361,6 @@ def test_started_again_the_servos_are_as_they_were(bus: SoftServoBus) -> None:
 )
 def test_bend_by_a_pair_of_wires(first_mm: float, second_mm: float, bend_mm: float) -> None:
     assert pair_bend_mm(first_mm, second_mm) == pytest.approx(bend_mm)
-
-
-@given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-1e-6, 1e-6))
-def test_bend_by_a_pair_is_continuous(first_mm: float, second_mm: float, little_mm: float) -> None:
-    assert pair_bend_mm(first_mm + little_mm, second_mm) == pytest.approx(pair_bend_mm(first_mm, second_mm), abs=2e-6)
 
 
 def test_joints_become_a_command() -> None:
