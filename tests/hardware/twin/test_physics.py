@@ -149,6 +149,7 @@ def test_the_sheath_follows_but_never_covers_the_steerable_part(inserted: TwinPh
     assert inserted.delivery_mm == 0.0
 
 
+@pytest.mark.slow
 def test_the_sheath_stiffens_what_it_covers() -> None:
     """Pushed against the same bend, the covered robot presses harder on the wall."""
     forces = []

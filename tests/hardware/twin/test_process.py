@@ -100,13 +100,6 @@ def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
         os.close(wake)
 
 
-@pytest.mark.usefixtures("no_process_stays_behind")
-def test_what_is_wrong_is_said_in_one_line() -> None:
-    config = Config.model_validate({"twin": {"phantom": "no such phantom"}})
-    with pytest.raises(DeviceError, match="no such phantom"):
-        RemoteTwin(config, 40.0)
-
-
 @pytest.mark.real_time
 @pytest.mark.usefixtures("no_process_stays_behind")
 def test_what_was_started_ahead_becomes_the_rig() -> None:
