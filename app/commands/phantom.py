@@ -50,7 +50,7 @@ def phantom(
 
     if sum(one is not None for one in (outline, svg, table)) > 1 or (picture is not None and outline is None):
         raise UserError("give one of --outline, --svg and --csv; --picture goes with --outline")
-    folder, size, title, vessel = _bench(bench, picture, outline)
+    folder, size, title, vessel = _bench(bench, picture, outline, is_drawn=svg is not None or table is not None)
     scale, port_px = _calibrated(rig or (bench if has_rig(bench) else None), size)
     if svg is not None:
         vessel, drawn = mask_of_svg(svg, size)
@@ -94,7 +94,9 @@ def phantom(
     )
 
 
-def _bench(bench: str, picture: Path | None, outline: Path | None) -> tuple[Path, tuple[int, int] | None, str, Mask | None]:
+def _bench(
+    bench: str, picture: Path | None, outline: Path | None, *, is_drawn: bool
+) -> tuple[Path, tuple[int, int] | None, str, Mask | None]:
     """Folder, size of its picture, title and vessel of the bench, which is made if there is a picture."""
     from core.bench.bench import INFO, bench_from_pictures, read_bench, with_vessel, write_bench
     from core.files import name_of, read_image
@@ -109,15 +111,26 @@ def _bench(bench: str, picture: Path | None, outline: Path | None) -> tuple[Path
         try:
             folder = bench_folder(bench)
         except PhantomError:
-            if "/" not in bench and not Path(bench).is_dir() and mask is None:
+            if mask is None and not is_drawn:
                 raise
             folder = Path(bench).resolve()
     if not (folder / INFO).is_file():
-        return folder, None, name_of(folder), mask
+        return folder, None, name_of(folder), None if mask is None else _at_working_size(mask)
     known = read_bench(folder)
     if mask is not None:
         known = with_vessel(known, mask)
     return folder, known.size, known.name, known.vessel
+
+
+def _at_working_size(mask: Mask) -> Mask:
+    import numpy as np
+
+    from core.learning.dataset import WORKING_SIZE_PX
+    from core.perception.segmentation import to_working
+
+    return np.asarray(
+        to_working(np.where(mask[..., None], np.full(3, 255, np.uint8), np.uint8(0)), WORKING_SIZE_PX)[0][..., 0] > 127
+    )
 
 
 def _calibrated(rig: str | None, size: tuple[int, int] | None) -> tuple[ScaleConfig | None, Point | None]:

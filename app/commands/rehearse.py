@@ -144,11 +144,9 @@ def _print(about: dict[str, Any]) -> None:
         lines.append(
             f"weakest at ({x:.0f}, {y:.0f}), {weakest['along_mm']:.0f} mm in, a turn of {weakest['turn_deg']:.0f} degrees: {why}"
         )
-    set_mm_s = about["speed_mm_s"]
-    lines.append(
-        f"recommended: advice.fast_mm_s = {speed:g} (now {set_mm_s:g})"
-        if speed is not None
-        else "no speed that was tried is good: choose another target"
-    )
+    if speed is None:
+        lines.append("no speed that was tried is good: choose another target")
+    else:
+        lines.append(f"recommended: {speed / about['speed_mm_s']:.0%} of the set speeds, advice.fast_mm_s = {speed:g}")
     for line in lines:
         console.print(line, soft_wrap=True)

@@ -62,7 +62,10 @@ def trial(
     true_masks: Annotated[bool, typer.Option("--true-masks", help="the twin's own masks instead of the network's")] = False,
     max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a trial has failed")] = 120.0,
     look: Annotated[
-        str, typer.Option(help="random: every trial another picture; bench: the default clear one; or a family, as in synth")
+        str,
+        typer.Option(
+            help="random: every trial another picture; bench: the clear one; own: your bench's picture; or a family, as in synth"
+        ),
     ] = "random",
     wall_force: Annotated[
         bool,

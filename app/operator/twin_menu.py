@@ -19,7 +19,7 @@ from app.ui.i18n import mark, tr, tr_text
 from app.ui.layout_state import layout_settings
 from core.config.models import Config, TwinConfig
 from hardware.rig import RigKind, kind_of
-from hardware.twin.catalog import BENCH_LOOK, BENCH_TITLE, LOOK_TITLES, LOOKS, RARE_TITLES, family_of, look_of
+from hardware.twin.catalog import BENCH_LOOK, BENCH_TITLE, LOOK_TITLES, LOOKS, OWN_LOOK, OWN_TITLE, RARE_TITLES, family_of, look_of
 from hardware.twin.phantom import PHANTOM_TITLES, own_file
 
 _ANY = mark("Any of the ten &families")
@@ -57,7 +57,7 @@ class TwinMenuController(QObject):
         super().__init__(window)
         assert panels.picker is not None
         self._rig, self._live, self._picker, self._say = rig, panels.live, panels.picker, say
-        usual: list[tuple[str | None, str]] = [(BENCH_LOOK, BENCH_TITLE), (None, _ANY), *LOOK_TITLES.items()]
+        usual: list[tuple[str | None, str]] = [(BENCH_LOOK, BENCH_TITLE), (OWN_LOOK, OWN_TITLE), (None, _ANY), *LOOK_TITLES.items()]
         entries: list[MenuEntry | None] = [*self._picker.menu_entries(), None, MenuEntry(tr("Another &look"), self.vary, ("L",))]
         for looks in (usual, [*RARE_TITLES.items()]):
             entries.append(None)
@@ -87,6 +87,7 @@ class TwinMenuController(QObject):
         """Mark the look in use; nothing can be chosen while another rig is open."""
         for action in self._actions:
             action.setEnabled(self._is_open)
+        self._looks[OWN_LOOK].setEnabled(self._is_open and own_file(self._twin.phantom) is not None)
         current = look_of(self._twin)
         for look, action in self._looks.items():
             action.setChecked(look == current)

@@ -9,6 +9,9 @@ from core.config.models import TwinConfig
 BENCH_LOOK = "bench"
 """The fixed default look, in none of the families."""
 BENCH_TITLE = "Clear bench"
+OWN_LOOK = "own"
+"""The empty picture of the bench whose phantom it is, with the robot in it; of another phantom as the default look."""
+OWN_TITLE = "Your bench's own picture"
 
 LOOK_TITLES = {
     "silicone_white": "Silicone on white",
@@ -35,11 +38,11 @@ RARE_TITLES = {
 }
 """Looks of other kinds of rigs, drawn only where they are named."""
 
-LOOKS = (*LOOK_TITLES, *RARE_TITLES, BENCH_LOOK)
+LOOKS = (*LOOK_TITLES, *RARE_TITLES, BENCH_LOOK, OWN_LOOK)
 """The names of all looks."""
 RANDOM_LOOK = "random"
 """For trials: each gets another look of the ten families."""
-TRIAL_LOOKS = (RANDOM_LOOK, BENCH_LOOK, *LOOK_TITLES, *RARE_TITLES)
+TRIAL_LOOKS = (RANDOM_LOOK, BENCH_LOOK, OWN_LOOK, *LOOK_TITLES, *RARE_TITLES)
 
 
 def family_of(seed: int) -> str:

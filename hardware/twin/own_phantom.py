@@ -21,7 +21,7 @@ from core import geometry
 from core.bench.bench import INFO
 from core.config.calibration import ScaleConfig
 from core.config.models import CleaningConfig, Config
-from core.config.rig_file import find_rig, has_rig
+from core.config.rig_file import find_rig, has_rig, list_rigs
 from core.config.section import first_problem
 from core.devices import UserError
 from core.files import write_atomic
@@ -31,6 +31,7 @@ from core.perception.segmentation import clean_mask
 from core.perception.skeleton import end_pixels, thin
 from core.perception.vessel_graph import build_graph
 from core.types import GraphEdge, Mask, Point, Points, VesselGraph
+from hardware.twin.catalog import OWN_LOOK
 from hardware.twin.phantom import BOARD_MM, OWN, PHANTOM_FILE, Phantom, own_file
 from hardware.twin.view import CameraView
 
@@ -101,12 +102,17 @@ def phantom_name(bench: str) -> str:
 
 
 def with_own_phantom(config: Config, bench: str) -> Config:
-    """The configuration with the twin in the phantom of a bench, seen at the size and scale of its picture. Raises PhantomError."""
+    """The configuration with the twin in the phantom of a bench, seen at the size and scale of its picture, in that picture.
+
+    A look that is configured stays. Raises PhantomError.
+    """
     name = phantom_name(bench)
     view = read_phantom(name).view
     assert view is not None
     (width, height), working = view.size, config.perception.working_size_px
-    twin = {"phantom": name, "image_width_px": max(width, 160), "image_height_px": max(height, 120)}
+    twin: dict[str, str | int] = {"phantom": name, "image_width_px": max(width, 160), "image_height_px": max(height, 120)}
+    if config.twin.look is None and not config.twin.appearance_seed:
+        twin["look"] = OWN_LOOK
     zoom = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2)) * working / max(view.size)
     pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom})
     policy = config.policy.model_copy(update={"pursuit": pursuit})
@@ -176,6 +182,10 @@ def mask_of_csv(path: Path, size: tuple[int, int] | None) -> tuple[Mask, ScaleCo
     if not len(values) or not np.isfinite(values).all() or (values[:, 2] <= 0.0).any():
         raise PhantomError(f"{path}: needs at least one line, finite places, and radii above 0")
     scale = None
+    if unit == "mm" and size is not None:
+        raise PhantomError(
+            f"{path}: places in mm are not known in the bench's picture; give x_px, y_px, radius_px, or a new folder"
+        )
     if unit == "mm":
         low = (values[:, :2] - 1.5 * values[:, 2:]).min(axis=0)
         high = (values[:, :2] + 1.5 * values[:, 2:]).max(axis=0)
@@ -387,8 +397,9 @@ def read_phantom(name: str) -> Phantom:
 
 
 def own_phantoms(current: str, bench: str | None) -> list[tuple[str, str]]:
-    """Names and titles of the phantoms of all benches that the program knows: of its own models, and those named here."""
+    """Names and titles of the phantoms of all benches that the program knows: of its own models, of rigs, and those named here."""
     folders = [path.parent for path in sorted(own_models().glob(f"*/{BENCH}/{PHANTOM_FILE}"))]
+    folders += [(one.path.parent / one.rig.bench).resolve() for one in list_rigs() if one.rig is not None and one.rig.bench]
     folders += [Path(bench).resolve()] if bench is not None else []
     folders += [file.parent] if (file := own_file(current)) is not None else []
     found = {}

@@ -98,7 +98,7 @@ class RehearsalPlan:
 
 def rehearse_once(plan: RehearsalPlan, seed: int) -> Row:
     """One run, at low priority."""
-    os.setpriority(os.PRIO_PROCESS, 0, _NICENESS)
+    os.setpriority(os.PRIO_PROCESS, 0, max(os.getpriority(os.PRIO_PROCESS, 0), _NICENESS))
     return Rehearsal(plan, seed).run()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from core.config.models import TwinConfig
 from core.types import Points
-from hardware.twin.catalog import BENCH_LOOK, LOOKS, family_of, look_of
+from hardware.twin.catalog import BENCH_LOOK, LOOKS, OWN_LOOK, family_of, look_of
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES, draw_family
 from hardware.twin.view import CameraView
@@ -185,12 +185,14 @@ def _share_inside(view: CameraView, points_mm: Points) -> float:
 
 
 def named_appearance(look: str | None, seed: int) -> Appearance:
-    """The clear bench, or a random look of the family `look` (None: of any of the ten).
+    """The clear bench, the bench's own picture, or a random look of the family `look` (None: of any of the ten).
 
     Raises ValueError for an unknown name; the message lists the known ones.
     """
     if look is not None and look not in LOOKS:
         raise ValueError(f"unknown look {look!r}; known: {', '.join(LOOKS)}")
+    if look == OWN_LOOK:
+        return Appearance(family=OWN_LOOK)
     return Appearance() if look == BENCH_LOOK else random_appearance(seed, look)
 
 

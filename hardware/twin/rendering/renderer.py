@@ -6,14 +6,16 @@ pixel centres, in mm on the board, to the robot's line and to the lumen's discs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core.bench.bench import bench_stamp, read_bench
 from core.types import Image, Mask, Points
-from hardware.twin.phantom import BOARD_MM, Phantom
+from hardware.twin.catalog import OWN_LOOK
+from hardware.twin.phantom import BOARD_MM, Phantom, own_file
 from hardware.twin.rendering.appearance import Appearance, make_view
 from hardware.twin.rendering.background import light_field, paint_board, stroke
 from hardware.twin.rendering.camera_effects import CameraEffects
@@ -25,6 +27,8 @@ from hardware.twin.view import CameraView, measure_lumen
 F32 = NDArray[np.float32]
 
 _REACH_MM = 2.5
+_GREY = 0.005
+"""A picture whose channels differ by less on average is grey: so is the robot in it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,8 +60,12 @@ class Renderer:
         seed: int = 0,
         view: CameraView | None = None,
     ) -> None:
-        self.phantom, self.appearance = phantom, appearance
         self.view = view if view is not None else make_view(appearance, size, phantom)
+        own = _own_picture(phantom, self.view.size) if appearance.family == OWN_LOOK else None
+        if own is not None:  # what the bench's camera does is in the picture already
+            grey = float(np.ptp(own[0], axis=2).mean()) < _GREY
+            appearance = replace(appearance, blur_px=0.0, vignette=0.0, noise=own[1], saturation=0.0 if grey else 1.0)
+        self.phantom, self.appearance = phantom, appearance
         rng = np.random.default_rng([seed, appearance.clutter_seed])
         self._grid = self.view.grid_mm().astype(np.float32)
         self._scale = self.view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
@@ -65,7 +73,7 @@ class Renderer:
         self.lumen = measure_lumen(phantom.graph, self.view, self._grid, appearance.wall_mm, appearance.wall_mm + _REACH_MM)
         self._vessel = self.lumen.inside
         self._camera = CameraEffects(appearance, self.view.size, rng)
-        self._under, self._front, self._front_keep = self._paint_background(rng)
+        self._under, self._front, self._front_keep = self._paint_background(rng) if own is None else self._taken(own[0])
         whole = slice(0, self.view.size[1]), slice(0, self.view.size[0])
         self._empty = self._camera.expose(self._under * self._front_keep + self._front, whole)
 
@@ -97,6 +105,12 @@ class Renderer:
         light = light_field(appearance, self._grid, rng)
         self._light = light
         return layers.under * light[..., None], layers.front, (1 - layers.front_alpha)[..., None]
+
+    def _taken(self, picture: F32) -> tuple[F32, F32, F32]:
+        """The same layers where the background is a picture (H, W, 3)."""
+        shape = picture.shape[:2]
+        self._light = np.ones(shape, np.float32)
+        return picture, np.zeros_like(picture), np.ones((*shape, 1), np.float32)
 
     def _with_robot(self, points: Points, band: Band, sheath_mm: float) -> Image:
         """The noise-free image, with the window around the robot painted again."""
@@ -154,6 +168,22 @@ class Renderer:
         port = self.phantom.graph.nodes[self.phantom.port]
         index = int(np.argmin(np.sum((points - port) ** 2, axis=1)))
         return np.float32(np.sum(np.linalg.norm(np.diff(points[: index + 1], axis=0), axis=1)))
+
+
+def _own_picture(phantom: Phantom, size: tuple[int, int]) -> tuple[F32, float] | None:
+    """The empty picture (H, W, 3), 0..1, of the phantom's bench, fitted into `size`, and its noise in grey levels.
+
+    None for a phantom of no bench, or of one without a picture. Raises BenchError for a damaged one.
+    """
+    file = own_file(phantom.name)
+    if file is None or bench_stamp(file.parent) is None:
+        return None
+    bench = read_bench(file.parent)
+    zoom = min(new / old for new, old in zip(size, bench.size, strict=True))
+    shift = [(new - 1 - zoom * (old - 1)) / 2 for new, old in zip(size, bench.size, strict=True)]
+    place = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
+    fitted = cv2.warpAffine(bench.empty, place, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return fitted.astype(np.float32) / np.float32(255), float(np.median(bench.noise))
 
 
 def _lamp_in_image(view: CameraView, light_deg: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from core import geometry
-from core.bench.bench import bench_from_pictures, write_bench
+from core.bench.bench import bench_from_pictures, read_bench, write_bench
 from core.config.calibration import ScaleConfig
 from core.config.models import Config
 from core.types import Mask
@@ -27,7 +27,8 @@ from hardware.twin.own_phantom import (
 )
 from hardware.twin.phantom import BOARD_MM
 from hardware.twin.phantoms import make_phantom
-from hardware.twin.rendering.appearance import Appearance, make_view
+from hardware.twin.rendering.appearance import Appearance, make_view, named_appearance
+from hardware.twin.rendering.renderer import Renderer
 
 SIZE = (640, 480)
 SCALE = ScaleConfig(mm_per_px=0.25, size_px=SIZE, method="two clicks", uncertainty_share=0.0)
@@ -131,6 +132,12 @@ def test_it_is_kept_with_its_bench_and_seen_as_the_bench_is(tmp_path: Path) -> N
     assert middle == pytest.approx([159.5, 119.5]) and view.pixels_per_mm((100, 75)) == pytest.approx(2.0)
     config = with_own_phantom(Config(), str(folder))
     assert (config.twin.phantom, config.policy.pursuit.pixels_per_mm) == (name, pytest.approx(4.0))
+    assert config.twin.look == "own"
+    renderer = Renderer(phantom, named_appearance("own", 0), SIZE)
+    empty, noise = renderer.render(None).image.astype(float), float(np.median(read_bench(folder).noise))
+    assert np.abs(empty - picture).mean() < 2.0 * noise
+    seen = renderer.render(VIEW.unproject(np.array([(0.0, 240.0), (300.0, 240.0)])))
+    assert seen.robot[240, 150] and seen.image[235:246, 50:250].mean() < 0.8 * picture.mean()
     (folder / "phantom.json").write_text("{}")
     with pytest.raises(ValueError, match="damaged"):
         read_phantom(name)

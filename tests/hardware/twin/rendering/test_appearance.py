@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from core.config.models import TwinConfig
-from hardware.twin.catalog import BENCH_TITLE, LOOK_TITLES, LOOKS, RARE_TITLES
+from hardware.twin.catalog import BENCH_TITLE, LOOK_TITLES, LOOKS, OWN_TITLE, RARE_TITLES
 from hardware.twin.rendering.appearance import Appearance, appearance_of, random_appearance
 from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES
 
@@ -15,7 +15,7 @@ from hardware.twin.rendering.presets import LOOK_FAMILIES, RARE_FAMILIES
 def test_all_looks_have_a_title() -> None:
     assert tuple(LOOK_TITLES) == LOOK_FAMILIES
     assert tuple(RARE_TITLES) == RARE_FAMILIES
-    titles = [BENCH_TITLE, *LOOK_TITLES.values(), *RARE_TITLES.values()]
+    titles = [BENCH_TITLE, OWN_TITLE, *LOOK_TITLES.values(), *RARE_TITLES.values()]
     assert len(set(titles)) == len(titles) == len(LOOKS)
 
 
