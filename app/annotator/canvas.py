@@ -358,7 +358,6 @@ class AnnotationCanvas(ImageCanvas):
             self._set_view(before)
 
     def blank(self) -> None:
-        """Show no image."""
         self._gestures.clear()
         self.editor.set_image(self.view.size, Annotation(), lambda _annotation: Readout())
         self.show_levels(())

@@ -288,13 +288,11 @@ class AnnotationEditor:
         return touched(self.annotation, lines, point, _POINT_REACH_PX * scale, _EDGE_REACH_PX * scale)
 
     def drag_to(self, point: Point) -> None:
-        """The held point follows the cursor."""
         if self.held is not None:
             at = self._inside((point[0] + self._grip[0], point[1] + self._grip[1]))
             self._preview(move(self.annotation, self.held.line, self.held.place, at))
 
     def release(self) -> Edit | None:
-        """The drag ends."""
         if self.held is None:
             return None
         self.held = None
@@ -449,7 +447,6 @@ class AnnotationEditor:
         self.stroke_radii.append(self.radius_px)
 
     def end_stroke(self) -> Edit | None:
-        """The brush is lifted."""
         stroke, self.stroke = np.array(self.stroke), []
         target = self.tool.value.target
         if target is None or len(stroke) == 0:
@@ -475,7 +472,6 @@ class AnnotationEditor:
         return MaskGesture(self._mask_action(mode), stroke, radii, erase, change)
 
     def apply_masks(self, action: str, masks: Polygons) -> Edit:
-        """The masks that a gesture has led to."""
         return self._done(action, replace(self.annotation, masks=masks))
 
     def _mask_action(self, mode: MaskMode) -> str:
@@ -483,7 +479,6 @@ class AnnotationEditor:
         return f"{_ACTIONS[mode][self.stroke_erases]} {target.value if target is not None else ''} mask"
 
     def simplify(self, tolerance_px: float) -> Edit | None:
-        """Fewer points on the outlines of the tool's masks."""
         target = self.tool.value.target
         if target is None:
             return None

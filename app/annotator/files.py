@@ -69,7 +69,6 @@ class AnnotationFiles(QObject):
         self._ask(tr("A folder of pictures, or a session"), QFileDialog.FileMode.Directory, self._window.open_path)
 
     def ask_import(self) -> None:
-        """Files of other programs."""
         self._ask(tr("Files of other programs"), QFileDialog.FileMode.ExistingFiles, lambda path: self._model.import_files([path]))
 
     def _on_imported(self, count: int, problems: Sequence[str]) -> None:
@@ -138,7 +137,6 @@ class AnnotationFiles(QObject):
         self._offers.offer(Offer(_WORK, words, "", (cancel,), share=share, dismissed=self.cancel))
 
     def cancel(self) -> None:
-        """End the work that goes on."""
         if self._child is not None:
             self._child.leave()
             self._child.kill()
@@ -160,6 +158,5 @@ class AnnotationFiles(QObject):
         self.said.emit(words, is_fault)
 
     def close(self) -> None:
-        """The window closes."""
         self.cancel()
         self._copying.stop(finish=False)

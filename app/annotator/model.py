@@ -157,7 +157,6 @@ class AnnotationModel(QObject):
 
     @property
     def is_open(self) -> bool:
-        """Whether the chosen item is loaded."""
         return self.index in self._levels
 
     @property
@@ -195,12 +194,10 @@ class AnnotationModel(QObject):
 
     @property
     def finished(self) -> int:
-        """How many items are answered."""
         return sum(self.status(place) in ANSWERED for place in range(len(self.items)))
 
     @property
     def unsaved(self) -> int:
-        """Edits that are not on the disk yet."""
         return len(self._to_write)
 
     def measure(self, shown: Annotation) -> Readout:

@@ -79,7 +79,6 @@ class VesselOutlineEditor(QWidget):
         self.set_mode(MaskMode.TUBE)
 
     def set_mode(self, mode: MaskMode) -> None:
-        """What a press does."""
         self.canvas.complete()
         self.canvas.set_mask_mode(mode)
         self.bar.show_tool(Tool.VESSEL_MASK, mode)

@@ -69,7 +69,6 @@ class Answer(Enum):
 
     @classmethod
     def of(cls, annotation: Annotation) -> Answer | None:
-        """The answer that is given."""
         if annotation.cannot_tell or annotation.no_robot:
             return cls.CANNOT_TELL if annotation.cannot_tell else cls.NO_ROBOT
         return next((one for one in cls if one.value.state is not None and one.value.state is annotation.state), None)
@@ -333,7 +332,6 @@ class Filter(Enum):
     NOT_BY_HAND = mark("Not drawn by hand")
 
     def keeps(self, items: Items, place: int) -> bool:
-        """Whether an item is listed."""
         status, content = items.status(place), items.content(place)
         kept = {
             Filter.OPEN: status in (Status.NEW, Status.BEGUN),
@@ -390,7 +388,6 @@ class QueueModel(QAbstractListModel):
         return [*([_SHORT] if self.items.is_short(row) else []), *([source] if source is not None else [])]
 
     def update_row(self, row: int) -> None:
-        """The status of a row has changed."""
         index = self.index(row)
         self.dataChanged.emit(index, index)
 

@@ -249,7 +249,6 @@ class AnnotatorWindow(WindowFrame):
         panels.queue.chosen.connect(self._on_chosen)
 
     def start(self) -> None:
-        """Open the first item without an answer."""
         super().start()
         self.panels.canvas.setFocus()
         self.panels.queue.show_progress(self.model.finished, len(self.model.items))
@@ -315,7 +314,6 @@ class AnnotatorWindow(WindowFrame):
             self.next_rater = ""
 
     def go_open(self) -> None:
-        """To the next item without an answer."""
         place = self.model.next_open(self.model.index)
         if place is None:
             self._offer_end()
@@ -454,7 +452,6 @@ class AnnotatorWindow(WindowFrame):
             self.model.edit("note", replace(self.model.annotation, note=text))
 
     def simplify(self) -> None:
-        """Fewer points on the outlines of the mask tool."""
         if self.panels.canvas.tool.is_mask:
             self.panels.canvas.simplify_masks()
         else:
@@ -480,7 +477,6 @@ class AnnotatorWindow(WindowFrame):
         canvas.setFocus()
 
     def toggle_mode(self, mode: MaskMode) -> None:
-        """Choose a mode, or leave it."""
         self.set_mode(MaskMode.POINTS if self.panels.canvas.mask_mode is mode else mode)
 
     def _on_switched(self, key: str, on: bool) -> None:
@@ -505,7 +501,6 @@ class AnnotatorWindow(WindowFrame):
     # ---- the algorithm
 
     def toggle_proposal(self) -> None:
-        """Show or hide what the algorithm says."""
         if self.model.blind:
             self.show_message(tr("A blind study: what the algorithm says is hidden"))
         else:
@@ -638,7 +633,6 @@ class AnnotatorWindow(WindowFrame):
         self.panels.toast.show_message(message, is_fault=is_fault)
 
     def show_where_saved(self) -> None:
-        """Where the annotations are."""
         self._complete_edits()
         self.model.settle()
         if self.model.unsaved:
@@ -691,5 +685,4 @@ class AnnotatorWindow(WindowFrame):
         self.panels.canvas.removeEventFilter(self)
 
     def _finish(self) -> Sequence[str]:
-        """Wait for what is still written or perceived."""
         return self.model.shut_down()

@@ -506,7 +506,6 @@ def _print_campaign(sums: _Sums, count: int, out: Path | None, *, with_diff: boo
 
 
 def print_replay(result: dict[str, Any], changes: Sequence[Change], *, with_diff: bool) -> None:
-    """Tables of one session on standard output."""
     console = Console(markup=False, emoji=False)
     console.print(_sums(result), _states(result["states"]["matrix"]), sep="\n")
     if not with_diff:

@@ -257,7 +257,6 @@ _pipelines = _Pipelines()
 
 
 def run_one(plan: TrialPlan, job: Job) -> Row:
-    """One trial in this thread."""
     from core.evaluation.accuracy import TrueMasks
     from core.perception.pipeline import Pipeline, open_pipeline
     from hardware.twin.trial import Trial

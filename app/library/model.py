@@ -115,11 +115,9 @@ class LibraryModel(QAbstractListModel):
 
     @Slot()
     def scan(self) -> None:
-        """Look through the folder, in a thread."""
         self._files.submit("scan", partial(_scan, self.folder, self._cache), once=True)
 
     def open_folder(self, folder: Path) -> None:
-        """List another folder."""
         self._details.cancel_waiting()
         self.folder, self.is_scanned = folder, False
         self._show([])

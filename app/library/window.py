@@ -155,7 +155,6 @@ def _paint_states(painter: QPainter, room: QRectF, summary: SessionSummary) -> N
 
 
 def _paint_last(painter: QPainter, room: QRectF, summary: SessionSummary) -> None:
-    """What is wrong with it, else its tags."""
     font = theme.font(12)
     if summary.problem:
         draw_text(painter, room, tr_text(summary.problem), font, theme.FAULT, elided=True)
@@ -248,7 +247,6 @@ def _facts(summary: SessionSummary) -> list[str]:
 
 
 def library_keys(window: QMainWindow) -> Sequence[KeyTable]:
-    """The keys of the menus, and the mouse."""
     return (*menu_tables(window), shown(_MOUSE))
 
 
@@ -315,7 +313,6 @@ class LibraryWindow(WindowFrame):
 
     @property
     def summary(self) -> SessionSummary | None:
-        """The session that is chosen."""
         summary = self.panels.list.currentIndex().data(SUMMARY)
         return summary if isinstance(summary, SessionSummary) else None
 
@@ -387,20 +384,17 @@ class LibraryWindow(WindowFrame):
 
     @Slot(str, bool)
     def show_message(self, message: str, is_fault: bool = False) -> None:
-        """A line for the person at the screen."""
         self.panels.toast.show_message(message, is_fault=is_fault)
 
     # ---- what is done
 
     def choose_folder(self) -> None:
-        """List another folder."""
         folder = QFileDialog.getExistingDirectory(self, tr("A folder with sessions"), str(self._model.folder))
         if folder:
             self._model.open_folder(Path(folder))
             self._show_title()
 
     def reload(self) -> None:
-        """Look through the folder again."""
         self._model.scan()
 
     def _begin_search(self) -> None:
@@ -408,7 +402,6 @@ class LibraryWindow(WindowFrame):
         self.panels.search.selectAll()
 
     def begin_description(self) -> None:
-        """To the fields of the session that is chosen."""
         self.panels.form.fields["operator"].setFocus()
 
     def _describe(self, description: Description) -> None:
@@ -417,7 +410,6 @@ class LibraryWindow(WindowFrame):
 
     @Slot()
     def play(self) -> None:
-        """The session that is chosen, in the player."""
         if (summary := self.summary) is not None:
             self._others.open(tr("Opening the player: {name}", name=summary.folder.name), "play", str(summary.folder))
 

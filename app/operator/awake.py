@@ -53,7 +53,6 @@ class AwakeInhibitor(QObject):
             self._release()
 
     def close(self) -> None:
-        """The window closes."""
         process = self._process
         self.hold(False)
         if process is not None:

@@ -39,7 +39,6 @@ class LiveMenuController(QObject):
 
     @Slot()
     def close(self) -> None:
-        """End all outputs."""
         ending = [*self._ended, *self._outputs.values()]
         for output in ending:
             output.end()
@@ -47,7 +46,6 @@ class LiveMenuController(QObject):
             output.close()
 
     def toggle(self, kind: OutputKind) -> None:
-        """Open an output, or end it."""
         running = self._outputs.pop(kind, None)
         if running is not None:
             running.end()

@@ -425,7 +425,6 @@ class DriveController(QObject):
 
     @Slot(object)
     def press(self, motion: Motion) -> None:
-        """A button of the jog panel is held."""
         self.jog.press(("button", motion), motion)
 
     @Slot(object)

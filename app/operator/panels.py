@@ -229,7 +229,6 @@ class OperatorPanels(ScenePanels):
         self.performance_shown.emit(self.shows_performance)
 
     def clear_history(self) -> None:
-        """Empty trends and performance, for another rig."""
         self._beside = None
         self.performance.clear()
         self.trends.clear()

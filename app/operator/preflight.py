@@ -174,12 +174,10 @@ class PreflightModel(QObject):
 
     @property
     def has_robot(self) -> bool:
-        """Whether there is anything to arm."""
         return self._view() is not None
 
     @property
     def preflight(self) -> Preflight:
-        """What is known now."""
         is_of_now = self._of == _digest(self._config())
         age_s = self._clock() - self._done_s if self._checked is not None and is_of_now else None
         made = (

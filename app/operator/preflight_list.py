@@ -116,7 +116,6 @@ class PreflightList(QDialog):
         return self._headline.text()
 
     def open_list(self) -> None:
-        """Show it, in front."""
         self.renew()
         self._timer.start()
         if not self.isVisible():
@@ -135,7 +134,6 @@ class PreflightList(QDialog):
         self.move(frame.center().x() - _SIZE.width() // 2, min(frame.center().y() - height // 2, bottom - height - _TITLE_PX))
 
     def renew(self) -> None:
-        """Show what is known now."""
         now = self._model.preflight
         self._headline.setText(now.headline)
         self._note.setText(_note(now))

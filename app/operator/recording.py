@@ -90,7 +90,6 @@ class Recorder(QObject):
 
     @property
     def status(self) -> RecordStatus:
-        """How it is going."""
         return self._writer.status() if self._writer is not None else RecordStatus()
 
     def open_rig(self, config: Config, kind: RigKind) -> None:
@@ -317,7 +316,6 @@ class DescriptionController(QObject):
         self._files.submit("next", keep)
 
     def close(self) -> None:
-        """Finish what is being kept."""
         self._files.stop(finish=True)
         self._files.wait(_END_WITHIN_MS)
 
@@ -510,7 +508,6 @@ class RecoveryController(QObject):
 
 
 def loss_words(lost: dict[str, Any]) -> str:
-    """A loss in words."""
     if not lost["rows"] and not lost["pictures"]:
         return tr("nothing of it is lost")
     return tr(
@@ -593,7 +590,6 @@ class AfterSession(QObject):
         self._windows.open(tr("Opening the annotator: {name}", name=session.name), "annotate", str(session), "--rows", REFUSED)
 
     def play(self, session: Path) -> None:
-        """The player."""
         self._windows.open(tr("Opening the player: {name}", name=session.name), "play", str(session))
 
     def open_library(self, folder: Path) -> None:

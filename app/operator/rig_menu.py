@@ -160,7 +160,6 @@ class RigMenuController(QObject):
     # ---- choosing
 
     def choose(self, name: str, _checked: bool = False) -> None:
-        """Open a rig by its name."""
         if why := self.hindrance():
             self._refuse(why)
             return

@@ -167,7 +167,6 @@ class RigSession(QObject):
 
     @Slot()
     def restart(self) -> None:
-        """Open the rig again."""
         if not self._is_shut:
             self._leave()
             self._prepare()

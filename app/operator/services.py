@@ -148,7 +148,6 @@ class WindowServices(QObject):
             self._offer_report(tr("The last run of the program crashed"), crash)
 
     def close(self) -> None:
-        """The window closes."""
         for part in (self.recovery, self.preflight, self.after, self.descriptions):
             part.close()
         self.checks.close()

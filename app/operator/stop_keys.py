@@ -20,7 +20,6 @@ COMMAND_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.Al
 
 
 def application() -> QApplication:
-    """The running application."""
     found = QApplication.instance()
     assert isinstance(found, QApplication)
     return found

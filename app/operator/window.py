@@ -147,7 +147,6 @@ class OperatorWindow(WindowFrame):
 
     @Slot()
     def show_tour(self) -> None:
-        """Show the tour from its first stop."""
         self.tour.begin(operator_stops(self.panels, has_robot=self.rig.config.rig.robot != "none"))
 
     # ---- composition

@@ -267,7 +267,6 @@ class SessionEvents(QListView):
 
     @property
     def lines(self) -> list[str]:
-        """What is listed."""
         return [self._model.line(event) for event in self._model.events]
 
     def show_events(self, events: Sequence[Event], first_s: float) -> None:

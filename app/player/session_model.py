@@ -189,11 +189,9 @@ class PlayedSession(QObject):
     # ---- what is written
 
     def add_note(self, event: Event) -> None:
-        """Into the session's own file."""
         self._files.submit(event, partial(_add_note, self._reader.folder, event))
 
     def describe(self, description: Description) -> None:
-        """Beside the session's manifest."""
         self._files.submit("description", partial(_describe, self._reader.folder, description))
 
     def save_snapshot(self, tick: Tick) -> None:
@@ -202,7 +200,6 @@ class PlayedSession(QObject):
 
     @property
     def has_clip(self) -> bool:
-        """Whether a clip is being written."""
         return self._clip_cancelled is not None
 
     def write_clip(self, places: tuple[int, int], times_s: tuple[float, float]) -> None:

@@ -182,7 +182,6 @@ class TimelineView(QWidget):
         self._set_view(about_s - min(1.0, max(0.0, share)) * span_s, span_s)
 
     def fit(self) -> None:
-        """The whole session."""
         self._set_view(0.0, np.inf)
 
     def _describe(self) -> None:
@@ -476,7 +475,6 @@ class TimelineView(QWidget):
         return "  ".join(parts)
 
     def _event_near(self, place: QPointF) -> Event | None:
-        """The mark under the pointer."""
         lanes = self._lanes()
         if self._course is None or not lanes.marks.adjusted(-8, -2, 8, 2).contains(place):
             return None

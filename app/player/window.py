@@ -139,7 +139,6 @@ _MOUSE = (
 
 
 def player_keys(window: QMainWindow) -> Sequence[KeyTable]:
-    """The keys of the menus, and the mouse."""
     return (*menu_tables(window), shown(_MOUSE))
 
 
@@ -455,7 +454,6 @@ class PlayerWindow(WindowFrame):
             self.panels.bar.show_playing(True)
 
     def pause(self) -> None:
-        """Stop at the frame that is shown."""
         was_playing = self._turn.isActive()
         self.clock.pause()
         self._turn.stop()
@@ -475,7 +473,6 @@ class PlayerWindow(WindowFrame):
 
     @Slot(float)
     def seek(self, time_s: float) -> None:
-        """To a time from the first row."""
         if len(self.course):
             self.clock.seek(min(time_s, self.course.duration_s))
             self._request(self.course.place_at(self.clock.position_s))
@@ -491,12 +488,10 @@ class PlayerWindow(WindowFrame):
 
     @Slot(int)
     def step(self, step: int) -> None:
-        """So many frames on or back, paused."""
         self.pause()
         self.go(max(0, self._requested) + step)
 
     def skip(self, seconds: float) -> None:
-        """So many seconds on or back."""
         self.seek(max(0.0, self.clock.position_s + seconds))
 
     @Slot(int)
@@ -526,7 +521,6 @@ class PlayerWindow(WindowFrame):
         self.panels.bar.show_speed(speed)
 
     def change_speed(self, step: int) -> None:
-        """One speed up or down."""
         self.set_speed(self.clock.change_speed(step))
 
     def _go_to_event(self, event: Event) -> None:
@@ -578,13 +572,11 @@ class PlayerWindow(WindowFrame):
         self.panels.bar.show_selection(selection[1] - selection[0] if selection is not None else None)
 
     def select_from_here(self) -> None:
-        """The selection begins here."""
         here = self.clock.position_s
         last = self.selection[1] if self.selection is not None and self.selection[1] > here else self.course.duration_s
         self.select((here, last))
 
     def select_to_here(self) -> None:
-        """The selection ends here."""
         here = self.clock.position_s
         self.select((self.selection[0] if self.selection is not None and self.selection[0] < here else 0.0, here))
 
@@ -640,7 +632,6 @@ class PlayerWindow(WindowFrame):
     # ---- annotation, in a window of its own
 
     def annotate_frame(self) -> None:
-        """The frame that is shown."""
         self.pause()
         if len(self.course):
             self._annotate(np.array([max(0, self._requested)]), "")
@@ -655,7 +646,6 @@ class PlayerWindow(WindowFrame):
         self._annotate(self._selected(differs) if differs is not None else np.zeros(0, np.int64), tr("No difference here"))
 
     def annotate_session(self) -> None:
-        """Frames evenly over the session."""
         self.after.annotate(self._reader.folder)
 
     def evaluate(self) -> None:
@@ -736,7 +726,6 @@ class PlayerWindow(WindowFrame):
 
     @Slot(str, bool)
     def show_message(self, message: str, is_fault: bool = False) -> None:
-        """A line for the person at the screen."""
         self.panels.toast.show_message(message, is_fault=is_fault)
 
     def go_to_time(self) -> None:
@@ -745,7 +734,6 @@ class PlayerWindow(WindowFrame):
         self.panels.bar.position.selectAll()
 
     def show_events(self) -> None:
-        """The list of events, by keyboard."""
         self.panels.pages.setCurrentWidget(self.panels.events)
         self.panels.events.setFocus()
 

@@ -112,7 +112,6 @@ class CameraPage(WizardPage):
         self.refresh()
 
     def search(self) -> None:
-        """Find cameras and ports."""
         self.model.run(tr("looking for cameras"), find_devices, self._on_found)
 
     def refresh(self) -> None:

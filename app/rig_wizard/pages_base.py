@@ -88,20 +88,17 @@ class WizardPicture(QWidget):
         return self._shapes
 
     def show_image(self, image: Image) -> None:
-        """Show a picture, (H, W, 3)."""
         height, width = image.shape[:2]
         self._image = QImage(image.tobytes(), width, height, 3 * width, QImage.Format.Format_RGB888)
         self.update()
 
     def show_shapes(self, shapes: Sequence[Shape]) -> None:
-        """Draw these over the picture."""
         self._shapes = tuple(shapes)
         texts = (shape.text for shape in shapes if not isinstance(shape, MeasuredLine) and shape.text)
         self.setAccessibleDescription(", ".join(texts))
         self.update()
 
     def show_text(self, text: str) -> None:
-        """Show a text instead of a picture."""
         self._image, self._text = None, text
         self.update()
 
@@ -268,7 +265,6 @@ def enable(on: bool, *controls: QWidget) -> None:
 
 
 def note(text: str) -> QLabel:
-    """A text of several lines."""
     label = QLabel(text)
     label.setWordWrap(True)
     theme.set_sheet(label, "color: @TEXT_DIM;")

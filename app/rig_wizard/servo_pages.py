@@ -161,7 +161,6 @@ class DrumsPage(WizardPage):
         return draft is not None and (draft.drums is not None or (bench is not None and bench.kind is RigKind.SIM))
 
     def enter(self) -> None:
-        """Show what is known."""
         draft = self.draft
         if draft is not None and self.is_done:
             joints = (draft.config.servos.joints[place] for place in (0, 4, 5))

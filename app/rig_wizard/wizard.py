@@ -149,12 +149,10 @@ class RigWizard(QDialog):
 
     @property
     def page(self) -> WizardPage:
-        """The page in front."""
         return self.pages[self.stack.currentIndex()]
 
     @property
     def message(self) -> str:
-        """The line at the foot."""
         return self.line.text()
 
     def next(self) -> None:
@@ -165,7 +163,6 @@ class RigWizard(QDialog):
             self._go(self.stack.currentIndex() + 1)
 
     def back(self) -> None:
-        """The page before."""
         if self.stack.currentIndex() > 0 and not self.model.is_busy:
             self._go(self.stack.currentIndex() - 1)
 

@@ -85,7 +85,6 @@ class SettingsController(QObject):
 
     @Slot()
     def open(self) -> None:
-        """The dialog, or the one that is open."""
         if self.dialog is None:
             draft = SettingsDraft(self._saved)
             dialog = SettingsDialog(draft, self._file.path, self._profiles, self._file.problems, self._window)

@@ -237,7 +237,6 @@ class ProfileRow(QWidget):
 
     @property
     def profile(self) -> Profile | None:
-        """The one that is chosen."""
         place = self.combo.currentIndex()
         return self._profiles[place - 1] if place > 0 else None
 
@@ -246,7 +245,6 @@ class ProfileRow(QWidget):
         return self._stack.currentIndex() != 0
 
     def begin_naming(self) -> None:
-        """Ask for a name."""
         profile = self.profile
         self.name.setText(profile.name if profile is not None and not profile.is_preset else "")
         self._stack.setCurrentWidget(self.name)
@@ -259,7 +257,6 @@ class ProfileRow(QWidget):
         self.question.ask(question, answer, action)  # type: ignore[arg-type]
 
     def end_asking(self) -> None:
-        """The row as it was."""
         self._stack.setCurrentIndex(0)
 
     def _on_activated(self, place: int) -> None:

@@ -84,7 +84,6 @@ class BrowseButton(QPushButton):
             self.clicked.connect(lambda _on=False: self.browse(folders=self._wanted.folders))
 
     def browse(self, *, folders: bool) -> None:
-        """Open the dialog."""
         if self.dialog is not None:
             self.dialog.raise_()
             return
@@ -160,7 +159,6 @@ class SettingField(QFrame):
 
     @property
     def default_text(self) -> str:
-        """The default with its unit."""
         if isinstance(self._default, bool):
             return tr("on") if self._default else tr("off")
         text = as_text(self._default)

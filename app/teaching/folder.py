@@ -331,7 +331,6 @@ class TeachingFolder:
         self._keep(model=name, used=False)
 
     def keep_used(self) -> None:
-        """Keep that the model is used."""
         self._keep(used=True)
 
     # ---- the empty bench

@@ -153,7 +153,6 @@ class TeachingModel(QObject):
         return self.training.is_busy
 
     def load(self) -> None:
-        """Read what was taken before."""
         self._run(tr("reading what was taken before"), self._folder.load, self._on_loaded)
 
     def start_over(self) -> None:
@@ -164,7 +163,6 @@ class TeachingModel(QObject):
         self.is_loaded = True
 
     def go(self, step: TeachingStep) -> None:
-        """To another step, which is kept."""
         self._run(tr("one moment"), partial(self._folder.go, step))
 
     def propose_vessel(self) -> None:
@@ -181,7 +179,6 @@ class TeachingModel(QObject):
         self._run(tr("keeping the vessel"), job)
 
     def keep_drawn(self, vessel: Mask) -> None:
-        """The vessel as it is drawn so far."""
         self._run("", partial(self._folder.keep_drawn, vessel), quiet=True)
 
     def leave_out(self, stem: str, on: bool) -> None:

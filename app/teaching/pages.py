@@ -484,7 +484,6 @@ class MovePage(TeachingPage):
 
 
 def lacks_line(view: TeachingView) -> str:
-    """What is missing, in words."""
     if view.is_enough:
         return tr("Nothing is missing. Next shows the frames; more may be taken.")
     names = list(dict.fromkeys(tr(_SIDE_TEXT[branch.side]) for branch in view.missing))

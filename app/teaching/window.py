@@ -123,12 +123,10 @@ class TeachingWindow(QDialog):
 
     @property
     def page(self) -> TeachingPage:
-        """The page in front."""
         return self._page
 
     @property
     def message(self) -> str:
-        """The line at the foot."""
         return self.line.text()
 
     def _lay_out(self) -> None:
@@ -167,7 +165,6 @@ class TeachingWindow(QDialog):
         self._enter(self.pages[self.model.view.step])
 
     def end(self) -> None:
-        """The window behind it closes."""
         self._leave()
         self.model.close()
         self.close()

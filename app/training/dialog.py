@@ -72,7 +72,6 @@ class TrainingCurves(QWidget):
         return plot
 
     def show_state(self, state: TrainingState) -> None:
-        """Draw all that is known."""
         curve = np.array(state.curve, np.float64).reshape(-1, 4)
         self._loss.setData(curve[:, 0], curve[:, 1])
         steps = [one.step for one in state.held_out]

@@ -20,7 +20,6 @@ _SIZE_PX = 72
 
 
 def program_icon() -> QIcon:
-    """The icon of all windows."""
     return QIcon(str(ICON))
 
 
@@ -277,7 +276,6 @@ class LanguageMenu(QMenu):
         self.show_choice(choice)
 
     def show_choice(self, choice: str) -> None:
-        """Mark what is set."""
         self._entries[choice].setChecked(True)
 
 

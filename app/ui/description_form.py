@@ -76,7 +76,6 @@ class DescriptionForm(QWidget):
         return changed_description(self._shown, given)
 
     def show_description(self, description: Description) -> None:
-        """Fill the fields."""
         self._shown = description
         for key, field in self.fields.items():
             value = getattr(description, key)

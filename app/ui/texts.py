@@ -75,7 +75,6 @@ class NextStep:
 
     @property
     def all_reasons(self) -> str:
-        """Every reason on a line of its own."""
         specs = (alert_of(key, simulated=self.simulated) for key in self.reasons)
         return "\n".join(f"{sentence(spec.text)} {sentence(spec.what_to_do)}" for spec in specs)
 
@@ -119,7 +118,6 @@ def who_drives(view: DriveView | None, why_not: Undriven = Undriven.NO_ROBOT) ->
 
 
 def next_step(view: DriveView) -> NextStep:
-    """The next sensible step of the operator."""
     if view.latched is not None or view.mode is Mode.STOPPED:
         return _acknowledge(view)
     if view.mode is Mode.AUTONOMOUS:
@@ -615,12 +613,10 @@ def friction_note(servos: ServosConfig) -> str:
 
 
 def joint_title(name: str) -> str:
-    """A joint's name in words."""
     return tr_text(name).replace("_", " ")
 
 
 def calibration_lines(rig: RigFile) -> list[str]:
-    """What was calibrated, a line each."""
     known = rig.calibration
     if known is None:
         return [tr("not calibrated")]

@@ -45,7 +45,6 @@ use_scheme(DARK)
 
 
 def current() -> Scheme:
-    """The scheme in use."""
     return _current
 
 

@@ -222,7 +222,6 @@ class AlertStrip(QWidget):
         self._expire()
 
     def clear(self) -> None:
-        """Remove all alerts, before another rig is opened."""
         self._entries.clear()
         self._show()
 

@@ -41,12 +41,10 @@ _NO_MARGINS = (0, 0, 0, 0)
 
 
 def column(*parts: Part, spacing: int = theme.GAP, margins: Margins = _NO_MARGINS) -> QVBoxLayout:
-    """Widgets and layouts below each other."""
     return _fill(QVBoxLayout(), parts, spacing, margins)
 
 
 def line(*parts: Part, spacing: int = theme.GAP, margins: Margins = _NO_MARGINS) -> QHBoxLayout:
-    """Widgets and layouts side by side."""
     return _fill(QHBoxLayout(), parts, spacing, margins)
 
 
@@ -114,7 +112,6 @@ def text_button(text: str, action: Callable[[], object], tool_tip: str = "", nam
 
 
 def page_tabs() -> QTabWidget:
-    """Pages that share a place."""
     pages = QTabWidget()
     pages.setDocumentMode(True)
     pages.setAccessibleName(tr("Pages"))

@@ -169,7 +169,6 @@ class ClearanceBar(PaintedWidget):
 
     @property
     def text(self) -> str:
-        """The full texts."""
         return self._room.texts[0] if self._force is None else f"{self._room.texts[0]}; {self._force.texts[0]}"
 
     @property

@@ -88,7 +88,6 @@ class EventLog(QWidget):
 
     @property
     def lines(self) -> list[str]:
-        """What the filter lets through, newest first."""
         items = (self._view.item(row) for row in range(self._view.count()))
         return [item.text() for item in items if not item.isHidden()]
 
@@ -109,7 +108,6 @@ class EventLog(QWidget):
 
     @Slot()
     def copy_all(self) -> None:
-        """All lines that are shown, to the clipboard."""
         QGuiApplication.clipboard().setText("\n".join(self.lines))
 
     @Slot()

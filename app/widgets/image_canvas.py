@@ -68,7 +68,6 @@ class Viewport:
         return replace(self, zoom=zoom, center=(x, y)).inside()
 
     def panned(self, dx: float, dy: float) -> Viewport:
-        """Moved by so many widget pixels."""
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] - dy / self.zoom)).inside()
 
     def in_room(self, room: tuple[int, int]) -> Viewport:
@@ -188,7 +187,6 @@ class ImageCanvas(QWidget):
         self._set_view(whole if self.view == near else near)
 
     def scroll_to(self, point: Point) -> None:
-        """Bring a place of the image into sight."""
         if not self.view.shows(point, 20.0):
             self._set_view(replace(self.view, center=point).inside())
 
@@ -291,11 +289,9 @@ class LightSliders(QWidget):
 
     @property
     def light(self) -> tuple[float, float]:
-        """Contrast and brightness."""
         return 4.0 ** (self._contrast.value() / 100.0), float(self._brightness.value())
 
     def step(self, contrast: int = 0, brightness: int = 0) -> None:
-        """Some steps up or down."""
         self._contrast.setValue(self._contrast.value() + contrast * _STEP)
         self._brightness.setValue(self._brightness.value() + brightness * _STEP)
 

@@ -273,7 +273,6 @@ class JogPanel(QWidget):
 
     @property
     def advised(self) -> frozenset[Motion]:
-        """The motions whose caps are framed."""
         return frozenset(motion for motion, cap in self._caps.items() if cap.is_advised)
 
     def show_status(self, status: RobotStatus | None) -> None:

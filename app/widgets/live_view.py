@@ -320,7 +320,6 @@ class LiveView(QWidget):
         self._show_loupe()
 
     def fit(self) -> None:
-        """Show the whole picture."""
         if self._size is not None:
             self._box.fit(*self._size)
 

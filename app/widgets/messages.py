@@ -238,7 +238,6 @@ class OfferStrip(QFrame):
 
     @property
     def text(self) -> str:
-        """What is shown, "" when nothing is."""
         return f"{self._shown.text} {self._shown.detail}".strip() if self._shown is not None else ""
 
     @property
@@ -375,7 +374,6 @@ class QuestionStrip(QWidget):
 
     @property
     def text(self) -> str:
-        """The open question, or an empty text."""
         return self._text
 
     def ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
@@ -389,7 +387,6 @@ class QuestionStrip(QWidget):
 
     @Slot()
     def cancel(self) -> None:
-        """Take the question back."""
         if self._text:
             self._close()
 

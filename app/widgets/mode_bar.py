@@ -409,12 +409,10 @@ class ModeBar(PaintedWidget):
 
     @property
     def text(self) -> str:
-        """The line as shown."""
         return self._shown.text
 
     @property
     def text_fits(self) -> bool:
-        """Nothing of the line is cut."""
         return self._text.fits
 
     def show_view(self, view: DriveView | None, why_not: Undriven = Undriven.NO_ROBOT) -> None:

@@ -161,7 +161,6 @@ def draw_box(
     edge: str | QColor | QPen | None = None,
     width: float = 1.0,
 ) -> None:
-    """A rounded rectangle."""
     set_colours(painter, fill, edge, width)
     painter.drawRoundedRect(box, radius, radius)
 

@@ -42,7 +42,6 @@ class PerformancePanel(PaintedWidget):
 
     @property
     def text(self) -> str:
-        """Everything that is shown, as lines."""
         heads = [f"{name} {value}" for name, value, _ in self._heads]
         return "\n".join(heads + [" ".join(row) for row in self._rows])
 
@@ -59,7 +58,6 @@ class PerformancePanel(PaintedWidget):
             self.update()
 
     def clear(self) -> None:
-        """Drop the numbers of the rig before."""
         self._stages.clear()
         self._shown_s.clear()
         self._pace.reset()

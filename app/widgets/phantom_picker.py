@@ -62,7 +62,6 @@ class PhantomPicker(QWidget):
         self._enable_seed()
 
     def menu_entries(self) -> tuple[MenuEntry, ...]:
-        """The same by menu and key."""
         return (
             MenuEntry(tr("Choose a &phantom"), self.open_list, ("Ctrl+P",)),
             MenuEntry(tr("Another ran&dom phantom"), self.roll, ("R",)),

@@ -63,16 +63,13 @@ class ScenePanels(QWidget):
 
     @property
     def views(self) -> tuple[LiveView, ...]:
-        """The pictures that the overlays are drawn in."""
         return (self.live,)
 
     def set_layer(self, layer: Layer, on: bool) -> None:
-        """An overlay on or off."""
         for view in self.views:
             view.set_layer(layer, on)
 
     def fit(self) -> None:
-        """The whole picture."""
         for view in self.views:
             view.fit()
 

@@ -315,7 +315,6 @@ class PairBalance:
 
     @property
     def text(self) -> str:
-        """All that is known, in full."""
         return ", ".join(part for part in (f"{self.title}: {self.sum}", self.word, self.forces) if part)
 
 

@@ -55,7 +55,6 @@ class KeyPage(PaintedWidget):
         return self._tables
 
     def toggle(self) -> None:
-        """Open it, or close it."""
         window = self._parent.window()
         if not self.isVisible() and isinstance(window, QMainWindow):
             self._tables = tuple(self._tables_of(window))

@@ -33,7 +33,6 @@ class ThetaGauge(PaintedWidget):
 
     @property
     def text(self) -> str:
-        """The number on the dial."""
         return NONE if self._number is None else signed_degrees(self._number, 1)
 
     @property

@@ -240,7 +240,6 @@ class _TourCard(PaintedWidget):
 
     @property
     def text(self) -> str:
-        """Title and text."""
         return f"{self._title.text()}. {self._text.text()}"
 
     def show_stop(self, stop: TourStop, place: int, count: int) -> None:

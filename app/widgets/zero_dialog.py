@@ -255,7 +255,6 @@ class ZeroDialog(QDialog):
 
     @property
     def request(self) -> ZeroRequest:
-        """What is chosen."""
         by_choice = {name: row.choice for name, row in self._tendons.items()}
         slack = [name for name, choice in by_choice.items() if choice in {Choice.SLACK, Choice.AGAIN}]
         feeds = {name: at_mm for name, row in self._feeds.items() if (at_mm := row.position_mm) is not None}

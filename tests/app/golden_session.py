@@ -58,7 +58,6 @@ def make(folder: Path) -> None:
     writer.stop("all recorded")
     assert writer.close()
     saved = writer.status().saved
-    assert saved is not None
     shutil.rmtree(folder, ignore_errors=True)
     saved.rename(folder)
     told = [{name: one[name] for name in TOLD} for one in truth]
@@ -79,7 +78,6 @@ def _see_again(folder: Path, config: PerceptionConfig, target: Point) -> None:
         reader.wait()
         for place, line in enumerate(lines):
             tick = reader.tick(place)
-            assert tick is not None
             line.update(row_of(replace(tick, scene=perceive(tick.frame, target)), None, with_masks=False))
             del line["crc"]
     text = "".join(sealed(json.dumps(line, separators=(",", ":"))) + "\n" for line in lines)

@@ -149,7 +149,6 @@ def test_a_name_that_the_output_cannot_hold_is_no_traceback(tmp_path: Path, enco
         assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
         assert b"\\udcff" in done.stdout
     recovered = read_manifest(named.with_name(named.name + "_recovered")).recovered
-    assert recovered is not None
     assert recovered.origin.endswith("\\xff")
 
 

@@ -138,7 +138,6 @@ def test_a_rig_that_was_changed_is_accepted_again_from_the_start(path: Path, mov
     with pytest.raises(UserError, match="no answer"):
         _run("--operator", "Bo")
     begun = read_acceptance(path)
-    assert begun is not None
     assert (begun.operator, begun.directions, len(begun.servos)) == ("Bo", (), 7)
     assert "Ada" in path.with_name("bench 1.acceptance.older.json").read_text()
 

@@ -324,18 +324,13 @@ def test_raters_files_may_be_joined_into_a_new_one(folder: Path, tmp_path: Path)
         assert len(store.annotations()) == 12
 
 
-def test_an_empty_name_is_no_model() -> None:
-    with pytest.raises(UserError, match=r"segmentation\.model"):
-        run_annotate(AnnotateOptions(paths=(), model=""))
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"report": True}, "no such annotation file; annotate the images first"),
+        ({"model": ""}, r"segmentation\.model"),
         ({"export": "xml", "out": Path("x")}, "--export xml: must be one of dataset, csv, angles, labelme, coco"),
         ({"export": "csv"}, "--export needs --out"),
-        ({"report": True, "salvage": True}, "give one of them"),
         ({"imports": (Path("nowhere.json"),)}, "nothing was imported"),
         ({"joins": (Path("nowhere.sqlite"),)}, "nowhere.sqlite: no such annotation file"),
         ({"joins": (Path("a.sqlite"),), "names": ("ben",)}, "--as ben: must be THERE=HERE"),

@@ -68,6 +68,22 @@ def paper_csv(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def drawn(paper_csv: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What an evaluation of these writes, with its figures."""
+    out = tmp_path_factory.mktemp("drawn")
+    command.evaluate(out, None, paper_csv)
+    return out
+
+
+def tubes(folder: Path, count: int) -> list[Path]:
+    """Pictures of a tube, to be measured by hand."""
+    images = [folder / f"frame_{index}.png" for index in range(count)]
+    for index, image in enumerate(images):
+        write_png(image, tube(index)[0])
+    return images
+
+
 def test_the_papers_labels_print_the_papers_table(paper_csv: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     evaluate(csv=paper_csv, out=tmp_path)
     printed = [re.split(r" {2,}", line.strip()) for line in capsys.readouterr().out.splitlines()]
@@ -90,8 +106,9 @@ def test_the_papers_labels_print_the_papers_table(paper_csv: Path, tmp_path: Pat
     assert ["D", "0", "1", "4"] in printed
 
 
-@pytest.mark.usefixtures("drawing")
-def test_json_is_all_there_is_on_standard_output(paper_csv: Path, tmp_path: Path) -> None:
+def test_json_is_all_there_is_on_standard_output_and_the_same_input_gives_the_same_files(
+    paper_csv: Path, drawn: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "deep" / "out"
     done = run("evaluate", "--csv", paper_csv, "--out", out, "--json")
     assert done.returncode == 0, done.stderr
@@ -101,14 +118,8 @@ def test_json_is_all_there_is_on_standard_output(paper_csv: Path, tmp_path: Path
     wanted = {"metrics.json", "measurements.csv", "report.html"} | {f"{name}{end}" for name in FIGURES for end in (".svg", ".pdf")}
     assert {path.name for path in out.iterdir()} == wanted
     assert (out / "scatter.pdf").read_bytes().startswith(b"%PDF")
-
-
-@pytest.mark.usefixtures("drawing")
-def test_the_same_input_gives_the_same_files(paper_csv: Path, tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        evaluate(csv=paper_csv, out=tmp_path / name)
-    for path in (tmp_path / "one").iterdir():
-        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
+    for path in out.iterdir():
+        assert path.read_bytes() == (drawn / path.name).read_bytes(), path.name
 
 
 class _Page(HTMLParser):
@@ -142,10 +153,8 @@ class _Page(HTMLParser):
         self.loads += [link for link in links if link and not link.startswith("#")]
 
 
-@pytest.mark.usefixtures("drawing")
-def test_the_report_is_one_page_that_needs_nothing_else(paper_csv: Path, tmp_path: Path) -> None:
-    evaluate(csv=paper_csv, out=tmp_path)
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+def test_the_report_is_one_page_that_needs_nothing_else(drawn: Path) -> None:
+    text = (drawn / "report.html").read_text(encoding="utf-8")
     page = _Page()
     page.feed(text)
     assert page.open == []
@@ -170,8 +179,7 @@ def test_the_report_says_that_whole_sessions_are_drawn(paper_csv: Path, tmp_path
     assert read_measurements(tmp_path / "out" / "measurements.csv") == rows
 
 
-@pytest.mark.usefixtures("drawing")
-def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, tmp_path: Path) -> None:
+def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, drawn: Path) -> None:
     from app.commands.figures import draw_figures
     from core.evaluation.evaluation import angle_pairs
     from core.evaluation.evaluation import evaluate as measure
@@ -184,15 +192,12 @@ def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, tmp_path: Path) 
     assert "(°)" in axes["bland_altman"].get_xlabel() and "(°)" in axes["bland_altman"].get_ylabel()
     assert axes["scatter"].get_xlim() == axes["scatter"].get_ylim()
     assert sum(bar.get_height() for bar in axes["error_distribution"].patches if bar.get_facecolor()[2] > 0.5) >= 44
-    evaluate(csv=paper_csv, out=tmp_path)
     for name in FIGURES:
-        assert ElementTree.parse(tmp_path / f"{name}.svg").getroot().tag.endswith("svg")
+        assert ElementTree.parse(drawn / f"{name}.svg").getroot().tag.endswith("svg")
 
 
-@pytest.mark.usefixtures("drawing")
-def test_a_figure_of_an_earlier_evaluation_does_not_stay(paper_csv: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    evaluate(csv=paper_csv, out=out)
+def test_a_figure_of_an_earlier_evaluation_does_not_stay(drawn: Path, tmp_path: Path) -> None:
+    out = Path(shutil.copytree(drawn, tmp_path / "out"))
     write_measurements(tmp_path / "states.csv", [Measurement("a", None, None, "B", None, "B")])
     found = evaluate(csv=tmp_path / "states.csv", out=out)
     assert found["angle"]["mean_error_deg"] is None
@@ -279,7 +284,6 @@ def labelled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     for place in range(4):
         world.insert(50.0 + 8.0 * place)
         truth = world.truth()
-        assert truth.pose is not None
         image = world.frame().image
         state = "BCDC"[place]  # a label by hand; what the algorithm makes of it is not the matter here
         rows.append({"stem": f"{place:06d}", "theta_deg": truth.pose.theta_deg, "state": state})
@@ -331,12 +335,8 @@ def test_a_damaged_picture_does_not_cost_the_others(labelled: Path, tmp_path: Pa
     cut = damaged / "images" / "000003.png"
     cut.write_bytes(cut.read_bytes()[:500])
     found = evaluate(damaged, out=tmp_path / "out")
-    assert [row.image for row in read_measurements(tmp_path / "out" / "measurements.csv")] == [
-        "000000",
-        "000001",
-        "000002",
-        "000004",
-    ]
+    images = [row.image for row in read_measurements(tmp_path / "out" / "measurements.csv")]
+    assert images == ["000000", "000001", "000002", "000004"]
     assert "1 images could not be read and are left out." in found["notes"]
     assert f"note: 1 of 5 frames could not be read and are left out; the first: {cut}" in capsys.readouterr().err
     for path in (damaged / "images").glob("*.png"):
@@ -345,19 +345,24 @@ def test_a_damaged_picture_does_not_cost_the_others(labelled: Path, tmp_path: Pa
         evaluate(damaged, out=tmp_path / "out")
 
 
-def test_an_interrupted_evaluation_keeps_what_was_perceived(
-    labelled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def interrupt_at_the_third_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     from core import files
 
-    read = files.read_image
+    read, calls = files.read_image, []
 
     def third_is_interrupted(path: Path) -> np.ndarray:
-        if path.stem == "000002":
+        calls.append(path)
+        if len(calls) == 3:
             raise KeyboardInterrupt
         return read(path)
 
     monkeypatch.setattr(files, "read_image", third_is_interrupted)
+
+
+def test_an_interrupted_evaluation_keeps_what_was_perceived(
+    labelled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupt_at_the_third_picture(monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         evaluate(labelled, out=tmp_path / "out")
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
@@ -392,9 +397,7 @@ def test_the_window_does_not_load_matplotlib_or_scikit_learn() -> None:
 
 def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Two raters measure two images twice: bo always two degrees more than al, and the second measure is as the first."""
-    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
-    for index, image in enumerate(images):
-        write_png(image, tube(index)[0])
+    images = tubes(tmp_path, 2)
     store = tmp_path / "annotations.lumenpilot.sqlite"
     for repeat in (1, 2):
         measure(store, images, [0.0, 10.0], study="main", rater="al", repeat=repeat)
@@ -439,9 +442,7 @@ def test_images_of_other_folders_are_found_where_they_were_annotated(tmp_path: P
 
 def test_raters_are_compared_on_the_images_that_are_here_only(tmp_path: Path) -> None:
     """Those that are gone were told to be in none of the figures, and were in the raters' agreement, by their hashes."""
-    images = [tmp_path / f"frame_{index}.png" for index in range(3)]
-    for index, image in enumerate(images):
-        write_png(image, tube(index)[0])
+    images = tubes(tmp_path, 3)
     store = tmp_path / "annotations.lumenpilot.sqlite"
     for repeat, tilts in ((1, [0.0, 10.0, 5.0]), (2, [0.0, 10.0, 25.0])):
         measure(store, images, tilts, study="main", rater="al", repeat=repeat)
@@ -455,9 +456,7 @@ def test_raters_are_compared_on_the_images_that_are_here_only(tmp_path: Path) ->
 
 
 def test_what_was_measured_outside_studies_can_be_chosen(tmp_path: Path) -> None:
-    images = [tmp_path / f"frame_{index}.png" for index in range(2)]
-    for index, image in enumerate(images):
-        write_png(image, tube(index)[0])
+    images = tubes(tmp_path, 2)
     store = tmp_path / "annotations.lumenpilot.sqlite"
     measure(store, images, [0.0, 10.0])
     measure(store, images, [5.0, 5.0], study="main")
@@ -465,29 +464,13 @@ def test_what_was_measured_outside_studies_can_be_chosen(tmp_path: Path) -> None
     assert done.returncode == 0, done.stderr
     rows = read_measurements(tmp_path / "out" / "measurements.csv")
     assert [row.angle_1 for row in rows] == pytest.approx([0.0, degrees(atan(10 / 40))], abs=0.05)
-    done = run("annotate", tmp_path, "--report", "--json", "--study=")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["study"] == ""
 
 
 def test_an_interrupted_evaluation_of_annotated_images_keeps_what_was_perceived(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from core import files as image_files
-
-    paths = [tmp_path / f"frame_{index}.png" for index in range(3)]
-    for index, path in enumerate(paths):
-        write_png(path, tube(index)[0])
-    measure(tmp_path / "annotations.lumenpilot.sqlite", paths, [0.0, 10.0, 5.0], study="main", rater="al")
-    read, calls = image_files.read_image, []
-
-    def third_is_interrupted(path: Path) -> np.ndarray:
-        calls.append(path)
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-        return read(path)
-
-    monkeypatch.setattr(image_files, "read_image", third_is_interrupted)
+    measure(tmp_path / "annotations.lumenpilot.sqlite", tubes(tmp_path, 3), [0.0, 10.0, 5.0], study="main", rater="al")
+    interrupt_at_the_third_picture(monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         evaluate(tmp_path, out=tmp_path / "out")
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
@@ -504,9 +487,7 @@ def test_a_study_needs_images_annotated_by_hand(paper_csv: Path, tmp_path: Path)
 
 
 def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
-    images = [tmp_path / f"frame_{index}.png" for index in range(3)]
-    for index, image in enumerate(images):
-        write_png(image, tube(index)[0])
+    images = tubes(tmp_path, 3)
     measure(tmp_path / "annotations.lumenpilot.sqlite", images, [0.0, 10.0, 5.0], study="main")
     images[2].unlink()
     (tmp_path / "truth.jsonl").write_text("")

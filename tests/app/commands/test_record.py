@@ -73,26 +73,20 @@ def test_recording_the_twin_writes_a_session_of_its_rig(recorded: tuple[Path, di
         assert all(tick is not None and tick.frame.image.shape == (240, 320, 3) for tick in ticks)
         assert all(tick is not None and tick.status is not None for tick in ticks)
         row = reader.row(0)
-        assert row is not None
         assert row.drive is not None
     assert result["dropped"] == 0
     assert float(str(result["seconds"])) >= 1.4
 
 
 def test_info_is_one_object_and_a_table(recorded: tuple[Path, dict[str, object]]) -> None:
-    session, result = recorded
-    done = run("session", "info", session, "--json")
-    assert done.returncode == 0, done.stderr
-    info = json.loads(done.stdout)
-    assert (info["rows"], info["kind"], info["ended"], info["problems"]) == (result["frames"], "SIM", "all recorded", [])
-    table = run("session", "info", session)
+    table = run("session", "info", recorded[0])
     assert table.returncode == 0
     assert "all recorded" in table.stdout
     assert "ADVISORY" in table.stdout
 
 
 def test_what_a_session_is_about_is_given_and_changed(recorded: tuple[Path, dict[str, object]]) -> None:
-    session, _ = recorded
+    session, result = recorded
     for changes, expected in (
         ((), {"operator": "Ana", "condition": "alone", "phantom": "tree", "task": None, "tags": ["pilot"]}),
         (
@@ -104,11 +98,8 @@ def test_what_a_session_is_about_is_given_and_changed(recorded: tuple[Path, dict
         info = json.loads(run("session", "info", session, "--json").stdout)
         assert {key: info[key] for key in expected} == expected
     assert info["program"] == program_line()
+    assert (info["rows"], info["kind"], info["ended"], info["problems"]) == (result["frames"], "SIM", "all recorded", [])
     assert read_manifest(session).description.tags == ("pilot",), "the manifest is as it was recorded"
-    assert (
-        run("library", session / "nothing").stderr
-        == f"error: {session / 'nothing'}: no such folder; give one that holds sessions\n"
-    )
 
 
 def test_export_writes_all_formats(recorded: tuple[Path, dict[str, object]], tmp_path: Path) -> None:
@@ -149,13 +140,8 @@ def test_a_recording_that_was_killed_is_recovered_by_the_command(tmp_path: Path)
     ("arguments", "why"),
     [
         (("record", "--seconds", 1, "--out", "{file}"), "choose another folder"),
-        (("record", "--seconds", 1, "--out", "{folder}", "--rig", "moon"), "unknown rig 'moon'"),
-        (("record", "--seconds", 1, "--out", "{folder}", "--config", "{file}"), "not valid TOML"),
-        (("record", "--seconds", 0, "--out", "{folder}"), "seconds"),
         (("record", "--seconds", 1, "--out", "{folder}", "--config", "{no_model}"), "no model 'nope'"),
         (("record", "--seconds", 1, "--out", "{folder}", "--config", "{no_bench}"), "bench.json: cannot be read"),
-        (("session", "info", "{folder}"), "not a session"),
-        (("session", "info", "{file}"), "not a file"),
         (("session", "recover", "{folder}/nothing"), "no such session"),
         (("session", "export", "{folder}", "--out", "{folder}/x.avi"), "must be one of .mp4, .csv, .mcap, .ros2.mcap, .lerobot"),
     ],
@@ -246,8 +232,6 @@ def test_one_that_comes_back_is_waited_for_and_its_absence_is_told(
     with SessionReader(session) as reader:
         assert reader.wait(10.0)
         first, last = (reader.row(place) for place in (0, len(reader) - 1))
-        assert first is not None
-        assert last is not None
         assert last.captured_s - first.captured_s > 0.8
 
 
@@ -267,23 +251,6 @@ def test_ctrl_c_ends_the_recording_properly(
     manifest = read_manifest(session)
     assert (json.loads(capsys.readouterr().out)["ended"], manifest.ended, manifest.closed) == ("interrupted", "interrupted", True)
     assert manifest.counts.frames > 0
-
-
-class SilentEngine(FlakyEngine):
-    """Whose camera gives nothing from some picture on, and does not say why."""
-
-    def step(self, timeout_s: float) -> Tick | None:
-        tick = super().step(timeout_s)
-        self.problem = None
-        return tick
-
-
-def test_a_silence_that_lasts_to_the_end_is_told_as_well(
-    record_flaky: Callable[[FlakyEngine, float], Path], capsys: pytest.CaptureFixture[str]
-) -> None:
-    record_flaky(SilentEngine((0.3, 99.0)), 1.0)
-    said = json.loads(capsys.readouterr().out)
-    assert said["without_picture_s"] >= 0.5
 
 
 class LosingEngine(FlakyEngine):
@@ -313,24 +280,6 @@ def test_a_device_that_fails_ends_the_session_with_the_reason(
     with pytest.raises(DeviceError, match=r"^the bus is gone; what was written is in .*session_"):
         record_flaky(FlakyEngine((0.3, 99.0), failure="the bus is gone"), 60.0)
     assert read_manifest(only_session(tmp_path)).ended == "the bus is gone"
-
-
-def test_what_the_rig_file_knows_of_the_rig_is_recorded_as_it_was_used(
-    record_flaky: Callable[[FlakyEngine, float], Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        record_command,
-        "as_calibrated",
-        lambda config: config.model_copy(
-            update={
-                "perception": config.perception.model_copy(
-                    update={"path": config.perception.path.model_copy(update={"port_x_share": 0.03})}
-                )
-            }
-        ),
-    )
-    session = record_flaky(FlakyEngine((99.0, 99.0)), 0.3)
-    assert read_manifest(session).config["perception"]["path"]["port_x_share"] == 0.03
 
 
 # ---- servos that hold at the end
@@ -385,10 +334,3 @@ def test_what_becomes_of_servos_that_hold(
     record_command.leave_servos(engine, at_close, lines.append)  # type: ignore[arg-type]
     assert engine.pilot.asked == asked
     assert any("not proven" in line for line in lines) is False
-
-
-def test_servos_without_torque_are_no_question(monkeypatch: pytest.MonkeyPatch) -> None:
-    engine, lines = HoldingEngine(torque=False), list[str]()
-    monkeypatch.setattr(sys, "stdin", Terminal("r"))
-    record_command.leave_servos(engine, "ask", lines.append)  # type: ignore[arg-type]
-    assert (engine.pilot.asked, lines) == ([], [])

@@ -52,24 +52,13 @@ def replayed(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, object
     return json.loads(done.stdout), out
 
 
-def test_the_golden_session_is_small_and_whole() -> None:
-    manifest = read_manifest(GOLDEN)
-    assert (manifest.kind, manifest.closed, manifest.counts.frames) == ("SIM", True, COUNT)
-    assert sum(path.stat().st_size for path in GOLDEN.iterdir()) < 300_000
-
-
 def test_perception_still_says_what_it_said_of_the_golden_session(replayed: tuple[dict[str, object], Path]) -> None:
     """On one processor the same to the last digit; the limits leave room for the arithmetic of others."""
     result, _ = replayed
     before, after = result["before"], result["after"]
-    assert isinstance(before, dict)
-    assert isinstance(after, dict)
     if before["sha256"] != after["sha256"]:
         pytest.skip("it was made with another model: look at the replay, then run python -m tests.app.golden_session")
     theta, head, states = result["theta_change_deg"], result["head_shift_px"], result["states"]
-    assert isinstance(theta, dict)
-    assert isinstance(head, dict)
-    assert isinstance(states, dict)
     assert result["frames"] == COUNT
     assert theta["n"] >= COUNT - 3
     assert theta["median"] < 0.7
@@ -183,12 +172,13 @@ def test_lost_pictures_are_counted_and_the_rest_goes_on(tmp_path: Path, capsys: 
     session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(3)])
     lines = (session / "frames.jsonl").read_text().splitlines()
     (session / "frames.jsonl").write_text("\n".join([lines[0], '{"row": 1, "nonsense', lines[2]]) + "\n")
-    out = tmp_path / "out"
+    session, out = session.rename(tmp_path / os.fsdecode(b"caf\xe9")), tmp_path / "out"
     run_replay(options(session), out, as_json=True)
     told = json.loads(capsys.readouterr().out)
     assert told["frames"] == 2
     frames = [json.loads(line) for line in (out / "changes.jsonl").read_text().splitlines()]
     assert [frame["row"] for frame in frames] == [0, 2], "as in the session, so that other tables of it can be joined"
+    assert "caf\\xe9" in json.loads((out / "replay.json").read_text())["session"], "a name that is no UTF-8"
     assert any("line 2" in problem for problem in told["problems"])
 
 
@@ -251,13 +241,6 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     result = json.loads(done.stdout)
     assert (result["ended"], result["frames"]) == ("interrupted after 3 of 5 frames", 3)
     assert len(out.read_text().splitlines()) == 3
-
-
-def test_a_session_whose_name_is_no_utf8_is_replayed(tmp_path: Path) -> None:
-    session = tmp_path / os.fsdecode(b"caf\xe9")
-    record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(2)]).rename(session)
-    run_replay(options(session), tmp_path / "new")
-    assert "caf\\xe9" in json.loads((tmp_path / "new" / "replay.json").read_text())["session"]
 
 
 def test_one_frame_can_be_drawn_and_written() -> None:
@@ -378,10 +361,7 @@ def test_as_tables(folder: Path, capsys: pytest.CaptureFixture[str], tmp_path: P
     ("arguments", "why"),
     [
         (["--jsonl", "new.jsonl"], "--jsonl is for one session: give --out"),
-        (["--model", "no_such_model"], "no_such_model"),
-        (["--preset", "moon"], "unknown preset 'moon'"),
         (["--out", "{folder}"], "is a recorded session, which --out would damage"),
-        (["--out", "{folder}/notes.txt"], "choose another folder"),
     ],
 )
 def test_bad_input_is_one_line_before_the_work_begins(folder: Path, arguments: list[str], why: str) -> None:
@@ -433,8 +413,3 @@ def test_what_was_done_is_told_when_a_worker_is_killed(
     with pytest.raises(UserError, match="a worker ended"):
         run_replays(both, ReplayOptions(folder), None, workers=2, scheduler=None, as_json=True)
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["ended"] == "ended after 1 of 2 sessions"
-
-
-def test_tallies_add_up() -> None:
-    nothing = ReplayTally.of([])
-    assert (nothing + nothing).to_json() == nothing.to_json()

@@ -74,7 +74,6 @@ def test_a_rig_is_shown() -> None:
     [
         ((), r"^say the diameters of the drums before anything moves, .*--drums TENDONS,FEED,DELIVERY"),
         (("--drums", "12.7,20"), "^--drums 12.7,20: three diameters in mm"),
-        (("--drums", "12.7,20,0.1"), "^--drums 12.7,20,0.1: three diameters in mm"),
         (("--drums", "12.7,20,x"), "^--drums 12.7,20,x: three diameters in mm"),
     ],
 )
@@ -151,8 +150,6 @@ def test_a_calibration_without_servos_finds_the_scale() -> None:
     said = _run("calibrate", "bench 1", "--auto", "--steps", "board", "--pictures", "2")
     assert "scale: 0.322" in said
     _, rig = find_rig("bench 1")
-    assert rig.calibration is not None
-    assert rig.calibration.scale is not None
     assert rig.calibration.scale.mm_per_px == pytest.approx(1 / 3.1, rel=0.01)
     assert rig.calibration.steering is None
 
@@ -215,7 +212,6 @@ def test_steps_that_were_done_before_one_failed_are_saved(bench: _Bench, monkeyp
         _run("calibrate", "bench 1", "--auto")
     assert bench.closed
     _, rig = find_rig("bench 1")
-    assert rig.calibration is not None
     assert rig.calibration.scale is not None
     with pytest.raises(UserError, match=r"^6 servos answer, seven are needed$"):
         _run("calibrate", "bench 2", "--auto", "--steps", "servos")

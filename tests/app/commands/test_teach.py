@@ -180,21 +180,8 @@ def test_without_an_empty_picture_the_bench_is_what_most_pictures_show(place: Pa
     for picture in toy_stream(30):
         write_png(tmp_path / "stream" / f"{picture.stem}.png", _large(_large(picture.image)))  # larger than working size
     write_mask(tmp_path / "vessel.png", cv2.resize(toy_vessel().astype(np.uint8), (1280, 960)) > 0)
-    done = run(
-        "teach",
-        tmp_path / "stream",
-        *(
-            "--vessel",
-            tmp_path / "vessel.png",
-            "--out",
-            tmp_path / "own",
-            "--init",
-            place / "model",
-            "--frames",
-            8,
-            "--frames-only",
-        ),
-    )
+    here = ("--vessel", tmp_path / "vessel.png", "--out", tmp_path / "own", "--init", place / "model")
+    done = run("teach", tmp_path / "stream", *here, "--frames", 8, "--frames-only")
     assert "note: without --empty the empty bench is what most pictures show" in done.stderr
     assert done.returncode == 0, done.stderr
     found, true = read_bench(tmp_path / "own_teaching" / "bench"), _large(toy_picture(seed=900))

@@ -144,12 +144,12 @@ def test_a_gpu_without_room_for_a_batch_is_one_line(options: TrainOptions, monke
         run_train(options, TrainingPlan(steps=1))
 
 
-@pytest.mark.parametrize("kind", ["scenes", "frames", "both"])
+@pytest.mark.parametrize("kind", ["scenes", "both"])
 def test_an_eight_bit_copy_learns_from_what_was_trained_on(tmp_path: Path, kind: str) -> None:
     scene = tmp_path / "000000.npz"
     scene.write_bytes(toy_scene().to_bytes())
     samples = [] if kind == "scenes" else find_samples([toy_set(tmp_path / "set", 4)])
-    task = FrameTraining(samples, None, 4, examples=4, scenes=[] if kind == "frames" else [scene])
+    task = FrameTraining(samples, None, 4, examples=4, scenes=[scene])
     task.network = network = DualUNet(SMALL).eval()
     with Progress(disable=True) as bar:
         task.crops(replace(PLAN, steps=60), bar, Interrupt())

@@ -69,9 +69,6 @@ def test_policies_are_known_by_name_and_taken_once() -> None:
     assert parse_policies(["table", "push", "table"]) == ("table", "push")
     with pytest.raises(TrialError, match="unknown policy 'magic'; known: pursuit, table, push, random"):
         parse_policies(["magic"])
-
-
-def test_an_unknown_look_is_named() -> None:
     with pytest.raises(TrialError, match="unknown look 'velvet'; known: random, bench"):
         call(look="velvet")
 
@@ -117,12 +114,6 @@ def test_a_campaign_goes_on_where_it_was(faked: list[Any], tmp_path: Path, capsy
     assert "Trials to look at first" in report
     assert report.count("<svg") == 4
     assert json.loads((tmp_path / "summary.json").read_text())["pursuit"]["trials"] == 3
-
-
-def test_a_folder_of_other_settings_is_refused(faked: list[Any], tmp_path: Path) -> None:
-    call("0:1", out=tmp_path)
-    with pytest.raises(TrialError, match="other settings"):
-        call("0:1", out=tmp_path, max_seconds=9.0)
 
 
 @pytest.mark.parametrize(

@@ -70,20 +70,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.mark.slow
 def test_trials_of_a_cluster_are_those_of_one_process(address: str, tmp_path: Path) -> None:
-    arguments = (
-        "trial",
-        "--seeds",
-        "0:2",
-        "--true-masks",
-        "--max-seconds",
-        "1",
-        "--scheduler",
-        address,
-        "--json",
-        "--out",
-        tmp_path,
-    )
-    done = run(*arguments)
+    done = run("trial", "--seeds", "0:2", "--true-masks", "--max-seconds", "1", "--scheduler", address, "--json", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert [json.loads(line).get("seed") for line in done.stdout.splitlines()] == [0, 1, None]
     rows = [json.loads(line) for line in (tmp_path / "trials.jsonl").read_text().splitlines()]

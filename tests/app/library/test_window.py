@@ -92,7 +92,6 @@ def test_what_is_typed_is_kept_beside_the_session(open_library: Open, folder: Pa
     window = open_library(folder)
     all_read(window, qtbot)
     window.panels.search.setText("ana")
-    assert window.summary is not None
     session = window.summary.folder
     before = (session / MANIFEST).read_bytes()
     window.panels.search.setText("")
@@ -198,7 +197,6 @@ def test_sessions_are_played_annotated_and_exported_from_here(
     window = open_library(folder)
     all_read(window, qtbot)
     window.panels.search.setText("ben")
-    assert window.summary is not None
     session = str(window.summary.folder)
     window.panels.list.setFocus()
     QTest.keyClick(window.panels.list, Qt.Key.Key_P)

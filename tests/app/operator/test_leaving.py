@@ -59,7 +59,6 @@ def _window(
 
 def _answer(window: OperatorWindow, title: str) -> None:
     box = window.leaving.box
-    assert box is not None
     next(button for button in box.buttons() if button.text() == title).click()
 
 
@@ -90,7 +89,6 @@ def test_a_live_rig_asks_and_does_not_close_before_the_answer(live: OperatorWind
     assert not live.close()
     assert live.isVisible()
     box = live.leaving.box
-    assert box is not None
     assert not box.isModal(), "STOP stays within reach"
     assert {button.text() for button in box.buttons()} == {*ANSWERS.values(), "Do not close"}
     assert box.defaultButton().text() == "Relax slowly"
@@ -159,7 +157,6 @@ def test_what_a_rig_remembers_is_done_without_a_question(
     window = _window(make_window, engine, qtbot, config=with_rig(Config.model_validate(CLOSED_CONFIG), rig, path))
     window.close()
     box = window.leaving.box
-    assert box is not None
     box.checkBox().setChecked(True)
     _answer(window, "Hold")
     assert not window.isVisible()

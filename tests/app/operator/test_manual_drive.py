@@ -186,28 +186,11 @@ def test_who_brings_the_robot_back_without_a_picture_sees_how_far_it_is_in(
     until(qtbot, lambda: jog.readout.endswith("inserted 84 mm"))
 
 
-def test_a_recording_has_nobody_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
-    engine = FakeEngine(bench)
-    engine.pilot = None  # type: ignore[assignment]
-    window = make_window(lambda _config: engine, kind=RigKind.PLAYBACK)
-    window.start()
-    until(qtbot, lambda: window.shown_tick is not None)
-    qtbot.keyClick(window, Key.Key_F6)
-    qtbot.keyClick(window, Key.Key_W)
-    qtbot.keyClick(window, Key.Key_Space)
-    qtbot.wait(120)
-    assert window.controls.view is None
-
-
 # ---- once the pilot is gone
 
 
 def fails(_window: OperatorWindow, engine: FakeEngine) -> None:
     engine.fail_with = DeviceError("the camera is gone")
-
-
-def is_opened_anew(window: OperatorWindow, _engine: FakeEngine) -> None:
-    window.rig.restart()
 
 
 def is_another_one(window: OperatorWindow, _engine: FakeEngine) -> None:
@@ -223,9 +206,7 @@ def is_lent(window: OperatorWindow, _engine: FakeEngine) -> None:
 WAITING, CLOSED = ("waiting for the rig", "Waiting for the rig."), ("no rig is open", "No rig is open. F5 opens it again.")
 
 
-@pytest.mark.parametrize(
-    ("end", "says"), [(fails, CLOSED), (is_opened_anew, WAITING), (is_another_one, WAITING), (is_lent, CLOSED)]
-)
+@pytest.mark.parametrize(("end", "says"), [(fails, CLOSED), (is_another_one, WAITING), (is_lent, CLOSED)])
 def test_nothing_says_who_drives_once_the_rig_is_over(
     end: Callable[[OperatorWindow, FakeEngine], None],
     says: tuple[str, str],
@@ -262,16 +243,19 @@ def test_nothing_says_who_drives_once_the_rig_is_over(
         may_open.set()
 
 
-def test_a_recording_that_is_over_still_has_no_robot(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+def test_a_recording_has_no_robot_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
     engine = FakeEngine(bench)
     engine.pilot = None  # type: ignore[assignment]
     window = make_window(lambda _config: engine, kind=RigKind.PLAYBACK)
     window.start()
     until(qtbot, lambda: window.panels.mode.who == "pictures only")
+    for key in (Key.Key_F6, Key.Key_W, Key.Key_Space):
+        qtbot.keyClick(window, key)
     engine.fail_with = EndOfStream("the last picture was shown")
     until(qtbot, lambda: window.rig.phase is EnginePhase.ENDED)
     qtbot.wait(120)  # two looks
     assert window.panels.mode.who == "pictures only"
+    assert window.controls.view is None
 
 
 def test_servo_requests_of_the_table_reach_the_servos(running: OperatorWindow, engine: FakeEngine) -> None:
@@ -294,7 +278,6 @@ def test_servos_without_zeros_are_not_switched_on_but_asked_for_them(
     until(qtbot, lambda: table.lacks_zeros)
     running.ask_step(OperatorStep.SERVOS_ON)
     assert engine.pilot.asked == []
-    assert table.zeros is not None
     assert table.zeros.isVisible()
     table.zeros.set_button.click()
     feeds = ["advance", "delivery_1", "delivery_2"]
@@ -379,10 +362,26 @@ def test_a_motion_is_there_while_held_and_gone_after(keyboard: Keyboard, key: Qt
     assert keyboard.jogs[-1] == AT_REST
 
 
-def test_motions_that_are_held_together_are_one_jog(keyboard: Keyboard) -> None:
+def test_keys_that_are_held_together_are_one_jog(keyboard: Keyboard) -> None:
+    """Opposite ones cancel, two of one motion count once, and repeats of the keyboard nothing."""
+    keyboard.press(Key.Key_W, repeat=True)
+    assert keyboard.jogs == [], "it was down before"
     keyboard.press(Key.Key_W)
-    keyboard.press(Key.Key_D)
-    assert keyboard.jogs[-1] == Jog(bend=1.0, advance=1.0)
+    for _ in range(5):
+        keyboard.release(Key.Key_W, repeat=True)
+        keyboard.press(Key.Key_W, repeat=True)
+    assert keyboard.jogs == [Jog(advance=1.0)]
+    for key, is_down, held in (
+        (Key.Key_D, True, Jog(bend=1.0, advance=1.0)),
+        (Key.Key_D, False, Jog(advance=1.0)),
+        (Key.Key_S, True, AT_REST),
+        (Key.Key_S, False, Jog(advance=1.0)),
+        (Key.Key_Up, True, Jog(advance=1.0)),
+        (Key.Key_W, False, Jog(advance=1.0)),
+        (Key.Key_Up, False, AT_REST),
+    ):
+        (keyboard.press if is_down else keyboard.release)(key)
+        assert keyboard.jogs[-1] == held
 
 
 def test_holding_sends_again_and_again(keyboard: Keyboard, qtbot: QtBot) -> None:
@@ -394,30 +393,6 @@ def test_holding_sends_again_and_again(keyboard: Keyboard, qtbot: QtBot) -> None
     assert len(keyboard.jogs) == sent, "nothing held, nothing sent"
 
 
-def test_opposite_keys_cancel(keyboard: Keyboard) -> None:
-    keyboard.press(Key.Key_W)
-    keyboard.press(Key.Key_S)
-    assert keyboard.jogs[-1].advance == 0.0
-    keyboard.release(Key.Key_S)
-    assert keyboard.jogs[-1].advance == 1.0
-
-
-def test_two_keys_of_one_motion_count_once(keyboard: Keyboard) -> None:
-    keyboard.press(Key.Key_W)
-    keyboard.press(Key.Key_Up)
-    assert keyboard.jogs[-1].advance == 1.0
-    keyboard.release(Key.Key_W)
-    assert keyboard.jogs[-1].advance == 1.0, "the other key is still down"
-
-
-def test_auto_repeat_is_ignored(keyboard: Keyboard) -> None:
-    keyboard.press(Key.Key_W)
-    for _ in range(5):
-        keyboard.release(Key.Key_W, repeat=True)
-        keyboard.press(Key.Key_W, repeat=True)
-    assert keyboard.jogs == [Jog(advance=1.0)]
-
-
 def test_a_held_key_types_nothing_into_a_field_that_is_clicked_meanwhile(keyboard: Keyboard) -> None:
     keyboard.press(Key.Key_W)
     keyboard.text.setFocus()
@@ -426,11 +401,6 @@ def test_a_held_key_types_nothing_into_a_field_that_is_clicked_meanwhile(keyboar
     keyboard.release(Key.Key_W, to=keyboard.text)
     QApplication.sendEvent(keyboard.text, QKeyEvent(QEvent.Type.KeyPress, Key.Key_W, NONE, "w"))
     assert keyboard.text.text() == "w"
-
-
-def test_a_key_that_was_down_before_does_not_count(keyboard: Keyboard) -> None:
-    keyboard.press(Key.Key_W, repeat=True)
-    assert keyboard.jog.held == frozenset()
 
 
 @pytest.mark.parametrize("lost", [QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked])
@@ -564,26 +534,19 @@ def test_what_takes_no_space_leaves_it_to_stop(keyboard: Keyboard) -> None:
         assert len(keyboard.stops) == number, widget
 
 
-def test_typing_does_not_move_the_robot(keyboard: Keyboard) -> None:
+def test_typing_shortcuts_and_keys_of_another_window_do_not_move_the_robot(keyboard: Keyboard, qtbot: QtBot) -> None:
     for field in (keyboard.text, keyboard.spin):
         field.setFocus()
         keyboard.press(Key.Key_W, to=field)
         keyboard.press(Key.Key_Up, to=field)
-    assert keyboard.jog.held == frozenset()
     assert keyboard.spin.value() == 1, "the arrow went to the field"
-
-
-def test_shortcuts_are_no_motion(keyboard: Keyboard) -> None:
-    event = QKeyEvent(QEvent.Type.KeyPress, Key.Key_S, Qt.KeyboardModifier.ControlModifier)
-    QApplication.sendEvent(keyboard.window, event)
-    assert keyboard.jog.held == frozenset()
-
-
-def test_keys_of_another_window_are_not_ours(keyboard: Keyboard, qtbot: QtBot) -> None:
+    save = QKeyEvent(QEvent.Type.KeyPress, Key.Key_S, Qt.KeyboardModifier.ControlModifier)
+    QApplication.sendEvent(keyboard.window, save)
     other = QWidget()
     qtbot.addWidget(other)
     keyboard.press(Key.Key_W, to=other)
     assert keyboard.jog.held == frozenset()
+    assert keyboard.jogs == []
 
 
 def test_every_motion_has_a_key_and_no_key_two_motions() -> None:
@@ -616,11 +579,8 @@ def test_a_gamepads_state_is_a_jog_a_deadman_and_a_stop(qtbot: QtBot) -> None:
     assert pilot.deadman_said == [True]
     assert pilot.acts == [Act.STOP]
     devices.close()
-
-
-def test_without_a_rig_nothing_happens(qtbot: QtBot) -> None:
     devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: None, lambda: None)
-    devices._on_gamepad(GamepadState(0.5, 0.0, 0.0, 0.0, True, True, 1.0))
+    devices._on_gamepad(GamepadState(0.5, 0.0, 0.0, 0.0, True, True, 1.0))  # without a rig nothing happens
     devices.close()
 
 

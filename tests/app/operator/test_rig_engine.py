@@ -67,7 +67,6 @@ def open_engine(monkeypatch: pytest.MonkeyPatch, robots: list[Robot]) -> Open:
 
 def test_the_twins_servos_are_switched_on_at_the_start(open_engine: Open, robots: list[Robot]) -> None:
     engine = open_engine()
-    assert engine.pilot is not None
     engine.pilot._requests._worker.submit(lambda: None).result(5.0)
     engine.close()
     assert "arm" in robots[0].calls
@@ -75,23 +74,19 @@ def test_the_twins_servos_are_switched_on_at_the_start(open_engine: Open, robots
 
 def test_starting_again_clears_no_stop(open_engine: Open, robots: list[Robot]) -> None:
     engine = open_engine()
-    assert engine.pilot is not None
     engine.pilot.stop()
     engine.close()
     for _ in range(2):  # and neither does a second time
         engine = open_engine()
-        assert engine.pilot is not None
         view = engine.pilot.view
         assert (view.mode, view.latched) == (Mode.STOPPED, Fault(Cause.STOP_PRESSED))
         engine.close()
     assert all("arm" not in robot.calls for robot in robots[1:])
     engine = open_engine()
-    assert engine.pilot is not None
     engine.pilot.ask(Act.ACKNOWLEDGE)
     engine.pilot.tick()
     engine.close()
     again = open_engine()
-    assert again.pilot is not None
     assert again.pilot.view.mode is Mode.ADVISORY
     again.close()
 
@@ -110,7 +105,6 @@ def test_the_policy_and_the_watch_over_stalls_use_the_rigs_own_scale(monkeypatch
     monkeypatch.setattr(rig_engine, "make_policy", make)
     monkeypatch.setattr(rig_engine, "open_rig", lambda config, _ahead: Rig("twin", RigKind.SIM, _Camera([]), Robot()))
     engine = _Maker()(with_rig(Config(), read_rig(path), path))
-    assert engine.pilot is not None
     told.append(engine.pilot._config.policy.pursuit.pixels_per_mm)
     engine.close()
     assert told == [pytest.approx(2.5)] * 2
@@ -133,7 +127,6 @@ def test_a_live_rigs_camera_is_compared_with_its_calibration_unless_it_has_a_ben
         engine = RigEngine(
             Rig("lab", kind, _Grey([0]), Robot()), Pipeline(DrawnNetwork(), PerceptionConfig()), used, ModelReport(True)
         )
-        assert engine.pilot is not None
         found = engine.pilot._reports._landmarks.drift_px(moved(BOARD, 40.0), 0.0, 1.0)
         engine.close()
         assert found == (None if drift_px is None else pytest.approx(drift_px, abs=0.6))
@@ -146,7 +139,6 @@ def test_a_live_rig_that_nothing_was_learnt_of_is_advisory_only_and_a_twin_is_no
         Rig("bench", kind, _Grey([0]), Robot()), Pipeline(DrawnNetwork(), PerceptionConfig()), config, ModelReport(True)
     )
     pilot = engine.pilot
-    assert pilot is not None
     until_s = time.monotonic() + 10.0
     while pilot.view.time_s == 0.0 or not pilot.view.against_arming:
         assert time.monotonic() < until_s
@@ -200,7 +192,6 @@ def test_other_thresholds_do_not_turn_the_robot_about(knows_past: bool, head_x: 
 
 def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     engine = open_engine()
-    assert engine.pilot is not None
     engine.pilot.stop()
     engine.close()
     works = rig_engine.open_rig
@@ -213,7 +204,6 @@ def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, mon
         open_engine()
     monkeypatch.setattr(rig_engine, "open_rig", works)
     engine = open_engine()
-    assert engine.pilot is not None
     assert engine.pilot.view.mode is Mode.STOPPED
     engine.close()
 

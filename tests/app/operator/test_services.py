@@ -42,10 +42,8 @@ def look(side: WindowServices, window: OperatorWindow, refusal: Refusal | None, 
         side._look_for_unfamiliar()
 
 
-@pytest.mark.parametrize("refusal", [UNKNOWN, Refusal(Reason.OTHER_BENCH), Refusal(Reason.BENCH_MOVED)])
-def test_teaching_is_offered_once_where_pictures_are_not_known(
-    refusal: Refusal, side: WindowServices, running: OperatorWindow
-) -> None:
+def test_teaching_is_offered_once_where_pictures_are_not_known(side: WindowServices, running: OperatorWindow) -> None:
+    refusal = UNKNOWN
     look(side, running, refusal, _UNFAMILIAR_S - 1)
     assert not running.panels.offers.text
     look(side, running, refusal, 1)
@@ -64,6 +62,7 @@ def test_it_is_not_offered_for_other_refusals_or_moments(side: WindowServices, r
 
 
 def test_the_hint_beside_a_robot_that_is_not_found_counts() -> None:
+    assert all(is_teachable(one) for one in (UNKNOWN, Refusal(Reason.OTHER_BENCH), Refusal(Reason.BENCH_MOVED)))
     assert is_teachable(Refusal(Reason.NO_ROBOT, "highest robot probability 0.01; it does not know such pictures: distance 2.0"))
     assert not is_teachable(Refusal(Reason.NO_ROBOT, "highest robot probability 0.01"))
 
@@ -73,7 +72,6 @@ def test_the_menu_opens_the_window_and_opens_it_again_as_it_was(side: WindowServ
     assert texts[-2:] == ["Teach this bench...", "Train on my annotations..."]
     side.teach()
     window = side.teaching
-    assert window is not None
     assert window.isVisible()
     window.close()
     side.teach()
@@ -92,23 +90,16 @@ def test_a_taught_model_is_used_with_its_bench_and_the_one_before_can_be_chosen(
     assert running.rig.config.perception.segmentation.model == "default"
 
 
-def test_another_phantom_is_opened_without_the_bench(side: WindowServices, running: OperatorWindow, qtbot: QtBot) -> None:
-    side._use_taught("mine_1")
-    config = running.rig.config
-    running.rig.use_config(config.model_copy(update={"twin": config.twin.model_copy(update={"phantom": "y_branch"})}))
-    assert running.rig.config.perception.bench is None
-    assert running.rig.config.perception.segmentation.model == "mine_1"
-    until(qtbot, lambda: running.shown_tick is not None)
-
-
 def test_while_another_phantom_is_shown_nothing_is_taken_of_it_and_the_bench_is_not_used(
     side: WindowServices, running: OperatorWindow, qtbot: QtBot
 ) -> None:
+    side._use_taught("mine_1")
     side.teach()
-    assert side.teaching is not None
     assert side.teaching._newest() is not None
     config = running.rig.config
     running.rig.use_config(config.model_copy(update={"twin": config.twin.model_copy(update={"phantom": "y_branch"})}))
+    perception = running.rig.config.perception
+    assert (perception.bench, perception.segmentation.model) == (None, "mine_1"), "it is opened without the bench"
     until(qtbot, lambda: running.shown_tick is not None)
     assert side.teaching._newest() is None
     assert "another bench is in use" in side._use_taught("mine_1")

@@ -96,12 +96,10 @@ def test_the_wizards_servos_are_stopped(
     rigs = RigMenuController(running, open_bench, lambda _config: lambda frame: make_scene())
     rigs.new()
     until(qtbot, lambda: rigs.wizard is not None and not rigs.wizard.model.is_busy)
-    assert rigs.wizard is not None
     desk = rigs.wizard.model
     desk.open_camera(running.rig.config)
     until(qtbot, lambda: desk.bench is not None and not desk.is_busy)
     bench = desk.bench
-    assert bench is not None
     begun = threading.Event()
 
     def wiggle() -> None:

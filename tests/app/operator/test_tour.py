@@ -24,7 +24,6 @@ from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeEngine, until
 
 Key = Qt.Key
-SIZES = [MIN_WINDOW, (1280, 720), (1600, 900), (1920, 1080)]
 
 
 @pytest.fixture(autouse=True)
@@ -56,33 +55,26 @@ def test_the_card_gives_way_to_what_is_kept_clear_even_on_the_light() -> None:
     assert not card.intersects(clear)
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_no_card_covers_stop_or_what_it_speaks_of(running: OperatorWindow, size: tuple[int, int], qtbot: QtBot) -> None:
-    running.resize(*size)
-    QApplication.processEvents()
+def test_no_card_covers_stop_or_what_it_speaks_of_and_all_of_its_text_is_on_it(running: OperatorWindow, qtbot: QtBot) -> None:
     panels, tour = running.panels, running.tour
-    stop = QRect(panels.mode_bar.stop.mapTo(panels, QPoint(0, 0)), panels.mode_bar.stop.size())
-    running.show_tour()
-    seen = []
-    for place in _stops(tour):
+    for size in (MIN_WINDOW, (1280, 720), (1600, 900), (1920, 1080)):
+        running.resize(*size)
         QApplication.processEvents()
-        card = tour.card.geometry()
-        seen.append(tour.card.text)
-        assert panels.rect().contains(card), place
-        assert not card.intersects(stop), place
-        assert tour.light.isValid(), f"{place}: it points at nothing"
-        assert panels.rect().adjusted(-6, -6, 6, 6).contains(tour.light), place
-        assert not card.intersects(tour.light), place
-        assert isinstance(panels.childAt(stop.center()), StopButton), place
-    assert len(seen) == len(set(seen)) == 7
-
-
-def test_all_of_the_text_is_on_the_card(running: OperatorWindow) -> None:
-    running.show_tour()
-    for _ in _stops(running.tour):
-        QApplication.processEvents()
-        label = running.tour.card._text
-        assert label.height() >= label.heightForWidth(label.width())
+        stop = QRect(panels.mode_bar.stop.mapTo(panels, QPoint(0, 0)), panels.mode_bar.stop.size())
+        running.show_tour()
+        seen = []
+        for place in _stops(tour):
+            QApplication.processEvents()
+            card, label = tour.card.geometry(), tour.card._text
+            seen.append(tour.card.text)
+            assert panels.rect().contains(card), place
+            assert not card.intersects(stop), place
+            assert tour.light.isValid(), f"{place}: it points at nothing"
+            assert panels.rect().adjusted(-6, -6, 6, 6).contains(tour.light), place
+            assert not card.intersects(tour.light), place
+            assert isinstance(panels.childAt(stop.center()), StopButton), place
+            assert label.height() >= label.heightForWidth(label.width()), place
+        assert len(seen) == len(set(seen)) == 7
 
 
 # ---- what stays in use
@@ -114,6 +106,10 @@ def test_the_robot_and_the_picture_stay_in_use(running: OperatorWindow, engine: 
 def test_it_works_by_keyboard_alone(running: OperatorWindow, qtbot: QtBot) -> None:
     running.show_tour()
     tour = running.tour
+    running.panels.mode_bar.stop.setFocus()
+    qtbot.keyClick(running.panels.mode_bar.stop, Key.Key_Return)
+    assert tour.place == 0, "on a control Enter is the control's"
+    tour.card.forward.setFocus()
     qtbot.keyClick(running.focusWidget(), Key.Key_Return)
     assert tour.place == 1
     running.panels.live.setFocus()  # as after a click into the picture
@@ -125,13 +121,6 @@ def test_it_works_by_keyboard_alone(running: OperatorWindow, qtbot: QtBot) -> No
     assert not tour.is_running
     assert not tour.card.isVisible()
     assert running.focusWidget() is running.panels.live
-
-
-def test_enter_on_a_control_is_the_controls(running: OperatorWindow, qtbot: QtBot) -> None:
-    running.show_tour()
-    running.panels.mode_bar.stop.setFocus()
-    qtbot.keyClick(running.panels.mode_bar.stop, Key.Key_Return)
-    assert running.tour.place == 0
 
 
 def test_the_end_of_it_can_be_clicked(running: OperatorWindow, qtbot: QtBot) -> None:

@@ -124,24 +124,21 @@ def test_a_target_is_a_click_and_refused_where_a_click_is_none_or_would_steer_th
     assert not engine.jogs
 
 
-@pytest.mark.parametrize(
-    ("sent", "error"),
-    [
+def test_a_line_that_makes_no_sense_is_answered_and_the_next_one_is_served(
+    line: socket.socket, ask: Ask, running: OperatorWindow, qtbot: QtBot
+) -> None:
+    for sent, error in (
         (b"record\n", "not a line of JSON"),
         (b"[" * 3000 + b"\n", "not a line of JSON"),
         (b"\xff\xfe\n", "not a line of JSON"),
         (b'["mark"]\n', 'not an object with a "command"'),
         (b'{"command": "arm"}\n', "unknown command 'arm'; known: record start, "),
         (b'{"command": "note", "text": " "}\n', 'a note needs a "text"'),
-    ],
-)
-def test_a_line_that_makes_no_sense_is_answered_and_the_next_one_is_served(
-    sent: bytes, error: str, line: socket.socket, ask: Ask, running: OperatorWindow, qtbot: QtBot
-) -> None:
-    line.send(sent)
-    assert json.loads(_answer(line, qtbot))["error"].startswith(error)
-    assert error in _log(running)
-    assert ask("status")["ok"]
+    ):
+        line.send(sent)
+        assert json.loads(_answer(line, qtbot))["error"].startswith(error)
+        assert error in _log(running)
+        assert ask("status")["ok"]
 
 
 def test_a_line_without_an_end_is_named_and_ends_its_client_alone(

@@ -22,7 +22,7 @@ from app.ui.actions import action_of
 from app.widgets.event_log import LogKind
 from app.widgets.scene_overlay import Layer
 from core.config.calibration import CalibrationConfig, ScaleConfig
-from core.config.models import Config, load_config
+from core.config.models import Config
 from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.control.drive_view import DriveView
 from core.control.modes import Act, Mode
@@ -52,6 +52,9 @@ def test_window_is_there_at_once_and_says_what_it_waits_for(make_window: MakeWin
     assert opened == [], "the window has not waited for the rig"
     assert window.panels.notice.isVisible()
     assert window.panels.notice.text.startswith("Starting: S-curve")
+    until(qtbot, window.isActiveWindow)
+    qtbot.keyClick(window, Key.Key_P)
+    assert window.panels.toast.text() == "No snapshot: there is no picture yet"
     assert window.panels.badge.letter == "-"
     gate.set()
     until(qtbot, lambda: window.shown_tick is not None)
@@ -78,52 +81,29 @@ def test_stop_in_the_moment_in_which_a_rig_is_opened_is_not_lost(
     assert engine.pilot.acts == [Act.STOP]
 
 
-def test_a_rig_that_is_lent_before_it_was_opened_stays_lent(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
-    opened: list[Config] = []
-
-    def open_engine(config: Config) -> FakeEngine:
-        opened.append(config)
-        return FakeEngine(bench)
-
-    window = make_window(open_engine)
-    window.start()
-    window.rig.lend("the rig is being set up")
-    until(qtbot, lambda: "being set up" in window.panels.notice.text)
-    qtbot.wait(200)  # longer than the window takes to paint itself
-    assert opened == []
-    window.rig.use_config(window.rig.config)
-    until(qtbot, lambda: window.shown_tick is not None)
-    assert len(opened) == 1
-
-
-def test_a_rig_that_is_changed_before_it_was_opened_is_opened_once(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+def test_what_is_asked_before_the_rig_was_opened_counts(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
+    """A changed rig is opened once, a closed window opens none, and a rig that is lent none until it is given back."""
     opened: list[str] = []
 
     def open_engine(config: Config) -> FakeEngine:
         opened.append(config.twin.phantom)
         return FakeEngine(bench)
 
-    window = make_window(open_engine)
-    window.start()
-    twin = window.rig.config.twin.model_copy(update={"phantom": "y_branch"})
-    window.rig.use_config(window.rig.config.model_copy(update={"twin": twin}))
-    until(qtbot, lambda: window.shown_tick is not None)
-    qtbot.wait(200)  # longer than the window takes to paint itself
-    assert opened == ["y_branch"]
-
-
-def test_a_window_that_is_closed_before_its_rig_was_opened_opens_none(make_window: MakeWindow, qtbot: QtBot) -> None:
-    opened: list[Config] = []
-
-    def open_engine(config: Config) -> FakeEngine:
-        opened.append(config)
-        raise DeviceError("nobody is there any more")
-
-    window = make_window(open_engine)
-    window.start()
-    window.close()
-    qtbot.wait(200)  # longer than the window takes to paint itself
+    closed, lent, changed = (make_window(open_engine) for _ in range(3))
+    closed.start()
+    closed.close()
+    lent.start()
+    lent.rig.lend("the rig is being set up")
+    until(qtbot, lambda: "being set up" in lent.panels.notice.text)
+    qtbot.wait(200)  # longer than the windows take to paint themselves
     assert opened == []
+    lent.rig.use_config(lent.rig.config)
+    until(qtbot, lambda: lent.shown_tick is not None)
+    changed.start()
+    twin = changed.rig.config.twin.model_copy(update={"phantom": "y_branch"})
+    changed.rig.use_config(changed.rig.config.model_copy(update={"twin": twin}))
+    until(qtbot, lambda: changed.shown_tick is not None)
+    assert opened == ["s_curve", "y_branch"]
 
 
 def test_millimetres_are_those_of_the_calibrated_rig(
@@ -210,23 +190,20 @@ def test_end_of_a_recording(make_window: MakeWindow, engine: FakeEngine, qtbot: 
     assert window.panels.picker is None
 
 
-def test_silent_camera_leaves_no_stale_overlay(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+def test_silent_camera_leaves_no_stale_overlay_and_no_older_number(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    until(qtbot, lambda: "total 27.5" in running.panels.performance.text)
     engine.silent = True
     until(qtbot, lambda: running.panels.badge.title == "No new picture")
+    assert "27.5" not in running.panels.performance.text
+    until(qtbot, lambda: running.panels.trends.curves[0].xData[-1] <= -0.5)
     assert running.panels.live.scene is None
     assert running.panels.advice.text == "No advice: no new picture"
     assert running.panels.notice.isVisible()
     engine.silent = False
     until(qtbot, lambda: running.panels.live.scene is not None)
     assert not running.panels.notice.isVisible()
-
-
-def test_with_no_new_picture_no_number_of_an_older_one_stands(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
-    until(qtbot, lambda: "total 27.5" in running.panels.performance.text)
-    engine.silent = True
-    until(qtbot, lambda: running.panels.badge.title == "No new picture")
-    assert "27.5" not in running.panels.performance.text
-    until(qtbot, lambda: running.panels.trends.curves[0].xData[-1] <= -0.5)
 
 
 def test_a_camera_that_never_gives_a_picture_says_why(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
@@ -242,18 +219,6 @@ def test_a_camera_that_never_gives_a_picture_says_why(make_window: MakeWindow, b
     until(qtbot, lambda: "Waiting for the first picture" in window.panels.notice.text)
     engine.silent = False
     until(qtbot, lambda: window.shown_tick is not None)
-
-
-def test_a_hand_that_holds_the_deadman_can_record(running: OperatorWindow, qtbot: QtBot) -> None:
-    qtbot.keyClick(running, Key.Key_F9, Qt.KeyboardModifier.ShiftModifier)
-    until(qtbot, lambda: running.recorder.status.recording)
-    running.recorder.stop("enough")
-
-
-def test_warnings_of_the_servo_page_begin_where_it_is_set(make_window: MakeWindow, bench: FakeBench) -> None:
-    window = make_window(lambda _config: FakeEngine(bench), load_config(overrides={"safety": {"temperature_warn_margin_c": 20.0}}))
-    window.start()
-    assert window.panels.servos._safety.temperature_warn_margin_c == 20.0
 
 
 def test_what_was_put_off_for_an_older_picture_is_not_shown_any_more(
@@ -278,9 +243,6 @@ def test_refusal_is_named_and_the_picture_goes_on(running: OperatorWindow, engin
     assert running.panels.gauge.text == "–"
     tick = running.shown_tick
     until(qtbot, lambda: running.shown_tick is not tick)
-
-
-def test_missing_model_says_what_to_do_while_the_picture_goes_on(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     engine.refusal = Refusal(Reason.NO_MODEL, "default/network.onnx: hash differs")
     until(qtbot, lambda: running.panels.badge.title == "No model")
     assert "Put back resources/models/default" in running.panels.badge.why
@@ -332,7 +294,6 @@ def test_it_can_be_closed_at_any_moment(
     if moment == "after a fault":
         until(qtbot, lambda: window.rig.phase is EnginePhase.FAULT)
     if moment == "while switching":
-        assert window.panels.picker is not None
         window.panels.picker.roll()
     if moment == "while a key is held":
         qtbot.keyPress(window, Key.Key_W)
@@ -358,12 +319,9 @@ def test_keys_move_the_robot_while_held(running: OperatorWindow, engine: FakeEng
     qtbot.keyRelease(running, Key.Key_W)
     assert engine.jogs[-1] == AT_REST
     assert not any(cap.is_lit for cap in running.panels.jog._caps.values())
-
-
-def test_losing_the_focus_stops_the_robot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     qtbot.keyPress(running, Key.Key_W)
     QApplication.sendEvent(running, QEvent(QEvent.Type.WindowDeactivate))
-    assert engine.jogs[-1] == AT_REST
+    assert engine.jogs[-1] == AT_REST, "without the focus no release is heard"
 
 
 def test_the_arrows_are_the_menu_bars_after_a_tap_on_alt(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -396,7 +354,7 @@ def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine
     assert chip.isChecked(), "space is no click here"
 
 
-def test_digits_switch_overlays(running: OperatorWindow, qtbot: QtBot) -> None:
+def test_digits_switch_overlays_but_not_when_typed_into_the_seed(running: OperatorWindow, qtbot: QtBot) -> None:
     for layer in Layer:
         qtbot.keyClick(running, layer.value.key)
         assert not running.panels.overlay_bar.is_on(layer)
@@ -404,10 +362,6 @@ def test_digits_switch_overlays(running: OperatorWindow, qtbot: QtBot) -> None:
     qtbot.keyClick(running, Key.Key_0)
     assert all(running.panels.overlay_bar.is_on(layer) for layer in Layer)
     assert all(action_of(running, layer.value.key).isChecked() for layer in Layer)
-
-
-def test_digits_typed_into_the_seed_switch_nothing(running: OperatorWindow, qtbot: QtBot) -> None:
-    assert running.panels.picker is not None
     seed = running.panels.picker._seed
     seed.setEnabled(True)
     seed.setFocus()
@@ -419,7 +373,6 @@ def test_escape_in_the_seed_takes_back_what_was_typed_and_gives_the_keys_to_the_
     running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
 ) -> None:
     picker = running.panels.picker
-    assert picker is not None
     picker.show_name("random:5")
     chosen: list[str] = []
     picker.chosen.connect(chosen.append)
@@ -439,7 +392,6 @@ def test_escape_in_the_seed_takes_back_what_was_typed_and_gives_the_keys_to_the_
 @pytest.mark.parametrize("way", ["key", "tab and enter"])
 def test_a_phantom_is_chosen_by_keyboard(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, way: str) -> None:
     picker = running.panels.picker
-    assert picker is not None
     combo, chosen, moved = picker._combo, [], len(engine.jogs)
     picker.chosen.connect(chosen.append)
     if way == "key":
@@ -492,7 +444,6 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     until(qtbot, lambda: window.shown_tick is not None)
     window.panels.live.clicked.emit(500.0, 280.0)
     qtbot.keyPress(window, Key.Key_D)
-    assert window.panels.picker is not None
     window.panels.picker.chosen.emit("tree")
     assert window.rig.phase is EnginePhase.STARTING
     assert not window.panels.live._picture.isVisible(), "the old world is not shown as the new one"
@@ -507,15 +458,13 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     assert opened[-1] == "random:1"
 
 
-@pytest.mark.parametrize("page", ["events", "commands"])
 def test_a_list_is_reached_by_tab_scrolled_by_keys_and_left_by_escape(
-    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, page: str
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
 ) -> None:
     """While it has the focus the arrows are its own; letters and STOP are the robot's as everywhere."""
     panels = running.panels
-    panels.pages.setCurrentWidget({"events": panels.events, "commands": panels.commands}[page])
-    view = panels.pages.currentWidget().findChild(QAbstractItemView)
-    assert view is not None
+    panels.pages.setCurrentWidget(panels.events)
+    view = panels.events.findChild(QAbstractItemView)
     for number in range(200):
         panels.events.add(LogKind.OPERATOR, f"event {number}")
     view.verticalScrollBar().setRange(0, max(500, view.verticalScrollBar().maximum()))
@@ -545,17 +494,14 @@ def test_a_list_is_reached_by_tab_scrolled_by_keys_and_left_by_escape(
     qtbot.keyPress(running, Key.Key_Up)
     assert engine.jogs[-1] == Jog(advance=1.0)
     qtbot.keyRelease(running, Key.Key_Up)
-
-
-def test_a_click_into_a_list_leaves_the_arrows_to_the_robot(running: OperatorWindow, qtbot: QtBot) -> None:
-    panels = running.panels
-    panels.pages.setCurrentWidget(panels.events)
-    view = panels.events.findChild(QAbstractItemView)
     qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton)
     assert running.focusWidget() is not view
 
 
-def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
+def test_snapshot_key_writes_three_files_says_where_and_names_the_phantom_that_runs(
+    running: OperatorWindow, qtbot: QtBot, tmp_path: Path
+) -> None:
+    running.panels.picker.show_name("tree")  # chosen, and not opened
     qtbot.keyClick(running, Key.Key_P)
     until(qtbot, running.panels.toast.isVisible)
     assert str(tmp_path / "shots") in running.panels.toast.text()
@@ -564,15 +510,6 @@ def test_snapshot_key_writes_three_files_and_says_where(running: OperatorWindow,
     record = json.loads(next((tmp_path / "shots").glob("*.json")).read_text())
     assert record["state"] in ("A", "B", "C", "D")
     assert (record["rig"], record["phantom"], record["model"]) == ("SIM", "s_curve", "default")
-
-
-def test_a_snapshot_names_the_phantom_that_runs(running: OperatorWindow, qtbot: QtBot, tmp_path: Path) -> None:
-    assert running.panels.picker is not None
-    running.panels.picker.show_name("tree")  # chosen, and not opened
-    qtbot.keyClick(running, Key.Key_P)
-    until(qtbot, running.panels.toast.isVisible)
-    (told,) = (tmp_path / "shots").glob("*.json")
-    assert json.loads(told.read_text())["phantom"] == "s_curve"
 
 
 def test_no_snapshot_of_a_picture_that_is_not_live(
@@ -628,13 +565,6 @@ def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench
     assert window.panels.live._picture.isVisible()
 
 
-def test_no_snapshot_before_the_first_picture(make_window: MakeWindow, qtbot: QtBot) -> None:
-    window = make_window()
-    until(qtbot, window.isActiveWindow)
-    qtbot.keyClick(window, Key.Key_P)
-    assert window.panels.toast.text() == "No snapshot: there is no picture yet"
-
-
 def test_help_and_full_screen_and_what_escape_leaves_first(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     running.panels.live.clicked.emit(500.0, 280.0)
     qtbot.keyClick(running, Key.Key_F11)
@@ -678,43 +608,39 @@ def test_window_opens_no_larger_than_the_screen(screen: tuple[int, int], expecte
     assert theme.start_size(Screen(*screen)).toTuple() == expected  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900), (1920, 1080)])
-def test_everything_has_room(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
-    running.resize(*size)
-    qtbot.wait(30)
-    assert (running.width(), running.height()) == size
+def test_everything_has_room(running: OperatorWindow, qtbot: QtBot) -> None:
     shown = running.panels
     everywhere = (shown.live, shown.badge, shown.gauge, shown.bars, shown.clearance, shown.mode, shown.mode_bar)
     on_pages = (shown.jog, shown.trends, shown.servos, shown.commands, shown.events)
-    for widget in (*everywhere, *on_pages):
-        page = next((k for k in range(shown.pages.count()) if shown.pages.widget(k).isAncestorOf(widget)), None)
-        page = page if page is not None else shown.pages.indexOf(widget)
-        if page >= 0:
-            shown.pages.setCurrentIndex(page)
-            qtbot.wait(10)
-        assert widget.isVisible(), widget
-        assert widget.height() >= widget.minimumSizeHint().height(), widget
-        assert widget.height() >= widget.minimumHeight(), widget
-        assert widget.width() >= widget.minimumWidth(), widget
-    assert running.panels.live.width() >= 0.5 * size[0]
+    for size in ((1100, 660), (1280, 720), (1600, 900), (1920, 1080)):
+        running.resize(*size)
+        qtbot.wait(30)
+        assert (running.width(), running.height()) == size
+        for widget in (*everywhere, *on_pages):
+            page = next((k for k in range(shown.pages.count()) if shown.pages.widget(k).isAncestorOf(widget)), None)
+            page = page if page is not None else shown.pages.indexOf(widget)
+            if page >= 0:
+                shown.pages.setCurrentIndex(page)
+                qtbot.wait(10)
+            assert widget.isVisible(), widget
+            assert widget.height() >= max(widget.minimumSizeHint().height(), widget.minimumHeight()), widget
+            assert widget.width() >= widget.minimumWidth(), widget
+        assert shown.live.width() >= 0.5 * size[0]
 
 
-@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900)])
-def test_the_page_of_keys_leaves_stop_in_sight_and_in_reach(
-    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, size: tuple[int, int]
-) -> None:
+def test_the_page_of_keys_leaves_stop_in_sight_and_in_reach(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     """F1 lies beside the keys that drive: the first click on STOP is a STOP also while the page is open."""
-    panels, stop = running.panels, running.panels.mode_bar.stop
+    panels, stop, bar = running.panels, running.panels.mode_bar.stop, running.panels.mode_bar
     qtbot.keyClick(running, Key.Key_F1)
-    running.resize(*size)
-    qtbot.wait(30)
-    assert panels.help.isVisible()
-    bar = panels.mode_bar
-    assert running.childAt(stop.mapTo(running, stop.rect().center())) is stop
-    assert panels.help.geometry().bottom() < bar.mapTo(panels.help.parentWidget(), bar.rect().topLeft()).y()
-    qtbot.mouseClick(running.windowHandle(), Qt.MouseButton.LeftButton, pos=stop.mapTo(running, stop.rect().center()))
-    assert engine.pilot.acts == [Act.STOP]
-    assert panels.help.isVisible()
+    for count, size in enumerate(((1100, 660), (1280, 720), (1600, 900)), 1):
+        running.resize(*size)
+        qtbot.wait(30)
+        assert panels.help.isVisible()
+        assert running.childAt(stop.mapTo(running, stop.rect().center())) is stop
+        assert panels.help.geometry().bottom() < bar.mapTo(panels.help.parentWidget(), bar.rect().topLeft()).y()
+        qtbot.mouseClick(running.windowHandle(), Qt.MouseButton.LeftButton, pos=stop.mapTo(running, stop.rect().center()))
+        assert engine.pilot.acts == [Act.STOP] * count
+        assert panels.help.isVisible()
 
 
 def test_a_screen_of_720_lines_is_enough(running: OperatorWindow, qtbot: QtBot) -> None:

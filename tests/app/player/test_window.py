@@ -172,14 +172,6 @@ def test_arrows_go_by_frames_and_show_what_was_recorded(player: PlayerWindow, se
     at(qtbot, player, COUNT - 1)
 
 
-def test_what_was_refused_has_no_pose_and_says_why(player: PlayerWindow, qtbot: QtBot) -> None:
-    player.go(31)
-    at(qtbot, player, 31)
-    assert (player.panels.badge.letter, player.panels.badge.title) == ("-", "No robot in view")
-    assert player.panels.gauge.text == "\N{EN DASH}"
-    assert player.panels.mode.mode is Mode.ARMED
-
-
 def test_space_plays_and_pauses_wherever_the_focus_is(player: PlayerWindow, qtbot: QtBot) -> None:
     player.panels.bar.note.setFocus()
     press(player, Key.Key_Space)
@@ -187,20 +179,15 @@ def test_space_plays_and_pauses_wherever_the_focus_is(player: PlayerWindow, qtbo
     assert not player.panels.note.isVisible()
     assert player.panels.bar.play.accessibleName() == "Pause"
     until(qtbot, lambda: player.place > 2)
-    press(player, Key.Key_Space)
-    assert not player.clock.is_playing
-    before = player.clock.position_s
-    qtbot.wait(60)
-    assert player.clock.position_s == before
-
-
-def test_a_pause_renews_the_numbers_that_playing_renews_now_and_then(player: PlayerWindow, qtbot: QtBot) -> None:
-    press(player, Key.Key_Space)
     until(qtbot, lambda: player.place >= 4)
     press(player, Key.Key_Space)
+    assert not player.clock.is_playing
     until(qtbot, lambda: player.place == player._requested)
     scene = player.panels.live.scene
-    assert player.panels.gauge.text == signed_degrees(scene.pose.theta_signed_deg, 1)
+    assert player.panels.gauge.text == signed_degrees(scene.pose.theta_signed_deg, 1), "of this frame, not of some before"
+    position_s = player.clock.position_s
+    qtbot.wait(60)
+    assert player.clock.position_s == position_s
 
 
 def test_it_plays_to_the_end_and_from_the_beginning_again(player: PlayerWindow, qtbot: QtBot) -> None:
@@ -270,6 +257,10 @@ def test_a_time_is_typed_or_dragged(player: PlayerWindow, qtbot: QtBot) -> None:
 def test_the_timeline_is_clicked_zoomed_and_selected(player: PlayerWindow, qtbot: QtBot) -> None:
     line = player.panels.timeline
     middle = QPoint((50 + line.width() - 10) // 2, line.height() // 2)
+    width = line.width() - 60
+    assert line.text_at(50 + 3.2 / 5.9 * width) == "0:03.200  no pose  ARMED"
+    state, angle = line.text_at(50 + 1.0 / 5.9 * width).split("  ")[1:3]
+    assert state[:6] == "state " and angle.endswith("°")
     QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=middle)
     assert player.clock.position_s == pytest.approx((COUNT - 1) * STEP_S / 2, abs=0.05)
     press(player, Key.Key_Plus)
@@ -293,15 +284,6 @@ def test_the_timeline_is_clicked_zoomed_and_selected(player: PlayerWindow, qtbot
     at(qtbot, player, 40)
 
 
-def test_the_timeline_tells_what_is_under_the_pointer(player: PlayerWindow) -> None:
-    line = player.panels.timeline
-    width = line.width() - 60
-    assert line.text_at(50 + 3.2 / 5.9 * width) == "0:03.200  no pose  ARMED"
-    state, angle = line.text_at(50 + 1.0 / 5.9 * width).split("  ")[1:3]
-    assert state[:6] == "state "
-    assert angle.endswith("°")
-
-
 def test_the_timeline_claims_nothing_for_a_time_without_frames(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     times_s = [FIRST_S + k * STEP_S for k in range(11)] + [FIRST_S + 6.0 + k * STEP_S for k in range(11)]
     window = open_player(record(tmp_path, (tick_of(k, time_s, full=True) for k, time_s in enumerate(times_s))))
@@ -313,21 +295,22 @@ def test_the_timeline_claims_nothing_for_a_time_without_frames(open_player: Open
     assert line.text_at(50 + 6.5 / 7.0 * width).startswith("0:06.500  state D")
 
 
-def test_values_that_no_dial_shows_can_be_read(player: PlayerWindow, qtbot: QtBot) -> None:
-    told = player.panels.values.toPlainText()
+def test_what_a_row_tells_is_shown_with_it(player: PlayerWindow, qtbot: QtBot) -> None:
+    panels = player.panels
+    told = panels.values.toPlainText()
     assert "frame 0 of the camera, captured at 1000.000 s, 640 \N{MULTIPLICATION SIGN} 480 px" in told
     assert "insertion 40.0 mm, sheath 0.0 mm" in told
     assert "perception 27.5 ms: " in told
-    player.go(31)
-    at(qtbot, player, 31)
-    assert "no pose: no robot: 0 px" in player.panels.values.toPlainText()
-
-
-def test_the_target_is_shown_from_when_it_was_chosen(player: PlayerWindow, qtbot: QtBot) -> None:
-    assert player.panels.live._target is None
+    assert panels.live._target is None
     player.go(12)
     at(qtbot, player, 12)
-    assert player.panels.live._target == (300.0, 200.0)
+    assert panels.live._target == (300.0, 200.0), "from when it was chosen"
+    player.go(31)
+    at(qtbot, player, 31)
+    assert "no pose: no robot: 0 px" in panels.values.toPlainText()
+    assert (panels.badge.letter, panels.badge.title) == ("-", "No robot in view")
+    assert panels.gauge.text == "\N{EN DASH}"
+    assert panels.mode.mode is Mode.ARMED
 
 
 def test_the_list_of_events_leads_to_them(player: PlayerWindow, qtbot: QtBot) -> None:
@@ -415,17 +398,6 @@ def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_pa
     (folder / "frames.jsonl").write_bytes(b"".join(lines[:-5]))
     window = open_player(folder)
     until(qtbot, lambda: f"the last 5 of {COUNT} rows are lost" in window.panels.problems.toPlainText())
-
-
-def test_rows_that_turn_out_to_be_missing_while_it_is_read_are_all_counted(
-    open_player: Open, session: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = [2]
-    monkeypatch.setattr(SessionReader, "missing_rows", property(lambda _reader: found[0]))
-    window = open_player(session)
-    until(qtbot, lambda: "2 rows are missing" in window.panels.problems.toPlainText())
-    found[0] = 5
-    until(qtbot, lambda: "5 rows are missing" in window.panels.problems.toPlainText())
 
 
 def test_a_session_that_was_cut_says_so(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
@@ -657,7 +629,7 @@ def test_a_replay_is_shown_beside_the_recording(open_player: Open, session: Path
     assert "No difference after this frame" in window.panels.toast.text()
 
 
-@pytest.mark.parametrize(("text", "why"), [("{}\n", "no results in it"), ("", "no results in it"), (None, "of another session")])
+@pytest.mark.parametrize(("text", "why"), [("{}\n", "no results in it"), (None, "of another session")])
 def test_results_that_do_not_belong_here_are_refused(
     open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot, text: str | None, why: str
 ) -> None:

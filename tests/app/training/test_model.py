@@ -255,17 +255,7 @@ def test_another_model_is_used_only_after_the_question(side: WindowServices, run
     assert [one.text().split(",")[0].split(":")[0] for one in side.models._actions if one.isChecked()] == ["own_1"]
 
 
-def test_no_other_model_while_armed(side: WindowServices, running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
-    install("own_1")
-    engine.pilot.view = DriveView(0.0, mode=Mode.ARMED)
-    until(qtbot, lambda: running.controls.view is not None and running.controls.view.mode is Mode.ARMED)
-    choose(side, "own_1")
-    assert running.panels.offers.text == ""
-    assert "disarm first" in running.panels.toast.text()
-    assert running.rig.config.perception.segmentation.model == "default"
-
-
-def test_no_other_model_when_it_was_armed_after_the_question(
+def test_no_other_model_while_armed_also_when_it_was_armed_after_the_question(
     side: WindowServices, running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
 ) -> None:
     install("own_1")
@@ -273,6 +263,8 @@ def test_no_other_model_when_it_was_armed_after_the_question(
     engine.pilot.view = DriveView(0.0, mode=Mode.AUTONOMOUS)
     until(qtbot, lambda: running.controls.view is not None and running.controls.view.mode is Mode.AUTONOMOUS)
     running.panels.offers.answers["Use own_1"].click()
+    choose(side, "own_1")
+    assert "disarm first" in running.panels.toast.text()
     assert running.rig.config.perception.segmentation.model == "default"
 
 

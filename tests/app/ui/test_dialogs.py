@@ -133,11 +133,8 @@ def _not_pressed_by_enter(dialog: QDialog) -> list[str]:
     return [button.text() for button in buttons if pressed.count(button) != 1]
 
 
-def test_every_control_has_a_name(dialog: QDialog) -> None:
+def test_every_control_has_a_name_and_enter_presses_the_button_that_has_the_focus(dialog: QDialog) -> None:
     assert _names_missing(dialog) == []
-
-
-def test_enter_presses_the_button_that_has_the_focus(dialog: QDialog) -> None:
     assert _not_pressed_by_enter(dialog) == []
 
 
@@ -204,19 +201,13 @@ def test_one_button_of_a_page_is_what_comes_next(wizard: RigWizard, qtbot: QtBot
         assert [one for one in (scale.take_button, scale.solve_button, wizard.next_button) if _is_main(one)] == [main]
 
 
-def test_what_was_said_on_a_page_goes_with_it(wizard: RigWizard, qtbot: QtBot) -> None:
+def test_the_steps_tell_which_are_done_and_what_was_said_on_a_page_goes_with_it(wizard: RigWizard, qtbot: QtBot) -> None:
     wizard.camera_page.open_button.click()
     until(qtbot, lambda: not wizard.model.is_busy)
     wizard.model.message.emit("board 2: 45 of 54 corners")
     assert wizard.message
     wizard.next()
     assert wizard.message == ""
-
-
-def test_the_steps_tell_which_are_done_and_where_one_is(wizard: RigWizard, qtbot: QtBot) -> None:
-    wizard.camera_page.open_button.click()
-    until(qtbot, lambda: not wizard.model.is_busy)
-    wizard.next()
     steps = wizard.findChild(QListWidget)
     told = [steps.item(row).data(Qt.ItemDataRole.AccessibleTextRole) for row in range(3)]
     assert told == ["Camera, done", "Scale and lens, this page", "Port and servos"]
@@ -242,13 +233,9 @@ def test_servos_go_by_the_name_that_is_printed_on_them(wizard: RigWizard, qtbot:
 # ---- training
 
 
-def test_a_long_path_makes_the_dialog_no_wider(qtbot: QtBot) -> None:
-    with training(qtbot) as shown:
-        assert shown.minimumSizeHint().width() < 1000
-
-
 def test_closing_while_it_trains_is_called_what_it_is(qtbot: QtBot) -> None:
     with training(qtbot) as shown:
+        assert shown.minimumSizeHint().width() < 1000, "its path is long"
         assert shown.hide_button.text() == "&Close"
         shown._on_changed(TrainingState(TrainingPhase.RUNNING, "10 pictures to learn from"))
         assert shown.hide_button.text() == "&Hide, go on training"

@@ -85,13 +85,6 @@ def test_the_compiled_file_is_what_lrelease_makes_of_the_texts(tmp_path: Path) -
     assert made.read_bytes() == TS.with_suffix(".qm").read_bytes(), "run make translations"
 
 
-def test_writing_the_texts_again_changes_nothing(tmp_path: Path) -> None:
-    copy = tmp_path / TS.name
-    copy.write_bytes(TS.read_bytes())
-    translations_tool.write_ts(copy, translations_tool.texts_of_code(), translations_tool.read_ts(copy))
-    assert copy.read_bytes() == TS.read_bytes()
-
-
 def test_a_new_text_stands_in_the_file_as_unfinished(tmp_path: Path) -> None:
     path = tmp_path / "lumenpilot_zh_CN.ts"
     translations_tool.write_ts(path, {"Robot & <head>": "app/a.py", "Vessel": "app/b.py"}, {"Vessel": "血管", "Gone": "没有"})
@@ -168,11 +161,11 @@ def test_texts_of_the_layers_below_are_translated_where_they_are_known(chinese: 
     assert tr_text(text) == translated
 
 
-@pytest.mark.parametrize("template", sorted(i18n.templates_below()))
-def test_a_text_is_taken_by_the_template_that_made_it(template: str) -> None:
+def test_a_text_is_taken_by_the_template_that_made_it() -> None:
     """And not by a shorter one, which would leave half of it in English."""
-    text = re.sub(r"\{(\w+)\}", lambda found: "5" if len(found[1]) == 1 else "/dev/ttyUSB0", template)
-    assert next(one for one, pattern in i18n._patterns() if pattern.fullmatch(text)) == template
+    for template in i18n.templates_below():
+        text = re.sub(r"\{(\w+)\}", lambda found: "5" if len(found[1]) == 1 else "/dev/ttyUSB0", template)
+        assert next(one for one, pattern in i18n._patterns() if pattern.fullmatch(text)) == template
 
 
 @pytest.mark.parametrize(
@@ -222,19 +215,11 @@ def test_what_is_kept_is_english_whatever_the_window_speaks(chinese: None) -> No
 # ---- choosing
 
 
-@pytest.mark.parametrize("choice", ["xx", "de", ""])
-def test_a_language_without_translation_is_english(qapp: QApplication, afterwards_english: None, choice: str) -> None:
-    assert use_language(qapp, choice) == ""
-    assert language_in_use() == ENGLISH
-    assert tr("&File") == "&File"
-
-
 @pytest.mark.parametrize(
     ("names", "spoken"),
     [
         (["zh-Hans-CN", "zh-CN", "zh"], CHINESE),
         (["zh_CN"], CHINESE),
-        (["en-GB"], ENGLISH),
         (["de-DE", "zh-CN"], ENGLISH),
         ([], ENGLISH),
     ],
@@ -243,8 +228,9 @@ def test_as_the_system_says(
     qapp: QApplication, afterwards_english: None, monkeypatch: pytest.MonkeyPatch, names: list[str], spoken: str
 ) -> None:
     monkeypatch.setattr(QLocale, "uiLanguages", lambda _self, *_separator: names)
-    use_language(qapp, AUTO)
+    assert use_language(qapp, AUTO) == ""
     assert language_in_use() == spoken
+    assert tr("&File") == ("&File" if spoken == ENGLISH else "文件(&F)")
 
 
 def test_the_buttons_of_qt_speak_it_too(qtbot: QtBot, chinese: None) -> None:
@@ -253,14 +239,14 @@ def test_the_buttons_of_qt_speak_it_too(qtbot: QtBot, chinese: None) -> None:
     assert HAN.search(box.button(QDialogButtonBox.StandardButton.Cancel).text())
 
 
-@pytest.mark.parametrize("damage", ["missing", "empty", "cut", "no such thing"])
+@pytest.mark.parametrize("damage", ["missing", "cut"])
 def test_a_damaged_translation_is_english_and_one_line(
     qapp: QApplication, afterwards_english: None, tmp_path: Path, damage: str
 ) -> None:
     path = tmp_path / "lumenpilot_zh_CN.qm"
-    whole = TS.with_suffix(".qm").read_bytes()
-    if damage != "missing":
-        path.write_bytes({"empty": b"", "cut": whole[: len(whole) // 2], "no such thing": b"hello" * 100}[damage])
+    if damage == "cut":
+        whole = TS.with_suffix(".qm").read_bytes()
+        path.write_bytes(whole[: len(whole) // 2])
     line = use_language(qapp, CHINESE, tmp_path)
     assert tr("&File") == "&File"
     assert language_in_use() == ENGLISH
@@ -298,7 +284,7 @@ def _menu_texts(window: OperatorWindow) -> list[str]:
     return texts
 
 
-def test_the_window_opens_in_chinese(
+def test_the_window_opens_in_chinese_and_what_is_recorded_is_english(
     chinese: None, make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path
 ) -> None:
     config = Config.model_validate({"record": {"folder": str(tmp_path), "ring_s": 0}})
@@ -319,6 +305,15 @@ def test_the_window_opens_in_chinese(
     assert panels.pages.tabText(0) == "驾驶"
     panels.help.toggle()
     assert all(HAN.search(title) and all(HAN.search(text) for _, text in rows) for title, rows in panels.help.tables)
+    window.recorder.toggle()
+    qtbot.waitUntil(lambda: window.recorder.status.frames > 5)
+    window.choose_target(100.0, 100.0)
+    window.recorder.toggle()
+    qtbot.waitUntil(lambda: window.recorder.status.saved is not None)
+    (session,) = tmp_path.glob("session_*")
+    assert json.loads((session / "frames.jsonl").read_text(encoding="utf-8").splitlines()[0])
+    for path in session.glob("*.json*"):
+        assert not HAN.search(path.read_text(encoding="utf-8")), path.name
 
 
 def test_counts_of_the_record_bar_and_statuses_of_the_queue_are_looked_up(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -331,25 +326,6 @@ def test_counts_of_the_record_bar_and_statuses_of_the_queue_are_looked_up(qtbot:
         items = Mock(**{"status.return_value": status, "is_short.return_value": False, "content.return_value": Annotation()})
         queue = QueueModel(["a.png"], items)
         assert queue.index(0).data(Qt.ItemDataRole.ToolTipRole) == f"1: a.png: <{status.value}>"
-
-
-def test_what_is_recorded_meanwhile_is_english(
-    chinese: None, make_window: MakeWindow, bench: FakeBench, qtbot: QtBot, tmp_path: Path
-) -> None:
-    config = Config.model_validate({"record": {"folder": str(tmp_path), "ring_s": 0}})
-    window = make_window(lambda _config: FakeEngine(bench), config)
-    window.start()
-    qtbot.waitUntil(lambda: window.shown_tick is not None)
-    window.recorder.toggle()
-    qtbot.waitUntil(lambda: window.recorder.status.frames > 5)
-    window.choose_target(100.0, 100.0)
-    window.recorder.toggle()
-    qtbot.waitUntil(lambda: window.recorder.status.saved is not None)
-    (session,) = tmp_path.glob("session_*")
-    rows = (session / "frames.jsonl").read_text(encoding="utf-8")
-    assert json.loads(rows.splitlines()[0])
-    for path in session.glob("*.json*"):
-        assert not HAN.search(path.read_text(encoding="utf-8")), path.name
 
 
 def test_every_alert_is_chinese(chinese: None) -> None:

@@ -33,10 +33,8 @@ def test_three_files_are_written(tmp_path: Path) -> None:
     first = write_snapshot(tmp_path / "new" / "folder", tick, Origin("SIM", "tree", "default"), NOW)
     assert first.name == "2025-03-04_05-06-07_089.png"
     raw = cv2.imread(str(first))
-    assert raw is not None
     np.testing.assert_array_equal(raw[:, :, ::-1], tick.frame.image)
     overlay = cv2.imread(str(first.with_name("2025-03-04_05-06-07_089_overlay.png")))
-    assert overlay is not None
     assert overlay.shape[1] == 1280
     record = json.loads(first.with_suffix(".json").read_text())
     assert record["state"] == "C"
@@ -61,7 +59,6 @@ def test_writer_says_where_it_wrote(qtbot: QtBot, tmp_path: Path) -> None:
     writer = SnapshotWriter(tmp_path)
     with qtbot.waitSignal(writer.saved) as signal:
         writer.write(make_tick(), Origin("SIM"))
-    assert signal.args is not None
     assert str(tmp_path) in signal.args[0]
     assert len(list(tmp_path.iterdir())) == 3
 
@@ -76,7 +73,6 @@ def test_unwritable_folder_is_one_clear_line(qtbot: QtBot, tmp_path: Path, obsta
     writer = SnapshotWriter(folder)
     with qtbot.waitSignal(writer.failed) as signal:
         writer.write(make_tick(), Origin("SIM"))
-    assert signal.args is not None
     message = signal.args[0]
     assert message.startswith("Snapshot not saved: ")
     assert "\n" not in message
@@ -107,12 +103,3 @@ def test_a_disk_that_does_not_answer_is_not_waited_for_for_ever(
     assert not writer.finish(within_ms=20)
     gate.set()
     assert writer.finish()
-
-
-def test_finish_waits_for_the_disk(tmp_path: Path, qtbot: QtBot) -> None:
-    writer = SnapshotWriter(tmp_path)
-    for _ in range(2):
-        writer.write(make_tick(), Origin("SIM"))
-    assert writer.finish()
-    assert len([path for path in tmp_path.iterdir() if path.suffix == ".json"]) >= 1
-    assert all(path.stat().st_size > 0 for path in tmp_path.iterdir())

@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
     QComboBox,
-    QLabel,
     QLineEdit,
     QMainWindow,
     QMenu,
@@ -98,14 +97,13 @@ def _entries(window: QMainWindow) -> Iterator[QAction]:
 # ---- menus
 
 
-def test_menus_come_in_the_same_order(window: QMainWindow) -> None:
+def test_all_windows_have_the_same_menus_names_keys_and_places(window: QMainWindow) -> None:
     names = list(_menus(window))
     assert names[:2] == ["File", "View"]
     assert names[-1] == "Help"
     assert [name for name in names[2:-1] if name in SPECIFIC[window.objectName()]] == SPECIFIC[window.objectName()]
-
-
-def test_what_all_windows_have_has_the_same_name_key_and_place(window: QMainWindow) -> None:
+    assert window.menuBar().cornerWidget().isVisible()
+    assert window.menuBar().cornerWidget().text() == "F1  keys"
     menus = _menus(window)
     found = {
         name: [(plain(action.text()), [key.toString() for key in action.shortcuts()]) for action in menus[name].actions()]
@@ -118,14 +116,7 @@ def test_what_all_windows_have_has_the_same_name_key_and_place(window: QMainWind
     assert found["Help"][-1][0] == "About LumenPilot"
 
 
-def test_the_menu_bar_says_where_the_keys_are(window: QMainWindow) -> None:
-    hint = window.menuBar().cornerWidget()
-    assert isinstance(hint, QLabel)
-    assert hint.isVisible()
-    assert hint.text() == "F1  keys"
-
-
-def test_every_entry_has_a_mnemonic_of_its_own(window: QMainWindow) -> None:
+def test_every_entry_has_a_mnemonic_of_its_own_and_no_key_means_two_things(window: QMainWindow) -> None:
     bar = [mnemonic(action.text()) for action in window.menuBar().actions()]
     assert len(set(bar)) == len(bar)
     assert all(bar)
@@ -134,23 +125,17 @@ def test_every_entry_has_a_mnemonic_of_its_own(window: QMainWindow) -> None:
         assert all(letters), name
         twice = [letter for letter, count in Counter(letters).items() if count > 1]
         assert not twice, f"{name}: {twice}"
-
-
-def test_no_key_means_two_things(window: QMainWindow) -> None:
     keys = Counter(key.toString() for action in window.actions() for key in action.shortcuts())
     assert [key for key, count in keys.items() if count > 1] == []
 
 
-def test_full_screen_is_marked_while_it_lasts(window: QMainWindow, qtbot: QtBot) -> None:
+def test_full_screen_is_marked_while_it_lasts_and_left_by_escape(window: QMainWindow, qtbot: QtBot) -> None:
     action = next(action for action in _entries(window) if plain(action.text()) == "Full screen")
     action.trigger()
     assert action.isChecked()
     assert window.isFullScreen()
     window.showNormal()  # as the desktop may do
     qtbot.waitUntil(lambda: not action.isChecked())
-
-
-def test_escape_leaves_full_screen(window: QMainWindow, qtbot: QtBot) -> None:
     place = window.panels.canvas if window.objectName() == "annotator" else window.panels.live
     place.setFocus()
     qtbot.keyClick(place, Key.Key_F11)
@@ -180,6 +165,10 @@ def test_entries_that_are_added_later_stand_before_help_and_in_the_menu_of_their
     assert names[-4:] == ["", "Settings", "", "Quit"]
     add_menu(window, "&Help", [MenuEntry("Language", lambda: None)])
     assert [plain(action.text()) for action in _menus(window)["Help"].actions()][-4:] == ["", "Language", "", "About LumenPilot"]
+    inner = QMenu("Inner", window)
+    inner.addAction(QAction("Deep", window, shortcut=QKeySequence("Ctrl+Alt+D")))
+    _menus(window)["File"].addMenu(inner)
+    assert ("Ctrl+Alt+D", "Deep") in dict(menu_tables(window))["File"]
     page = window.panels.help
     page.toggle()
     assert ("Ctrl+Alt+M", "Make a rig") in dict(page.tables)["Rig"]
@@ -262,31 +251,13 @@ def _pressed(name: str) -> list[Qt.Key]:
     return [words[name]]
 
 
-@pytest.mark.parametrize(
-    ("key", "name"),
-    [
-        ("Left", "\N{LEFTWARDS ARROW}"),
-        ("Shift+Left", "Shift+\N{LEFTWARDS ARROW}"),
-        ("-", "\N{MINUS SIGN}"),
-        ("+", "+"),
-        ("PgUp", "PgUp"),
-    ],
-)
-def test_names_of_keys(key: str, name: str) -> None:
-    assert key_name(key) == name
-
-
-def test_a_key_that_only_adds_the_deadmans_shift_is_not_told_twice() -> None:
-    assert key_names(["F3", "Shift+F3"]) == "F3"
+def test_names_of_keys() -> None:
+    left = "\N{LEFTWARDS ARROW}"
+    for key, name in (("Left", left), ("Shift+Left", f"Shift+{left}"), ("-", "\N{MINUS SIGN}"), ("+", "+"), ("PgUp", "PgUp")):
+        assert key_name(key) == name
+    assert key_names(["F3", "Shift+F3"]) == "F3", "it only adds the deadman's shift"
     assert key_names(["Ctrl+Shift+Z", "Ctrl+Y"]) == "Ctrl+Shift+Z   Ctrl+Y"
     assert key_names(["Shift+F6"]) == "Shift+F6"
-
-
-def test_menus_within_menus_are_told_too(window: QMainWindow) -> None:
-    inner = QMenu("Inner", window)
-    inner.addAction(QAction("Deep", window, shortcut=QKeySequence("Ctrl+Alt+D")))
-    _menus(window)["File"].addMenu(inner)
-    assert ("Ctrl+Alt+D", "Deep") in dict(menu_tables(window))["File"]
 
 
 # ---- names for screen readers
@@ -342,21 +313,18 @@ def _unnamed(window: QMainWindow, wanted: Callable[[QWidget], bool]) -> list[str
     )
 
 
-def test_every_control_has_a_name(window: QMainWindow) -> None:
-    assert _unnamed(window, lambda widget: isinstance(widget, CONTROLS)) == []
-
-
-def test_whatever_takes_the_focus_has_a_name(window: QMainWindow) -> None:
-    assert _unnamed(window, lambda widget: bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)) == []
-
-
-def test_every_dial_that_is_painted_has_a_name(window: QMainWindow) -> None:
-    """Ours are painted, so Qt cannot read a text from them."""
+def test_every_control_dial_and_whatever_takes_the_focus_has_a_name(window: QMainWindow) -> None:
+    """Dials are painted by us, so Qt cannot read a text from them."""
 
     def is_painted(widget: QWidget) -> bool:
         return any("paintEvent" in vars(kind) for kind in type(widget).__mro__ if kind.__module__.startswith("app."))
 
-    assert _unnamed(window, is_painted) == []
+    for wanted in (
+        lambda widget: isinstance(widget, CONTROLS),
+        lambda widget: bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus),
+        is_painted,
+    ):
+        assert _unnamed(window, wanted) == []
 
 
 def test_tab_reaches_every_button_list_and_field_of_the_drive_page(make_window: MakeWindow, qtbot: QtBot) -> None:

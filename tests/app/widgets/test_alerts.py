@@ -220,10 +220,7 @@ def test_sounds_are_told_apart_by_rhythm() -> None:
 
 
 @posix_only
-@pytest.mark.parametrize(
-    ("player", "arguments"),
-    [("pw-play", []), ("paplay", []), ("aplay", ["-q"]), ("afplay", [])],
-)
+@pytest.mark.parametrize(("player", "arguments"), [("pw-play", []), ("aplay", ["-q"])])
 def test_any_installed_player_gets_the_file(
     qtbot: QtBot, install: Install, make_sounds: Callable[..., AlertSounds], player: str, arguments: list[str]
 ) -> None:

@@ -10,20 +10,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMenu
 
 from app.widgets.event_log import MOST_ROWS, EventLog, LogKind
-from app.widgets.mode_bar import HEIGHT, ModeBar
-from core.control.drive_view import DriveView
-from core.control.gate import Source
-from core.control.modes import Mode
-from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
-
-NARROWEST_AT_720 = 760
-ARMED = DriveView(0.0, Mode.ARMED, Source.OPERATOR, servos_on=True, deadman=False)
-
-
-@pytest.fixture
-def bar(own: Own, clock: Clock) -> ModeBar:
-    return own(ModeBar(clock), NARROWEST_AT_720, HEIGHT, show=True)
 
 
 class WallClock:

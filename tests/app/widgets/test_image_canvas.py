@@ -29,7 +29,6 @@ class Painted(ImageCanvas):
         painter = QPainter(pixmap)
         assert self.paint_picture(painter)
         painter.end()
-        assert self._picture is not None
         assert self._picture.width() == round(200 * self._picture.devicePixelRatio())
         return self._picture.devicePixelRatio()
 

@@ -243,15 +243,6 @@ def test_stale_overlays_go_away_the_picture_stays(view: LiveView, bench: FakeBen
     assert picture(view) == bare
 
 
-def test_items_are_made_once(view: LiveView, bench: FakeBench) -> None:
-    counts = []
-    for k in range(5):
-        image, scene = bench.scene_at(k, float(k))
-        _show(view, Frame(k, 0.0, image), scene)
-        counts.append(len(view._view.scene().items()))
-    assert len(set(counts)) == 1
-
-
 def test_click_gives_source_pixels(view: LiveView, qtbot: QtBot) -> None:
     _show(view, blank_frame(1280, 960), replace(make_scene(), source_size=(1280, 960), scale=0.5))
     at = on_screen(view, 800.0, 300.0).toPoint()

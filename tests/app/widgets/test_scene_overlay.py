@@ -45,18 +45,15 @@ def test_lines_and_points_are_mapped_alike_where_x_and_y_differ() -> None:
     path = RobotPath(np.array([[0.0, 0.0], [9.5, 9.5]]), 1.0, None, True, 0.0, 3.0)
     shapes = scene_shapes(scene(0.5, scale_xy=(0.5, 0.4), path=path))
     assert shapes.head == pytest.approx((19.5, 24.5))
-    assert shapes.robot_line is not None
     np.testing.assert_allclose(shapes.robot_line[-1], (19.5, 24.5))
 
 
 def test_arc_turns_from_the_vessel_to_the_robot_the_short_way() -> None:
     shapes = scene_shapes(scene(robot_vector=ROBOT, vessel_vector=VESSEL, pose=POSE))
-    assert shapes.angle_arc is not None
     np.testing.assert_allclose(shapes.angle_arc[0], VESSEL.direction)
     np.testing.assert_allclose(shapes.angle_arc[-1], ROBOT.direction)
     back = Vector((0.0, 0.0), (-1.0, -0.1), (-2.0, -0.2))
     turned = scene_shapes(scene(robot_vector=back, vessel_vector=VESSEL, pose=POSE)).angle_arc
-    assert turned is not None
     assert turned[:, 1].max() <= 1e-9, "just under a half turn to the left stays above the line"
 
 
@@ -70,7 +67,6 @@ def test_without_a_pose_nothing_is_measured() -> None:
 def test_long_lines_are_thinned_but_keep_their_ends() -> None:
     points = np.column_stack([np.arange(200.0), np.zeros(200)])
     shapes = scene_shapes(scene(path=RobotPath(points, 1.0, None, True, 0.0, 3.0)))
-    assert shapes.robot_line is not None
     assert 30 < len(shapes.robot_line) < 60
     np.testing.assert_allclose(shapes.robot_line[[0, -1]], points[[0, -1]])
 

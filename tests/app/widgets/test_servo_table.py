@@ -101,7 +101,6 @@ def test_before_arming_loose_and_unzeroed_joints_are_no_fault() -> None:
 
 def test_track_tells_shares_of_the_envelope() -> None:
     track = servo_rows(bus(servo(0, position_mm=0.2, goal_mm=2.8)), SERVOS, SAFETY)[0][1].track
-    assert track is not None
     assert (track.at, track.goal) == pytest.approx((0.5, 1.0))
     assert (track.low_warn, track.high_warn) == pytest.approx((0.06, 0.94), abs=0.005)
 
@@ -162,7 +161,6 @@ def test_tension_is_told_by_the_currents() -> None:
     assert silent.share is None
     loose, _ = pair_balances(bus(servo(0, position_mm=0.0), servo(1, position_mm=0.0), phase=BusPhase.DISARMED), SERVOS)
     assert (loose.share, loose.word) == (pytest.approx(-1.0), ""), "slack wires are no warning before arming"
-    assert first.forces_n is not None
     assert first.forces_n[0] == pytest.approx(28.0, abs=0.05)
     assert second.forces_n is None
 
@@ -188,20 +186,6 @@ def table(own: Own, clock: Clock) -> Iterator[ServoTable]:
     yield widget
     for menu in widget.findChildren(QMenu):
         menu.close()
-
-
-def changed_cells(table: ServoTable) -> list[tuple[int, int]]:
-    seen: list[tuple[int, int]] = []
-    table.table.model().dataChanged.connect(lambda first, last: seen.append((first.row(), first.column())))
-    return seen
-
-
-def test_only_cells_that_changed_are_renewed(table: ServoTable, clock: Clock) -> None:
-    table.show_status(bus(), SERVOS)
-    seen = changed_cells(table)
-    clock.now_s += 0.25
-    table.show_status(bus(servo(3, temperature_c=32.0), time_s=clock.now_s, cycle=2), SERVOS)
-    assert set(seen) == {(3, list(Column).index(Column.TEMPERATURE))}
 
 
 def test_five_times_a_second_at_most_but_a_new_phase_at_once(table: ServoTable, clock: Clock) -> None:
@@ -254,7 +238,6 @@ def test_zeroing_is_asked_back_and_then_told(table: ServoTable, qtbot: QtBot) ->
     for opened in (lambda: button(table, "Zero").click(), lambda: choose(table.menu_for(SERVOS.joints[5]), "Zero…")):
         opened()
         dialog = table.zeros
-        assert dialog is not None
         assert not dialog.isModal(), "STOP stays within reach"
         box, number = dialog.feed("delivery_1")
         box.setChecked(True)
@@ -264,34 +247,22 @@ def test_zeroing_is_asked_back_and_then_told(table: ServoTable, qtbot: QtBot) ->
         assert table.zeros is None
     assert asked == []
     table.open_zeros()
-    assert table.zeros is not None
     table.zeros.feed("delivery_1")[1].setValue(12.5)
     table.zeros.feed("delivery_1")[0].setChecked(True)
     table.zeros.set_button.click()
     assert asked == [ZeroRequest(positions_mm={"delivery_1": 12.5})]
 
 
-@pytest.mark.parametrize(
-    ("changes", "lacks"),
-    [
+def test_a_joint_that_is_not_zeroed_is_noticed_when_all_servos_answer(table: ServoTable) -> None:
+    one_lacks = (False,) + (True,) * 6
+    for changes, lacks in (
         ({"phase": BusPhase.DISARMED}, False),
-        ({"phase": BusPhase.DISARMED, "zeroed": (False,) + (True,) * 6}, True),
-        ({"zeroed": (False,) + (True,) * 6}, False),
+        ({"phase": BusPhase.DISARMED, "zeroed": one_lacks}, True),
+        ({"zeroed": one_lacks}, False),
         ({"phase": BusPhase.DISARMED, "zeroed": (False,) * 7, "servos": ()}, False),
-    ],
-)
-def test_a_joint_that_is_not_zeroed_is_noticed_when_all_servos_answer(
-    table: ServoTable, changes: dict[str, object], lacks: bool
-) -> None:
-    table.show_status(bus(**changes), SERVOS)
-    assert table.lacks_zeros is lacks
-
-
-def test_arming_closes_the_dialog_of_the_zeros(table: ServoTable) -> None:
-    table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
-    table.open_zeros()
-    table.show_status(bus(), SERVOS)
-    assert table.zeros is None
+    ):
+        table.show_status(bus(**changes), SERVOS)
+        assert table.lacks_zeros is lacks
 
 
 def test_restart_and_torque_off_are_asked_back(table: ServoTable, qtbot: QtBot) -> None:
@@ -321,12 +292,14 @@ def test_while_armed_only_the_torque_can_be_let_go(table: ServoTable) -> None:
     assert not button(table, "Torque off").isEnabled()
 
 
-def test_arming_takes_an_open_question_back(table: ServoTable) -> None:
+def test_arming_takes_an_open_question_back_and_closes_the_dialog_of_the_zeros(table: ServoTable) -> None:
     table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
+    table.open_zeros()
     button(table, "Torque off").click()
     assert table.question.text
     table.show_status(bus(), SERVOS)
     assert table.question.text == ""
+    assert table.zeros is None
 
 
 def test_right_click_offers_the_row_under_it_and_tab_reaches_the_buttons_only(table: ServoTable) -> None:
