@@ -235,13 +235,8 @@ class AnnotationLoupe:
         painter.setPen(QPen(QColor(ON_PICTURE.TEXT), 2))
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawRoundedRect(frame, theme.RADIUS, theme.RADIUS)
-        draw_text(
-            painter,
-            QRectF(frame.left() + 8, frame.bottom() - 22, 60, 18),
-            f"{zoom:.0f}\N{MULTIPLICATION SIGN}",
-            theme.semi_bold(12),
-            ON_PICTURE.TEXT,
-        )
+        place = QRectF(frame.left() + 8, frame.bottom() - 22, 60, 18)
+        draw_text(painter, place, f"{zoom:.0f}\N{MULTIPLICATION SIGN}", theme.semi_bold(12), ON_PICTURE.TEXT)
 
     def _place(self, side: int, room: tuple[int, int], keep_clear: list[Point]) -> QRectF:
         frames = [QRectF(x, y, side, side) for y in (10, room[1] - side - 10) for x in (room[0] - side - 10, 10)]

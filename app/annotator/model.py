@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -466,20 +466,24 @@ class AnnotationModel(QObject):
 
     def _on_followed(self, _key: object, found: tuple[list[tuple[int, Line, Line]], dict[int, History]]) -> None:
         lines, histories = found
+        edits = (
+            (place, FOLLOWS_LINES, replace(self.content(place), robot=robot, vessel=vessel))
+            for place, robot, vessel in lines
+            if not (self._is_own(place) or self.content(place).without_pose)  # drawn or answered meanwhile
+        )
+        self.followed.emit(self._edit_many(edits, histories))
+
+    def _edit_many(self, edits: Iterable[tuple[int, str, Annotation]], histories: dict[int, History]) -> int:
+        """Place, action and content of each, one after the other; how many items were changed."""
         changed = set()
-        for place, robot, vessel in lines:
-            old = self.content(place)
-            if self._is_own(place) or old.without_pose:  # drawn or answered meanwhile
-                continue
+        for place, action, content in edits:
             history = self._histories.get(place) or self._histories.setdefault(place, histories[place])
-            content = replace(old, robot=robot, vessel=vessel)
-            entry = history.edit(FOLLOWS_LINES, content)
-            if entry is not None:
+            if (entry := history.edit(action, content)) is not None:
                 self._write(place, entry, content)
                 changed.add(place)
         if self.index in changed:
             self.changed.emit()
-        self.followed.emit(len(changed))
+        return len(changed)
 
     def _on_not_followed(self, _key: object, line: str) -> None:
         self.followed.emit(0)
@@ -503,17 +507,8 @@ class AnnotationModel(QObject):
 
     def _on_read(self, _paths: object, read: tuple[list[tuple[int, Imported]], list[str], dict[int, History]]) -> None:
         placed, problems, histories = read
-        changed = set()
-        for place, one in placed:
-            history = self._histories.get(place) or self._histories.setdefault(place, histories[place])
-            content = merged(self.content(place), one.content)
-            entry = history.edit(f"import {one.source.name}", content)
-            if entry is not None:
-                self._write(place, entry, content)
-                changed.add(place)
-        if self.index in changed:
-            self.changed.emit()
-        self.imported.emit(len(changed), problems)
+        edits = ((place, f"import {one.source.name}", merged(self.content(place), one.content)) for place, one in placed)
+        self.imported.emit(self._edit_many(edits, histories), problems)
 
     # ---- the end
 

@@ -99,7 +99,7 @@ class AnnotationBar(QWidget):
         group = QButtonGroup(self)
         for tool in tools:
             key, label = tool.value.key, tr(tool.value.label)
-            chip = _Chip(key, label, tool.value.role, tr("{meaning}  (key {key})", meaning=label, key=key))
+            chip = _Chip(key, label, tool.value.role, label)
             chip.clicked.connect(lambda _on=False, which=tool: self.tool_chosen.emit(which))
             group.addButton(chip)
             row.addWidget(chip)
@@ -109,7 +109,7 @@ class AnnotationBar(QWidget):
         for key, label, colour, meaning in _SWITCHES:
             if key == "H" and not self._has_algorithm:
                 continue
-            chip = _Chip(key, tr(label), colour, tr("{meaning}  (key {key})", meaning=tr(meaning), key=key))
+            chip = _Chip(key, tr(label), colour, tr(meaning))
             chip.setChecked(key in "LK")
             for signal in (self.switched, self.shown):
                 chip.toggled.connect(lambda on, which=key, signal=signal: signal.emit(which, on))
@@ -118,9 +118,9 @@ class AnnotationBar(QWidget):
         answers = line(spacing=5)
         self._answers: dict[Answer, _Chip] = {}
         for answer in Answer if any(not tool.is_mask for tool in tools) else ():
-            key, label = answer.value.key, tr(answer.value.label)
+            key = answer.value.key
             role = f"STATE_{key}" if answer.value.state is not None else "TEXT"
-            chip = _Chip(key, label, role, tr("{meaning}  (key {key})", meaning=tr(answer.value.meaning), key=key))
+            chip = _Chip(key, tr(answer.value.label), role, tr(answer.value.meaning))
             chip.clicked.connect(lambda _on=False, which=answer: self.answered.emit(which))
             answers.addWidget(chip)
             self._answers[answer] = chip
@@ -130,8 +130,7 @@ class AnnotationBar(QWidget):
         for mode in MaskMode:
             if mode is MaskMode.POINTS:
                 continue
-            key, label = mode.value.key, tr(mode.value.label)
-            chip = _Chip(key, label, "ORANGE", tr("{meaning}  (key {key})", meaning=tr(mode.value.meaning), key=key))
+            chip = _Chip(mode.value.key, tr(mode.value.label), "ORANGE", tr(mode.value.meaning))
             chip.clicked.connect(lambda on, which=mode: self.mode_chosen.emit(which if on else MaskMode.POINTS))
             modes.addWidget(chip)
             self._modes[mode] = chip
@@ -202,7 +201,7 @@ _HINT_HEIGHT = 34
 class _Chip(Painted, QAbstractButton):
     """Key cap, colour and name; filled when on, outlined when off."""
 
-    def __init__(self, key: str, label: str, role: str, tip: str) -> None:
+    def __init__(self, key: str, label: str, role: str, meaning: str) -> None:
         super().__init__()
         self._key, self.role = key, role
         self._is_next = False
@@ -211,7 +210,7 @@ class _Chip(Painted, QAbstractButton):
         self.setFixedHeight(30)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setToolTip(tip)
+        self.setToolTip(tr("{meaning}  (key {key})", meaning=meaning, key=key))
         self.setAccessibleName(label)
 
     def show_enter(self, on: bool) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QInputDialog, QMainWindow, QMessageBox, QWidget
 
 from app.annotator.canvas import CANVAS_KEYS, AnnotationCanvas
@@ -27,7 +28,7 @@ from app.widgets.basics import Card, Columns, column, holder, set_window_margins
 from app.widgets.image_canvas import LightSliders
 from app.widgets.messages import Offer, OfferButton, OfferStrip, Toast
 from app.widgets.shortcut_page import KeyPage
-from core.annotation.model import TAKES_LINES, Annotation, Readout
+from core.annotation.model import TAKES_LINES, Annotation, MaskTarget, Readout
 
 _ZOOM_STEP = 1.3
 
@@ -71,9 +72,28 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
     )
     switches = dict(zip("LKH", view[-4:-1], strict=True))
     bar.shown.connect(lambda key, on: switches[key].setChecked(on))
-    answers = [
-        MenuEntry(tr("Answer: {answer}", answer=tr(one.value.label)), partial(window.give, one), (one.value.key,)) for one in Answer
-    ]
+    drawing = _add_drawing_menus(window)
+    go = add_menu(
+        window,
+        tr("&Go"),
+        [
+            MenuEntry(tr("&Next"), partial(window.step, 1), ("N", "PgDown")),
+            MenuEntry(tr("&Previous"), partial(window.step, -1), ("P", "PgUp")),
+            MenuEntry(tr("Next &without an answer"), window.go_open, ("U",)),
+            MenuEntry(tr("&First"), partial(window.open, 0), ("Home",)),
+            MenuEntry(tr("&Last"), partial(window.open, len(window.model.items) - 1), ("End",)),
+            MenuEntry(tr("Lis&t of images"), panels.queue.focus_list, ("F6",)),
+        ],
+    )
+    for action in (*drawing, *go[:2], *view[:2], *view[4:8]):
+        action.setAutoRepeat(True)
+    add_help_menu(window, panels.help.toggle)
+
+
+def _add_drawing_menus(window: AnnotatorWindow) -> Sequence[QAction]:
+    """What edits the annotation, and its tools; returns the steps among them."""
+    canvas = window.panels.canvas
+    answers = [MenuEntry(tr("Answer: {answer}", answer=tr(a.value.label)), partial(window.give, a), (a.value.key,)) for a in Answer]
     edits = add_menu(
         window,
         tr("&Edit"),
@@ -90,8 +110,6 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("&Fewer points on outlines"), window.simplify, ("S",)),
         ],
     )
-    for action in edits[:2]:
-        action.setAutoRepeat(True)
     tools = [MenuEntry(tr(t.value.label), partial(window.set_tool, t), (t.value.key,)) for t in Tool]
     drawing = add_menu(
         window,
@@ -104,21 +122,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("Circle larger"), partial(canvas.resize_circle, RADIUS_NOTCH), ("]",)),
         ],
     )
-    go = add_menu(
-        window,
-        tr("&Go"),
-        [
-            MenuEntry(tr("&Next"), partial(window.step, 1), ("N", "PgDown")),
-            MenuEntry(tr("&Previous"), partial(window.step, -1), ("P", "PgUp")),
-            MenuEntry(tr("Next &without an answer"), window.go_open, ("U",)),
-            MenuEntry(tr("&First"), partial(window.open, 0), ("Home",)),
-            MenuEntry(tr("&Last"), partial(window.open, len(window.model.items) - 1), ("End",)),
-            MenuEntry(tr("Lis&t of images"), panels.queue.focus_list, ("F6",)),
-        ],
-    )
-    for action in (*go[:2], *view[:2], *view[4:8], *drawing[-2:]):
-        action.setAutoRepeat(True)
-    add_help_menu(window, panels.help.toggle)
+    return (*edits[:2], *drawing[-2:])
 
 
 _MOUSE = (
@@ -578,14 +582,18 @@ class AnnotatorWindow(WindowFrame):
     def _apply_carried(self, proposal: Annotation) -> None:
         """The masks of the mask tool, or with a line tool both."""
         target = self.panels.canvas.tool.value.target
-        taken = tuple(mask for mask in proposal.masks if target is None or mask.target is target)
-        targets = {mask.target for mask in taken}
-        if taken:
-            kept = tuple(mask for mask in self.model.annotation.masks if mask.target not in targets)
-            self.model.edit("take the proposed masks", replace(self.model.annotation, masks=(*kept, *taken)))
-        else:
+        if not self._take_masks("take the proposed masks", proposal, MaskTarget if target is None else (target,)):
             self.show_message(tr("Nothing of it was found in this image"))
         self._hide_proposal()
+
+    def _take_masks(self, action: str, proposal: Annotation, targets: Iterable[MaskTarget]) -> bool:
+        """Put the proposal's masks of these targets in the place of the rater's; False where it has none."""
+        taken = tuple(mask for mask in proposal.masks if mask.target in tuple(targets))
+        if taken:
+            replaced = {mask.target for mask in taken}
+            kept = tuple(mask for mask in self.model.annotation.masks if mask.target not in replaced)
+            self.model.edit(action, replace(self.model.annotation, masks=(*kept, *taken)))
+        return bool(taken)
 
     def apply_proposal(self) -> None:
         """Take over the lines with a line tool, the tool's masks with a mask tool; undo brings the rater's own back."""
@@ -600,11 +608,7 @@ class AnnotatorWindow(WindowFrame):
             return
         proposed, annotation, target = self.model.proposed_annotation, self.model.annotation, self.panels.canvas.tool.value.target
         if target is not None:
-            kept = tuple(mask for mask in annotation.masks if mask.target is not target)
-            taken = tuple(mask for mask in proposed.masks if mask.target is target)
-            if taken:
-                self.model.edit(f"take the algorithm's {target.value} mask", replace(annotation, masks=(*kept, *taken)))
-            else:
+            if not self._take_masks(f"take the algorithm's {target.value} mask", proposed, (target,)):
                 self.show_message(tr("The algorithm found no {what}", what=tr_text(target.value)))
         elif proposed.robot or proposed.vessel:
             self.panels.canvas.close_line()

@@ -84,25 +84,22 @@ def evaluate(
             check_no_input(out / name, [csv], "--out")
         found = _Study(read_measurements(csv), {"kind": "table of measures", "name": name_as_text(csv.name)}, [])
         _make_out(out)
-    else:
-        assert labelled is not None
-        annotations = _annotation_file(labelled, study)
-        if annotations is not None and like_paper:
+    elif labelled is not None and (annotations := _annotation_file(labelled, study)) is not None:
+        if like_paper:
             raise EvaluationError("--like-paper needs a labelled set with its truth, not annotations by hand")
-        if annotations is None and study is not None:
-            raise EvaluationError(
-                f"{labelled}: has no annotation file; begin the study with: {COMMAND} annotate {labelled} --study {study}"
-            )
-        truth = _read_set(labelled) if annotations is None else []
         _make_out(out)
         settings = load_config(config, preset, choose_model(model))
-        if annotations is not None:
-            recorded = _recorded(annotations.parent, settings, model) if config is None and preset is None else None
-            settings, notes = recorded or (settings, [])
-            found = _perceive_annotated(annotations, settings, study, seed, notes)
-        else:
-            manual_sd_deg = 1.5 if manual_sd is None else manual_sd
-            found = _perceive_set(labelled, truth, settings, manual_sd_deg if like_paper else None, seed)
+        recorded = _recorded(annotations.parent, settings, model) if config is None and preset is None else None
+        found = _perceive_annotated(annotations, *(recorded or (settings, [])), study, seed)
+        found.source["preset"] = preset
+    elif labelled is not None:
+        if study is not None:
+            begin = f"{COMMAND} annotate {labelled} --study {study}"
+            raise EvaluationError(f"{labelled}: has no annotation file; begin the study with: {begin}")
+        truth = _read_set(labelled)
+        _make_out(out)
+        manual_sd_deg = (1.5 if manual_sd is None else manual_sd) if like_paper else None
+        found = _perceive_set(labelled, truth, load_config(config, preset, choose_model(model)), manual_sd_deg, seed)
         found.source["preset"] = preset
     metrics: dict[str, Any] = {"source": found.source, "seed": seed, "program": program_id()}
     metrics |= evaluation.evaluate(found.rows, seed)
@@ -115,6 +112,13 @@ def evaluate(
         metrics["agreement"] = {key: value for key, value in found.agreement.items() if key != "measures"}
     if like_paper:
         metrics["against_paper"] = against_paper(metrics)
+    _report(out, found, metrics, as_json)
+    if found.interrupted:
+        raise KeyboardInterrupt
+
+
+def _report(out: Path, found: _Study, metrics: dict[str, Any], as_json: bool) -> None:
+    """Write the files and print the results; raises EvaluationError."""
     try:
         _write(out, found.rows, metrics)
         if found.agreement is not None:
@@ -130,8 +134,6 @@ def evaluate(
         if found.agreement is not None:
             print_agreement(found.agreement, within=False)  # stands among the angles
         sys.stderr.write(f"report and figures are in {out}\n")
-    if found.interrupted:
-        raise KeyboardInterrupt
 
 
 def _insert_repeatability(metrics: dict[str, Any], within: dict[str, Any]) -> None:
@@ -195,7 +197,7 @@ def _annotation_file(given: Path, study: str | None) -> Path | None:
     return own if own.is_file() and (study is not None or not (given / "truth.jsonl").is_file()) else None
 
 
-def _perceive_annotated(annotations: Path, config: Config, study: str | None, seed: int, notes: list[str]) -> _Study:
+def _perceive_annotated(annotations: Path, config: Config, notes: list[str], study: str | None, seed: int) -> _Study:
     """Images that were annotated by hand, against the algorithm."""
     from app.annotator.comparison import comparable_answers, compare_with_algorithm, rater_agreement
     from app.annotator.sources import read_annotated

@@ -69,8 +69,7 @@ def train(
     out: Annotated[Path, typer.Option(help="folder of the new model")],
     data: Annotated[list[Path] | None, typer.Option(help="labelled folder as synth writes it; may be repeated")] = None,
     scenes: Annotated[
-        list[Path] | None,
-        typer.Option(help="folder of synth --scenes, from which crops of benches are painted; may be repeated"),
+        list[Path] | None, typer.Option(help="folder of synth --scenes, from which crops of benches are painted; may be repeated")
     ] = None,
     scene_share: Annotated[
         float, typer.Option(min=0, max=1, help="share of the crops painted from --scenes where there is --data, too")
@@ -82,8 +81,7 @@ def train(
     ] = 0,
     shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
     without: Annotated[
-        list[str] | None,
-        typer.Option(help="leave out frames of this family of looks, to be tested on; may be repeated"),
+        list[str] | None, typer.Option(help="leave out frames of this family of looks, to be tested on; may be repeated")
     ] = None,
     second_look: Annotated[
         bool, typer.Option("--second-look", help="train the network of the --init model's second look, near the robot's ends")
@@ -144,8 +142,7 @@ def train(
     if progress_json:
         report_progress()
     frames = synthetic or remember
-    without, scenes = without or [], scenes or []
-    run_train(TrainOptions(out, data or (), frames, without, held_out, init, base, shallow, second_look, scenes), plan)
+    run_train(TrainOptions(out, data or (), frames, without or (), held_out, init, base, shallow, second_look, scenes or ()), plan)
 
 
 def run_train(options: TrainOptions, plan: TrainingPlan) -> None:

@@ -21,8 +21,6 @@ from hardware.rig import RigKind, rig_config, start_ahead
 from hardware.twin.phantom import PHANTOM_TITLES
 
 if TYPE_CHECKING:
-    from PySide6.QtCore import QTimer
-
     from app.operator.rig_engine import EngineMaker
     from app.operator.window import OperatorWindow
     from core.session.live_output import LiveOutput, OutputKind
@@ -108,27 +106,19 @@ def run_window(
         performance = Switch(lambda: panels.shows_performance, toggling(panels.toggle_performance))
         switches = {**overlay_switches(panels.overlay_bar), "performance": performance}
         LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
-    rigs = RigMenuController(window)
-    live = LiveMenuController(window, outputs)
-
+    rigs, live, triggers = RigMenuController(window), LiveMenuController(window, outputs), TriggerServer(window)
     devices = OperatorDevices(config, lambda: window.rig.pilot, window.rig.stop, window)
     devices.said.connect(window.say)
-    triggers = TriggerServer(window)
     add_menu(window, tr("&Session"), [MenuEntry(tr("&Triggers from other programs..."), triggers.describe)])
-    application.aboutToQuit.connect(settings.close)
-    application.aboutToQuit.connect(rigs.close)
-    application.aboutToQuit.connect(live.close)
-    application.aboutToQuit.connect(devices.close)
-    application.aboutToQuit.connect(triggers.close)
-    application.aboutToQuit.connect(services.close)
-    timers: list[QTimer] = []
+    for close in (settings.close, rigs.close, live.close, devices.close, triggers.close, services.close):
+        application.aboutToQuit.connect(close)
 
     def begin() -> None:
         devices.start()
         services.start()
         settings.start()
         if until_first_frame:
-            timers.append(_leave_after_first_frame(window))
+            _leave_after_first_frame(window)
         else:
             triggers.listen()
             tour_at_start(window, asked=tour)
@@ -141,7 +131,7 @@ def run_window(
     return code
 
 
-def _leave_after_first_frame(window: OperatorWindow) -> QTimer:
+def _leave_after_first_frame(window: OperatorWindow) -> None:
     """For ``benchmark``: say when the first understood frame was on screen, and close."""
     from PySide6.QtCore import QTimer
 
@@ -161,4 +151,3 @@ def _leave_after_first_frame(window: OperatorWindow) -> QTimer:
 
     timer.timeout.connect(look)
     timer.start(5)
-    return timer

@@ -79,33 +79,24 @@ class NextStep:
         return "\n".join(f"{sentence(spec.text)} {sentence(spec.what_to_do)}" for spec in specs)
 
 
-NO_ROBOT = NextStep(OperatorStep.SERVOS_ON, False, mark("This rig has no robot"), mark("pictures and advice only"))
-NOT_YET = NextStep(OperatorStep.SERVOS_ON, False, mark("Waiting for the rig"), "")
-CLOSED = NextStep(OperatorStep.SERVOS_ON, False, mark("No rig is open"), mark("F5 opens it again"))
-
-
 class Undriven(Enum):
-    """Why there is no view of driving: what the badge says, and the step."""
+    """Why there is no view of driving: what the badge says, and what and what else the line beside the main button says."""
 
-    NO_ROBOT = (mark("pictures only"), NO_ROBOT)
-    NOT_YET = (mark("waiting for the rig"), NOT_YET)
+    NO_ROBOT = (mark("pictures only"), mark("This rig has no robot"), mark("pictures and advice only"))
+    NOT_YET = (mark("waiting for the rig"), mark("Waiting for the rig"), "")
     """It is being opened: whether there is something to drive is not known yet."""
-    CLOSED = (mark("no rig is open"), CLOSED)
+    CLOSED = (mark("no rig is open"), mark("No rig is open"), mark("F5 opens it again"))
     """It stopped, and is opened again by the operator only."""
 
     @property
-    def who(self) -> str:
-        return self.value[0]
-
-    @property
     def step(self) -> NextStep:
-        return self.value[1]
+        return NextStep(OperatorStep.SERVOS_ON, False, *self.value[1:])
 
 
 def who_drives(view: DriveView | None, why_not: Undriven = Undriven.NO_ROBOT) -> str:
     """In few words, for the badge; `why_not` says it where there is no view."""
     if view is None:
-        return tr(why_not.who)
+        return tr(why_not.value[0])
     if view.mode is Mode.HOLD:
         return tr("interrupted")
     if view.mode is Mode.STOPPED:
@@ -140,12 +131,8 @@ def next_step(view: DriveView) -> NextStep:
         return _hand_over(view)
     if view.against_arming:
         return _refused(OperatorStep.ARM, view.against_arming, view)
-    return NextStep(
-        OperatorStep.ARM,
-        True,
-        tr("You steer"),
-        tr("press {key} to arm; then you can hand over to the program", key=OperatorStep.ARM.value.key),
-    )
+    rest = tr("press {key} to arm; then you can hand over to the program", key=OperatorStep.ARM.value.key)
+    return NextStep(OperatorStep.ARM, True, tr("You steer"), rest)
 
 
 def sentence(text: str) -> str:
@@ -162,12 +149,8 @@ def _refused(step: OperatorStep, reasons: tuple[AlertKey, ...], view: DriveView,
 
 def _acknowledge(view: DriveView) -> NextStep:
     if view.latched is None:
-        return NextStep(
-            OperatorStep.ACKNOWLEDGE,
-            True,
-            tr("Stopped"),
-            tr("press {key}, then switch the servos on", key=OperatorStep.ACKNOWLEDGE.value.key),
-        )
+        rest = tr("press {key}, then switch the servos on", key=OperatorStep.ACKNOWLEDGE.value.key)
+        return NextStep(OperatorStep.ACKNOWLEDGE, True, tr("Stopped"), rest)
     cause = view.latched.cause
     # a fault of servos in use that is still there latches again at once
     remains = view.servos_on and cause.area is Area.SERVOS and any(fault.cause is cause for fault in view.active)
@@ -179,11 +162,10 @@ def _hand_over(view: DriveView) -> NextStep:
     if view.against_hand_over:
         return _refused(OperatorStep.HAND_OVER, view.against_hand_over, view, OperatorStep.DISARM)
     key = OperatorStep.HAND_OVER.value.key
-    held, loose = (
-        tr("press {key}: the program drives while you hold", key=key),
-        tr("hold {deadman}, then press {key} to hand over", deadman=_deadman_of(view), key=key),
-    )
-    return NextStep(OperatorStep.HAND_OVER, True, tr("Ready"), held if view.deadman else loose, other=OperatorStep.DISARM)
+    rest = tr("hold {deadman}, then press {key} to hand over", deadman=_deadman_of(view), key=key)
+    if view.deadman:
+        rest = tr("press {key}: the program drives while you hold", key=key)
+    return NextStep(OperatorStep.HAND_OVER, True, tr("Ready"), rest, other=OperatorStep.DISARM)
 
 
 def _interrupted(view: DriveView) -> NextStep:
@@ -314,11 +296,8 @@ def why_line(pose: Pose, limits: PoseConfig) -> str:
     d_head, d_tail = _pixels("d_head", head, digits), _pixels("d_tail", tail, digits)
     compared = f"{d_head} {'<' if head < tail else '>' if head > tail else '='} {d_tail}"
     if pose.state is PoseState.A:
-        allowed_px, allowed_deg = (
-            tr("allowed {limit:g}", limit=limits.d_allow_px),
-            tr("allowed {limit:g}°", limit=limits.theta_allow_deg),
-        )
-        line = f"{d_head}, {d_tail} ({allowed_px}), {angle} ({allowed_deg})"
+        allowed_px = tr("allowed {limit:g}", limit=limits.d_allow_px)
+        line = f"{d_head}, {d_tail} ({allowed_px}), {angle} ({tr('allowed {limit:g}°', limit=limits.theta_allow_deg)})"
     elif pose.state is PoseState.D:
         line = tr(
             "head {head:.0f} px {side}, tail {tail:.0f} px {other_side} of the centerline, {angle}",
@@ -392,8 +371,7 @@ QUANTITY = {
         "degrees",
         mark(
             "Angle between the line through the robot's last 40 px and the line through 40 px of the vessel's centerline beside "
-            "the "
-            "head. Positive: the robot points to the right of the vessel's direction, as seen on screen."
+            "the head. Positive: the robot points to the right of the vessel's direction, as seen on screen."
         ),
     ),
     "d_head": Quantity(
@@ -460,8 +438,7 @@ QUANTITY = {
         mark("mm/s and degrees"),
         mark(
             "How fast to advance or retract, and how far to turn the head (right and left as seen on screen). Unless you hand "
-            "over, "
-            "you steer, and nothing is sent to the robot but what you ask for."
+            "over, you steer, and nothing is sent to the robot but what you ask for."
         ),
     ),
     "commands": Quantity(
@@ -469,9 +446,8 @@ QUANTITY = {
         "",
         mark(
             "Four things kept apart: advised, asked by you, commanded by the program, and sent after the gate. Bend and pitch: "
-            "share "
-            "of the tendons' full pull; advised: the turn in degrees. \N{NOT EQUAL TO}: the gate sent something else than was "
-            "asked."
+            "share of the tendons' full pull; advised: the turn in degrees. \N{NOT EQUAL TO}: the gate sent something else than "
+            "was asked."
         ),
     ),
     "capture_to_servo": Quantity(
@@ -511,8 +487,7 @@ QUANTITY = {
         mark("mm and N"),
         mark(
             "Two wires that pull against each other: the sum of their pulls should be twice the pretension. Bar to the left: "
-            "slack. "
-            "Bar to the right: too tight. In N: tension of either wire as the motor's current tells it, friction included."
+            "slack. Bar to the right: too tight. In N: tension of either wire as the motor's current tells it, friction included."
         ),
     ),
     # ---- pace
@@ -541,8 +516,7 @@ QUANTITY = {
         "s",
         mark(
             "The whole session: states as a band, theta, gaps, and marks of alerts, steps, destinations and notes. Click or drag "
-            "goes "
-            "there, the wheel zooms, Shift and drag selects."
+            "goes there, the wheel zooms, Shift and drag selects."
         ),
     ),
     "values": Quantity(
@@ -621,25 +595,12 @@ def calibration_lines(rig: RigFile) -> list[str]:
     if known is None:
         return [tr("not calibrated")]
     lines = []
-    if known.lens is not None:
-        lines.append(
-            tr(
-                "lens: k1 {k1:+.4f}, k2 {k2:+.4f}, {left:.2f} px left over",
-                k1=known.lens.k1,
-                k2=known.lens.k2,
-                left=known.lens.residual_px,
-            )
-        )
-    if known.scale is not None:
-        scale = known.scale
-        share = 100 * scale.uncertainty_share
-        text = tr(
-            "scale: {scale:.4f} mm/px in the middle, \N{PLUS-MINUS SIGN}{share:.2f} % (by {method})",
-            scale=scale.mm_per_px,
-            share=share,
-            method=tr_text(scale.method),
-        )
-        lines.append(text)
+    if (lens := known.lens) is not None:
+        lines.append(tr("lens: k1 {k1:+.4f}, k2 {k2:+.4f}, {left:.2f} px left over", k1=lens.k1, k2=lens.k2, left=lens.residual_px))
+    if (scale := known.scale) is not None:
+        text = mark("scale: {scale:.4f} mm/px in the middle, \N{PLUS-MINUS SIGN}{share:.2f} % (by {method})")
+        share, method = 100 * scale.uncertainty_share, tr_text(scale.method)
+        lines.append(tr(text, scale=scale.mm_per_px, share=share, method=method))
     servos = ", ".join(f"{tr_text(joint.name)} {'+' if joint.sign > 0 else '-'}{joint.id}" for joint in rig.servos.joints)
     lines.append(tr("servos (direction and id): {servos}", servos=servos))
     in_mm = [joint for joint in rig.servos.joints if joint.unit == "mm"]
@@ -668,24 +629,14 @@ def calibration_lines(rig: RigFile) -> list[str]:
             f"{tr_text(tendon.name)} {tr('out of the picture') if tendon.direction_deg is None else f'{tendon.direction_deg:.0f}°'}"
             for tendon in known.steering.tendons
         )
-        lines.append(
-            tr(
-                "steering, 0° to the right and 90° down in the picture: {ways}; roll {roll:+.0f}°",
-                ways=ways,
-                roll=known.steering.roll_deg,
-            )
-        )
+        roll = known.steering.roll_deg
+        lines.append(tr("steering, 0° to the right and 90° down in the picture: {ways}; roll {roll:+.0f}°", ways=ways, roll=roll))
         if known.steering.turn_deg_per_mm is not None:
             lines.append(tr("turn of the head: {turn:.0f}° per mm of pull", turn=known.steering.turn_deg_per_mm))
     if known.zero is not None:
         slack = ", ".join(f"{value:+.2f}" for value in known.zero.slack_mm)
-        lines.append(
-            tr(
-                "zero: wires were slack by {slack} mm; pretension {pretension:g} mm",
-                slack=slack,
-                pretension=known.zero.pretension_mm,
-            )
-        )
+        tight = known.zero.pretension_mm
+        lines.append(tr("zero: wires were slack by {slack} mm; pretension {pretension:g} mm", slack=slack, pretension=tight))
     return lines
 
 

@@ -25,7 +25,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QSizePolicy
 
 from app.ui import theme
 from app.ui.i18n import mark, tr
-from app.ui.texts import DEADMAN_KEY, NOT_YET, STOP_KEY, NextStep, OperatorStep, Undriven, next_step, sentence, tip, who_drives
+from app.ui.texts import DEADMAN_KEY, STOP_KEY, NextStep, OperatorStep, Undriven, next_step, sentence, tip, who_drives
 from app.widgets.basics import holder, line
 from app.widgets.painting import (
     CENTER,
@@ -390,7 +390,7 @@ class ModeBar(PaintedWidget):
         super().__init__(tr("Who drives"), hint=(_NARROW, HEIGHT), height=HEIGHT)
         self.setMinimumWidth(_NARROW)
         self._mode: Mode | None = None
-        self._shown = NOT_YET
+        self._shown = Undriven.NOT_YET.step
         self._shown_s = 0.0
         self._checks: tuple[str, str] | None = None
         self.main = StepButton(filled=True, clock=clock)
@@ -405,7 +405,7 @@ class ModeBar(PaintedWidget):
         self.stop.asked.connect(self.stop_asked)
         self.deadman.held_changed.connect(self.deadman_changed)
         self._set_usable(False)
-        self._show_step(NOT_YET)
+        self._show_step(self._shown)
 
     @property
     def text(self) -> str:
@@ -479,7 +479,7 @@ class _Line(PaintedWidget):
 
     def __init__(self) -> None:
         super().__init__(tr("What is next"))
-        self._step = NOT_YET
+        self._step = Undriven.NOT_YET.step
         self._document = QTextDocument(self)
         self._document.setDocumentMargin(0)
         self.fits = True
