@@ -81,8 +81,7 @@ class AnnotationFiles(QObject):
             self.said.emit(tr("Nothing was imported"), True)
 
     def _ask(self, title: str, mode: QFileDialog.FileMode, then: Any) -> None:
-        dialog = QFileDialog(self._window, title, str(self._model.store.path.parent))
-        dialog.setFileMode(mode)
+        dialog = QFileDialog(self._window, title, str(self._model.store.path.parent), fileMode=mode)
         dialog.filesSelected.connect(lambda chosen: [then(Path(path)) for path in chosen])
         dialog.finished.connect(dialog.deleteLater)
         dialog.open()

@@ -134,10 +134,9 @@ class AnnotationBar(QWidget):
             chip.clicked.connect(lambda on, which=mode: self.mode_chosen.emit(which if on else MaskMode.POINTS))
             modes.addWidget(chip)
             self._modes[mode] = chip
-        self._hint = QLabel()
+        self._hint = QLabel(wordWrap=True)
         self._hint.setObjectName("card_note")
         self._hint.setMinimumWidth(10)
-        self._hint.setWordWrap(True)
         self._hint.setFixedHeight(_HINT_HEIGHT)
         modes.addSpacing(7)
         modes.addWidget(self._hint, 1)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QObject
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QHBoxLayout, QInputDialog, QMainWindow, QMessageBox, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QInputDialog, QMessageBox, QWidget
 
 from app.annotator.canvas import CANVAS_KEYS, AnnotationCanvas
 from app.annotator.editing import RADIUS_NOTCH, MaskMode, Tool
@@ -20,7 +20,7 @@ from app.player.controls import NoteField
 from app.training.dialog import TrainingDialog
 from app.training.model import collect_from_store
 from app.ui import theme
-from app.ui.actions import KeyTable, MenuEntry, add_help_menu, add_menu, menu_tables, shown
+from app.ui.actions import MenuEntry, add_help_menu, add_menu
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import refusal_text
 from app.ui.window_base import WindowFrame
@@ -135,12 +135,6 @@ _MOUSE = (
     ),
 )
 
-
-def annotation_keys(window: QMainWindow) -> Sequence[KeyTable]:
-    """The keys of the picture, the mouse, and the menus."""
-    return (shown((mark("In the picture"), CANVAS_KEYS)), shown(_MOUSE), *menu_tables(window))
-
-
 _LEFT_SHARE = 0.74
 _SIDE_WIDTH = (330, 400)
 _LEFT_GAP = 6
@@ -179,7 +173,7 @@ class AnnotatorPanels(QWidget):
         room = QHBoxLayout(self)
         set_window_margins(room)
         room.addWidget(self.columns)
-        self.help = KeyPage(self, annotation_keys)
+        self.help = KeyPage(self, ((mark("In the picture"), CANVAS_KEYS), _MOUSE))
         self.toast = Toast(self.canvas)
         self.offers = OfferStrip(self.canvas)
         self.offers.lifted.connect(self.toast.lift)

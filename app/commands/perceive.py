@@ -93,7 +93,8 @@ def perceive(
             lines.write(json.dumps(scene_to_json(picture.name, scene), allow_nan=False))
             try:
                 if masks is not None:
-                    _write_masks(masks, picture.stem, scene)
+                    for name, mask in source_masks(scene).items():
+                        write_mask(masks / f"{picture.stem}_{name}.png", mask)
                 if overlay is not None:
                     _write_overlay(overlay, picture.stem, picture.image, scene, settings.advice)
             except OSError as error:
@@ -212,12 +213,6 @@ def source_masks(scene: Scene) -> dict[str, Mask]:
             mask = np.asarray(cv2.resize(mask.astype(np.uint8) * 255, (width, height), interpolation=cv2.INTER_LINEAR) > 127)
         found[name] = mask
     return found
-
-
-def _write_masks(folder: Path, stem: str, scene: Scene) -> None:
-    """Raises OSError."""
-    for name, mask in source_masks(scene).items():
-        write_mask(folder / f"{stem}_{name}.png", mask)
 
 
 def _write_overlay(folder: Path, stem: str, image: Image, scene: Scene, advice_config: Any) -> None:

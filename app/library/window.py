@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QListView,
-    QMainWindow,
     QMenu,
     QPushButton,
     QStyle,
@@ -27,7 +26,7 @@ from PySide6.QtWidgets import (
 
 from app.library.model import SUMMARY, LibraryFilter, LibraryModel, SortOrder, title_of
 from app.ui import theme
-from app.ui.actions import KeyTable, MenuEntry, add_help_menu, add_menu, menu_tables, shown
+from app.ui.actions import MenuEntry, add_help_menu, add_menu
 from app.ui.description_form import DescriptionForm
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.opening import OtherWindows
@@ -175,8 +174,7 @@ class LibraryPanels(QWidget):
     def __init__(self, sessions: LibraryFilter) -> None:
         super().__init__()
         theme.set_sheet(self, theme.FORM_SHEET)
-        self.search = QLineEdit()
-        self.search.setPlaceholderText(tr("Search: operator, task, date, rig, #tag, fault ..."))
+        self.search = QLineEdit(placeholderText=tr("Search: operator, task, date, rig, #tag, fault ..."))
         self.search.setAccessibleName(tr("Search"))
         self.search.setClearButtonEnabled(True)
         self.tags, self.order = QComboBox(), QComboBox()
@@ -217,7 +215,7 @@ class LibraryPanels(QWidget):
         layout = column(self.columns)
         set_window_margins(layout)
         self.setLayout(layout)
-        self.help = KeyPage(self.columns, library_keys)
+        self.help = KeyPage(self.columns, last=(_MOUSE,))
         self.toast, self.offers = Toast(self.list), OfferStrip(self.list)
         self.offers.lifted.connect(self.toast.lift)
 
@@ -244,10 +242,6 @@ def _facts(summary: SessionSummary) -> list[str]:
     faults = tr("faults: {faults}", faults=faults_text(summary)) if summary.faults else ""
     parts = (summary.folder.name, head, tr_text(summary.problem), states_text(summary), faults, made)
     return [part for part in parts if part]
-
-
-def library_keys(window: QMainWindow) -> Sequence[KeyTable]:
-    return (*menu_tables(window), shown(_MOUSE))
 
 
 class LibraryWindow(WindowFrame):

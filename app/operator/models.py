@@ -143,9 +143,8 @@ class ModelMenu(QObject):
     def _add(self, model: InstalledModel, is_current: bool) -> None:
         own = tr(", own") if model.is_own else ""
         problem = f":  {model.problem}" if model.problem else ""
-        action = QAction(f"{model.name.replace('&', '&&')}{own}{problem}", self._menu)
-        action.setCheckable(True)
-        action.setChecked(is_current)
+        name = f"{model.name.replace('&', '&&')}{own}{problem}"
+        action = QAction(name, self._menu, checkable=True, checked=is_current)
         action.setEnabled(not model.problem)
         action.setToolTip(f"{model.figures}\n{model.folder}")
         action.triggered.connect(partial(self._on_chosen, model.name))

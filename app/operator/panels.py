@@ -16,7 +16,7 @@ from app.ui.i18n import tr, tr_text
 from app.ui.texts import Undriven
 from app.ui.workers import Pace
 from app.widgets.alerts import AlertStrip
-from app.widgets.basics import Card, card_note, column, holder, row
+from app.widgets.basics import Card, card_note, column, holder, line, row
 from app.widgets.command_panel import CommandPanel
 from app.widgets.event_log import EventLog, LogKind
 from app.widgets.jog_panel import JogPanel, advised_motions
@@ -241,14 +241,8 @@ class OperatorPanels(ScenePanels):
         self._legend.setText(_trend_legend(with_distances))
 
     def _header(self) -> QHBoxLayout:
-        header = QHBoxLayout()
-        header.setSpacing(16)
-        header.addWidget(self.banner, 1)
-        if self.picker is not None:
-            header.addWidget(self.picker)
-        header.addWidget(self.record_bar)
-        header.addWidget(self.mode)
-        return header
+        picker = [self.picker] if self.picker is not None else []
+        return line((self.banner, 1), *picker, self.record_bar, self.mode, spacing=16)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

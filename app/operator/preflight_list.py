@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen
-from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QLabel, QPushButton, QScrollArea, QWidget
 
 from app.operator.preflight import Preflight, PreflightFinding, PreflightModel
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import OperatorStep
-from app.widgets.basics import card_note, takes_enter
+from app.widgets.basics import card_note, column, line, takes_enter
 from app.widgets.painting import PaintedWidget, Sign, draw_text, paint_sign, polygon, set_colours
 from hardware.preflight.preflight import Level
 
@@ -86,17 +86,11 @@ class PreflightList(QDialog):
         self.leave.clicked.connect(self.close)
         self.arm.setShortcut(OperatorStep.ARM.value.key)  # the keys are this window's while it is in front
         self.arm.setObjectName("main_button")
-        buttons = QHBoxLayout()
-        buttons.addWidget(self._note, 1)
-        for button in (self.again, self.arm, self.leave):
+        buttons = self.again, self.arm, self.leave
+        for button in buttons:
             button.setAutoDefault(False)
-            buttons.addWidget(button)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(18, 14, 18, 14)
-        column.setSpacing(12)
-        column.addWidget(self._headline)
-        column.addWidget(scroll, 1)
-        column.addLayout(buttons)
+        foot = line((self._note, 1), *buttons, spacing=12)
+        self.setLayout(column(self._headline, (scroll, 1), foot, spacing=12, margins=(18, 14, 18, 14)))
         self._timer = QTimer(self, interval=_UPDATE_MS)
         self._timer.timeout.connect(self.renew)  # the state of the open rig changes without a signal
         self.finished.connect(self._timer.stop)

@@ -510,12 +510,8 @@ class RecoveryController(QObject):
 def loss_words(lost: dict[str, Any]) -> str:
     if not lost["rows"] and not lost["pictures"]:
         return tr("nothing of it is lost")
-    return tr(
-        "{seconds:.1f} s are lost (rows: {rows}, pictures: {pictures})",
-        seconds=lost["seconds"],
-        rows=lost["rows"],
-        pictures=lost["pictures"],
-    )
+    seconds, rows, pictures = lost["seconds"], lost["rows"], lost["pictures"]
+    return tr("{seconds:.1f} s are lost (rows: {rows}, pictures: {pictures})", seconds=seconds, rows=rows, pictures=pictures)
 
 
 FRAMES = 48

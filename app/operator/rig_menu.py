@@ -137,8 +137,7 @@ class RigMenuController(QObject):
         self._rigs = [self._rig_action(rig) for rig in list_rigs()]
 
     def _rig_action(self, rig: ListedRig) -> QAction:
-        action = QAction(rig.name.replace("&", "&&"), self._menu)
-        action.setCheckable(True)
+        action = QAction(rig.name.replace("&", "&&"), self._menu, checkable=True)
         action.setChecked(self._rig.config.rig.file == str(rig.path))
         action.setEnabled(rig.rig is not None)
         action.setToolTip(rig_line(rig.rig) if rig.rig is not None else rig.problem)
@@ -180,8 +179,7 @@ class RigMenuController(QObject):
 
     def ask_source(self, mode: QFileDialog.FileMode) -> None:
         """Ask for a picture, video or folder of pictures to look at instead of the rig's camera."""
-        dialog = QFileDialog(self._window, tr("Look at pictures instead of the camera's"))
-        dialog.setFileMode(mode)
+        dialog = QFileDialog(self._window, tr("Look at pictures instead of the camera's"), fileMode=mode)
         dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
         dialog.fileSelected.connect(lambda path: self.choose_source(Path(path)))
         dialog.finished.connect(dialog.deleteLater)

@@ -184,8 +184,7 @@ class WindowServices(QObject):
 
     def _choose_session(self) -> None:
         folder = sessions_folder(self._window.rig.config.record.folder)
-        dialog = QFileDialog(self._window, tr("A recorded session"), str(folder))
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog = QFileDialog(self._window, tr("A recorded session"), str(folder), fileMode=QFileDialog.FileMode.Directory)
         dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
         dialog.fileSelected.connect(lambda path: self.after.offer(Path(path), tr("Session")))
         dialog.finished.connect(dialog.deleteLater)

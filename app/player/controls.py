@@ -408,10 +408,8 @@ class NoteField(QLineEdit):
     """A line for a note that goes into a file; `hint` is its placeholder, `edge` the role of its frame's colour."""
 
     def __init__(self, hint: str, edge: str = "LINE") -> None:
-        super().__init__()
-        self.setPlaceholderText(hint)
+        super().__init__(placeholderText=hint, maxLength=_MOST_LETTERS)
         self.setAccessibleName(tr("Note"))
-        self.setMaxLength(_MOST_LETTERS)
         frame = f"border: 1px solid @{edge}; border-radius: 6px; padding: 5px 10px;"
         theme.set_sheet(
             self, f"QLineEdit {{ background: @PANEL; color: @TEXT; {frame} }} QLineEdit:focus {{ border-color: @SKY; }}"

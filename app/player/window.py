@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Slot
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QMainWindow, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
 
 from app.operator.recording import AfterSession, open_file
 from app.player.controls import NoteField, PlayerBar, RecordedPlate, SessionEvents
@@ -23,7 +23,7 @@ from app.player.replayed import compared_line
 from app.player.session_model import PlayedSession
 from app.player.timeline import TimelineView
 from app.ui import theme
-from app.ui.actions import KeyTable, MenuEntry, add_help_menu, add_menu, menu_tables, shown
+from app.ui.actions import MenuEntry, add_help_menu, add_menu
 from app.ui.description_form import DescriptionDialog
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.snapshot import pictures_folder
@@ -137,11 +137,6 @@ _MOUSE = (
     ),
 )
 
-
-def player_keys(window: QMainWindow) -> Sequence[KeyTable]:
-    return (*menu_tables(window), shown(_MOUSE))
-
-
 _TEXT_EVERY_S = 0.1
 _BANNER_WIDTH, _GAP = 330, 8
 
@@ -186,7 +181,7 @@ class PlayerPanels(ScenePanels):
         room.setContentsMargins(6, 3, 4, 3)  # the usual margins of a card are for text
         pictures, bar = self._lay_out_pictures(), self.overlay_bar
         left = column((pictures, 5), (bar, 0), (self.note, 0), (timeline, 1), (self.bar, 0), spacing=_GAP)
-        self.help = KeyPage(self._lay_out(self._header(), holder(left), self._right_side()), player_keys)
+        self.help = KeyPage(self._lay_out(self._header(), holder(left), self._right_side()), last=(_MOUSE,))
         self.notice = Notice(self.live)
         self.toast = Toast(self.live)
         self.offers = OfferStrip(self.live)
@@ -287,9 +282,7 @@ class PlayerPanels(ScenePanels):
 
 
 def _text_page(name: str) -> QPlainTextEdit:
-    page = QPlainTextEdit()
-    page.setReadOnly(True)
-    page.setTabChangesFocus(True)
+    page = QPlainTextEdit(readOnly=True, tabChangesFocus=True)
     page.setAccessibleName(name)
     theme.set_sheet(page, "QPlainTextEdit { background: @PANEL; color: @TEXT_DIM; border: none; font-size: 13px; }")
     return page
@@ -616,8 +609,7 @@ class PlayerWindow(WindowFrame):
         self._ask(tr("Export the session as"), QFileDialog.FileMode.AnyFile, self._export, endings)
 
     def _ask(self, title: str, mode: QFileDialog.FileMode, then: Callable[[Path], None], endings: str = "") -> None:
-        dialog = QFileDialog(self, title, str(self._reader.folder.parent))
-        dialog.setFileMode(mode)
+        dialog = QFileDialog(self, title, str(self._reader.folder.parent), fileMode=mode)
         if endings:
             dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
             dialog.setNameFilter(endings)

@@ -56,9 +56,7 @@ class CameraPage(WizardPage):
         self.found = FoundDevices((), ())
         self.ask: Callable[[str, str, Callable[[], None]], None] = lambda _question, _answer, action: action()
         """Asks before something is lost: a question, the answer that does it, and what is done then."""
-        self.name_edit = QLineEdit(rig_name)
-        self.name_edit.setMaxLength(60)
-        self.name_edit.setPlaceholderText("bench 1")
+        self.name_edit = QLineEdit(rig_name, maxLength=60, placeholderText="bench 1")
         self.name_edit.setAccessibleName(tr("Name of the rig"))
         self.name_edit.textChanged.connect(lambda _text: self.model.changed.emit())
         self.cameras = QListWidget()

@@ -265,8 +265,7 @@ def enable(on: bool, *controls: QWidget) -> None:
 
 
 def note(text: str) -> QLabel:
-    label = QLabel(text)
-    label.setWordWrap(True)
+    label = QLabel(text, wordWrap=True)
     theme.set_sheet(label, "color: @TEXT_DIM;")
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     return label
@@ -279,9 +278,8 @@ def set_note(label: QLabel, text: str) -> None:
 
 
 def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
-    made = QPushButton(text)
+    made = QPushButton(text, autoDefault=False)
     made.setToolTip(tip)
-    made.setAutoDefault(False)
     made.clicked.connect(lambda _checked=False: slot())
     return made
 

@@ -146,8 +146,7 @@ class DrumsPage(WizardPage):
         self.column.addStretch(1)
 
     def _field(self, per_mm: float) -> QDoubleSpinBox:
-        field = QDoubleSpinBox()
-        field.setDecimals(3)
+        field = QDoubleSpinBox(decimals=3)
         field.setRange(0.0, per_mm * 150.0)
         field.setSingleStep(0.1)
         field.setSuffix(" mm")
@@ -357,9 +356,7 @@ class ZeroPage(WizardPage):
         self.tendon.setAccessibleName(tr("Tendon to set by eye"))
         self.tighten = button(tr("&Tighten {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(_NUDGE_MM))
         self.loosen = button(tr("&Loosen {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(-_NUDGE_MM))
-        self.pretension = QDoubleSpinBox()
-        self.pretension.setSingleStep(0.05)
-        self.pretension.setSuffix(" mm")
+        self.pretension = QDoubleSpinBox(singleStep=0.05, suffix=" mm")
         self.pretension.setAccessibleName(tr("Pretension"))
         self.pretension.setToolTip(tr("Pull of every wire while the robot is straight, so that none hangs"))
         self.pretension.valueChanged.connect(self._set_pretension)

@@ -43,8 +43,7 @@ class SummaryPage(WizardPage):
     def __init__(self, model: RigWizardModel, picture: WizardPicture, rig_name: Callable[[], str]) -> None:
         super().__init__(model, picture)
         self._rig_name = rig_name
-        self.text = QPlainTextEdit()
-        self.text.setReadOnly(True)
+        self.text = QPlainTextEdit(readOnly=True)
         self.text.setFrameShape(QFrame.Shape.NoFrame)
         self.text.setAccessibleName(tr("The rig as it will be saved"))
         self.text.setTabChangesFocus(True)

@@ -11,7 +11,6 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QDialog,
     QFrame,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QPushButton,
@@ -28,7 +27,7 @@ from app.settings.draft import SettingsDraft, search
 from app.settings.fields import SettingField
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.widgets.basics import QuietCombo, takes_enter
+from app.widgets.basics import QuietCombo, card_title, column, holder, line, takes_enter
 from app.widgets.messages import QuestionStrip
 from core.config.files import Profile, ProfileError, Profiles
 from core.config.models import Config
@@ -171,13 +170,7 @@ class SettingPage(QScrollArea):
         button.setAccessibleName(tr("Reset section {title}", title=tr(section.title)))
         keys = [setting.key for setting in section.all_settings()]
         button.clicked.connect(lambda _on=False: self.reset_asked.emit(keys))
-        head = QWidget()
-        row = QHBoxLayout(head)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addWidget(title)
-        row.addStretch(1)
-        row.addWidget(button)
-        for widget in (head, meaning, note, error):
+        for widget in (holder(line((title, 1), button)), meaning, note, error):
             self._add(widget)
         note.hide()
         error.hide()
@@ -205,8 +198,7 @@ class ProfileRow(QWidget):
         self.combo.setMinimumWidth(190)
         self.combo.setToolTip(tr("Takes all settings from a profile; nothing is kept before you save"))
         self.save_button, self.delete_button = QPushButton(tr("Save as")), QPushButton(tr("Delete"))
-        self.name = QLineEdit()
-        self.name.setPlaceholderText(tr("Name of the profile; Enter saves, Esc does not"))
+        self.name = QLineEdit(placeholderText=tr("Name of the profile; Enter saves, Esc does not"))
         self.name.setAccessibleName(tr("Name of the profile"))
         self.name.setMaxLength(60)
         self.question = QuestionStrip()
@@ -274,18 +266,9 @@ class ProfileRow(QWidget):
             self.ask(tr("Delete the profile {name}?", name=profile.name), tr("Delete"), lambda: self.delete_asked.emit(profile))
 
     def _lay_out(self) -> None:
-        buttons = QWidget()
-        row = QHBoxLayout(buttons)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.setSpacing(6)
-        label = QLabel(tr("Profile"))
-        label.setObjectName("card_title")
-        row.addWidget(label)
-        row.addWidget(self.combo, 1)
-        row.addWidget(self.save_button)
-        row.addWidget(self.delete_button)
+        choice = line(card_title(tr("Profile")), (self.combo, 1), self.save_button, self.delete_button, spacing=6)
         self._stack = QStackedLayout(self)
-        for widget in (buttons, self.name, self.question):
+        for widget in (holder(choice), self.name, self.question):
             self._stack.addWidget(widget)
         self.setFixedHeight(36)
 
@@ -636,33 +619,20 @@ class SettingsDialog(QDialog):
         self.status.setWordWrap(True)
         self.status.setObjectName("setting_meaning")
         self.status.setAccessibleName(tr("State of the settings"))
-        top = QHBoxLayout()
-        top.setSpacing(20)
-        top.addWidget(self.search, 2)
-        top.addWidget(self.profile_row, 3)
         self.splitter = QSplitter(Qt.Orientation.Horizontal)
         self.splitter.addWidget(self.tree)
         self.splitter.addWidget(self.page)
         self.splitter.setChildrenCollapsible(False)
         self.splitter.setStretchFactor(1, 1)
         self.splitter.setSizes([_TREE_PX, _SIZE[0] - _TREE_PX])
-        bottom = QHBoxLayout()
-        bottom.setSpacing(8)
-        bottom.addWidget(self.status, 1)
-        bottom.addWidget(self.question, 1)
         self.question.hide()
-        for button in (self.reset_all, self.cancel, self.save, self.save_and_restart):
-            bottom.addWidget(button)
+        self.save.setObjectName("main_button")
+        top = line((self.search, 2), (self.profile_row, 3), spacing=20)
+        buttons = self.reset_all, self.cancel, self.save, self.save_and_restart
+        bottom = line((self.status, 1), (self.question, 1), *buttons, spacing=8)
+        self.setLayout(column(top, self.notice, (self.splitter, 1), bottom, spacing=8, margins=(theme.GAP,) * 4))
         for button in self.findChildren(QPushButton):
             button.setAutoDefault(False)
-        self.save.setObjectName("main_button")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(theme.GAP, theme.GAP, theme.GAP, theme.GAP)
-        column.setSpacing(8)
-        column.addLayout(top)
-        column.addWidget(self.notice)
-        column.addWidget(self.splitter, 1)
-        column.addLayout(bottom)
 
 
 def _shown_name(key: str) -> str:

@@ -11,7 +11,6 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF, QTransform
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QListWidget,
@@ -407,8 +406,7 @@ class MovePage(TeachingPage):
     def __init__(self, model: TeachingModel, picture: BenchPicture) -> None:
         super().__init__(model, picture)
         self._picture = picture
-        self.said = QLabel()
-        self.said.setWordWrap(True)
+        self.said = QLabel(wordWrap=True)
         self.said.setFixedHeight(62)
         self.said.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft)
         self.said.setAccessibleName(tr("What became of the newest picture"))
@@ -417,13 +415,11 @@ class MovePage(TeachingPage):
         self.pause = button(tr("&Pause"), self._on_pause, tr("Take no frames for a while"))
         self.pause.setCheckable(True)
         self._thumbs = [QLabel() for _ in range(_STRIP)]
-        strip = QHBoxLayout()
-        strip.setSpacing(6)
         for thumb in self._thumbs:
             thumb.setFixedSize(116, 87)
             thumb.setScaledContents(True)
             theme.set_sheet(thumb, "background: @WINDOW; border-radius: 4px;")
-            strip.addWidget(thumb)
+        strip = line(*self._thumbs, spacing=6)
         strip.addStretch(1)
         for part in (self.said, self.places, self.bends, self.frames, self.lacks):
             self.column.addWidget(part)
@@ -662,16 +658,13 @@ class TrainPage(TeachingPage):
         self.minutes.setAccessibleName(tr("Time for the training"))
         self.start = self.main = button(tr("&Train"), self._on_start)
         self.stop = button(tr("&Stop"), model.stop_training, tr("Frames and what was learnt are kept"))
-        self.bar = QProgressBar()
-        self.bar.setTextVisible(False)
+        self.bar = QProgressBar(textVisible=False)
         self.bar.setFixedHeight(8)
         self.bar.setAccessibleName(tr("Training"))
         self.words = note("")
         self.words.setFixedHeight(80)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.table = QLabel()
-        self.table.setTextFormat(Qt.TextFormat.RichText)
-        self.table.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.table = QLabel(textFormat=Qt.TextFormat.RichText, alignment=Qt.AlignmentFlag.AlignTop)
         self.table.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
         name_label, minutes_label = QLabel(tr("New model")), QLabel(tr("for"))
         name_label.setBuddy(self.model_name)

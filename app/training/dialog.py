@@ -33,9 +33,7 @@ class TrainingCurves(QWidget):
     """Left the loss; right Dice of vessel and robot: thin on what is trained on, dots on the held-out pictures."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.setAccessibleName(tr("Loss and Dice of the training, by step"))
-        self.setMinimumHeight(170)
+        super().__init__(accessibleName=tr("Loss and Dice of the training, by step"), minimumHeight=170)
         self.setToolTip(
             tr(
                 "Left: the loss, which training makes small. Right: Dice, the agreement of what is found with what was drawn by "
@@ -93,9 +91,8 @@ class _Picture(QLabel):
     """A file's picture, as large as fits."""
 
     def __init__(self, name: str) -> None:
-        super().__init__()
+        super().__init__(alignment=Qt.AlignmentFlag.AlignCenter)
         self.setAccessibleName(name)
-        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self.setMinimumSize(200, 130)
         theme.set_sheet(self, "color: @TEXT_FAINT;")
@@ -131,8 +128,7 @@ class BeforeAfter(QWidget):
         self._left, self._right = _Picture(tr("Before")), _Picture(tr("After"))
         self._title = QLabel()
         self._title.setObjectName("card_note")
-        self._next = QPushButton(tr("&Next picture"))
-        self._next.setAutoDefault(False)
+        self._next = QPushButton(tr("&Next picture"), autoDefault=False)
         self._next.clicked.connect(self._on_next)
         head = QHBoxLayout()
         head.addWidget(self._title, 1)
@@ -215,10 +211,7 @@ class TrainingDialog(QDialog):
         heading.setText(QFontMetrics(theme.semi_bold(12)).elidedText(from_where, Qt.TextElideMode.ElideMiddle, room))
         heading.setToolTip(source)
         heading.setAccessibleName(from_where)
-        foot = QHBoxLayout()
-        foot.addWidget(self._bar, 1, Qt.AlignmentFlag.AlignVCenter)
-        foot.addWidget(self.stop)
-        foot.addWidget(self.hide_button)
+        foot = line((self._bar, 1), self.stop, self.hide_button)
         cards = (Card("", self.curves), 4), (Card("", self.pictures), 6)
         self.setLayout(column(heading, self._form(), *cards, self._line, foot, margins=(16, 12, 16, 12)))
         self.job.changed.connect(self._on_changed)

@@ -268,8 +268,7 @@ class LanguageMenu(QMenu):
         group = QActionGroup(self)
         self._entries: dict[str, QAction] = {}
         for code, text in ((AUTO, tr("As the &system says")), *NATIVE.items()):
-            action = QAction(text, group)
-            action.setCheckable(True)
+            action = QAction(text, group, checkable=True)
             action.triggered.connect(partial(self.chosen.emit, code))
             self.addAction(action)
             self._entries[code] = action

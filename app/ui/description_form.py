@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QCompleter, QDialog, QFormLayout, QLabel, QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCompleter, QDialog, QFormLayout, QLabel, QLineEdit, QPlainTextEdit, QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr
-from app.widgets.basics import line, takes_enter, text_button
+from app.widgets.basics import column, line, takes_enter, text_button
 from core.session.manifest import Description, changed_description
 
 _LINES = {
@@ -122,19 +122,13 @@ class DescriptionDialog(QDialog):
         self.form = DescriptionForm(is_of_session=is_of_session)
         self.form.show_description(description)
         self.form.setMinimumWidth(_WIDTH_PX)
-        title = QLabel(about)
+        title = QLabel(about, wordWrap=True)
         title.setObjectName("setting_name")
-        title.setWordWrap(True)
         keep = text_button(tr("Keep"), self.accept)
         keep.setObjectName("main_button")
         buttons = line(text_button(tr("Cancel"), self.reject), keep, spacing=8)
         buttons.insertStretch(0, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(16, 14, 16, 14)
-        layout.setSpacing(12)
-        layout.addWidget(title)
-        layout.addWidget(self.form)
-        layout.addLayout(buttons)
+        self.setLayout(column(title, self.form, buttons, spacing=12, margins=(16, 14, 16, 14)))
         next(iter(self.form.fields.values())).setFocus()
 
     def accept(self) -> None:

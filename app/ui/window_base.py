@@ -80,8 +80,7 @@ class WindowFrame(QMainWindow):
         super().__init__()
         self._is_shut = False
         self._heartbeat = GuiLatencyMonitor(parent=self)
-        escape = QAction(self)
-        escape.setShortcut(QKeySequence(Qt.Key.Key_Escape))
+        escape = QAction(self, shortcut=QKeySequence(Qt.Key.Key_Escape))
         escape.triggered.connect(self._on_escape)
         self.addAction(escape)
         hint = QLabel(tr("F1  keys"), self.menuBar())  # without a parent it would be gone: the menu bar does not keep it

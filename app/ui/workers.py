@@ -119,8 +119,7 @@ class Worker(QObject):
     ended = Signal()
 
     def __init__(self, name: str, parent: QObject | None = None, *, latest_only: bool = False, behind: bool = False) -> None:
-        super().__init__(parent)
-        self.setObjectName(name)
+        super().__init__(parent, objectName=name)
         self._latest_only, self._behind = latest_only, behind
         self._queue = _JobQueue()
         self._thread: threading.Thread | None = None

@@ -112,8 +112,7 @@ def text_button(text: str, action: Callable[[], object], tool_tip: str = "", nam
 
 
 def page_tabs() -> QTabWidget:
-    pages = QTabWidget()
-    pages.setDocumentMode(True)
+    pages = QTabWidget(documentMode=True)
     pages.setAccessibleName(tr("Pages"))
     pages.tabBar().setAccessibleName(tr("Pages"))
     pages.tabBar().setDrawBase(False)

@@ -34,8 +34,7 @@ class MarksLabel(QLabel):
     """
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
+        super().__init__(parent, alignment=Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
     def record(self, marks: Marks, to_label: QTransform, label_px: int, glass: QPainterPath | None = None) -> None:

@@ -480,8 +480,7 @@ class _Line(PaintedWidget):
     def __init__(self) -> None:
         super().__init__(tr("What is next"))
         self._step = Undriven.NOT_YET.step
-        self._document = QTextDocument(self)
-        self._document.setDocumentMargin(0)
+        self._document = QTextDocument(self, documentMargin=0)
         self.fits = True
 
     def follow_theme(self) -> None:

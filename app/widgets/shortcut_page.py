@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from PySide6.QtCore import QPoint, QRect, QRectF, Qt
 from PySide6.QtGui import QMouseEvent, QPainter
@@ -32,16 +32,14 @@ class KeyPage(PaintedWidget):
     Parameters
     ----------
     parent : what it covers, a part of the window whose keys these are.
-    tables_of : the tables in their order, of that window.
+    first, last : tables before and after those of the window's menus.
     above : what the page ends above, a part of the parent that must stay in sight and in reach.
     """
 
-    def __init__(
-        self, parent: QWidget, tables_of: Callable[[QMainWindow], Sequence[KeyTable]], above: QWidget | None = None
-    ) -> None:
+    def __init__(self, parent: QWidget, first: Column = (), last: Column = (), above: QWidget | None = None) -> None:
         super().__init__(tr("Keys"), parent=parent)
         self._parent = parent
-        self._tables_of = tables_of
+        self._first, self._last = first, last
         self._above = above
         self._tables: Column = ()
         self.hide()
@@ -57,7 +55,7 @@ class KeyPage(PaintedWidget):
     def toggle(self) -> None:
         window = self._parent.window()
         if not self.isVisible() and isinstance(window, QMainWindow):
-            self._tables = tuple(self._tables_of(window))
+            self._tables = (*map(shown, self._first), *menu_tables(window), *map(shown, self._last))
             rows = (row for _, table in self._tables for row in table)
             self.setAccessibleDescription("; ".join(f"{key}: {text}" for key, text in rows))
         self._place()
@@ -166,11 +164,6 @@ _ELSE = (
 )
 
 
-def operator_keys(window: QMainWindow) -> Sequence[KeyTable]:
-    """The keys that move the robot, and those of the menus."""
-    return (*map(shown, (_HELD, _DRIVING)), *menu_tables(window), shown(_ELSE))
-
-
 def operator_help(parent: QWidget, above: QWidget) -> KeyPage:
     """The page of the operator window, over `parent`; it ends above what the robot is stopped with."""
-    return KeyPage(parent, operator_keys, above)
+    return KeyPage(parent, (_HELD, _DRIVING), (_ELSE,), above)

@@ -206,9 +206,8 @@ class ZeroDialog(QDialog):
     torque_off_asked = Signal()
 
     def __init__(self, servos: ServosConfig, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(parent, modal=False)
         self.setWindowTitle(tr("Where the joints are"))
-        self.setModal(False)
         theme.set_sheet(self, theme.FORM_SHEET)
         self.resize(_SIZE)
         self._tendons = {joint.name: _TendonRow(joint.name) for joint in servos.tendons}

@@ -38,17 +38,19 @@ def bench() -> FakeBench:
 
 
 @pytest.fixture(autouse=True)
-def no_leaks(qapp: QApplication, imported: set[str]) -> Iterator[None]:
-    """Every window that a test makes is gone after it."""
+def no_leaks(request: pytest.FixtureRequest, qapp: QApplication, imported: set[str]) -> Iterator[None]:
+    """Every window that a test makes is gone after it. Without ``qtbot`` it is looked for first: collecting takes its time."""
     _leave_out(imported)
     before = set(QApplication.topLevelWidgets())
     yield
+    may_be_clean = "qtbot" not in request.fixturenames
     for _ in range(2):  # what Qt lets go of may hold more
+        if may_be_clean and set(QApplication.topLevelWidgets()) <= before:
+            break
         gc.collect()
         QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
         qapp.processEvents()
-        if set(QApplication.topLevelWidgets()) <= before:
-            break
+        may_be_clean = True
     left = [widget for widget in QApplication.topLevelWidgets() if widget not in before]
     assert not left, f"left over: {left}"
     _leave_out(imported)

@@ -106,6 +106,7 @@ def test_the_papers_labels_print_the_papers_table(paper_csv: Path, tmp_path: Pat
     assert ["D", "0", "1", "4"] in printed
 
 
+@pytest.mark.usefixtures("drawing")
 def test_json_is_all_there_is_on_standard_output_and_the_same_input_gives_the_same_files(
     paper_csv: Path, drawn: Path, tmp_path: Path
 ) -> None:

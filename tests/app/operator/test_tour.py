@@ -80,7 +80,7 @@ def test_no_card_covers_stop_or_what_it_speaks_of_and_all_of_its_text_is_on_it(r
 # ---- what stays in use
 
 
-def test_stop_is_neither_covered_nor_silenced(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+def test_stop_the_robot_and_the_picture_stay_in_use(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     running.show_tour()
     assert running.tour.card.forward.hasFocus() or running.focusWidget() is running.tour.card.forward
     qtbot.keyClick(running.focusWidget(), Key.Key_Space)
@@ -90,10 +90,6 @@ def test_stop_is_neither_covered_nor_silenced(running: OperatorWindow, engine: F
     qtbot.mouseClick(stop, Qt.MouseButton.LeftButton)
     assert engine.pilot.acts == [Act.STOP, Act.STOP]
     assert running.tour.is_running
-
-
-def test_the_robot_and_the_picture_stay_in_use(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
-    running.show_tour()
     qtbot.keyPress(running.focusWidget(), Key.Key_W)
     assert engine.jogs[-1].advance > 0
     qtbot.keyRelease(running.focusWidget(), Key.Key_W)
@@ -103,7 +99,7 @@ def test_the_robot_and_the_picture_stay_in_use(running: OperatorWindow, engine: 
     assert live.isAncestorOf(under) or under is live, "the shade lets clicks through"
 
 
-def test_it_works_by_keyboard_alone(running: OperatorWindow, qtbot: QtBot) -> None:
+def test_it_works_by_keyboard_alone_and_by_clicks(running: OperatorWindow, qtbot: QtBot) -> None:
     running.show_tour()
     tour = running.tour
     running.panels.mode_bar.stop.setFocus()
@@ -121,36 +117,27 @@ def test_it_works_by_keyboard_alone(running: OperatorWindow, qtbot: QtBot) -> No
     assert not tour.is_running
     assert not tour.card.isVisible()
     assert running.focusWidget() is running.panels.live
-
-
-def test_the_end_of_it_can_be_clicked(running: OperatorWindow, qtbot: QtBot) -> None:
     running.show_tour()
-    card = running.tour.card
-    assert not card.back.isEnabled()
-    qtbot.mouseClick(card.forward, Qt.MouseButton.LeftButton)
-    qtbot.mouseClick(card.back, Qt.MouseButton.LeftButton)
-    assert running.tour.place == 0
-    qtbot.mouseClick(card.skip, Qt.MouseButton.LeftButton)
-    assert not running.tour.is_running
+    assert not tour.card.back.isEnabled()
+    qtbot.mouseClick(tour.card.forward, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(tour.card.back, Qt.MouseButton.LeftButton)
+    assert tour.place == 0
+    qtbot.mouseClick(tour.card.skip, Qt.MouseButton.LeftButton)
+    assert not tour.is_running
 
 
-def test_it_turns_to_the_page_that_it_speaks_of(running: OperatorWindow) -> None:
-    panels = running.panels
+def test_it_turns_to_the_page_that_it_speaks_of_and_its_light_follows_the_window(running: OperatorWindow, qtbot: QtBot) -> None:
+    panels, tour = running.panels, running.tour
     panels.pages.setCurrentWidget(panels.events)
-    running.show_tour()
-    for _ in itertools.takewhile(lambda _place: "Move it yourself" not in running.tour.card.text, _stops(running.tour)):
-        pass
-    assert panels.jog.isVisible()
-
-
-def test_the_light_follows_the_window(running: OperatorWindow, qtbot: QtBot) -> None:
     running.resize(1280, 720)
     running.show_tour()
-    before = running.tour.light
+    before = tour.light
     running.resize(1600, 900)
-    qtbot.waitUntil(lambda: running.tour.light != before)
-    live = running.panels.live
-    assert running.tour.light.contains(QRect(live.mapTo(running.panels, QPoint(0, 0)), live.size()))
+    qtbot.waitUntil(lambda: tour.light != before)
+    assert tour.light.contains(QRect(panels.live.mapTo(panels, QPoint(0, 0)), panels.live.size()))
+    for _ in itertools.takewhile(lambda _place: "Move it yourself" not in tour.card.text, _stops(tour)):
+        pass
+    assert panels.jog.isVisible()
 
 
 def test_without_a_robot_it_does_not_speak_of_moving_one(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -165,17 +152,15 @@ def test_without_a_robot_it_does_not_speak_of_moving_one(make_window: MakeWindow
 # ---- when it comes
 
 
-def test_never_uncalled_without_a_screen(running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_once_at_the_first_start_on_a_screen_and_whenever_it_is_asked_for(
+    running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(tour_module, "_LOOK_EVERY_MS", 1)
     tour_at_start(running, asked=False)
     qtbot.wait(30)
-    assert not running.tour.is_running
+    assert not running.tour.is_running, "without a screen"
     assert not was_seen()
-
-
-def test_once_at_the_first_start_on_a_screen(running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tour_module, "_NO_SCREEN", ())
-    monkeypatch.setattr(tour_module, "_LOOK_EVERY_MS", 1)
     tour_at_start(running, asked=False)
     until(qtbot, lambda: running.tour.is_running)
     assert was_seen()
@@ -183,11 +168,6 @@ def test_once_at_the_first_start_on_a_screen(running: OperatorWindow, qtbot: QtB
     tour_at_start(running, asked=False)
     qtbot.wait(30)
     assert not running.tour.is_running
-
-
-def test_whenever_it_is_asked_for(running: OperatorWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tour_module, "_LOOK_EVERY_MS", 1)
-    mark_seen()
     tour_at_start(running, asked=True)
     until(qtbot, lambda: running.tour.is_running)
     running.tour.end()
