@@ -95,7 +95,7 @@ def test_while_another_phantom_is_shown_nothing_is_taken_of_it_and_the_bench_is_
 ) -> None:
     side._use_taught("mine_1")
     side.teach()
-    assert side.teaching._newest() is not None
+    until(qtbot, lambda: side.teaching._newest() is not None)
     config = running.rig.config
     running.rig.use_config(config.model_copy(update={"twin": config.twin.model_copy(update={"phantom": "y_branch"})}))
     perception = running.rig.config.perception

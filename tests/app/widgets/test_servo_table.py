@@ -253,16 +253,20 @@ def test_zeroing_is_asked_back_and_then_told(table: ServoTable, qtbot: QtBot) ->
     assert asked == [ZeroRequest(positions_mm={"delivery_1": 12.5})]
 
 
-def test_a_joint_that_is_not_zeroed_is_noticed_when_all_servos_answer(table: ServoTable) -> None:
-    one_lacks = (False,) + (True,) * 6
-    for changes, lacks in (
+@pytest.mark.parametrize(
+    ("changes", "lacks"),
+    [
         ({"phase": BusPhase.DISARMED}, False),
-        ({"phase": BusPhase.DISARMED, "zeroed": one_lacks}, True),
-        ({"zeroed": one_lacks}, False),
+        ({"phase": BusPhase.DISARMED, "zeroed": (False,) + (True,) * 6}, True),
+        ({"zeroed": (False,) + (True,) * 6}, False),
         ({"phase": BusPhase.DISARMED, "zeroed": (False,) * 7, "servos": ()}, False),
-    ):
-        table.show_status(bus(**changes), SERVOS)
-        assert table.lacks_zeros is lacks
+    ],
+)
+def test_a_joint_that_is_not_zeroed_is_noticed_when_all_servos_answer(
+    table: ServoTable, changes: dict[str, object], lacks: bool
+) -> None:
+    table.show_status(bus(**changes), SERVOS)
+    assert table.lacks_zeros is lacks
 
 
 def test_restart_and_torque_off_are_asked_back(table: ServoTable, qtbot: QtBot) -> None:
