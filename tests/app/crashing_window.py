@@ -1,4 +1,6 @@
-"""A real operator window on a fake rig that meets an error nobody foresaw. Arguments: where ("slot", "thread", "fault"), folder.
+"""A real operator window on a fake rig that meets errors nobody foresaw.
+
+Arguments: which ("errors", in a thread and a slot, or "fault"), folder.
 
 Writes what became of it as one JSON object on standard output; a memory fault ends it before.
 """
@@ -33,7 +35,7 @@ def fail() -> None:
 
 
 def main() -> None:
-    where, folder = sys.argv[1], Path(sys.argv[2])
+    which, folder = sys.argv[1], Path(sys.argv[2])
     application = make_application()
     application.setQuitOnLastWindowClosed(False)
     config = Config.model_validate({"record": {"folder": str(folder / "sessions"), "ring_s": 0}})
@@ -54,15 +56,12 @@ def main() -> None:
                 asked.append(True)
                 window.recorder.toggle()  # once: until its first picture it does not record yet
         elif not boxes:
-            if where == "fault":
+            if which == "fault":
                 sys.stdout.write("going\n")
                 sys.stdout.flush()
                 faulthandler._sigsegv()  # type: ignore[attr-defined]
-            if where == "thread":
-                threading.Thread(target=fail, name="helper").start()
-            else:
-                QTimer.singleShot(0, fail)
-                QTimer.singleShot(0, fail)
+            threading.Thread(target=fail, name="helper").start()
+            QTimer.singleShot(0, fail)
             again.setInterval(1000)
         elif status.saved is not None:
             again.stop()

@@ -49,11 +49,11 @@ def test_commands_are_listed_in_their_order_and_groups_after_them() -> None:
         assert listed(help_of(group)) == names
 
 
-@pytest.mark.parametrize("path", [*((name,) for name in COMMANDS), *((g, name) for g, names in INNER.items() for name in names)])
-def test_every_command_says_what_it_does(path: tuple[str, ...]) -> None:
-    usage, _, rest = help_of(*path).partition("\n\n")
-    assert usage.startswith(f"Usage: main.py {' '.join(path)} ")
-    assert rest.partition("\n\n")[0].strip().endswith(".")
+def test_every_command_says_what_it_does() -> None:
+    for path in (*((name,) for name in COMMANDS), *((g, name) for g, names in INNER.items() for name in names)):
+        usage, _, rest = help_of(*path).partition("\n\n")
+        assert usage.startswith(f"Usage: main.py {' '.join(path)} ")
+        assert rest.partition("\n\n")[0].strip().endswith("."), path
 
 
 def test_a_help_page_waits_for_nothing_slow() -> None:
