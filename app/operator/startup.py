@@ -65,13 +65,7 @@ def run_window(
     config = with_outputs(config, stream, lsl=lsl)
     if bench is not None and kind is not RigKind.SIM:
         raise UserError("--bench is for the twin: leave --rig and --source out")
-    outputs: dict[OutputKind, LiveOutput] = {}
-    if config.stream.foxglove or config.stream.lsl:
-        from core.session.live_output import open_outputs
-
-        outputs = open_outputs(config.stream)
-        for output in outputs.values() if stream is not None or lsl else ():  # what is asked for here is there, or an error
-            output.wait_open()
+    outputs = _open_outputs(config, is_asked=stream is not None or lsl)
     ahead = start_ahead(config)  # before all that is slow to load here; it is told the configuration later
 
     from app.operator.live_menu import LiveMenuController
@@ -85,7 +79,6 @@ def run_window(
     from app.ui.actions import MenuEntry, add_menu
     from app.ui.crash_report import CrashWatch, state_folder
     from app.ui.i18n import tr
-    from app.ui.layout_state import LayoutState, Parts, Switch, overlay_switches, toggling
     from app.ui.window_base import make_application, run_until_closed
     from hardware.twin.own_phantom import with_own_phantom
 
@@ -102,10 +95,7 @@ def run_window(
     services = WindowServices(window, state_folder(), watch)
     settings = SettingsController(window, file, maker.perceive_again)
     if not until_first_frame:
-        panels = window.panels
-        performance = Switch(lambda: panels.shows_performance, toggling(panels.toggle_performance))
-        switches = {**overlay_switches(panels.overlay_bar), "performance": performance}
-        LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
+        _keep_layout(window)
     rigs, live, triggers = RigMenuController(window), LiveMenuController(window, outputs), TriggerServer(window)
     devices = OperatorDevices(config, lambda: window.rig.pilot, window.rig.stop, window)
     devices.said.connect(window.say)
@@ -129,6 +119,27 @@ def run_window(
         maker.close()
     watch.remove()
     return code
+
+
+def _open_outputs(config: Config, *, is_asked: bool) -> dict[OutputKind, LiveOutput]:
+    """Those of the configuration; what the command line asks for is there then, or a UserError."""
+    if not (config.stream.foxglove or config.stream.lsl):
+        return {}
+    from core.session.live_output import open_outputs
+
+    outputs = open_outputs(config.stream)
+    for output in outputs.values() if is_asked else ():
+        output.wait_open()
+    return outputs
+
+
+def _keep_layout(window: OperatorWindow) -> None:
+    from app.ui.layout_state import LayoutState, Parts, Switch, overlay_switches, toggling
+
+    panels = window.panels
+    performance = Switch(lambda: panels.shows_performance, toggling(panels.toggle_performance))
+    switches = {**overlay_switches(panels.overlay_bar), "performance": performance}
+    LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
 
 
 def _leave_after_first_frame(window: OperatorWindow) -> None:
