@@ -31,9 +31,9 @@ _HEAD = """# Faults
 What the program does in each fault. `python -m tools.fault_campaign --out docs/faults.md` brings them about and writes this page.
 
 **HOLD** stops an autonomous motion and may clear itself within half a second; **DISARM** holds, leaves autonomy and must be
-acknowledged; **STOP** does so in every mode and blocks the bus. Times are the pilot's own, from the injection on; ages count from
-the capture of the last frame, which came up to a frame's period before it. A case counts as listed only if the modes, the alerts,
-the record in the session and, for faults of camera and perception, the blanked advice are as listed.
+acknowledged; **STOP** does so in every mode and blocks the bus. Times count from the injection on, ages from the frame before it.
+A case counts as listed only if the modes, the alerts, the record in the session and, for faults of camera and perception, the
+blanked advice are as listed.
 """
 _WAYS = {
     True: """Measured live: seven software servos on a pseudo-terminal, the real driver in its own process, the wall's clock. The
