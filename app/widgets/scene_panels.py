@@ -106,8 +106,8 @@ class ScenePanels(QWidget):
 
     def _show_allowed(self, limits: PoseConfig) -> None:
         angle, distances = self._allowed
-        angle.setText(tr("state A: up to {limit:g}°", limit=limits.theta_allow_deg))
-        distances.setText(tr("state A: up to {limit:g} px", limit=limits.d_allow_px))
+        angle.setText(tr("A: up to {limit:g}°", limit=limits.theta_allow_deg))
+        distances.setText(tr("A: up to {limit:g} px", limit=limits.d_allow_px))
 
     # ---- places
 

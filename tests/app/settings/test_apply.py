@@ -102,11 +102,11 @@ def test_thresholds_act_at_once_and_cancel_puts_them_back(at: Bench, monkeypatch
     at.edit(D_ALLOW, "12")
     at.edit(D_ALLOW, "900")
     assert at.tried() == [9.0, 12.0]
-    assert at.window.panels._allowed[1].text() == "state A: up to 12 px"
+    assert at.window.panels._allowed[1].text() == "A: up to 12 px"
     assert at.desk.is_trying
     at.desk.dialog.reject()
     assert at.tried() == [9.0, 12.0, 6.0]
-    assert at.window.panels._allowed[1].text() == "state A: up to 6 px"
+    assert at.window.panels._allowed[1].text() == "A: up to 6 px"
     assert not at.desk.is_trying
     assert not at.path.exists()
     assert recorded == [9.0, 12.0, 6.0], "what is recorded names the thresholds in force"
