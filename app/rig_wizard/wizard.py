@@ -272,8 +272,8 @@ class RigWizard(QDialog):
         self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.model.draft is not None))
         self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
         set_main_button(self.next_button, is_last or page.is_done)
-        if not busy and self.stop_button.hasFocus():  # Qt moved the focus there while the buttons were off
-            self.next_button.setFocus()
+        if not busy and self.focusWidget() is self.stop_button:  # Qt moved the focus there while the buttons were off
+            (self.next_button if self.next_button.isEnabled() else self).setFocus()
         if page.main is not None:
             set_main_button(page.main, not page.is_done)
         if busy:

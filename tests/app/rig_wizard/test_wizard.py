@@ -88,6 +88,7 @@ def _open_camera(wizard: RigWizard, qtbot: QtBot) -> None:
     qtbot.mouseClick(wizard.camera_page.open_button, Qt.MouseButton.LeftButton)
     _idle(wizard, qtbot)
     assert wizard.model.bench is not None
+    assert wizard.focusWidget() is not wizard.stop_button
 
 
 def _idle(wizard: RigWizard, qtbot: QtBot) -> None:
