@@ -53,6 +53,7 @@ rig = typer.Typer(help="Rigs: camera, servos and calibration of a bench, in one 
 
 @rig.command("list")
 def print_list(as_json: JsonOption = False) -> None:
+    """The rigs that there are."""
     listed = list_rigs()
     if as_json:
         rows = []
@@ -75,6 +76,7 @@ def print_list(as_json: JsonOption = False) -> None:
 
 @rig.command("show")
 def show(name: RigName, as_json: JsonOption = False) -> None:
+    """One rig with its calibration."""
     _print_rig(*find_rig(name), as_json=as_json)
 
 
