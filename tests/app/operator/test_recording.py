@@ -392,7 +392,7 @@ def test_the_window_offers_it_when_a_recording_ends_and_takes_it_back_when_the_n
     dialog.form.fields["tags"].setText("pilot")
     dialog.accept()
     running.recorder.toggle()
-    until(qtbot, lambda: strip.text == "" and running.recorder.status.frames >= 1)
+    until(qtbot, lambda: strip.text == "" and running.recorder.status.recording and running.recorder.status.frames >= 1)
     until(qtbot, lambda: remembered_description() == Description(operator="Ana"))
     assert read_description(session, None).tags == ("pilot",)
     running.recorder.toggle()
