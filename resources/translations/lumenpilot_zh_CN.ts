@@ -164,8 +164,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
-        <source>Drag paints, Shift + drag or right drag takes away · wheel or [ ] size, Ctrl + wheel zoom · Insert and Delete paint at the cross · T back to points</source>
-        <translation>拖动绘制，Shift + 拖动或右键拖动擦除 · 滚轮或 [ ] 调大小，Ctrl + 滚轮缩放 · Insert 和 Delete 在十字处绘制 · T 返回点编辑</translation>
+        <source>Drag paints, Shift + drag or right drag takes away · wheel or [ ] size, Ctrl + wheel zoom · Insert and Delete paint at the cross · S fewer points · T back to points</source>
+        <translation>拖动为涂画，Shift + 拖动或右键拖动为擦除 · 滚轮或 [ ] 改大小，Ctrl + 滚轮缩放 · Insert 和 Delete 在十字处涂擦 · S 减少点数 · T 返回点编辑</translation>
     </message>
     <message>
         <location filename="../../app/annotator/editing.py"/>
@@ -434,6 +434,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
+        <source>{meaning}  (key {key})</source>
+        <translation>{meaning}  （按键 {key}）</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
         <source>State of the file</source>
         <translation>文件的状态</translation>
     </message>
@@ -496,11 +501,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/panels.py"/>
         <source>The lines say {state}, by the rule</source>
         <translation>按规则，两条线表明 {state}</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/panels.py"/>
-        <source>{meaning}  (key {key})</source>
-        <translation>{meaning}  （按键 {key}）</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -569,6 +569,11 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Go</source>
+        <translation>转到(&amp;G)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
         <source>&amp;Edit</source>
         <translation>编辑(&amp;E)</translation>
     </message>
@@ -576,11 +581,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>&amp;Tools</source>
         <translation>工具(&amp;T)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>&amp;Go</source>
-        <translation>转到(&amp;G)</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -859,6 +859,36 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Next</source>
+        <translation>下一项(&amp;N)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Previous</source>
+        <translation>上一项(&amp;P)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Next &amp;without an answer</source>
+        <translation>下一个未作答的(&amp;W)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;First</source>
+        <translation>第一个(&amp;F)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>&amp;Last</source>
+        <translation>最后一个(&amp;L)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>Lis&amp;t of images</source>
+        <translation>图像列表(&amp;T)</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
         <source>&amp;Undo</source>
         <translation>撤销(&amp;U)</translation>
     </message>
@@ -901,41 +931,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>Circle larger</source>
         <translation>放大圆</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>&amp;Next</source>
-        <translation>下一项(&amp;N)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>&amp;Previous</source>
-        <translation>上一项(&amp;P)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>Next &amp;without an answer</source>
-        <translation>下一个未作答的(&amp;W)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>&amp;First</source>
-        <translation>第一个(&amp;F)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>&amp;Last</source>
-        <translation>最后一个(&amp;L)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>Lis&amp;t of images</source>
-        <translation>图像列表(&amp;T)</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>In the picture</source>
-        <translation>在图像中</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -986,6 +981,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/window.py"/>
         <source>Angle to the vessel</source>
         <translation>与血管的夹角</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
+        <source>In the picture</source>
+        <translation>在图像中</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -1134,11 +1134,6 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
-        <source>Search: operator, task, date, rig, #tag, fault ...</source>
-        <translation>搜索：操作者、任务、日期、装置、#标签、故障……</translation>
-    </message>
-    <message>
-        <location filename="../../app/library/window.py"/>
         <source>Search</source>
         <translation>搜索</translation>
     </message>
@@ -1226,6 +1221,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/library/window.py"/>
         <source>not described</source>
         <translation>没有描述</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
+        <source>Search: operator, task, date, rig, #tag, fault ...</source>
+        <translation>搜索：操作者、任务、日期、装置、#标签、故障……</translation>
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
@@ -3136,6 +3136,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
+        <source>No angles by hand: {why}</source>
+        <translation>没有人工测量的角度：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/session_model.py"/>
         <source>it is empty</source>
         <translation>内容为空</translation>
     </message>
@@ -3146,23 +3151,23 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
-        <source>Kept beside the session</source>
-        <translation>保存在会话旁</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/session_model.py"/>
         <source>Clip not saved: {why}</source>
         <translation>片段未保存：{why}</translation>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
-        <source>Note kept</source>
-        <translation>备注已保存</translation>
+        <source>Kept beside the session</source>
+        <translation>保存在会话旁</translation>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
         <source>Clip cancelled; nothing was kept</source>
         <translation>片段已取消；没有保留任何内容</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/session_model.py"/>
+        <source>Note kept</source>
+        <translation>备注已保存</translation>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
@@ -3208,6 +3213,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/timeline.py"/>
         <source>state {state}</source>
         <translation>状态 {state}</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/timeline.py"/>
+        <source>by hand {angle}</source>
+        <translation>人工 {angle}</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -4371,11 +4381,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
-        <source>Name of the profile; Enter saves, Esc does not</source>
-        <translation>配置方案名称；Enter 保存，Esc 取消</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
         <source>Name of the profile</source>
         <translation>配置方案名称</translation>
     </message>
@@ -4451,6 +4456,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
+        <source>Name of the profile; Enter saves, Esc does not</source>
+        <translation>配置方案名称；Enter 保存，Esc 取消</translation>
+    </message>
+    <message>
+        <location filename="../../app/settings/dialog.py"/>
         <source>Choose one of your own profiles first</source>
         <translation>请先选择一个自己的配置方案</translation>
     </message>
@@ -4476,8 +4486,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
-        <source>some at the next start of the program</source>
-        <translation>部分在下次启动程序后生效</translation>
+        <source>some when the program is started again</source>
+        <translation>部分在程序重新启动后生效</translation>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
@@ -5306,11 +5316,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
-        <source>Loss and Dice of the training, by step</source>
-        <translation>训练的损失和 Dice，按步数</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
         <source>Left: the loss, which training makes small. Right: Dice, the agreement of what is found with what was drawn by hand, 1 at best. What counts are the held-out pictures: when they get no better any more, it has learnt enough.</source>
         <translation>左：损失，训练使其变小。右：Dice，即检出与手绘的一致程度，最好为 1。以留出图像为准：不再变好时，就学够了。</translation>
     </message>
@@ -5353,6 +5358,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training/dialog.py"/>
         <source>{minutes:.0f} min</source>
         <translation>{minutes:.0f} 分钟</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/dialog.py"/>
+        <source>Loss and Dice of the training, by step</source>
+        <translation>训练的损失和 Dice，按步数</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -5453,6 +5463,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training/model.py"/>
         <source>Model {name} is installed{early}. Dice on held-out pictures: {vessel}, {robot}. {verdict}</source>
         <translation>模型 {name} 已安装{early}。留出图像上的 Dice：{vessel}，{robot}。{verdict}</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/model.py"/>
+        <source>{count} pictures have both masks.</source>
+        <translation>{count} 张图片两种掩膜都有。</translation>
     </message>
     <message>
         <location filename="../../app/training/model.py"/>
@@ -5649,23 +5664,13 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>pictures and advice only</source>
-        <translation>只有图像和建议</translation>
+        <source>press {key} to arm; then you can hand over to the program</source>
+        <translation>按 {key} 进入待命；之后可移交给程序</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>Waiting for the rig</source>
-        <translation>等待装置</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>No rig is open</source>
-        <translation>没有打开的装置</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>F5 opens it again</source>
-        <translation>按 F5 重新打开</translation>
+        <source>hold {deadman}, then press {key} to hand over</source>
+        <translation>按住 {deadman}，再按 {key} 移交</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -5834,13 +5839,33 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
+        <source>pictures and advice only</source>
+        <translation>只有图像和建议</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
         <source>waiting for the rig</source>
         <translation>正在等待台架</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
+        <source>Waiting for the rig</source>
+        <translation>等待装置</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
         <source>no rig is open</source>
         <translation>没有打开的装置</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>No rig is open</source>
+        <translation>没有打开的装置</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>F5 opens it again</source>
+        <translation>按 F5 重新打开</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -5879,23 +5904,18 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>press {key} to arm; then you can hand over to the program</source>
-        <translation>按 {key} 进入待命；之后可移交给程序</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>{sentence}.</source>
         <translation>{sentence}。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>press {key}: the program drives while you hold</source>
-        <translation>按 {key}：按住期间由程序驾驶</translation>
+        <source>press {key}, then switch the servos on</source>
+        <translation>按 {key}，然后开启舵机</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>hold {deadman}, then press {key} to hand over</source>
-        <translation>按住 {deadman}，再按 {key} 移交</translation>
+        <source>press {key}: the program drives while you hold</source>
+        <translation>按 {key}：按住期间由程序驾驶</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6121,6 +6141,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>left</source>
         <translation>左</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>allowed {limit:g}</source>
+        <translation>允许 {limit:g}</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6499,21 +6524,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>press {key}, then switch the servos on</source>
-        <translation>按 {key}，然后开启舵机</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>allowed {limit:g}</source>
-        <translation>允许 {limit:g}</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>allowed {limit:g}°</source>
-        <translation>允许 {limit:g}°</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>head {head:.0f} px {side}, tail {tail:.0f} px {other_side} of the centerline, {angle}</source>
         <translation>头端在中心线{side}侧 {head:.0f} px，尾端在{other_side}侧 {tail:.0f} px，{angle}</translation>
     </message>
@@ -6566,6 +6576,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>zero: wires were slack by {slack} mm; pretension {pretension:g} mm</source>
         <translation>零位：驱动丝原松弛 {slack} mm；预紧 {pretension:g} mm</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>allowed {limit:g}°</source>
+        <translation>允许 {limit:g}°</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -7398,13 +7413,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/scene_panels.py"/>
-        <source>state A: up to {limit:g}°</source>
-        <translation>状态 A：至多 {limit:g}°</translation>
+        <source>A: up to {limit:g}°</source>
+        <translation>A：不超过 {limit:g}°</translation>
     </message>
     <message>
         <location filename="../../app/widgets/scene_panels.py"/>
-        <source>state A: up to {limit:g} px</source>
-        <translation>状态 A：至多 {limit:g} px</translation>
+        <source>A: up to {limit:g} px</source>
+        <translation>A：不超过 {limit:g} px</translation>
     </message>
     <message>
         <location filename="../../app/widgets/scene_panels.py"/>
@@ -12938,8 +12953,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>below it there is no answer</source>
-        <translation>低于此不给结果</translation>
+        <source>an answer with less confidence is not given</source>
+        <translation>置信度低于此值的结果不给出</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -12948,8 +12963,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>an answer that is less sure than this is shown as unsure</source>
-        <translation>确定度低于此的结果显示为“不确定”</translation>
+        <source>an answer with less confidence is shown as unsure</source>
+        <translation>置信度低于此值的结果显示为不确定</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -14048,8 +14063,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>below, autonomy holds</source>
-        <translation>低于此，自主驾驶保持</translation>
+        <source>an answer with less confidence holds the program</source>
+        <translation>置信度低于此值时程序保持不动</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -14058,8 +14073,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>so much more is needed to go on</source>
-        <translation>继续所需再高出的量</translation>
+        <source>how much more confidence is needed to go on</source>
+        <translation>恢复继续还需高出多少置信度</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -14253,8 +14268,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>of all windows; auto = as the system says, en = English, zh = Chinese (simplified)</source>
-        <translation>所有窗口的；auto = 跟随系统，en = 英文，zh = 简体中文</translation>
+        <source>of all windows; auto = the system's, en = English, zh = Chinese (simplified)</source>
+        <translation>所有窗口的语言；auto = 随系统，en = 英文，zh = 中文（简体）</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
