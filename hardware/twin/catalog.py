@@ -34,7 +34,7 @@ RARE_TITLES = {
     "glow": "Glowing liquid",
     "tank": "Tank of rippling water",
     "picture": "Printed photograph",
-    "resin": "Layers of printed resin",
+    "resin": "3D-printed resin",
 }
 """Looks of other kinds of rigs, drawn only where they are named."""
 

@@ -9553,6 +9553,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>Your bench's own picture</source>
+        <translation>您的台架的实拍图</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>Silicone on white</source>
         <translation>白底硅胶</translation>
     </message>
@@ -9633,8 +9638,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Layers of printed resin</source>
-        <translation>分层打印树脂</translation>
+        <source>3D-printed resin</source>
+        <translation>3D 打印树脂</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
