@@ -46,7 +46,7 @@ _BEYOND_PX, _END_POINTS = (4.0, 8.0), 6
 _ROUNDS = 2
 """Corrections across and along that follow each other."""
 _TIE = 0.1
-"""Added to the mean squared difference (grey values) per square px of a correction: where all look alike, there is none."""
+"""Added to the mean squared difference (grey values) per square px of a correction: where all look alike, nothing is corrected."""
 
 
 def followed_lines(

@@ -32,8 +32,9 @@ from core.types import Image, Mask, Points
 FORMAT = 1
 INFO, EMPTY, NOISE, KNOWN, VESSEL = "bench.json", "empty.png", "noise.png", "known.png", "vessel.png"
 _PICTURES = frozenset({EMPTY, NOISE, KNOWN, VESSEL})
-_FILES = frozenset({INFO, *_PICTURES, "phantom.json"})
-"""With the twin's phantom of this bench (``hardware/twin/own_phantom.py``); another vessel needs another one."""
+PHANTOM_FILE = "phantom.json"
+"""The twin's phantom of this bench (``hardware/twin/own_phantom.py``); another vessel needs another one."""
+_FILES = frozenset({INFO, *_PICTURES, PHANTOM_FILE})
 
 SHARP_SHARE = 0.9
 """Empty pictures that are less sharp than this share of the sharpest one are not averaged into it."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core import geometry
-from core.bench.bench import INFO
+from core.bench.bench import INFO, PHANTOM_FILE
 from core.config.calibration import ScaleConfig
 from core.config.models import CleaningConfig, Config
 from core.config.rig_file import find_rig, has_rig, list_rigs
@@ -32,7 +32,7 @@ from core.perception.skeleton import end_pixels, thin
 from core.perception.vessel_graph import build_graph
 from core.types import GraphEdge, Mask, Point, Points, VesselGraph
 from hardware.twin.catalog import OWN_LOOK
-from hardware.twin.phantom import BOARD_MM, OWN, PHANTOM_FILE, Phantom, own_file
+from hardware.twin.phantom import BOARD_MM, OWN, Phantom, own_file
 from hardware.twin.view import CameraView
 
 ROBOT_MM = 2.5

@@ -9,8 +9,8 @@ from core.types import VesselGraph
 from hardware.twin.view import CameraView
 
 BOARD_MM = (200.0, 150.0)
-OWN, PHANTOM_FILE = "bench:", "phantom.json"
-"""How the name of the phantom of a bench begins, the bench's folder follows; and its file in there."""
+OWN = "bench:"
+"""How the name of the phantom of a bench begins; the bench's folder follows."""
 
 PHANTOM_TITLES = {
     "s_curve": "S-curve",
@@ -28,7 +28,11 @@ PHANTOM_TITLES = {
 
 def own_file(name: str) -> Path | None:
     """The file of the phantom of a bench, which need not be there; None for another phantom's name."""
-    return Path(name.removeprefix(OWN)) / PHANTOM_FILE if name.startswith(OWN) else None
+    if not name.startswith(OWN):
+        return None
+    from core.bench.bench import PHANTOM_FILE  # loads OpenCV
+
+    return Path(name.removeprefix(OWN)) / PHANTOM_FILE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
