@@ -19,7 +19,7 @@ from core.devices import UserError
 from hardware.twin.phantom import OWN
 
 if TYPE_CHECKING:
-    from core.types import Mask, Point
+    from core.types import Mask
 
 _UNITS_MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6}
 _WHITE = 192
@@ -46,12 +46,22 @@ def phantom(
     as_json: JsonOption = False,
 ) -> None:
     """Make the twin's phantom of your own bench, kept in the bench's folder, for --bench of gui, trial, synth, rehearse."""
-    from hardware.twin.own_phantom import PhantomError, filled, mask_of_csv, phantom_of_mask, view_of_scale, write_phantom
+    from hardware.twin.own_phantom import (
+        PhantomError,
+        filled,
+        mask_of_csv,
+        phantom_of_mask,
+        scale_and_port,
+        view_of_scale,
+        write_phantom,
+    )
 
     if sum(one is not None for one in (outline, svg, table)) > 1 or (picture is not None and outline is None):
         raise UserError("give one of --outline, --svg and --csv; --picture goes with --outline")
     folder, size, title, vessel = _bench(bench, picture, outline, is_drawn=svg is not None or table is not None)
-    scale, port_px = _calibrated(rig or (bench if has_rig(bench) else None), size)
+    rig = rig or (bench if has_rig(bench) else None)
+    known = find_rig(rig)[1].calibration if rig is not None and size is not None else None
+    scale, port_px = scale_and_port(known, size or (1, 1))
     if svg is not None:
         vessel, drawn = mask_of_svg(svg, size)
         scale = scale or drawn
@@ -131,16 +141,6 @@ def _at_working_size(mask: Mask) -> Mask:
     return np.asarray(
         to_working(np.where(mask[..., None], np.full(3, 255, np.uint8), np.uint8(0)), WORKING_SIZE_PX)[0][..., 0] > 127
     )
-
-
-def _calibrated(rig: str | None, size: tuple[int, int] | None) -> tuple[ScaleConfig | None, Point | None]:
-    """Scale and insertion port of a rig, for pictures of `size`."""
-    if rig is None or size is None:
-        return None, None
-    known = find_rig(rig)[1].calibration
-    scale = known.scale if known is not None and known.scale is not None and known.scale.fits(size) else None
-    entry = known.port if known is not None else None
-    return scale, None if entry is None else (entry.x_share * (size[0] - 1), entry.y_share * (size[1] - 1))
 
 
 def mask_of_svg(path: Path, size: tuple[int, int] | None) -> tuple[Mask, ScaleConfig | None]:

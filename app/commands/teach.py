@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from core.bench.bench import Bench
+    from core.config.calibration import CalibrationConfig
     from core.evaluation.bench_calibration import TeachingResult
     from core.learning.dataset import Sample
     from core.learning.teaching import FrameSelection, TeachingPicture, TeachingSet
@@ -105,10 +106,25 @@ def teach(
     if frames_only:
         _print_frames(made, as_json or progress_json)
         return
+    from hardware.twin.own_phantom import phantom_for_bench
+
     result, steps = _train(made, out, init, clock)
+    sys.stderr.write(f"note: {phantom_for_bench(out / BENCH, _calibration(source, rig))}\n")
     if taker is not None:
         set_bench(taker, out / BENCH, str(out))
     _print_result(made, out, result, steps, clock.elapsed_s, as_json or progress_json)
+
+
+def _calibration(source: Path, rig: str | None) -> CalibrationConfig | None:
+    """Of the rig, or else of the rig that recorded the session."""
+    from core.session.manifest import MANIFEST, SessionError, read_manifest
+
+    if rig is not None:
+        return find_rig(rig)[1].calibration
+    try:
+        return read_manifest(source).known if (source / MANIFEST).is_file() else None
+    except SessionError:  # its pictures were taken all the same
+        return None
 
 
 @dataclass(frozen=True, slots=True)

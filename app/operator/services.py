@@ -30,7 +30,7 @@ from app.ui.texts import OperatorStep
 from app.widgets.messages import Offer, OfferButton
 from core.annotation.store import DEFAULT_NAME
 from core.config.models import sessions_folder
-from core.config.rig_file import RigFileError, set_bench
+from core.config.rig_file import RigFileError, calibration_of, set_bench
 from core.control.modes import ARMED_MODES, Mode
 from core.perception.model_file import BENCH, own_models
 from core.perception.quality import UNKNOWN_KIND
@@ -280,7 +280,9 @@ class WindowServices(QObject):
         if self.teaching is None:
             controls = window.controls
             newest = partial(self._frame_of, bench)
-            model = TeachingModel(teaching_folder(bench), bench, newest, partial(_open_proposals, window.rig.config.perception))
+            config = window.rig.config
+            known = partial(calibration_of, config) if window.rig.kind is RigKind.LIVE else None  # the twin has its phantom
+            model = TeachingModel(teaching_folder(bench), bench, newest, partial(_open_proposals, config.perception), known=known)
             model.trained.connect(self._on_taught)
             driver = TeachingDriver(controls.drive, controls.stop, window.ask_step, lambda: controls.can_move)
             self.teaching = TeachingWindow(model, newest, driver, self._use_taught, window)

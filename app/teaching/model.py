@@ -15,9 +15,12 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from app.teaching.folder import LookKind, Segment, TakenLook, TeachingFolder, TeachingStep, TeachingView
 from app.training.model import TrainingPhase, TrainingState, name_problem, with_record
 from app.ui.i18n import tr, tr_text
+from app.ui.texts import sentence
 from app.ui.workers import ChildProcess, Worker, command_of
-from core.perception.model_file import own_models
+from core.config.calibration import CalibrationConfig
+from core.perception.model_file import BENCH, own_models
 from core.types import Frame, Image, Mask
+from hardware.twin.own_phantom import phantom_for_bench
 
 MINUTES = 5
 """Of a training, as the window proposes it."""
@@ -98,6 +101,7 @@ class TeachingModel(QObject):
     rig : what the bench is called.
     newest : the live picture.
     segment : opens the network that proposes; called in the thread.
+    known : the rig's calibration, for the twin's phantom of the bench; called in the thread. None: no phantom is made.
     """
 
     changed = Signal()
@@ -107,10 +111,16 @@ class TeachingModel(QObject):
     trained = Signal(str)
 
     def __init__(
-        self, folder: Path, rig: str, newest: NewestFrame, segment: Callable[[], Segment], parent: QObject | None = None
+        self,
+        folder: Path,
+        rig: str,
+        newest: NewestFrame,
+        segment: Callable[[], Segment],
+        parent: QObject | None = None,
+        known: Callable[[], CalibrationConfig | None] | None = None,
     ) -> None:
         super().__init__(parent)
-        self.rig, self._newest = rig, newest
+        self.rig, self._newest, self._known = rig, newest, known
         self._folder = TeachingFolder(folder, rig, segment)
         self.view = TeachingView()
         self.busy = ""
@@ -339,7 +349,7 @@ class TeachingModel(QObject):
         self._child = None
         if code == 0:
             self._show(replace(self.training, phase=TrainingPhase.DONE, line="", left_s=None))
-            self._run("", partial(self._folder.keep_model, self._name), quiet=True)
+            self._run("", partial(self._keep_model, self._name), self._on_kept, quiet=True)
             self.trained.emit(self._name)
         elif code == _INTERRUPTED or self._is_stopping:
             why = tr("Stopped. Frames and what was learnt are kept: Train goes on from there")
@@ -348,6 +358,14 @@ class TeachingModel(QObject):
             signalled = tr("it was ended by signal {number}", number=-code)
             why = tr_text(line) or (signalled if code < 0 else tr("exit code {code}", code=code))
             self._show(replace(self.training, phase=TrainingPhase.FAILED, line=tr("Training failed: {why}", why=why), left_s=None))
+
+    def _keep_model(self, name: str) -> str:
+        self._folder.keep_model(name)
+        return phantom_for_bench(own_models() / name / BENCH, self._known()) if self._known is not None else ""
+
+    def _on_kept(self, line: object) -> None:
+        if isinstance(line, str) and line:
+            self.said.emit(sentence(tr_text(line)), False)
 
     # ---- the end
 

@@ -33,7 +33,7 @@ FORMAT = 1
 INFO, EMPTY, NOISE, KNOWN, VESSEL = "bench.json", "empty.png", "noise.png", "known.png", "vessel.png"
 _PICTURES = frozenset({EMPTY, NOISE, KNOWN, VESSEL})
 PHANTOM_FILE = "phantom.json"
-"""The twin's phantom of this bench (``hardware/twin/own_phantom.py``); another vessel needs another one."""
+"""The twin's phantom of this bench (``hardware/twin/own_phantom.py``), which stays when the bench is written again."""
 _FILES = frozenset({INFO, *_PICTURES, PHANTOM_FILE})
 
 SHARP_SHARE = 0.9
@@ -512,6 +512,8 @@ def write_bench(bench: Bench, folder: Path) -> None:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
+        if (phantom := folder / PHANTOM_FILE).is_file():
+            shutil.copy2(phantom, scratch)
         scratch.chmod(0o755)
         if (aside := replace_folder(scratch, folder)) is not None:
             shutil.rmtree(aside, ignore_errors=True)

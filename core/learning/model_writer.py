@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from core.bench.bench import PHANTOM_FILE
 from core.config.models import SegmentationConfig
 from core.files import replace_folder, sync_folder
 from core.perception.inference import open_second_look, open_segmenter
@@ -230,6 +231,8 @@ def install_model(made: Path, folder: Path, bench: Path | None = None) -> None:
             _copy(near, scratch / SECOND_LOOK)
         if bench is not None:
             shutil.copytree(bench, scratch / BENCH)
+            if (phantom := folder / BENCH / PHANTOM_FILE).is_file() and not (bench / PHANTOM_FILE).exists():
+                shutil.copy2(phantom, scratch / BENCH)  # made anew where there is a scale (hardware/twin/own_phantom.py)
 
 
 @contextmanager

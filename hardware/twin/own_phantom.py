@@ -6,6 +6,7 @@ The picture's middle lies in the middle of the board, and the twin's camera sees
 
 from __future__ import annotations
 
+import contextlib
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,14 +19,15 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core import geometry
-from core.bench.bench import INFO, PHANTOM_FILE
-from core.config.calibration import ScaleConfig
+from core.bench.bench import INFO, PHANTOM_FILE, read_bench
+from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import CleaningConfig, Config
 from core.config.rig_file import find_rig, has_rig, list_rigs
 from core.config.section import first_problem
 from core.devices import UserError
 from core.files import write_atomic
 from core.learning.dataset import WORKING_SIZE_PX
+from core.messages import message
 from core.perception.model_file import BENCH, own_models
 from core.perception.segmentation import clean_mask
 from core.perception.skeleton import end_pixels, thin
@@ -127,6 +129,45 @@ def view_of_scale(scale: ScaleConfig, size: tuple[int, int]) -> CameraView:
     shift = np.eye(3)
     shift[:2, 2] = middle - np.array(BOARD_MM) / 2
     return CameraView(view.homography @ shift, size)
+
+
+def scale_and_port(known: CalibrationConfig | None, size: tuple[int, int]) -> tuple[ScaleConfig | None, Point | None]:
+    """What a calibration says of pictures of `size` (width, height); None where it says nothing."""
+    if known is None:
+        return None, None
+    scale = known.scale if known.scale is not None and known.scale.fits(size) else None
+    port = known.port
+    return scale, None if port is None else (port.x_share * (size[0] - 1), port.y_share * (size[1] - 1))
+
+
+def phantom_for_bench(folder: Path, known: CalibrationConfig | None) -> str:
+    """Make the phantom of a bench's vessel, or make it anew: by a calibration, else by scale and port of the one before.
+
+    Returns a line that says what was made, or why not and what to do: the one before stays then. Raises nothing.
+    """
+    has_one = (folder / PHANTOM_FILE).is_file()
+    try:
+        bench, before = read_bench(folder), None
+        with contextlib.suppress(PhantomError):  # a damaged one is made anew
+            before = read_phantom(f"{OWN}{folder}") if has_one else None
+        scale, port_px = scale_and_port(known, bench.size)
+        view = view_of_scale(scale, bench.size) if scale is not None else None
+        if before is not None and before.view is not None and before.view.size == bench.size:
+            view = view or before.view
+            x, y = before.view.project(before.graph.nodes[before.port][None])[0].tolist()
+            port_px = port_px or (x, y)
+        if view is None or bench.vessel is None:
+            why = message(
+                "calibrate the rig, or say how much the picture shows: python main.py phantom {folder} --width-mm MM", folder=folder
+            )
+            raise PhantomError(why)
+        made = phantom_of_mask(bench.vessel, view, f"{OWN}{folder}", bench.name, port_px).phantom
+        write_phantom(made, folder)
+    except (UserError, ArithmeticError, LookupError, ValueError) as error:
+        if has_one:
+            return message("the twin's phantom of this bench stays as it was: {why}", why=error)
+        return message("the twin has no phantom of this bench: {why}", why=error)
+    return message("the twin has a phantom of this bench: gui --bench {folder}", folder=folder)
 
 
 def filled(ink: Mask) -> Mask:

@@ -117,6 +117,7 @@ def move_robot(hand: BenchHand, count: int = 6) -> None:
 def test_the_whole_way_to_a_model_in_use(open_hand: OpenHand, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> None:
     stands_for_teach(monkeypatch, TEACHES)
     hand = open_hand()
+    hand.model._known = lambda: None
     window, page = hand.window, hand.window.train_page
     assert window.page is window.empty_page
     assert [window.steps.item(row).text().partition("  ")[2] for row in range(5)] == [
@@ -138,6 +139,7 @@ def test_the_whole_way_to_a_model_in_use(open_hand: OpenHand, monkeypatch: pytes
     qtbot.waitUntil(lambda: hand.model.training.phase is TrainingPhase.DONE, timeout=LONG_MS)
     hand.wait()
     assert "4 of these" in page.table.text()
+    assert window.message.startswith("The twin has no phantom of this bench: ")
     assert window.next_button.text() == "&Use it"
     hand.refusal = "the program is armed"
     hand.click(window.next_button)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 
 import cv2
@@ -9,8 +10,8 @@ import numpy as np
 import pytest
 
 from core import geometry
-from core.bench.bench import bench_from_pictures, read_bench, write_bench
-from core.config.calibration import ScaleConfig
+from core.bench.bench import bench_from_pictures, read_bench, with_vessel, write_bench
+from core.config.calibration import CalibrationConfig, PortConfig, ScaleConfig
 from core.config.models import Config
 from core.types import Mask
 from hardware.twin.own_phantom import (
@@ -18,6 +19,7 @@ from hardware.twin.own_phantom import (
     filled,
     mask_of_csv,
     own_phantoms,
+    phantom_for_bench,
     phantom_name,
     phantom_of_mask,
     read_phantom,
@@ -141,5 +143,28 @@ def test_it_is_kept_with_its_bench_and_seen_as_the_bench_is(tmp_path: Path) -> N
     (folder / "phantom.json").write_text("{}")
     with pytest.raises(ValueError, match="damaged"):
         read_phantom(name)
-    write_bench(bench_from_pictures([picture], None, "Mine", 640), folder)  # another vessel: its phantom goes
-    assert not (folder / "phantom.json").exists()
+
+
+def test_a_bench_gets_its_phantom_and_keeps_or_renews_it(tmp_path: Path) -> None:
+    folder, name = tmp_path / "bench", f"bench:{tmp_path / 'bench'}"
+    picture = np.random.default_rng(1).integers(90, 160, (*SIZE[::-1], 3), np.uint8)
+    bench = bench_from_pictures([picture], drawn(TRUNK, BRANCH), "Mine", 640)
+    write_bench(bench, folder)
+    assert phantom_for_bench(folder, None) == (
+        "the twin has no phantom of this bench: calibrate the rig, or say how much the picture shows: "
+        f"python main.py phantom {folder} --width-mm MM"
+    )
+    port = PortConfig(x_share=420 / 639, y_share=410 / 479)
+    known = CalibrationConfig(made_utc=datetime(2026, 1, 1, tzinfo=UTC), scale=SCALE, port=port)
+    assert phantom_for_bench(folder, known) == f"the twin has a phantom of this bench: gui --bench {folder}"
+    first = read_phantom(name)
+    write_bench(bench, folder)
+    assert len(read_phantom(name).targets) == len(first.targets) == 2
+    write_bench(with_vessel(bench, drawn([(250, 60), (250, 240)], TRUNK, BRANCH)), folder)
+    phantom_for_bench(folder, None)
+    again = read_phantom(name)
+    assert len(again.targets) == 3
+    assert np.linalg.norm(again.graph.nodes[again.port] - first.graph.nodes[first.port]) < 2.0
+    write_bench(with_vessel(bench, drawn([(100, 240), (200, 240)], [(270, 240), (370, 240)])), folder)
+    assert phantom_for_bench(folder, known).startswith("the twin's phantom of this bench stays as it was: the vessel has a gap")
+    assert len(read_phantom(name).targets) == 3
