@@ -109,8 +109,6 @@ def test_linear_regression_takes_errors_in_one_direction_only() -> None:
     # Regression by hand: x - 6 = -6 -2 2 6, y - 1 = -1 1 -1 1, sum xy = 8, sum xx = 80: slope 1/10.
     along = fit_line(zigzag, "least_squares")
     upright = fit_line(zigzag[:, ::-1], "least_squares")
-    assert along is not None
-    assert upright is not None
     assert along.direction[1] / along.direction[0] == pytest.approx(0.1)
     assert upright.direction[0] / upright.direction[1] == pytest.approx(0.1)
     assert along.start[0] < along.end[0]
@@ -121,7 +119,6 @@ def test_both_fits_find_a_straight_line() -> None:
     line = np.column_stack([np.arange(20.0), 3.0 * np.arange(20.0)])
     for fit in ("total_least_squares", "least_squares"):
         found = fit_line(line, fit)  # type: ignore[arg-type]
-        assert found is not None
         assert found.direction == pytest.approx((1 / np.sqrt(10), 3 / np.sqrt(10)))
 
 

@@ -602,7 +602,6 @@ def test_angles_by_hand_are_shown_beside_the_recording(open_player: Open, sessio
     window = open_player(copy)
     until(qtbot, lambda: window.session.is_whole and window.session.course.by_hand is not None)
     by_hand = window.session.course.by_hand
-    assert by_hand is not None
     assert by_hand[:, 0] == pytest.approx([1.2, 5.0])
     assert np.abs(by_hand[:, 1]) == pytest.approx([math.degrees(math.atan2(10.0, 60.0)), 0.0])
     timeline = window.panels.timeline

@@ -76,7 +76,6 @@ def test_a_key_that_is_marked_in_english_is_marked_in_chinese() -> None:
         marked = re.search(r"&(\w)", text)
         if marked is not None:
             found = re.search(r"&(\w)", translated)
-            assert found is not None, text
             assert found[1].isascii(), text
 
 

@@ -140,7 +140,6 @@ def test_a_head_without_room_costs_no_zero(draft: RigDraft, monkeypatch: pytest.
 def test_zeros_are_kept_without_the_steering(draft: RigDraft) -> None:
     draft.set_pretension(0.4)
     zero = draft.calibration().zero
-    assert zero is not None
     assert zero.found_utc is not None
     assert zero == ZeroConfig(ticks=TICKS, slack_mm=(0.1,) * 4, pretension_mm=0.4, found_utc=zero.found_utc)
 

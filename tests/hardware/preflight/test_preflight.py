@@ -460,7 +460,6 @@ def test_a_program_that_holds_the_port_without_a_lock_is_named(line: str, tmp_pa
     script = tmp_path / "wizard.py"
     script.write_text(f"import os, sys\nos.open({line!r}, os.O_RDWR | os.O_NOCTTY)\nprint(flush=True)\nsys.stdin.read()\n")
     with subprocess.Popen([sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
-        assert other.stdout is not None
         other.stdout.readline()
         named = rf"in use by another program: python\S* wizard.py \(process {other.pid}\)"
         _bad(device_checks.check_servo_port(line), named, f"fuser -v {line}")

@@ -75,7 +75,6 @@ def test_tendons_are_let_go_slowly_to_no_pull_and_nothing_else_moves() -> None:
     ramp, at_mm = ReleaseRamp(SERVOS.joints, PULLED, 10.0), list(PULLED)
     for now_s, tendons in ((10.0, (2.3, -1.7, 0.3, 0.3)), (10.1, (2.1, -1.7, 0.1, 0.1)), (10.4, (1.5, -1.7, 0.0, 0.0))):
         goals = ramp.goals(at_mm, now_s)
-        assert goals is not None
         assert goals[1] is None, "it hangs slack already"
         assert goals[4:] == (None, None, None), "nothing is pulled out of a vessel without an order"
         at_mm = [at if goal is None else goal for goal, at in zip(goals, at_mm, strict=True)]
@@ -94,13 +93,11 @@ def test_a_tendon_that_cannot_be_read_keeps_no_other_one_tight_and_is_named() ->
     left, blind = PULLED[1], (PULLED[0], None, None, *PULLED[3:])
     ramp = ReleaseRamp(SERVOS.joints, blind, 10.0)
     goals = ramp.goals(blind, 10.1)
-    assert goals is not None
     assert goals[:4] == pytest.approx((2.1, None, None, 0.1))
     at_mm: tuple[float | None, ...] = (0.0, left, None, 0.0, *PULLED[4:])
     assert ramp.goals(at_mm, 11.2) is not None
     assert ramp.tight == ("up",)
     late = ramp.goals((*at_mm[:2], 0.3, *at_mm[3:]), 11.3)
-    assert late is not None
     assert late[2] == pytest.approx(0.3)
     assert ramp.goals((*at_mm[:2], 0.0, *at_mm[3:]), 11.5) is None
     assert ramp.tight == ()

@@ -191,7 +191,6 @@ XM430, XL330 = SERVO_MODELS[1020], SERVO_MODELS[1200]
 def test_a_status_block_by_hand() -> None:
     block = bytes.fromhex("A7 02 01 20 FF 00FCFF 0AFF BFFF FFFFFD 2D 7800 1A00")
     state = registers.state_of(TENDON, XM430, -131_073, block, 5.0, 0xA7)
-    assert state is not None
     assert (state.torque, state.error, state.watchdog_tripped) == (True, HardwareError.OVERLOAD, True)
     assert (state.goal_ticks, state.ticks, state.position_mm) == (-1024, -131_073, 0.0)
     assert (state.current_ma, state.voltage_v, state.temperature_c) == (pytest.approx(-246 * 2.69), 12.0, 45.0)
@@ -199,7 +198,6 @@ def test_a_status_block_by_hand() -> None:
     assert [one.is_limited for one in limited if one is not None] == [True, False, False]
     assert state.velocity_mm_s == pytest.approx(-65 * 0.229 / 60 * 40)
     small = registers.state_of(TENDON, XL330, -131_073, block[:-4] + b"\x32\x1a", 5.0, 0xA7)
-    assert small is not None
     assert (small.current_ma, small.voltage_v, small.temperature_c) == (-246.0, 5.0, 45.0)
 
 
@@ -207,7 +205,6 @@ def test_a_supply_of_25_6_v_is_no_lost_block() -> None:
     block = bytes.fromhex("A7 02 01 00 00 000000 0000 0000 000000 2D 0001 1A00")
     assert registers.state_of(TENDON, SERVO_MODELS[1040], 0, block, 0.0, 0xA8) is None, "another mark: it has restarted"
     state = registers.state_of(TENDON, SERVO_MODELS[1040], 0, block, 0.0, 0xA7)
-    assert state is not None
     assert state.voltage_v == pytest.approx(25.6)
 
 

@@ -150,7 +150,6 @@ def test_a_program_that_had_the_port_before_is_named(terminal: str, tmp_path: Pa
     script = tmp_path / "wizard.py"
     script.write_text(f"import os, sys\nos.open({terminal!r}, os.O_RDWR | os.O_NOCTTY)\nprint(flush=True)\nsys.stdin.read()\n")
     with subprocess.Popen([sys.executable, str(script)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
-        assert other.stdout is not None
         other.stdout.readline()
         line = ServoLine(terminal, 1_000_000)
         with pytest.raises(PortTaken, match=rf"in use by another program, python\S* wizard.py \(process {other.pid}\): close"):

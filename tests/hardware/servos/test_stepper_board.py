@@ -186,8 +186,6 @@ def test_stop_reaches_the_board_through_the_guarded_process(board: SoftStepper) 
         robot.stop()
         _until(lambda: (status := robot.bus_status()) is not None and status.latched is not None)
         status = robot.bus_status()
-        assert status is not None
-        assert status.latched is not None
         assert status.latched.cause is Cause.STOP_PRESSED
         _until(lambda: "S" in board.said)
         at = board.axes[4].position

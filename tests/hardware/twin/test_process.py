@@ -104,15 +104,12 @@ def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
 @pytest.mark.usefixtures("no_process_stays_behind")
 def test_what_was_started_ahead_becomes_the_rig() -> None:
     ahead = start_ahead(CONFIG)
-    assert ahead is not None
     rig = open_rig(CONFIG, ahead)
     try:
         assert {child.pid for child in psutil.Process().children()} >= {ahead.twin.pid, ahead.bus.pid}
         assert isinstance(rig.robot, ServoRobot)
-        assert rig.robot._client is not None
         assert rig.robot._client.pid == ahead.bus.pid
         frame = rig.camera.read(20.0)
-        assert frame is not None
         assert frame.image.shape == (120, 160, 3)
         rig.robot.connect()
         assert rig.robot._client.pid != ahead.bus.pid, "the second connection has a process of its own"
@@ -137,7 +134,6 @@ def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, 
 def test_what_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     open_before = psutil.Process().num_fds()
     ahead = start_ahead(CONFIG)
-    assert ahead is not None
     cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
     rig = {"camera": "image_folder", "robot": "none", "source": str(tmp_path)}
     open_rig(load_config(overrides={"rig": rig}), ahead).close()
@@ -196,7 +192,6 @@ def test_the_rig_on_it_is_driven_by_the_real_driver() -> None:
     rig = open_rig(CONFIG)
     try:
         assert rig.kind is RigKind.SIM
-        assert rig.robot is not None
         assert rig.camera.name.startswith("bench twin: ")
         rig.robot.arm()
         start_mm = rig.robot.status().insertion_mm

@@ -62,7 +62,6 @@ def test_straight_robot_in_a_straight_lumen(
 ) -> None:
     truth = _truth(_robot(angle_deg, offset_mm))
     assert truth.reason is None
-    assert truth.pose is not None
     assert truth.pose.theta_signed_deg == pytest.approx(angle_deg, abs=1e-6)
     assert truth.pose.c_head_px == pytest.approx(c_head, abs=1e-6)
     assert truth.pose.c_tail_px == pytest.approx(c_tail, abs=1e-6)
@@ -77,10 +76,8 @@ def test_points_and_distances() -> None:
     assert truth.nearest == pytest.approx((320, 235))
     assert truth.lumen_radius_px == pytest.approx(18)
     assert truth.offset_ratio == pytest.approx(6 / 18)
-    assert truth.robot_vector is not None
     assert truth.robot_vector.start == pytest.approx((280, 241))
     assert truth.robot_vector.end == pytest.approx((320, 241))
-    assert truth.vessel_vector is not None
     assert truth.vessel_vector.start == pytest.approx((300, 235))
     assert truth.vessel_vector.end == pytest.approx((340, 235))
     # The wall is 6 mm from the centerline: 6 - 2 - radius 1 = 3 mm of room.
@@ -93,9 +90,7 @@ def test_tail_is_the_port_side_end_of_what_is_visible() -> None:
     # 59 mm of line behind the tip at 1 mm steps of 2: its first point is 59 mm back, its cap ends 60 mm back.
     assert inside.tail_xy == pytest.approx((320 - 3 * 60, 235))
     entering = _truth(np.array([[-30.0, 75.0], [99.0, 75.0]]))
-    assert entering.tail_xy is not None
     assert entering.tail_xy[0] == pytest.approx(-0.5, abs=0.5)
-    assert entering.robot_path is not None
     assert entering.robot_path[-1] == pytest.approx((320, 235))
 
 
@@ -109,8 +104,6 @@ def test_working_pixels_do_not_depend_on_the_cameras_resolution() -> None:
     # TWICE shows the same scene at double size: x' = 2 (x + 0.5) - 0.5.
     robot = _robot(12.0, 1.5)
     one, two = _truth(robot), _truth(robot, TWICE)
-    assert one.pose is not None
-    assert two.pose is not None
     assert two.scale == 0.5
     assert two.head_xy == pytest.approx(one.head_xy)
     assert two.pose.theta_deg == pytest.approx(one.pose.theta_deg)
@@ -208,6 +201,5 @@ def test_it_is_the_operators_route_to_the_same_place(name: str) -> None:
     nodes = [(float(x), float(y)) for x, y in phantom.graph.nodes]
     for target in phantom.targets:
         route = plan_route(phantom.graph, nodes[phantom.port], nodes[target])
-        assert route is not None
         np.testing.assert_array_equal(way_from_port(phantom, target), route.points)
         assert RouteFollower(phantom, target).length_mm == pytest.approx(route.length_px, abs=1e-9)

@@ -28,8 +28,6 @@ def test_lock_step_is_bit_equal_for_the_same_seed_and_commands() -> None:
         world.robot.send(Command(bend=0.3, advance_mm_s=10.0))
         runs.append([camera.read(0.0) for _ in range(4)])
     for first, second in zip(*runs, strict=True):
-        assert first is not None
-        assert second is not None
         np.testing.assert_array_equal(first.image, second.image)
         assert first.captured_s == second.captured_s
     assert [frame.index for frame in runs[0] if frame] == [0, 1, 2, 3]
@@ -58,8 +56,6 @@ def test_the_real_time_camera_gives_new_frames_and_stops() -> None:
     try:
         first = camera.read(10.0)
         second = camera.read(10.0)
-        assert first is not None
-        assert second is not None
         assert second.index > first.index
         assert second.captured_s >= first.captured_s
         assert opened_s <= second.captured_s <= time.monotonic()
