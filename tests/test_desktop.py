@@ -35,7 +35,7 @@ def home(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 
 def entry_of(path: Path) -> configparser.SectionProxy:
     parser = configparser.ConfigParser(interpolation=None, comment_prefixes=("#",))
-    parser.optionxform = str  # type: ignore[assignment]
+    parser.optionxform = str
     parser.read_string(path.read_text())
     return parser["Desktop Entry"]
 

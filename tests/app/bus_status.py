@@ -21,7 +21,7 @@ def servo(place: int, **changes: object) -> ServoState:
         joint.name, joint.id, 100.0, 1000, 1000, at_mm, at_mm, 0.0, 8.07, 12.0, 31.0, HardwareError(0), torque=True,
         watchdog_tripped=False,
     )  # fmt: skip
-    return replace(state, **changes)  # type: ignore[arg-type]
+    return replace(state, **changes)
 
 
 def bus(*others: ServoReading, **changes: object) -> BusStatus:
@@ -33,4 +33,4 @@ def bus(*others: ServoReading, **changes: object) -> BusStatus:
         rejection=None, clamps=(), at_end=(), rejections={}, clamp_count=12, line=LineCounts(), bad_packets=3, restarts=0,
         times=CycleTimes(20.0, 21.4, 4.0, 6.0), zeroed=(True,) * 7,
     )  # fmt: skip
-    return replace(status, **changes)  # type: ignore[arg-type]
+    return replace(status, **changes)

@@ -59,7 +59,7 @@ def main() -> None:
             if which == "fault":
                 sys.stdout.write("going\n")
                 sys.stdout.flush()
-                faulthandler._sigsegv()  # type: ignore[attr-defined]
+                faulthandler._sigsegv()
             threading.Thread(target=fail, name="helper").start()
             QTimer.singleShot(0, fail)
             again.setInterval(1000)

@@ -118,7 +118,7 @@ def test_linear_regression_takes_errors_in_one_direction_only() -> None:
 def test_both_fits_find_a_straight_line() -> None:
     line = np.column_stack([np.arange(20.0), 3.0 * np.arange(20.0)])
     for fit in ("total_least_squares", "least_squares"):
-        found = fit_line(line, fit)  # type: ignore[arg-type]
+        found = fit_line(line, fit)
         assert found.direction == pytest.approx((1 / np.sqrt(10), 3 / np.sqrt(10)))
 
 
@@ -324,6 +324,6 @@ def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
         (frames, {"model": str(tmp_path / "none")}, "none"),
     ):
         with pytest.raises(UserError) as failed:
-            run_ablation(folder, **options)  # type: ignore[arg-type]
+            run_ablation(folder, **options)
         assert words in str(failed.value)
         assert "\n" not in str(failed.value)

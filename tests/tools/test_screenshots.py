@@ -30,7 +30,7 @@ class Blind:
 
 def make_engine() -> LockStepEngine:
     config = Config.model_validate({"record": {"ring_s": 0}})
-    return LockStepEngine(config, Blind(), "y_branch", start_mm=20.0)  # type: ignore[arg-type]
+    return LockStepEngine(config, Blind(), "y_branch", start_mm=20.0)
 
 
 def test_every_picture_of_the_documents_is_made_by_the_command() -> None:

@@ -108,13 +108,13 @@ def test_what_was_done_before_a_step_failed_is_kept_and_goes_on_there(path: Path
         UserError, match=r"direction of up is wrong.*what was done is kept in .*go on: main.py rig accept 'bench 1'"
     ):
         _run("--operator", "Ada", answers="\ny\n\ny\n\nn\n")
-    assert read_acceptance(path).directions == ("right", "left")  # type: ignore[union-attr]
+    assert read_acceptance(path).directions == ("right", "left")
     with pytest.raises(UserError, match=r"right pulled 22.5 N, at most 22 N"):
         _run(answers="\ny\n" * 5 + "\n22,5\n")
-    assert read_acceptance(path).forces == ()  # type: ignore[union-attr]
+    assert read_acceptance(path).forces == ()
     with pytest.raises(UserError, match="no answer on standard input"):
         _run(answers="\n19\n\n18.5\n")
-    assert [one.read_n for one in read_acceptance(path).forces] == [19.0, 18.5]  # type: ignore[union-attr]
+    assert [one.read_n for one in read_acceptance(path).forces] == [19.0, 18.5]
     assert moved.count("direction right") == 1
 
 
@@ -126,7 +126,7 @@ def test_ctrl_c_keeps_what_was_done(path: Path, moved: list[str], monkeypatch: p
     result = runner.invoke(cli.app, ["rig", "accept", "bench 1", "--operator", "Ada"], input=YES + ENTERS)
     assert result.exit_code != 0
     assert "what was done is kept" in result.stderr
-    assert read_acceptance(path).directions == JOINT_NAMES  # type: ignore[union-attr]
+    assert read_acceptance(path).directions == JOINT_NAMES
 
 
 def test_a_rig_that_was_changed_is_accepted_again_from_the_start(path: Path, moved: list[str]) -> None:

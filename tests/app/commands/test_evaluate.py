@@ -38,7 +38,7 @@ FIGURES = {"error_distribution", "bland_altman", "scatter", "confusion"}
 
 
 def evaluate(folder: Path | None = None, csv: Path | None = None, *, out: Path, **more: object) -> dict:
-    command.evaluate(out, folder, csv, **more)  # type: ignore[arg-type]
+    command.evaluate(out, folder, csv, **more)
     return json.loads((out / "metrics.json").read_text(encoding="utf-8"))
 
 

@@ -279,7 +279,7 @@ def test_what_a_closed_session_has_lost_is_told(tmp_path: Path, capsys: pytest.C
     assert f"{EVENTS}: {len(events)} of {len(events)} events are lost" in json.loads(capsys.readouterr().out)["problems"]
     (session / EVENTS).write_bytes(b"".join(events))
     (session / "video_0000.mkv").unlink()
-    assert "1 of 1 videos are lost" in found()["problems"]  # type: ignore[operator]
+    assert "1 of 1 videos are lost" in found()["problems"]
 
 
 WITHOUT_QT = """

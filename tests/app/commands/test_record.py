@@ -331,6 +331,6 @@ def test_what_becomes_of_servos_that_hold(
 ) -> None:
     engine, lines = HoldingEngine(), list[str]()
     monkeypatch.setattr(sys, "stdin", terminal)
-    record_command.leave_servos(engine, at_close, lines.append)  # type: ignore[arg-type]
+    record_command.leave_servos(engine, at_close, lines.append)
     assert engine.pilot.asked == asked
     assert any("not proven" in line for line in lines) is False

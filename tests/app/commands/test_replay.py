@@ -113,7 +113,7 @@ def test_what_a_replay_has_written_may_be_written_over_and_is_no_session(
 
 
 def options(session: Path, **changes: object) -> ReplayOptions:
-    return replace(ReplayOptions(session), **changes)  # type: ignore[arg-type]
+    return replace(ReplayOptions(session), **changes)
 
 
 def test_without_wishes_the_recorded_configuration_is_taken(tmp_path: Path) -> None:
@@ -210,12 +210,12 @@ def test_pictures_that_had_nothing_to_do_with_each_other_are_perceived_so_again(
     session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(3)])
     path = session / MANIFEST
     manifest = json.loads(path.read_text())
-    manifest["config"] = Config(rig=RigConfig(camera=camera, source="pictures")).model_dump(mode="json")  # type: ignore[arg-type]
+    manifest["config"] = Config(rig=RigConfig(camera=camera, source="pictures")).model_dump(mode="json")
     path.write_text(json.dumps(manifest))
     pipeline = _Asked()
     with SessionReader(session) as reader:
         reader.wait()
-        assert len(replay_frames(reader, pipeline).changes) == 3  # type: ignore[arg-type]
+        assert len(replay_frames(reader, pipeline).changes) == 3
     warm_up = 1
     assert (pipeline.as_stream, pipeline.alone) == ((3 + warm_up, 0) if is_stream else (0, 3 + warm_up))
 

@@ -130,7 +130,7 @@ def test_what_a_cluster_has_not_made_is_made_when_the_command_is_given_again(add
 def test_results_come_as_they_are_ready_and_what_has_not_begun_is_cancelled(address: str) -> None:
     slow = over_cluster(address, time.sleep, [0.0, 0.5, 3600.0])
     assert next(slow) is None
-    slow.close()  # type: ignore[attr-defined]
+    slow.close()
     assert sorted(over_cluster(address, abs, [-1, 2])) == [1, 2]
 
 

@@ -43,7 +43,7 @@ Key = Qt.Key
 
 
 def drive_view(**changes: object) -> DriveView:
-    return replace(DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False), **changes)  # type: ignore[arg-type]
+    return replace(DriveView(0.0, permitted=Source.OPERATOR, servos_on=True, deadman=False), **changes)
 
 
 def test_the_keys_of_the_steps_reach_the_pilot(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
@@ -176,12 +176,12 @@ def test_who_brings_the_robot_back_without_a_picture_sees_how_far_it_is_in(
     engine.silent = True
     until(qtbot, lambda: running.panels.badge.title == "No new picture")
     until(qtbot, lambda: jog.readout == "bend –, pitch –, inserted – mm")
-    engine.bus_status = lambda: bus(time_s=time.monotonic())  # type: ignore[assignment,return-value]
+    engine.bus_status = lambda: bus(time_s=time.monotonic())
     until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, inserted 20 mm")
     zeroed = (True, True, True, True, False, True, True)
-    engine.bus_status = lambda: bus(time_s=time.monotonic(), zeroed=zeroed)  # type: ignore[assignment,return-value]
+    engine.bus_status = lambda: bus(time_s=time.monotonic(), zeroed=zeroed)
     until(qtbot, lambda: jog.readout == "bend 0.00, pitch 0.00, inserted – mm")
-    engine.bus_status = lambda: None  # type: ignore[assignment,return-value]
+    engine.bus_status = lambda: None
     engine.silent = False
     until(qtbot, lambda: jog.readout.endswith("inserted 84 mm"))
 
@@ -216,7 +216,7 @@ def test_nothing_says_who_drives_once_the_rig_is_over(
 ) -> None:
     """Where it stopped for good, nobody waits for anything: it is opened again by whoever asks for it."""
     engine, may_open = FakeEngine(bench), threading.Event()
-    engine.bus_status = lambda: bus(time_s=time.monotonic())  # type: ignore[assignment,return-value]
+    engine.bus_status = lambda: bus(time_s=time.monotonic())
     rigs = iter([engine])
 
     def open_engine(_config: Config) -> FakeEngine:
@@ -245,7 +245,7 @@ def test_nothing_says_who_drives_once_the_rig_is_over(
 
 def test_a_recording_has_no_robot_to_drive(make_window: MakeWindow, bench: FakeBench, qtbot: QtBot) -> None:
     engine = FakeEngine(bench)
-    engine.pilot = None  # type: ignore[assignment]
+    engine.pilot = None
     window = make_window(lambda _config: engine, kind=RigKind.PLAYBACK)
     window.start()
     until(qtbot, lambda: window.panels.mode.who == "pictures only")
@@ -273,7 +273,7 @@ def test_servos_without_zeros_are_not_switched_on_but_asked_for_them(
     states = tuple(servo(place, position_mm=None, goal_mm=None) for place in range(7))
     offers = tuple(ZeroOffer(name, 0.3, 0.0, 0, 0.0) for name in JOINT_NAMES)
     lost = partial(bus, *states, phase=BusPhase.DISARMED, zeroed=(False,) * 7, offers=offers)
-    engine.bus_status = lambda: lost(time_s=time.monotonic())  # type: ignore[method-assign]
+    engine.bus_status = lambda: lost(time_s=time.monotonic())
     table = running.panels.servos
     until(qtbot, lambda: table.lacks_zeros)
     running.ask_step(OperatorStep.SERVOS_ON)
@@ -282,7 +282,7 @@ def test_servos_without_zeros_are_not_switched_on_but_asked_for_them(
     table.zeros.set_button.click()
     feeds = ["advance", "delivery_1", "delivery_2"]
     assert engine.pilot.asked == [f"zero {feeds}, kept ['right', 'left', 'up', 'down']"]
-    engine.bus_status = lambda: bus(phase=BusPhase.DISARMED, time_s=time.monotonic())  # type: ignore[method-assign]
+    engine.bus_status = lambda: bus(phase=BusPhase.DISARMED, time_s=time.monotonic())
     until(qtbot, lambda: not table.lacks_zeros)
     running.ask_step(OperatorStep.SERVOS_ON)
     assert engine.pilot.asked[-1] == "switch on"
@@ -571,7 +571,7 @@ def pedal() -> Iterator[SoftPedal]:
 
 def test_a_gamepads_state_is_a_jog_a_deadman_and_a_stop(qtbot: QtBot) -> None:
     pilot = FakePilot()
-    devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: pilot, pilot.stop)  # type: ignore[arg-type,return-value]
+    devices = OperatorDevices(Config.model_validate({"gamepad": {"enabled": False}}), lambda: pilot, pilot.stop)
     devices._on_gamepad(GamepadState(0.5, -0.25, 1.0, 0.0, None, False, 1.0))
     assert pilot.jogs == [Jog(0.5, -0.25, 1.0, 0.0)]
     assert pilot.deadman_said == []
@@ -588,7 +588,7 @@ def test_a_gamepads_state_is_a_jog_a_deadman_and_a_stop(qtbot: QtBot) -> None:
 def test_a_pedal_on_its_line_is_deadman_and_stop(qtbot: QtBot, pedal: SoftPedal) -> None:
     pilot = FakePilot()
     config = Config.model_validate({"gamepad": {"enabled": False}, "pedal": {"port": pedal.port}})
-    devices = OperatorDevices(config, lambda: pilot, pilot.stop)  # type: ignore[arg-type,return-value]
+    devices = OperatorDevices(config, lambda: pilot, pilot.stop)
     said: list[tuple[str, bool]] = []
     devices.said.connect(lambda text, bad: said.append((text, bad)))
     devices.start()

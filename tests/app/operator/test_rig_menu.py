@@ -104,14 +104,14 @@ def test_no_camera_is_looked_for_while_the_robot_is_armed(
     monkeypatch.setattr("app.operator.rig_menu.find_devices", look)
     desk = _desk(window)
     pilot = window.rig.pilot
-    pilot.view = DriveView(0.0, mode=Mode.AUTONOMOUS)  # type: ignore[misc]
+    pilot.view = DriveView(0.0, mode=Mode.AUTONOMOUS)
     until(qtbot, lambda: desk.hindrance() != "")
     desk._cameras.aboutToShow.emit()
     assert looks == []
     (line,) = desk._cameras.actions()
     assert line.text() == "The rig stays as it is: the robot is armed: disarm it first"
     assert not line.isEnabled()
-    pilot.view = DriveView(0.0)  # type: ignore[misc]
+    pilot.view = DriveView(0.0)
     until(qtbot, lambda: desk.hindrance() == "")
     desk._cameras.aboutToShow.emit()
     assert [action.text() for action in desk._cameras.actions()] == ["Bench twin"]
@@ -139,7 +139,7 @@ def test_the_wizard_is_refused_for_joints_that_it_does_not_know(window: Operator
     until(qtbot, lambda: len(opened) == 2)
     assert opened[1].servos.names == THREE.names
     said: list[str] = []
-    window.say = lambda text, **_: said.append(text)  # type: ignore[method-assign]
+    window.say = lambda text, **_: said.append(text)
     desk.calibrate()
     assert desk.wizard is None
     assert said == [

@@ -46,7 +46,7 @@ def meet_an_error(watch: CrashWatch) -> None:
     try:
         raise RuntimeError("broken")
     except RuntimeError:
-        watch.report(sys.exc_info(), "gui")  # type: ignore[arg-type]
+        watch.report(sys.exc_info(), "gui")
 
 
 def box_of(window: OperatorWindow, qtbot: QtBot) -> str:

@@ -558,7 +558,7 @@ def test_the_last_picture_of_a_recording_is_shown(make_window: MakeWindow, bench
         shown.append(tick.frame.index)
         show_tick(tick, max_block_ms)
 
-    window.panels.show_tick = spy  # type: ignore[method-assign]
+    window.panels.show_tick = spy
     window._pace._due_s = time.monotonic() + 60.0  # no picture's time comes before the end
     window.start()
     until(qtbot, lambda: window.rig.phase is EnginePhase.ENDED)

@@ -220,7 +220,7 @@ def test_after_saving_a_rig_that_stopped_looks_stopped(
     until(qtbot, lambda: at.window.shown_tick is not None)
     at.engine.fail_with = DeviceError("camera: cable out")
     until(qtbot, lambda: at.window.rig.phase is EnginePhase.FAULT)
-    at.engine.set_perception = lambda _config: False  # type: ignore[method-assign]
+    at.engine.set_perception = lambda _config: False
     panels = at.window.panels
     assert panels.notice.isVisible()
     at.edit(D_ALLOW, "9")
@@ -267,7 +267,7 @@ def test_a_session_has_one_set_of_thresholds(at: Bench, qtbot: QtBot, monkeypatc
 def test_the_last_frame_is_understood_anew_when_the_rig_is_over(at: Bench, qtbot: QtBot) -> None:
     at.engine.fail_with = EndOfStream("the end")
     until(qtbot, lambda: at.window.rig.phase is EnginePhase.ENDED)
-    at.engine.set_perception = lambda config: False  # type: ignore[method-assign]
+    at.engine.set_perception = lambda config: False
     assert at.window.panels.badge.letter == "-"
     at.edit(D_ALLOW, "9")
     until(qtbot, lambda: at.window.panels.badge.letter == "C")
@@ -323,7 +323,7 @@ def test_what_the_rig_file_keeps_is_shown_as_it_is_in_force_and_not_edited(
     until(qtbot, lambda: dialog.draft.value("servos.max_pull_mm") == 5.0)
     dialog.go_to("servos.max_pull_mm")
     pull = dialog.page.fields["servos.max_pull_mm"]
-    assert (pull.editor.text(), pull.isEnabled()) == ("5", False)  # type: ignore[union-attr]
+    assert (pull.editor.text(), pull.isEnabled()) == ("5", False)
     said = [label.text() for label in dialog.page.findChildren(QLabel) if label.isVisible()]
     assert f"Kept in the rig file {path}: change it there, or by menu Rig, Calibrate" in said
     assert dialog.draft.changed_in(dialog._section) == 1

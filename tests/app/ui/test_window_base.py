@@ -392,6 +392,6 @@ def test_what_goes_wrong_after_the_start_leaves_no_thread_running(qapp: QApplica
 
     window = Window()
     with pytest.raises(RuntimeError, match="no such order"):
-        run_until_closed(qapp, window, lambda *_: None, fail)  # type: ignore[arg-type]
+        run_until_closed(qapp, window, lambda *_: None, fail)
     assert window.done == ["show", "start", "shut down"]
     qapp.aboutToQuit.disconnect(window.shut_down)

@@ -141,7 +141,7 @@ class _Desk(QObject):
 def _from_a_thread(letters: QueuedCallback[_Desk], count: int) -> None:
     def send() -> None:
         for number in range(count):
-            letters.send(lambda desk, number=number: desk.hear(number))  # type: ignore[misc]
+            letters.send(lambda desk, number=number: desk.hear(number))
 
     thread = threading.Thread(target=send)
     thread.start()
@@ -179,7 +179,7 @@ def test_a_command_whose_window_closes_while_it_speaks_is_heard_no_more(qtbot: Q
         child.told.connect(heard.append)
         child.start()
         already = len(heard)
-        qtbot.waitUntil(lambda already=already: len(heard) > already)  # type: ignore[misc]
+        qtbot.waitUntil(lambda already=already: len(heard) > already)
         process = child._process
         shiboken6.delete(window)
         until_now = len(heard)

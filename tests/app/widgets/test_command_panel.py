@@ -17,7 +17,7 @@ from tests.app.widgets.conftest import Own
 
 
 def clamp(joint: str = "right", asked_mm: float = 1.2, allowed_mm: float = 0.8, limit: Limit = Limit.RATE) -> Clamp:
-    return Clamp(joint, asked_mm, allowed_mm, limit)  # type: ignore[arg-type]
+    return Clamp(joint, asked_mm, allowed_mm, limit)
 
 
 def told(log: ClampLog) -> list[tuple[str, str, int]]:

@@ -40,7 +40,7 @@ def wall_scene(offset_px: float, captured_s: float = 0.0) -> Scene:
 
 
 def force(newton: float | None) -> RobotStatus:
-    return RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4, newton)  # type: ignore[arg-type]
+    return RobotStatus(0.0, 0.0, 0.0, (0.0,) * 4, (0.0,) * 4, newton)
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ POSE = Pose(40.9, 40.9, 30.0, 4.0, False, PoseState.C, 0.9)
 
 
 def scene(scale: float = 1.0, **parts: object) -> Scene:
-    return Scene(0, 0.0, (640, 480), scale, **parts)  # type: ignore[arg-type]
+    return Scene(0, 0.0, (640, 480), scale, **parts)
 
 
 def test_foot_is_the_nearest_point_of_the_line() -> None:

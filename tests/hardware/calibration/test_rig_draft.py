@@ -51,7 +51,7 @@ class Bench:
 def draft(monkeypatch: pytest.MonkeyPatch) -> RigDraft:
     monkeypatch.setattr(servo_identification, "find_zeros", lambda *_: Zeros((0.1,) * 4))
     monkeypatch.setattr(servo_identification, "standing_ticks", lambda *_: TICKS)
-    made = RigDraft(Bench(), Config())  # type: ignore[arg-type]
+    made = RigDraft(Bench(), Config())
     made.find_zeros()
     return made
 
@@ -157,7 +157,7 @@ def test_without_a_search_the_steering_is_learnt_from_a_kept_zero_or_not_at_all(
 
     zero = None if offered is None else ZeroConfig(ticks=offered, slack_mm=(0.0,) * 4, pretension_mm=0.3)
     known = CalibrationConfig(made_utc=WHEN, zero=zero)
-    fresh = RigDraft(Bench(), Config(), known)  # type: ignore[arg-type]
+    fresh = RigDraft(Bench(), Config(), known)
     error, said = (DeviceError, "find the zeros first") if zero is None else (SteeringNotSeen, "no room")
     with pytest.raises(error, match=said):
         fresh.learn_steering()
@@ -191,7 +191,7 @@ def test_the_wiring_that_was_found_is_kept(draft: RigDraft) -> None:
     draft.set_assignments(found)
     known = draft.calibration()
     assert known.wiring == ((2, -1), (1, 1), (3, 1), (4, 1), (5, 1), (6, 1), (7, 1)) == wiring_of(draft.config.servos)
-    again = RigDraft(Bench(), draft.config, known)  # type: ignore[arg-type]
+    again = RigDraft(Bench(), draft.config, known)
     assert again.calibration().wiring == known.wiring
 
 
@@ -215,7 +215,7 @@ def test_what_keeps_servos_from_being_seven_is_told(
 def test_what_was_seen_of_a_servo_that_is_gone_is_forgotten(draft: RigDraft, monkeypatch: pytest.MonkeyPatch) -> None:
     draft.config = draft.config.model_copy(update={"servos": draft.config.servos.model_copy(update={"port": "/dev/ttyUSB0"})})
     draft.set_assignments([Assignment(joint.name, joint.id, joint.sign, "seen") for joint in draft.servos.joints])
-    draft.findings = dict.fromkeys(range(1, 8), ServoFinding("advance", 1, "seen"))  # type: ignore[arg-type]
+    draft.findings = dict.fromkeys(range(1, 8), ServoFinding("advance", 1, "seen"))
     found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in (1, 2, 3, 4, 5, 6, 9)))
     monkeypatch.setattr("hardware.calibration.rig_draft.find_servos", lambda *_: found)
     draft.search_servos()
@@ -237,7 +237,7 @@ def test_nothing_moves_on_a_live_rig_before_its_drums_are_known(
 ) -> None:
     for name in ("find_zeros", "learn_steering", "wiggle", "identify_servo", "nudge"):
         ends(monkeypatch, name, AssertionError("it moved"))
-    draft = RigDraft(Bench(RigKind.LIVE), Config())  # type: ignore[arg-type]
+    draft = RigDraft(Bench(RigKind.LIVE), Config())
     draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(k, 1020) for k in range(1, 8)))
     with pytest.raises(DeviceError, match=r"^say the diameters of the drums before anything moves"):
         step(draft)
@@ -260,7 +260,7 @@ def test_drums_become_ways_per_turn_and_what_was_found_with_others_is_forgotten(
     draft.find_zeros()
     draft.set_drums(DRUMS)
     assert draft.zero is not None, "the same drums again forget nothing"
-    assert RigDraft(Bench(), draft.config, known).drums == DRUMS  # type: ignore[arg-type]
+    assert RigDraft(Bench(), draft.config, known).drums == DRUMS
 
 
 def _search(draft: RigDraft, monkeypatch: pytest.MonkeyPatch, **models: int) -> None:
@@ -279,7 +279,7 @@ def test_small_servos_for_the_wires_beside_strong_ones(draft: RigDraft, monkeypa
     # the servos are found to sit elsewhere: their models move with them
     order = (5, 6, 7, 1, 2, 3, 4)
     names = ("right", "left", "up", "down", "advance", "delivery_1", "delivery_2")
-    draft.set_assignments([Assignment(name, one, 1, "seen") for name, one in zip(names, order, strict=True)])  # type: ignore[arg-type]
+    draft.set_assignments([Assignment(name, one, 1, "seen") for name, one in zip(names, order, strict=True)])
     servos = draft.config.servos
     assert [servos.model_of(joint).number for joint in servos.joints] == [1020] * 3 + [1200] * 4
 

@@ -300,7 +300,7 @@ class _Wires:
         yield _WireProbe(self.at_mm, servo_id, limits)
 
     def find(self) -> servo_identification.Zeros:
-        return servo_identification.find_zeros(self, self.servos, lambda _: None)  # type: ignore[arg-type]
+        return servo_identification.find_zeros(self, self.servos, lambda _: None)
 
     def too_tight_mm(self) -> list[float]:
         return [self.at_mm[servo_id] - taut for servo_id, taut in self.taut_mm.items()]

@@ -60,7 +60,7 @@ def _watched(folder: Path, _: ExitStack) -> Camera:
         cv2.imwrite(str(folder / "pictures" / f"{next(numbers)}.png"), np.zeros((48, 64, 3), np.uint8))
         return read(timeout_s)
 
-    camera.read = read_after_writing  # type: ignore[method-assign]
+    camera.read = read_after_writing
     return camera
 
 

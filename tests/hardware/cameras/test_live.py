@@ -186,7 +186,7 @@ def test_a_driver_that_hangs_is_noticed_from_outside(script: _Script, camera: Li
 
 
 def test_a_driver_that_breaks_is_for_good(script: _Script, camera: LiveCamera) -> None:
-    script.shots = ["no shot at all"]  # type: ignore[list-item]
+    script.shots = ["no shot at all"]
     camera.open()
     with pytest.raises(DeviceError, match=r"no longer read \(AttributeError.*F5") as caught:
         for _ in range(100):

@@ -237,7 +237,7 @@ def test_where_nothing_is_written_nothing_is_told_as_sent(bench: Bench) -> None:
     bench.cycles(7)
     assert bench.reason is RejectReason.STALE_MEASUREMENT
     assert bench.guard.sent.order is None
-    assert bench.guard.sent.motion == Command(bend=pytest.approx(0.5))  # type: ignore[arg-type]
+    assert bench.guard.sent.motion == Command(bend=pytest.approx(0.5))
     assert bench.guard.sent.goals_mm == tuple(bench.goals)
     bench.alter = lambda state: state
     bench.cycles(2)

@@ -128,7 +128,7 @@ class Paper:
         self.now_s = 100.0
         monkeypatch.setattr(bus_process.time, "monotonic", lambda: self.now_s)
         self.bus, self.end = PaperBus(), PaperEnd()
-        self.loop = BusLoop(self.end, self.bus, ServosConfig(**servos), SafetyConfig())  # type: ignore[arg-type]
+        self.loop = BusLoop(self.end, self.bus, ServosConfig(**servos), SafetyConfig())
 
     def hear(self, *, stop: bool = False, request: str | None = None) -> None:
         self.end.stop = stop
@@ -138,8 +138,8 @@ class Paper:
     def turn(self) -> None:
         """A cycle in which the servos say nothing new."""
         self.now_s += 0.02
-        self.loop._guard.update = lambda *_: None  # type: ignore[method-assign]
-        self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+        self.loop._guard.update = lambda *_: None
+        self.end.heartbeat = lambda: None
         self.loop._read_decide_write()
 
     def reads(self, advance_mm: float = 0.0, tendon_mm: float = 0.0) -> None:
@@ -157,8 +157,8 @@ class Paper:
             )
             for place, (joint, at_mm) in enumerate(places)
         )  # fmt: skip
-        self.bus.read = lambda: states  # type: ignore[method-assign]
-        self.end.heartbeat = lambda: None  # type: ignore[attr-defined]
+        self.bus.read = lambda: states
+        self.end.heartbeat = lambda: None
 
     @property
     def stopped(self) -> bool:
@@ -220,7 +220,7 @@ def test_stop_between_two_transactions_of_arming_is_told_at_once_and_the_servos_
         paper.bus.told.append("undone")
         raise StoppedMeanwhile("stopped meanwhile: acknowledge, then switch the servos on again")
 
-    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.bus.arm = arm
     paper.reads()
     paper.hear(request="arm")
     assert paper.bus.told == ["undone", "hold"]
@@ -238,7 +238,7 @@ def test_stop_in_the_middle_of_arming_releases_the_wires_where_that_is_the_polic
         paper.end.stop = True
         paper.bus.check()
 
-    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.bus.arm = arm
     paper.reads()
     paper.hear(request="arm")
     assert paper.bus.told == ["hold", "torque off"]
@@ -250,7 +250,7 @@ def test_servos_are_not_switched_on_for_an_application_that_has_gone(paper: Pape
         paper.bus.check()
         raise AssertionError("it went on")
 
-    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.bus.arm = arm
     paper.reads()
     paper.hear(request="arm")
     assert "the application ended meanwhile" in str(paper.end.answers[0][1])
@@ -423,8 +423,8 @@ def test_without_an_application_only_servos_that_pull_are_watched(
     paper.loop._servos = paper.loop._servos.model_copy(update={"port": "/dev/none", "unattended_s": 60.0})
     paper.reads(tendon_mm=2.0)
     if loses == "torque":
-        states = tuple(replace(state, torque=False) for state in paper.bus.read())  # type: ignore[type-var]
-        paper.bus.read = lambda: states  # type: ignore[method-assign,assignment,return-value]
+        states = tuple(replace(state, torque=False) for state in paper.bus.read())
+        paper.bus.read = lambda: states
     paper.end.is_alone = True
     begun_s = paper.now_s
     paper.loop.run()
@@ -483,7 +483,7 @@ def _off_after(paper: Paper, tries: int) -> None:
             raise TorqueStillOn("torque of right is not proven to be off: cut the servos' power")
         paper.bus.told.append("torque off")
 
-    paper.bus.torque_off = torque_off  # type: ignore[method-assign]
+    paper.bus.torque_off = torque_off
 
 
 @pytest.mark.parametrize("tries", [0, 1, 3])
@@ -514,7 +514,7 @@ def test_an_arming_that_fails_half_way_and_cannot_be_undone_owes_the_torque_off(
     def arm() -> None:
         raise TorqueStillOn("servo 5 did not take it; torque of right is not proven to be off: cut the servos' power")
 
-    paper.bus.arm = arm  # type: ignore[method-assign]
+    paper.bus.arm = arm
     paper.reads()
     paper.bus.torque_stays = True
     paper.hear(request="arm")
@@ -661,8 +661,8 @@ def test_arming_looks_again_where_an_answer_is_late(paper: Paper, late: int) -> 
         silent = MissingServo(states[6].name, states[6].id, paper.now_s, 1, "no answer")
         return tuple(states[:6]) + ((silent,) if reads <= late else (states[6],))
 
-    paper.end.heartbeat = lambda: None  # type: ignore[attr-defined]
-    paper.bus.read = read  # type: ignore[method-assign,assignment]
+    paper.end.heartbeat = lambda: None
+    paper.bus.read = read
     paper.hear(request="arm")
     assert paper.bus.told == [], "where a joint is that does not answer, nobody knows"
     assert reads == min(late + 1, 3)

@@ -355,7 +355,7 @@ def test_torque_that_went_off_on_a_port_that_cannot_be_opened_is_told_at_once(ro
     """All seven had let go, but one of them was another one than before: told only when somebody had changed it back."""
     link, status = robot._client, _seen(robot, lambda status: bool(status.servos))
     closed = replace(status, phase=BusPhase.CLOSED, servos=(), cycle=status.cycle + 1000, torque_offs=1)
-    link.status = lambda: closed  # type: ignore[method-assign]
+    link.status = lambda: closed
     report = robot.report()
     assert (report.port_open, report.torque_off) == (False, True)
     closed = replace(closed, cycle=closed.cycle + 1)

@@ -739,7 +739,7 @@ class TorqueChanges:
 
         def watched(servo: SoftServo, *args: object, **details: object) -> object:
             before = servo.table["torque"]
-            reply = answer(servo, *args, **details)  # type: ignore[arg-type]
+            reply = answer(servo, *args, **details)
             if servo.table["torque"] != before:
                 self.seen.append((servo.id, servo.table["torque"]))
             return reply
@@ -1338,7 +1338,7 @@ def test_small_and_strong_servos_work_together(mixed: tuple[SoftServoBus, ServoB
     assert all(not state.error for state in states)
     bus.write((0.3, 0.2, 0.1, 0.0, 0.4, 0.5, 0.6))
     for index, goal_mm in enumerate((0.3, 0.2, 0.1, 0.0, 0.4, 0.5, 0.6)):
-        _until(bus, index, lambda r, goal_mm=goal_mm: isinstance(r, ServoState) and abs((r.position_mm or 0.0) - goal_mm) < 0.01)  # type: ignore[misc]
+        _until(bus, index, lambda r, goal_mm=goal_mm: isinstance(r, ServoState) and abs((r.position_mm or 0.0) - goal_mm) < 0.01)
 
 
 def test_currents_of_several_models_are_told_in_their_units(mixed: tuple[SoftServoBus, ServoBus]) -> None:

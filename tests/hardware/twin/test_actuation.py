@@ -84,7 +84,7 @@ def test_the_head_goes_where_it_is_steered_on_the_screen(path: object) -> None:
     assert turned_deg(0.0) == pytest.approx(0.0, abs=3.0)
     status = world.physics.status()
     assert len(status.tendon_pull_mm) == len(servos.tendons)
-    assert status.rotation_deg == pytest.approx(90.0 if path.stem == "two_tendons_rotation" else 0.0, abs=0.01)  # type: ignore[attr-defined]
+    assert status.rotation_deg == pytest.approx(90.0 if path.stem == "two_tendons_rotation" else 0.0, abs=0.01)
     assert unpack_status(pack_status(status)) == status
 
 

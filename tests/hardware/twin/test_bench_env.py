@@ -56,12 +56,12 @@ def test_a_bend_takes_the_time_that_the_joints_need() -> None:
     env = BenchEnv()
     env.reset(options={"trial": 1})
     env.step(np.array([1.0, 0.0, 0.0], np.float32))
-    pull_mm = max(env._opened().drive(0.001).bend, 0.0)  # type: ignore[misc]
+    pull_mm = max(env._opened().drive(0.001).bend, 0.0)
     assert 0.0 < pull_mm < 0.9
 
 
 def test_what_is_no_observation_is_refused() -> None:
     with pytest.raises(ValueError, match="must be state or image"):
-        BenchEnv("sound")  # type: ignore[arg-type]
+        BenchEnv("sound")
     with pytest.raises(RuntimeError, match="call reset"):
         BenchEnv().step(np.zeros(3, np.float32))

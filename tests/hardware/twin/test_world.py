@@ -16,7 +16,7 @@ from hardware.twin.world import MAX_ADVANCE_MM_S, MAX_DELIVERY_MM_S, TwinCamera,
 
 
 def _world(**changes: object) -> TwinWorld:
-    return TwinWorld(TwinConfig(phantom="s_curve", image_width_px=320, image_height_px=240, **changes))  # type: ignore[arg-type]
+    return TwinWorld(TwinConfig(phantom="s_curve", image_width_px=320, image_height_px=240, **changes))
 
 
 def test_lock_step_is_bit_equal_for_the_same_seed_and_commands() -> None:
