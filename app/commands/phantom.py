@@ -41,11 +41,13 @@ def phantom(
         float | None, typer.Option(min=1.0, max=10_000.0, help="width of what the picture shows, if not calibrated")
     ] = None,
     port: Annotated[
-        str | None, typer.Option(help="X,Y: where the robot enters, in pixels of the picture; default: at its border")
+        str | None,
+        typer.Option(help="X,Y: where the robot enters, in pixels of the picture; default: as in teach, or at its border"),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Make the twin's phantom of your own bench, kept in the bench's folder, for --bench of gui, trial, synth, rehearse."""
+    from core.bench.robot_texture import entry_of, read_textures
     from hardware.twin.own_phantom import (
         PhantomError,
         filled,
@@ -82,7 +84,7 @@ def phantom(
         view_of_scale(scale, (width, height)),
         f"{OWN}{folder}",
         title,
-        point_option(port) if port is not None else port_px,
+        point_option(port) if port is not None else port_px or entry_of(read_textures(folder)),
     )
     write_phantom(made.phantom, folder)
     graph, view = made.phantom.graph, made.phantom.view

@@ -287,6 +287,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
 
     from app.commands.trainer import FrameTraining, HeldOutMonitor, Trainer
     from core.bench.bench import read_bench
+    from core.bench.robot_texture import textures_of, write_textures
     from core.config.models import PerceptionConfig
     from core.evaluation.bench_calibration import BenchCalibration
     from core.learning.dataset import find_samples
@@ -295,6 +296,8 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
 
     twin = _twin_frames(made.folder)
     remembered = find_samples([twin])
+    bench = read_bench(made.bench)
+    write_textures(textures_of(made.train, bench), made.bench)
     begin = _resumed(made, init)
     network = made.network
     prior = read_model_info(model_folder(init))
@@ -314,7 +317,7 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
     notes: dict[str, Any] = {
         "init": init,
         "frames": len(samples),
-        "taught": {"bench": read_bench(made.bench).name, "frames": len(made.train)},
+        "taught": {"bench": bench.name, "frames": len(made.train)},
     }
     torch.manual_seed(plan.seed)
     task = FrameTraining(samples, begin, examples=_EXAMPLES)

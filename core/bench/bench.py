@@ -32,9 +32,10 @@ from core.types import Image, Mask, Points
 FORMAT = 1
 INFO, EMPTY, NOISE, KNOWN, VESSEL = "bench.json", "empty.png", "noise.png", "known.png", "vessel.png"
 _PICTURES = frozenset({EMPTY, NOISE, KNOWN, VESSEL})
-PHANTOM_FILE = "phantom.json"
-"""The twin's phantom of this bench (``hardware/twin/own_phantom.py``), which stays when the bench is written again."""
-_FILES = frozenset({INFO, *_PICTURES, PHANTOM_FILE})
+PHANTOM_FILE, ROBOT_FILE = "phantom.json", "robot.npz"
+"""The twin's phantom of this bench (``hardware/twin/own_phantom.py``) and what its robot looks like (``robot_texture.py``), which
+stay when the bench is written again."""
+_FILES = frozenset({INFO, *_PICTURES, PHANTOM_FILE, ROBOT_FILE})
 
 SHARP_SHARE = 0.9
 """Empty pictures that are less sharp than this share of the sharpest one are not averaged into it."""
@@ -512,8 +513,9 @@ def write_bench(bench: Bench, folder: Path) -> None:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-        if (phantom := folder / PHANTOM_FILE).is_file():
-            shutil.copy2(phantom, scratch)
+        for kept in (folder / PHANTOM_FILE, folder / ROBOT_FILE):
+            if kept.is_file():
+                shutil.copy2(kept, scratch)
         scratch.chmod(0o755)
         if (aside := replace_folder(scratch, folder)) is not None:
             shutil.rmtree(aside, ignore_errors=True)

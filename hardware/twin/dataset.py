@@ -31,7 +31,7 @@ from core.learning.painting import PaintedBench, exposed
 from core.learning.scenes import BenchScene
 from core.system import begin_as_worker
 from core.types import Image, Mask, Points
-from hardware.twin.catalog import BENCH_LOOK
+from hardware.twin.catalog import BENCH_LOOK, OWN_LOOK
 from hardware.twin.phantom import BOARD_MM, Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import TwinPhysics
@@ -151,9 +151,11 @@ def episode_frames(plan: SynthPlan, episode: int) -> Iterator[LabelledFrame]:
         moment = int(moments[place])
         points, sheath_mm, clearance_mm = shapes[moment]
         empty = bool(rng.random() < _EMPTY_SHARE)
+        if appearance.family == OWN_LOOK:
+            sheath_mm = 0.0  # how it looks there is not known
         robot = None if empty else points
         picture = renderer.render(robot, 0.0 if empty else sheath_mm, noise_seed=place)
-        truth = truth_of(phantom, view, robot, appearance.robot_radius_mm, config).to_json()
+        truth = truth_of(phantom, view, robot, renderer.appearance.robot_radius_mm, config).to_json()
         stem = f"{first + place:06d}"
         stuck = moment > 0 and points is shapes[moment - 1][0]
         row = {"stem": stem, "seed": seed, "phantom": phantom.name, "family": appearance.family}
@@ -171,6 +173,7 @@ class _PaintedRenderer:
     """Stands in for ``Renderer``: the same geometry and exact labels, in a painted look."""
 
     def __init__(self, phantom: Phantom, appearance: Appearance, size: tuple[int, int], seed: int, view: CameraView) -> None:
+        self.appearance = appearance
         self._rng = np.random.default_rng((seed, appearance.clutter_seed, 19))
         distance_px, ratio = _measured(phantom, appearance, view)
         self._bench = PaintedBench(self._rng, distance_px, ratio)

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from core import geometry
 from core.bench.bench import INFO, PHANTOM_FILE, read_bench
+from core.bench.robot_texture import entry_of, read_textures
 from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import CleaningConfig, Config
 from core.config.rig_file import find_rig, has_rig, list_rigs
@@ -156,6 +157,7 @@ def phantom_for_bench(folder: Path, known: CalibrationConfig | None) -> str:
             view = view or before.view
             x, y = before.view.project(before.graph.nodes[before.port][None])[0].tolist()
             port_px = port_px or (x, y)
+        port_px = port_px or entry_of(read_textures(folder))
         if view is None or bench.vessel is None:
             why = message(
                 "calibrate the rig, or say how much the picture shows: python main.py phantom {folder} --width-mm MM", folder=folder

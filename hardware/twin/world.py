@@ -153,6 +153,7 @@ class TwinWorld:
         self.physics = TwinPhysics(self.phantom, seed, drive, tendons_deg=[joint.angle_deg or 0.0 for joint in servos.tendons])
         self.robot = TwinRobot(self.physics)
         self._renderer = Renderer(self.phantom, self.appearance, size, seed)
+        self.appearance = self._renderer.appearance
         self._frame_index = 0
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None

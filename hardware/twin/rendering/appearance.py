@@ -192,7 +192,7 @@ def named_appearance(look: str | None, seed: int) -> Appearance:
     if look is not None and look not in LOOKS:
         raise ValueError(f"unknown look {look!r}; known: {', '.join(LOOKS)}")
     if look == OWN_LOOK:
-        return Appearance(family=OWN_LOOK)
+        return Appearance(family=OWN_LOOK, clutter_seed=seed)
     return Appearance() if look == BENCH_LOOK else random_appearance(seed, look)
 
 

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.bench.bench import bench_stamp, read_bench
+from core.bench.robot_texture import REACH_RADII, RobotTexture, lines_above, read_textures
 from core.types import Image, Mask, Points
 from hardware.twin.catalog import OWN_LOOK
 from hardware.twin.phantom import BOARD_MM, Phantom, own_file
 from hardware.twin.rendering.appearance import Appearance, make_view
 from hardware.twin.rendering.background import light_field, paint_board, stroke
 from hardware.twin.rendering.camera_effects import CameraEffects
-from hardware.twin.rendering.robot import Band, measure_band, paint_robot, paint_sheath
+from hardware.twin.rendering.robot import Band, measure_band, paint_robot, paint_sheath, paint_texture
 from hardware.twin.rendering.scene_objects import add_board_clutter, add_fittings
 from hardware.twin.rendering.vessel import paint_vessel, surface_of
 from hardware.twin.view import CameraView, measure_lumen
@@ -61,10 +62,10 @@ class Renderer:
         view: CameraView | None = None,
     ) -> None:
         self.view = view if view is not None else make_view(appearance, size, phantom)
-        own = _own_picture(phantom, self.view.size) if appearance.family == OWN_LOOK else None
+        own = _own_bench(phantom, self.view, appearance) if appearance.family == OWN_LOOK else None
+        self._texture = own.texture if own is not None else None
         if own is not None:  # what the bench's camera does is in the picture already
-            grey = float(np.ptp(own[0], axis=2).mean()) < _GREY
-            appearance = replace(appearance, blur_px=0.0, vignette=0.0, noise=own[1], saturation=0.0 if grey else 1.0)
+            appearance = own.appearance
         self.phantom, self.appearance = phantom, appearance
         rng = np.random.default_rng([seed, appearance.clutter_seed])
         self._grid = self.view.grid_mm().astype(np.float32)
@@ -73,7 +74,7 @@ class Renderer:
         self.lumen = measure_lumen(phantom.graph, self.view, self._grid, appearance.wall_mm, appearance.wall_mm + _REACH_MM)
         self._vessel = self.lumen.inside
         self._camera = CameraEffects(appearance, self.view.size, rng)
-        self._under, self._front, self._front_keep = self._paint_background(rng) if own is None else self._taken(own[0])
+        self._under, self._front, self._front_keep = self._paint_background(rng) if own is None else self._taken(own)
         whole = slice(0, self.view.size[1]), slice(0, self.view.size[0])
         self._empty = self._camera.expose(self._under * self._front_keep + self._front, whole)
 
@@ -89,6 +90,8 @@ class Renderer:
         if robot_points_mm is not None and len(robot_points_mm) >= 2:
             points = np.asarray(robot_points_mm, np.float64)
             reach = radius_mm + max(self.appearance.sheath_extra_mm if sheath_mm > 0 else 0.0, 1.0 / self._scale) + 0.3
+            if self._texture is not None:
+                reach = max(reach, REACH_RADII * radius_mm)
             band = measure_band(points, radius_mm, reach, self.view, self._grid)
             if len(band.pixel):
                 robot.reshape(-1)[band.pixel] = band.distance_mm < np.float32(radius_mm)
@@ -106,11 +109,11 @@ class Renderer:
         self._light = light
         return layers.under * light[..., None], layers.front, (1 - layers.front_alpha)[..., None]
 
-    def _taken(self, picture: F32) -> tuple[F32, F32, F32]:
-        """The same layers where the background is a picture (H, W, 3)."""
-        shape = picture.shape[:2]
-        self._light = np.ones(shape, np.float32)
-        return picture, np.zeros_like(picture), np.ones((*shape, 1), np.float32)
+    def _taken(self, own: _OwnBench) -> tuple[F32, F32, F32]:
+        """The same layers where the background is a picture."""
+        self._light = np.ones(own.picture.shape[:2], np.float32)
+        keep = 1 - own.above
+        return np.asarray((own.picture - own.above) / np.maximum(keep, np.float32(0.01)), np.float32), own.above, keep
 
     def _with_robot(self, points: Points, band: Band, sheath_mm: float) -> Image:
         """The noise-free image, with the window around the robot painted again."""
@@ -126,7 +129,12 @@ class Renderer:
             (np.float32(appearance.robot_radius_mm) - band.distance_mm) * np.float32(self._scale) + np.float32(0.5), 0, 1
         )
         veil = np.float32(appearance.robot_veil) * self._vessel.reshape(-1)[band.pixel]
-        paint_robot(canvas, local, coverage * (1 - veil), lit.astype(np.float32), appearance, self._light.reshape(-1)[band.pixel])
+        if self._texture is not None:
+            from_head_mm = self._grid.reshape(-1, 2)[band.pixel] - points[-1].astype(np.float32)
+            paint_texture(canvas, local, self._texture, appearance.robot_radius_mm, from_head_mm)
+        else:
+            light = self._light.reshape(-1)[band.pixel]
+            paint_robot(canvas, local, coverage * (1 - veil), lit.astype(np.float32), appearance, light)
         if sheath_mm > 0:
             covered = np.clip((self._port_mm(points) + np.float32(sheath_mm) - band.from_tail_mm) * np.float32(self._scale), 0, 1)
             outside = np.float32(appearance.robot_radius_mm + appearance.sheath_extra_mm)
@@ -170,20 +178,43 @@ class Renderer:
         return np.float32(np.sum(np.linalg.norm(np.diff(points[: index + 1], axis=0), axis=1)))
 
 
-def _own_picture(phantom: Phantom, size: tuple[int, int]) -> tuple[F32, float] | None:
-    """The empty picture (H, W, 3), 0..1, of the phantom's bench, fitted into `size`, and its noise in grey levels.
+@dataclass(frozen=True, slots=True, eq=False)
+class _OwnBench:
+    """The empty picture of a bench (H, W, 3), 0..1, with what of it lies ``above`` the robot; and the robot's texture, if known."""
+
+    picture: F32
+    above: F32
+    texture: RobotTexture | None
+    appearance: Appearance
+
+
+def _own_bench(phantom: Phantom, view: CameraView, appearance: Appearance) -> _OwnBench | None:
+    """The picture of the phantom's bench, fitted into the view's; the appearance's seed chooses between the robots seen there.
 
     None for a phantom of no bench, or of one without a picture. Raises BenchError for a damaged one.
     """
     file = own_file(phantom.name)
     if file is None or bench_stamp(file.parent) is None:
         return None
-    bench = read_bench(file.parent)
-    zoom = min(new / old for new, old in zip(size, bench.size, strict=True))
-    shift = [(new - 1 - zoom * (old - 1)) / 2 for new, old in zip(size, bench.size, strict=True)]
+    bench, textures = read_bench(file.parent), read_textures(file.parent)
+    zoom = min(new / old for new, old in zip(view.size, bench.size, strict=True))
+    shift = [(new - 1 - zoom * (old - 1)) / 2 for new, old in zip(view.size, bench.size, strict=True)]
     place = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
-    fitted = cv2.warpAffine(bench.empty, place, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return fitted.astype(np.float32) / np.float32(255), float(np.median(bench.noise))
+
+    def fitted(pixels: Image | F32) -> F32:
+        warped = cv2.warpAffine(pixels, place, view.size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return warped.astype(np.float32) / np.float32(255)
+
+    picture = fitted(bench.empty)
+    grey = float(np.ptp(picture, axis=2).mean()) < _GREY
+    noise = float(np.median(bench.noise))
+    appearance = replace(appearance, blur_px=0.0, vignette=0.0, noise=noise, saturation=0.0 if grey else 1.0)
+    if not textures:
+        return _OwnBench(picture, np.zeros_like(picture), None, appearance)
+    chosen = textures[appearance.clutter_seed % len(textures)]
+    radius_mm = chosen.radius_px * zoom / view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
+    appearance = replace(appearance, robot_radius_mm=radius_mm, robot_shadow=0.0)
+    return _OwnBench(picture, fitted(lines_above(bench.empty)), chosen, appearance)
 
 
 def _lamp_in_image(view: CameraView, light_deg: float) -> tuple[float, float]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core.bench.robot_texture import REACH_RADII, RobotTexture
 from core.types import Points
 from hardware.twin.rendering.appearance import Appearance
 from hardware.twin.view import CameraView
@@ -127,6 +129,30 @@ def paint_robot(canvas: F32, band: Band, coverage: F32, lit: F32, appearance: Ap
     painted += gloss.astype(np.float32) * (np.float32(1) - painted) * np.float32(0.8)
     alpha = (coverage * strength * appearance.robot_opacity)[:, None].astype(np.float32)
     canvas[band.pixel] = canvas[band.pixel] * (1 - alpha) + painted * alpha
+
+
+def paint_texture(canvas: F32, band: Band, texture: RobotTexture, radius_mm: float, from_head_mm: F32) -> None:
+    """Blend the straightened picture of a real robot over the flat `canvas` (H * W, 3).
+
+    `from_head_mm` (K, 2) leads from the head of the line, a radius behind the robot's end, to each pixel.
+    """
+    rows, columns = texture.rgba.shape[:2]
+    reach, pitch = np.float32(radius_mm * REACH_RADII), np.float32(texture.radius_px / radius_mm)
+    is_ahead, across = band.from_tip_mm <= 0, np.sum(from_head_mm * band.normal, axis=1)
+    ahead = np.sqrt(np.maximum(band.distance_mm**2 - across**2, 0))
+    row = np.float32(texture.radius_px) + pitch * np.where(is_ahead, -ahead, band.from_tip_mm)
+    half = np.float32((rows - 1) / 2)  # a longer robot goes on with the rear half, to and fro
+    row = np.minimum(row, 2 * half) - half + np.abs(half - np.maximum(row - 2 * half, 0) % (2 * half))
+    across = np.where(is_ahead, across, np.sign(band.side) * band.distance_mm)
+    shape = -(-len(row) // 512), 512  # OpenCV takes no longer lines
+    x, y = np.resize((across / reach + 1) * np.float32((columns - 1) / 2), shape), np.resize(row, shape)
+    taken = cv2.remap(texture.rgba, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    seen = taken.reshape(-1, 4)[: len(row)].astype(np.float32) / np.float32(255)
+    inside = np.where(
+        is_ahead, np.clip((np.float32(radius_mm) - band.distance_mm) * pitch + np.float32(0.5), 0, 1), band.distance_mm < reach
+    )
+    alpha = seen[:, 3:] * inside[:, None]
+    canvas[band.pixel] = canvas[band.pixel] * (1 - alpha) + seen[:, :3] * alpha
 
 
 def _absorb(canvas: F32, band: Band, coverage: F32, colour: F32, appearance: Appearance) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from core.bench.bench import read_bench
+from core.bench.robot_texture import read_textures
 from core.config.models import Config
 from core.config.rig_file import make_rig, read_rig, write_rig
 from core.learning.dataset import Sample, write_mask, write_png
@@ -209,7 +210,7 @@ def test_a_bench_is_taught_from_end_to_end(place: Path, tmp_path: Path, monkeypa
     assert info.calibration.features == default.calibration.features
     assert info.familiarity is not None
     assert info.training["taught"] == {"bench": "stream", "frames": 8}
-    assert read_bench(out / "bench").vessel is not None
+    assert read_bench(out / "bench").vessel is not None and read_textures(out / "bench")
     assert not (tmp_path / "own_teaching" / "network").exists()
     done = run("perceive", place / "stream", "--model", out, "--jsonl", tmp_path / "out.jsonl")
     assert done.returncode == 0, done.stderr

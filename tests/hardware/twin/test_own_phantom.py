@@ -11,6 +11,7 @@ import pytest
 
 from core import geometry
 from core.bench.bench import bench_from_pictures, read_bench, with_vessel, write_bench
+from core.bench.robot_texture import RobotTexture, write_textures
 from core.config.calibration import CalibrationConfig, PortConfig, ScaleConfig
 from core.config.models import Config
 from core.types import Mask
@@ -121,7 +122,7 @@ def test_a_table_of_centerlines(tmp_path: Path) -> None:
 
 
 def test_it_is_kept_with_its_bench_and_seen_as_the_bench_is(tmp_path: Path) -> None:
-    picture = np.random.default_rng(0).integers(0, 255, (*SIZE[::-1], 3), np.uint8)
+    picture = np.random.default_rng(0).integers(140, 150, (*SIZE[::-1], 3), np.uint8)
     folder = tmp_path / "bench"
     write_bench(bench_from_pictures([picture], drawn(TRUNK), "Mine", 640), folder)
     with pytest.raises(PhantomError, match="has no phantom yet"):
@@ -140,6 +141,15 @@ def test_it_is_kept_with_its_bench_and_seen_as_the_bench_is(tmp_path: Path) -> N
     assert np.abs(empty - picture).mean() < 2.0 * noise
     seen = renderer.render(VIEW.unproject(np.array([(0.0, 240.0), (300.0, 240.0)])))
     assert seen.robot[240, 150] and seen.image[235:246, 50:250].mean() < 0.8 * picture.mean()
+    rgba = np.zeros((100, 41, 4), np.uint8)
+    rgba[:, 12:29], rgba[:20, :, 0] = (0, 200, 0, 255), 250  # green, as wide as the robot; its head yellow
+    write_textures([RobotTexture(rgba, 6.0, (0.0, 240.0))], folder)
+    renderer = Renderer(phantom, named_appearance("own", 0), SIZE)
+    assert np.abs(renderer.render(None).image.astype(float) - picture).mean() < 2.0 * noise
+    seen = renderer.render(VIEW.unproject(np.array([(0.0, 240.0), (300.0, 240.0)])))
+    assert seen.robot[:, 150].sum() == pytest.approx(12, abs=1)
+    red, green, _ = seen.image[236:245].astype(float).mean(axis=0).T
+    assert red[285:295].mean() > 2 * red[20:270].mean() and green[20:295].min() > 150
     (folder / "phantom.json").write_text("{}")
     with pytest.raises(ValueError, match="damaged"):
         read_phantom(name)
