@@ -60,6 +60,8 @@ def _segmentation(image: Image, probabilities: Probability, deepest: NDArray[np.
 
 
 _core_lock = threading.Lock()
+_PROCESSOR = (Path("/proc/cpuinfo"), Path("/sys/devices/system/cpu"))
+"""Where Linux tells the processor's cores: OpenVINO's threads wait forever for a network where both are missing."""
 
 
 @functools.cache
@@ -112,6 +114,8 @@ class OpenVinoSegmenter(Segmenter):
         self.is_eight_bit = precision == "int8" or (precision == "auto" and self.info.onnx_int8_sha256 is not None)
         name = ONNX_INT8 if self.is_eight_bit else ONNX
         check_files(self.info, folder, (name,))
+        if sys.platform == "linux" and not any(path.exists() for path in _PROCESSOR):
+            raise ModelError("neither /proc nor /sys is there, which OpenVINO needs: mount -t proc proc /proc (in a chroot)")
         with _core_lock:
             self._core = _openvino_core()
         self._threads = threads or cores()

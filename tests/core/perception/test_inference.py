@@ -10,7 +10,9 @@ import pytest
 import torch
 
 from core.learning.model_writer import save_model
+from core.perception import inference
 from core.perception.inference import OpenVinoSegmenter, TorchSegmenter
+from core.perception.model_file import ModelError
 from core.perception.segmentation import OrientationAverage, Segmenter
 from core.perception.unet import DualUNet, UNetShape
 
@@ -132,3 +134,11 @@ def test_who_cannot_see_together_is_asked_one_by_one() -> None:
     for image, (vessel, robot) in zip(images, found, strict=True):
         np.testing.assert_allclose(vessel, image[:, :, 0] / 255, atol=1e-5)
         np.testing.assert_allclose(robot, image[:, :, 1] / 255, atol=1e-5)
+
+
+def test_a_chroot_without_proc_and_sys_is_told_instead_of_waited_for(undecided: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inference, "_PROCESSOR", (Path("/nowhere"), Path("/proc/self")))
+    OpenVinoSegmenter(undecided, threads=1)
+    monkeypatch.setattr(inference, "_PROCESSOR", (Path("/nowhere"),))
+    with pytest.raises(ModelError, match="mount -t proc proc /proc"):
+        OpenVinoSegmenter(undecided, threads=1)
