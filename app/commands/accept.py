@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -30,7 +30,7 @@ from core.config.acceptance import (
 from core.config.files import own_settings_path, read_settings
 from core.config.models import Config
 from core.config.rig_file import RigFile, find_rig, with_rig
-from core.config.safety import JOINT_NAMES, JointConfig
+from core.config.safety import TENDONS, JointConfig, JointKind
 from core.devices import UserError
 from core.program import CALLED
 
@@ -59,11 +59,11 @@ def accept_rig(
         return
     if rig.robot != "servos":
         raise UserError(f"rig {rig.name} has no servos of its own: there is nothing to accept")
-    if not rig.servos.is_default or rig.servos.driver != "dynamixel":
+    if rig.servos.driver != "dynamixel" or not any(joint.kind is JointKind.ADVANCE for joint in rig.servos.joints):
         raise UserError(
-            f"rig {rig.name} has other joints or another drive than the default robot: it cannot be accepted, and stays advisory"
+            f"rig {rig.name} has another drive than DYNAMIXEL servos, or no feed: it cannot be accepted, and stays advisory"
         )
-    readings = _readings(force or [])
+    readings = _readings(force or [], rig.servos.names)
     accepted = _begin(path, rig, config, operator, anew=anew)
     _say(f"Ctrl-C stops the servos at any moment and keeps what was done; the E-stop is within reach of {accepted.operator}")
     try:
@@ -132,7 +132,8 @@ def _steps(config: Config, accepted: Acceptance, readings: dict[str, float], *, 
         if kind not in {one.kind for one in accepted.stops}:
             free = "free 15 mm before and behind the robot"
             _wait(f"{kind} times: {free}; Enter drives the feed and ends it by {what}, {STOP_TRIES} times")
-            accepted = accepted.model_copy(update={"stops": (*accepted.stops, bench.stop_times(kind, joints["advance"], _say))})
+            feed = next(joint for joint in joints.values() if joint.kind is JointKind.ADVANCE)
+            accepted = accepted.model_copy(update={"stops": (*accepted.stops, bench.stop_times(kind, feed, _say))})
             yield accepted
     if accepted.estop is None:
         _wait(f"{ESTOP_STEP}: slacken the wires; Enter switches the servos on, then press the E-stop when it says so")
@@ -142,27 +143,37 @@ def _steps(config: Config, accepted: Acceptance, readings: dict[str, float], *, 
 def _confirm_direction(bench: AcceptanceBench, joint: JointConfig) -> None:
     from hardware.calibration.acceptance import DIRECTION_MM
 
-    way_mm = DIRECTION_MM[joint.is_tendon]
-    what = f"did its wire tighten, and bend the head to the robot's {joint.name}" if joint.is_tendon else "did it go forward"
-    _wait(f"direction of {joint.name}: look at the robot; Enter moves it by {way_mm:g} mm and back")
+    _wait(f"direction of {joint.name}: look at the robot; Enter moves it by {DIRECTION_MM[joint.kind]:g} {joint.unit} and back")
     bench.show_direction(joint)
-    if not _ask(f"  {what}? y or n: ").lower().startswith("y"):
+    if not _ask(f"  {_seen(joint)}? y or n: ").lower().startswith("y"):
         raise AcceptanceError(
             f"direction of {joint.name} is wrong: menu Rig, Calibrate (page Wiggle and direction), or its id and sign"
         )
+
+
+def _seen(joint: JointConfig) -> str:
+    """What is seen of a joint that is moved in its positive direction, as a question."""
+    if joint.kind is JointKind.ROTATION:
+        return "did the shaft turn to the left, seen from behind (from the robot's right towards the camera)"
+    if not joint.is_tendon:
+        return "did it go forward"
+    to = f"to the robot's {joint.name}" if joint.name in TENDONS else f"at {joint.angle_deg:g}° (0: its right, 90: the camera)"
+    return f"did its wire tighten, and bend the head {to}"
 
 
 def _read_force(bench: AcceptanceBench, joint: JointConfig, given_n: float | None, *, pulls: bool) -> ForceReading:
     by_current_n = None
     if pulls:
         scale = "a spring scale or load cell that keeps its peak"
-        _wait(f"force of {joint.name}: tie it to {scale}; Enter pulls with {joint.max_force_n:g} N")
+        lever = " by a lever on the shaft" if joint.kind is JointKind.ROTATION else ""
+        _wait(f"force of {joint.name}: tie it to {scale}{lever}; Enter pulls with {joint.max_force_n:g} {joint.force_unit}")
         pull = bench.pull(joint)
         if not pull.was_held:
             raise AcceptanceError(f"nothing held {joint.name}: fasten the scale so that it is taut, then try again")
         by_current_n = pull.by_current_n
-    read_n = given_n if given_n is not None else _number(_ask("  highest newtons on the scale: "))
-    if problem := force_problem(joint.name, read_n, joint.max_force_n):
+    what = "newtons on the scale times the lever's mm" if joint.kind is JointKind.ROTATION else "newtons on the scale"
+    read_n = given_n if given_n is not None else _number(_ask(f"  highest {what}: "))
+    if problem := force_problem(joint.name, read_n, joint.max_force_n, joint.force_unit):
         raise AcceptanceError(problem)
     return ForceReading(name=joint.name, limit_n=joint.max_force_n, read_n=read_n, by_current_n=by_current_n)
 
@@ -180,7 +191,8 @@ def acceptance_lines(accepted: Acceptance | None, config: Config) -> list[str]:
         told = ", ".join(f"{one.name} id {one.id} model {one.model} firmware {one.firmware}" for one in accepted.servos)
         lines.append(f"accepted servos: {told}")
     if accepted.forces:
-        read = ", ".join(f"{one.name} {one.read_n:g} of {one.limit_n:g} N" for one in accepted.forces)
+        units = {joint.name: joint.force_unit for joint in config.servos.joints}
+        read = ", ".join(f"{one.name} {one.read_n:g} of {one.limit_n:g} {units.get(one.name, 'N')}" for one in accepted.forces)
         lines.append(f"accepted forces: {read}")
     lines += [f"{one.kind} to stand-still: {max(one.times_ms):.0f} ms, {one.way_mm:g} mm at most" for one in accepted.stops]
     if accepted.estop is not None:
@@ -200,13 +212,13 @@ def print_acceptance(path: Path, config: Config, *, as_json: bool) -> None:
     sys.stdout.write(json.dumps(result) + "\n")
 
 
-def _readings(texts: list[str]) -> dict[str, float]:
-    """Axis and newtons of each --force. Raises UserError."""
+def _readings(texts: list[str], names: Sequence[str]) -> dict[str, float]:
+    """Axis and newtons (N mm of a rotation) of each --force. Raises UserError."""
     found: dict[str, float] = {}
     for text in texts:
         name, _, value = text.partition("=")
-        if name not in JOINT_NAMES or not value:
-            raise UserError(f"--force {text}: say AXIS=NEWTONS; axes: {', '.join(JOINT_NAMES)}")
+        if name not in names or not value:
+            raise UserError(f"--force {text}: say AXIS=NEWTONS; axes: {', '.join(names)}")
         found[name] = _number(value)
     return found
 

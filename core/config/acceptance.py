@@ -148,14 +148,14 @@ class Acceptance(ConfigSection):
         return (*found, *([] if self.estop is not None else [ESTOP_STEP]))
 
 
-def force_problem(name: str, read_n: float, limit_n: float) -> str:
+def force_problem(name: str, read_n: float, limit_n: float, unit: str = "N") -> str:
     """Why a force that was read is refused; "" when it is not."""
     most_n = FORCE_ALLOWANCE * limit_n
     if read_n <= most_n:
         return ""
     return (
-        f"{name} pulled {read_n:g} N, at most {most_n:g} N ({limit_n:g} N and 10 %): correct mm_per_turn, or lower its "
-        "max_force_n, then try again"
+        f"{name} pulled {read_n:g} {unit}, at most {most_n:g} {unit} ({limit_n:g} {unit} and 10 %): correct its way per turn, or "
+        "lower its greatest force, then try again"
     )
 
 

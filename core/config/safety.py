@@ -221,6 +221,11 @@ class JointConfig(ConfigSection):
         return math.radians(self.mm_per_turn) if self.kind is JointKind.ROTATION else self.mm_per_turn
 
     @property
+    def max_turn_nmm(self) -> float:
+        """Its servo's greatest torque (N mm) at the horn, times a whole turn (2 pi)."""
+        return self.max_force_n * self.drum_mm_per_turn
+
+    @property
     def ticks_per_mm(self) -> float:
         """Signed position units per millimetre."""
         return self.sign * TICKS_PER_TURN / self.mm_per_turn

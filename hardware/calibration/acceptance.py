@@ -1,6 +1,6 @@
 """The steps of an acceptance that ask or move servos, through the same driver, process and gate as every other motion.
 
-One axis moves at a time, in the place that ``servo_probe`` gives a servo under test; the six others hold where they stand.
+One axis moves at a time, in the place that ``servo_probe`` gives a servo under test; the others hold where they stand.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import Self
 
 from core.config.acceptance import STOP_TRIES, AcceptanceError, AcceptedServo, EstopRecord, StopTimes
 from core.config.models import Config
-from core.config.safety import JointConfig
+from core.config.safety import JointConfig, JointKind
 from core.config.servo_models import drum_radius_mm
 from core.control.faults import Cause
 from core.control.health import Deadman
 from core.types import Command
-from hardware.calibration.servo_probe import ProbeFailed, ProbeLimits, ServoProbe, StopSwitch, probe_config
+from hardware.calibration.servo_probe import ProbeFailed, ProbeLimits, ServoProbe, StopSwitch, feed_of, probe_config
 from hardware.servos.bus_ipc import BusStatus, ask_for_port
 from hardware.servos.dynamixel_bus import identify
 from hardware.servos.dynamixel_port import ServoError, ServoLine
@@ -27,9 +27,9 @@ from hardware.servos.registers import ServoState
 
 _VOLTAGE = 144
 """Register of the supply's voltage, 0.1 V."""
-DIRECTION_MM = {True: 1.5, False: 5.0}
-"""Way by which the direction of a tendon (True), or of a feed, is shown."""
-PULL_MM = {True: 6.0, False: 15.0}
+DIRECTION_MM = {JointKind.TENDON: 1.5, JointKind.ADVANCE: 5.0, JointKind.DELIVERY: 5.0, JointKind.ROTATION: 15.0}
+"""Way by which the direction of a joint is shown, in its own unit."""
+PULL_MM = {JointKind.TENDON: 6.0, JointKind.ADVANCE: 15.0, JointKind.DELIVERY: 15.0, JointKind.ROTATION: 15.0}
 """Longest way of the pull at a scale, which gives way itself."""
 _PULL_MM_S = 1.5
 _PULLED_CYCLES = 2
@@ -223,8 +223,8 @@ class AcceptanceBench:
 
     def show_direction(self, joint: JointConfig) -> None:
         """A short way in the joint's positive direction, and back."""
-        way_mm = DIRECTION_MM[joint.is_tendon]
-        limits = ProbeLimits(-way_mm, way_mm, min(3.0, joint.max_speed_mm_s))
+        way_mm = DIRECTION_MM[joint.kind]
+        limits = ProbeLimits(-way_mm, way_mm, min(max(3.0, way_mm / 1.5), joint.max_speed_mm_s))
         with AcceptanceProbe.of(self._config, joint, limits, self._stop, self._backups) as probe:
             probe.move_to(way_mm)
             probe.pause(1.0)
@@ -232,7 +232,7 @@ class AcceptanceBench:
 
     def pull(self, joint: JointConfig) -> ScalePull:
         """Pull at the scale until the servo gives all that its force limit allows, then let go."""
-        way_mm = PULL_MM[joint.is_tendon]
+        way_mm = PULL_MM[joint.kind]
         limits = ProbeLimits(-1.0, way_mm, 4.0)
         with AcceptanceProbe.of(self._config, joint, limits, self._stop, self._backups) as probe:
             was_held = probe.pull_to(way_mm)
@@ -270,9 +270,8 @@ class AcceptanceBench:
 
     def estop(self, say: Callable[[str], None], within_s: float) -> EstopRecord:
         """Wait until the E-stop is pressed, and until it is released again. Raises ServoError, AcceptanceError."""
-        joint = next(one for one in self._config.servos.joints if one.name == "advance")
         limits = ProbeLimits()
-        with AcceptanceProbe.of(self._config, joint, limits, self._stop, self._backups) as probe:
+        with AcceptanceProbe.of(self._config, feed_of(self._config.servos), limits, self._stop, self._backups) as probe:
             heard_s = time.monotonic()
 
             def is_over(status: BusStatus) -> bool:

@@ -1,7 +1,8 @@
-"""Servos moved for a calibration, one by itself or all seven, through the same process, gate and driver as every other motion.
+"""Servos moved for a calibration, one by itself or all together, through the same process, gate and driver as every other motion.
 
-A servo under test plays the part of the joint "advance", whose envelope is what it may do at most; the six others hold where they
-stand. So its bounds are enforced where all bounds are, in a process of its own that holds when this program falls silent.
+A servo under test plays the part of the robot's feed, whose envelope is what it may do at most; the others hold where they stand.
+So its bounds are enforced where all bounds are, in a process of its own that holds when this program falls silent. The millimetres
+of a rotation are its degrees.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from core.config.safety import JOINT_NAMES, JointName, SafetyConfig, ServosConfig
-from core.control.kept_zero import ALL_AT_ZERO, ZeroBasis
+from core.config.safety import JointConfig, JointKind, SafetyConfig, ServosConfig
+from core.control.kept_zero import ZeroBasis, all_at_zero
 from core.messages import message
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
@@ -24,8 +25,6 @@ from hardware.servos.dynamixel_port import NoAnswer, ServoError
 from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
 
-_UNDER_TEST: JointName = "advance"
-_PLACE = JOINT_NAMES.index(_UNDER_TEST)
 _PERIOD_S = 0.02
 _ARRIVED_MM, _SETTLED_MM = 0.02, 0.25
 _EXTRA_S = 3.0
@@ -110,6 +109,13 @@ class ProbeLimits:
     speed_mm_s: float = 4.0
 
 
+def feed_of(servos: ServosConfig) -> JointConfig:
+    """The joint whose place a servo under test takes. Raises ProbeFailed for a robot without feed."""
+    if not (feed := servos.joints[servos.places(JointKind.ADVANCE)]):
+        raise ProbeFailed("a servo is tested in the place of the robot's feed, and this robot has no joint of kind advance")
+    return feed[0]
+
+
 def probe_config(
     servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1] = 1, found: Mapping[int, int] | None = None
 ) -> ServosConfig:
@@ -119,25 +125,26 @@ def probe_config(
     ----------
     servos : port, speed, model, millimetres per turn.
     sign : the servo's direction that counts as positive.
-    found : ids and models of all seven on the line while it is unknown which is which; default: `servos` says which is which.
+    found : ids and models of all on the line while it is unknown which is which; default: `servos` says which is which.
 
     Notes
     -----
-    A known servo turns its own joint's millimetres per turn, with its own joint's force. An unknown one may drive any of the seven:
-    with the largest of their ways its wire or screw never moves further, nor faster, than it is asked to, and with the smallest of
+    A known servo turns its own joint's millimetres per turn, with its own torque. An unknown one may drive any of them: with
+    the largest of their ways its wire or screw never moves further, nor faster, than it is asked to, and with the smallest of
     their torques it never pulls harder than it may.
 
-    Raises ProbeFailed when there are not seven, or `servo_id` is not among them.
+    Raises ProbeFailed when the robot has no feed, or another number of servos, or `servo_id` is not among them.
     """
     models = found if found is not None else {joint.id: servos.model_of(joint).number for joint in servos.joints}
-    every = list(models)
-    if len(every) != len(JOINT_NAMES) or servo_id not in every:
-        raise ProbeFailed(f"servo {servo_id} cannot be moved: seven servos are needed, there are {', '.join(map(str, every))}")
+    every, place = list(models), servos.joints.index(feed_of(servos))
+    if len(every) != len(servos.joints) or servo_id not in every:
+        listed = ", ".join(map(str, every))
+        raise ProbeFailed(f"servo {servo_id} cannot be moved: {len(servos.joints)} servos are needed, there are {listed}")
     every.remove(servo_id)
-    every.insert(_PLACE, servo_id)
-    largest = max(joint.mm_per_turn for joint in servos.joints)
-    weakest_n = min(joint.max_force_n * joint.mm_per_turn for joint in servos.joints) / largest
-    known = {} if found is not None else {joint.id: (joint.mm_per_turn, joint.max_force_n) for joint in servos.joints}
+    every.insert(place, servo_id)
+    largest = max(joint.mm_per_turn for joint in servos.joints if joint.kind is not JointKind.ROTATION)
+    unknown = largest, min(joint.max_turn_nmm for joint in servos.joints)
+    known = {} if found is not None else {joint.id: (joint.mm_per_turn, joint.max_turn_nmm) for joint in servos.joints}
     bounds = {
         "low_mm": limits.low_mm - _MARGIN_MM,
         "high_mm": limits.high_mm + _MARGIN_MM,
@@ -146,20 +153,14 @@ def probe_config(
         "max_acceleration_mm_s2": 25.0 * limits.speed_mm_s,
         "max_step_mm": 0.6,
     }
-    joints = tuple(
-        joint.model_copy(
-            update={
-                "id": one,
-                "model": models[one],
-                "sign": sign if one == servo_id else 1,
-                "mm_per_turn": known.get(one, (largest, weakest_n))[0],
-                "max_force_n": known.get(one, (largest, weakest_n))[1],
-                **bounds,
-            }
-        )
-        for joint, one in zip(servos.joints, every, strict=True)
-    )
-    return patient(servos).model_copy(update={"joints": joints, "pretension_mm": 0.0})
+    joints = []
+    for joint, one in zip(servos.joints, every, strict=True):
+        mm_per_turn, turn_nmm = known.get(one, unknown)
+        turned = {"id": one, "model": models[one], "sign": sign if one == servo_id else 1, "mm_per_turn": mm_per_turn}
+        # in place of a rotation, whose values are degrees, one more joint that only holds
+        kind = JointKind.DELIVERY if joint.kind is JointKind.ROTATION else joint.kind
+        joints.append(joint.model_copy(update=turned | bounds | {"kind": kind, "max_force_n": turn_nmm / mm_per_turn}))
+    return patient(servos).model_copy(update={"joints": tuple(joints), "pretension_mm": 0.0})
 
 
 def patient(servos: ServosConfig) -> ServosConfig:
@@ -176,7 +177,7 @@ def patient(servos: ServosConfig) -> ServosConfig:
 
 
 @contextmanager
-def armed(robot: ServoRobot, stop: StopSwitch, basis: ZeroBasis) -> Iterator[None]:
+def armed(robot: ServoRobot, servos: ServosConfig, stop: StopSwitch, basis: ZeroBasis) -> Iterator[None]:
     """Connect, zero where the servos stand, arm; in the end hold and close.
 
     A line without an answer is opened again; once it was armed, nothing is.
@@ -189,7 +190,7 @@ def armed(robot: ServoRobot, stop: StopSwitch, basis: ZeroBasis) -> Iterator[Non
         for attempt in range(_TRIES):
             try:
                 robot.connect()
-                robot.zero(ALL_AT_ZERO.model_copy(update={"basis": basis}))
+                robot.zero(all_at_zero(servos).model_copy(update={"basis": basis}))
                 break
             except NoAnswer:
                 robot.close()
@@ -227,11 +228,12 @@ def check_armed(status: BusStatus, title: str) -> None:
 class ServoProbe:
     """A servo that can be moved; ``opened`` makes one. One thread uses it; STOP may come from anywhere."""
 
-    def __init__(
-        self, robot: ServoRobot, servo_id: int, limits: ProbeLimits, stop: StopSwitch, strain_ma: float | None = None
-    ) -> None:
-        self._robot, self.servo_id, self._limits, self._stop = robot, servo_id, limits, stop
-        self._strain_ma = strain_ma
+    def __init__(self, robot: ServoRobot, servos: ServosConfig, limits: ProbeLimits, stop: StopSwitch) -> None:
+        self._robot, self._limits, self._stop = robot, limits, stop
+        joint = feed_of(servos)
+        self.servo_id, self._place = joint.id, servos.joints.index(joint)
+        self._strain_ma = servos.force_limit(joint).strain_ma
+        self._arrived_mm = max(_ARRIVED_MM, abs(1.0 / joint.ticks_per_mm))
         self._strained = 0
         self._strain_seen_s = 0.0
         self._last: ServoState | None = None
@@ -242,11 +244,10 @@ class ServoProbe:
         cls, config: ServosConfig, safety: SafetyConfig, limits: ProbeLimits, stop: StopSwitch, backups: Path | None = None
     ) -> Iterator[ServoProbe]:
         """Connect and arm, with ``probe_config``'s bus; where the servo stands now is 0. At the end it holds, disarmed."""
-        servo_id = config.joints[_PLACE].id
-        robot = ServoRobot(config, safety, name=f"servo {servo_id}", backups=backups)
+        robot = ServoRobot(config, safety, name=f"servo {feed_of(config).id}", backups=backups)
         try:
-            with armed(robot, stop, ZeroBasis.HERE):
-                yield cls(robot, servo_id, limits, stop, config.force_limit(config.joints[_PLACE]).strain_ma)
+            with armed(robot, config, stop, ZeroBasis.HERE):
+                yield cls(robot, config, limits, stop)
         except ServoError as error:
             raise type(error)(_by_id(str(error), config)) from None
 
@@ -272,9 +273,9 @@ class ServoProbe:
             at_mm = state.position_mm or 0.0
             status, goal_mm = self._robot.bus_status(), at_mm
             if status is not None and status.sent is not None and status.rejection is None:
-                goal_mm = status.sent.goals_mm[_PLACE]  # where it was sent last
+                goal_mm = status.sent.goals_mm[self._place]  # where it was sent last
             left_mm = target_mm - goal_mm
-            if abs(left_mm) <= _ARRIVED_MM and abs(at_mm - goal_mm) <= _SETTLED_MM:
+            if abs(left_mm) <= self._arrived_mm and abs(at_mm - goal_mm) <= _SETTLED_MM:
                 self._robot.hold()
                 return
             speed = max(-self._limits.speed_mm_s, min(self._limits.speed_mm_s, _GAIN_PER_S * left_mm))
@@ -308,7 +309,7 @@ class ServoProbe:
         newest: BusStatus | None = status
         while True:
             readings = () if newest is None else newest.servos
-            reading = readings[_PLACE] if len(readings) > _PLACE else None
+            reading = readings[self._place] if len(readings) > self._place else None
             if isinstance(reading, ServoState):
                 self._last = reading
             if self._last is not None:
@@ -357,7 +358,7 @@ class SteeredRobot:
         """
         config = patient(servos)
         robot = ServoRobot(config, safety, name="robot", backups=backups)
-        with armed(robot, stop, ZeroBasis.SEARCHED):
+        with armed(robot, config, stop, ZeroBasis.SEARCHED):
             yield cls(robot, config, stop)
 
     def bend_to(self, command: Command) -> None:
@@ -386,7 +387,7 @@ class SteeredRobot:
         self._robot.send(self._command)
 
     def ticks(self) -> tuple[int, ...]:
-        """Position registers of the seven, as they told last."""
+        """Position registers of all joints, as they told last."""
         until_s = time.monotonic() + 1.0
         while time.monotonic() < until_s:
             status = self._robot.bus_status()

@@ -20,7 +20,7 @@ from core.devices import UserError
 from hardware.calibration import acceptance
 from hardware.calibration.acceptance import AcceptanceBench, ScalePull
 from hardware.twin.servos.bus import SoftServoBus
-from tests.core.robots import THREE
+from tests.core.robots import ROTATION, THREE, TURNED, robot, tendons
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("own_folder", "no_process_stays_behind")]
 
@@ -168,9 +168,42 @@ def test_a_rig_of_the_twin_has_nothing_to_accept() -> None:
     assert accept.acceptance_lines(None, load_config()) == ["acceptance: none; main.py rig accept NAME"]
 
 
-def test_a_robot_of_another_shape_stays_advisory() -> None:
-    servos = THREE.model_copy(update={"port": "/dev/null"})
+def _write(servos: ServosConfig) -> None:
     config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}}).model_copy(update={"servos": servos})
     write_rig(make_rig(config, "bench 1", None))
-    with pytest.raises(UserError, match=r"rig bench 1 has other joints or another drive .* and stays advisory"):
+
+
+@pytest.mark.parametrize("shape", [TURNED], ids=["turned"])
+def test_a_robot_of_another_shape_is_accepted(shape: ServosConfig, moved: list[str]) -> None:
+    bus = SoftServoBus(shape)
+    bus.start()
+    _write(shape.model_copy(update={"port": bus.port}))
+    forces = [f"--force={joint.name}={joint.max_force_n}" for joint in shape.joints]
+    try:
+        result = runner.invoke(cli.app, ["rig", "accept", "bench 1", "--operator", "Ada", *forces], input="\ny\n" * 4 + ENTERS)
+    finally:
+        bus.stop()
+    assert ": valid" in result.stdout, result.stderr
+    assert "rotation 80 of 80 N mm" in result.stdout
+    for question in (
+        "bend the head at 270° (0: its right, 90: the camera)? y or n",
+        "direction of rotation: look at the robot; Enter moves it by 15 ° and back",
+        "did the shaft turn to the left, seen from behind (from the robot's right towards the camera)?",
+        "by a lever on the shaft; Enter pulls with 80 N mm",
+    ):
+        assert question in result.stderr
+    assert moved[-3:] == ["STOP", "deadman", "E-stop"]
+
+
+@pytest.mark.parametrize(
+    "servos",
+    [
+        THREE.model_copy(update={"driver": "stepper board", "port": "/dev/null"}),
+        robot(*tendons(90.0, 270.0), ROTATION).model_copy(update={"port": "/dev/null"}),
+    ],
+    ids=["another drive", "no feed"],
+)
+def test_what_cannot_be_accepted_stays_advisory(servos: ServosConfig) -> None:
+    _write(servos)
+    with pytest.raises(UserError, match=r"rig bench 1 has another drive than DYNAMIXEL servos, or no feed: .* stays advisory"):
         _run()

@@ -15,13 +15,20 @@ from core.control.faults import Cause
 from hardware.calibration.acceptance import AcceptanceBench
 from hardware.calibration.servo_probe import ProcedureStopped, StopSwitch
 from hardware.twin.servos.bus import SoftServoBus
+from tests.core.robots import THREE, TURNED
 
 pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("no_process_stays_behind")]
 
 
 @pytest.fixture
-def servos() -> Iterator[SoftServoBus]:
-    servos = SoftServoBus(ServosConfig(), wire_time=True)
+def shape(request: pytest.FixtureRequest) -> ServosConfig:
+    """The robot's joints."""
+    return getattr(request, "param", ServosConfig())
+
+
+@pytest.fixture
+def servos(shape: ServosConfig) -> Iterator[SoftServoBus]:
+    servos = SoftServoBus(shape, wire_time=True)
     servos.start()
     yield servos
     servos.stop()
@@ -29,10 +36,10 @@ def servos() -> Iterator[SoftServoBus]:
 
 
 @pytest.fixture
-def config(servos: SoftServoBus) -> Config:
-    config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": servos.port}})
+def config(shape: ServosConfig, servos: SoftServoBus) -> Config:
+    config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}})
     # no process stays behind to watch the servos
-    return config.model_copy(update={"servos": config.servos.model_copy(update={"unattended_s": 0.0})})
+    return config.model_copy(update={"servos": shape.model_copy(update={"port": servos.port, "unattended_s": 0.0})})
 
 
 @pytest.fixture
@@ -159,3 +166,52 @@ def test_stop_ends_a_step(servos: SoftServoBus, config: Config) -> None:
     at_mm = servos.positions_mm()
     time.sleep(0.2)
     assert servos.positions_mm() == pytest.approx(at_mm, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("shape", "name"),
+    [(THREE, "tendon_2"), (TURNED, "tendon_2"), (TURNED, "rotation")],
+    indirect=["shape"],
+    ids=["three", "two", "shaft"],
+)
+def test_axes_of_other_robots_are_shown_one_by_one(servos: SoftServoBus, config: Config, bench: AcceptanceBench, name: str) -> None:
+    joint, seen = _joint(config, name), list[tuple[float, ...]]()
+    watching = threading.Event()
+
+    def watch() -> None:
+        while not watching.wait(0.02):
+            seen.append(servos.positions_mm())
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        bench.show_direction(joint)
+    finally:
+        watching.set()
+        thread.join()
+    place = config.servos.joints.index(joint)
+    farthest = [max(at[one] for at in seen) for one in range(len(servos.positions_mm()))]
+    assert farthest[place] == pytest.approx(15.0 if name == "rotation" else 1.5, abs=0.1)
+    assert max(at for one, at in enumerate(farthest) if one != place) < 0.05
+    assert servos.positions_mm() == pytest.approx([0.0] * len(farthest), abs=0.1)
+
+
+@pytest.mark.parametrize("shape", [TURNED], indirect=True, ids=["turned"])
+def test_the_torque_of_a_shaft_is_read_at_a_lever(servos: SoftServoBus, config: Config, bench: AcceptanceBench) -> None:
+    joint = _joint(config, "rotation")
+    servos.attach_wire(joint.id, n_per_mm=10.0)  # N mm per degree
+    pull = bench.pull(joint)
+    assert pull.was_held
+    assert pull.by_current_n == pytest.approx(joint.max_force_n, rel=0.15)
+
+
+@pytest.mark.parametrize("shape", [TURNED], indirect=True, ids=["turned"])
+def test_stops_and_e_stop_of_another_robot_are_those_of_its_feed(
+    servos: SoftServoBus, config: Config, bench: AcceptanceBench
+) -> None:
+    assert bench.stop_times("STOP", _joint(config, "advance"), lambda _: None).way_mm < 8.0
+
+    def press(line: str) -> None:
+        servos.brown_out(60.0 if line.startswith("press") else 0.0)
+
+    assert bench.estop(press, 10.0).cause == Cause.SUPPLY_LOST.value

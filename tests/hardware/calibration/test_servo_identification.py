@@ -234,7 +234,7 @@ def test_the_servo_under_test_has_bounds_and_the_others_stand() -> None:
     assert made.pretension_mm == 0.0
     with pytest.raises(ProbeFailed, match="servo 9 cannot be moved"):
         probe_config(ServosConfig(), 9, limits, 1, FOUND)
-    with pytest.raises(ProbeFailed, match="seven servos are needed"):
+    with pytest.raises(ProbeFailed, match="7 servos are needed"):
         probe_config(ServosConfig(), 1, limits, 1, dict.fromkeys(IDS[:6], 1020))
 
 
