@@ -5,12 +5,20 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
+from core.messages import message
+
 if TYPE_CHECKING:
     from core.types import Command, Frame, RobotStatus
 
 
 class UserError(Exception):
-    """Root of all errors that a user can fix; the message is one line that says what to do. A command ends with exit code 2."""
+    """Root of all errors that a user can fix; the message is one line that says what to do. A command ends with exit code 2.
+
+    With `values` the text is a template, as that of ``message``.
+    """
+
+    def __init__(self, text: str = "", /, **values: object) -> None:
+        super().__init__(message(text, **values) if values else text)
 
 
 class DeviceError(UserError):

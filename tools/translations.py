@@ -1,8 +1,8 @@
 """``make translations``: brings resources/translations/*.ts up to date with the code, and makes the .qm files of them.
 
-Texts are the literals in ``tr("...")`` and ``mark("...")`` in app/, those in ``message("...")`` in core/ and hardware/ (without the
-formats of their values), and the lists in app/ui/i18n.py, all in one context. A text
-that is new stands in the .ts as unfinished; one that is gone from the code goes from the .ts. The .qm is made by Qt's lrelease.
+Texts are the literals in ``tr("...")`` and ``mark("...")`` in app/, those in ``message("...")`` and in errors with values in core/
+and hardware/ (without the formats of the values), and the lists in app/ui/i18n.py, all in one context. A text that is new stands in
+the .ts as unfinished; one that is gone from the code goes from the .ts. The .qm is made by Qt's lrelease.
 """
 
 from __future__ import annotations
@@ -41,12 +41,13 @@ def texts_of_code(root: Path = ROOT) -> dict[str, str]:
 
 
 def _texts_of(path: Path, names: set[str]) -> Iterator[str]:
-    """The literals that are the first argument of a call of one of these functions."""
+    """The literals that are the first argument of a call of one of these functions, or a template with the call's own values."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names and node.args:
-            text = node.args[0]
-            if isinstance(text, ast.Constant) and isinstance(text.value, str):
-                yield text.value
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args and isinstance(node.args[0], ast.Constant):
+            text, values = node.args[0].value, {keyword.arg for keyword in node.keywords}
+            is_template = names != MARKS and bool(values) and values == set(re.findall(r"\{(\w+)", str(text)))
+            if isinstance(text, str) and (node.func.id in names or is_template):
+                yield text
 
 
 def read_ts(path: Path) -> dict[str, str]:

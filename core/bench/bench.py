@@ -22,7 +22,6 @@ from core.config.section import first_problem
 from core.devices import UserError
 from core.files import ImageError, read_image, replace_folder
 from core.learning.dataset import mask_png, png
-from core.messages import message
 from core.perception import quality
 from core.perception.segmentation import Probability, to_working
 from core.perception.skeleton import end_pixels, thin
@@ -133,16 +132,14 @@ def bench_from_pictures(
     best = int(np.argmax(sharp))
     if sharp[best] < LEAST_SHARPNESS:
         raise BenchError(
-            message("the empty picture is blurred (sharpness {found:.3f}): focus the camera and take another", found=sharp[best])
+            "the empty picture is blurred (sharpness {found:.3f}): focus the camera and take another", found=sharp[best]
         )
     for number, image in enumerate(images, 1):
         if (found := likeness(image, images[best])) < LEAST_LIKENESS:
             raise BenchError(
-                message(
-                    "empty picture {number} shows another bench, or the camera was moved (likeness {found:.2f})",
-                    number=number,
-                    found=found,
-                )
+                "empty picture {number} shows another bench, or the camera was moved (likeness {found:.2f})",
+                number=number,
+                found=found,
             )
     base = images[best]
     others = [same_light(image, base) for index, image in enumerate(images) if index != best]
@@ -186,14 +183,14 @@ def bench_from_frames(
         frames is taken for the empty bench.
     """
     if len(frames) < _LEAST_FRAMES:
-        raise BenchError(message("{count} frames are too few: move the robot to three places", count=len(frames)))
+        raise BenchError("{count} frames are too few: move the robot to three places", count=len(frames))
     _check_sizes(frames, vessel)
     images = [to_working(frame, working_size_px)[0] for frame in frames]
     sharp = [quality.sharpness(image) for image in images]
     base = images[int(np.argsort(sharp)[len(sharp) // 2])]
     for number, image in enumerate(images, 1):
         if likeness(image, base) < LEAST_LIKENESS:
-            raise BenchError(message("frame {number} shows another bench, or the camera was moved", number=number))
+            raise BenchError("frame {number} shows another bench, or the camera was moved", number=number)
     even = [same_light(image, base) for image in images]
     usable = np.ones((len(even), *base.shape[:2]), np.bool_)
     for index, robot in enumerate(robots):
@@ -376,24 +373,20 @@ def _check_sizes(pictures: Sequence[Image], vessel: Mask | None) -> None:
     for number, picture in enumerate(pictures, 1):
         if picture.shape[:2] != (height, width):
             raise BenchError(
-                message(
-                    "picture {number} has {a}x{b} px, the first {width}x{height}: take all with the same camera",
-                    number=number,
-                    a=picture.shape[1],
-                    b=picture.shape[0],
-                    width=width,
-                    height=height,
-                )
-            )
-    if vessel is not None and vessel.shape != (height, width):
-        raise BenchError(
-            message(
-                "the vessel mask has {a}x{b} px, the pictures {width}x{height}: draw it on one of them",
-                a=vessel.shape[1],
-                b=vessel.shape[0],
+                "picture {number} has {a}x{b} px, the first {width}x{height}: take all with the same camera",
+                number=number,
+                a=picture.shape[1],
+                b=picture.shape[0],
                 width=width,
                 height=height,
             )
+    if vessel is not None and vessel.shape != (height, width):
+        raise BenchError(
+            "the vessel mask has {a}x{b} px, the pictures {width}x{height}: draw it on one of them",
+            a=vessel.shape[1],
+            b=vessel.shape[0],
+            width=width,
+            height=height,
         )
 
 
@@ -404,7 +397,7 @@ def _drawn_vessel(vessel: Mask | None, shape: tuple[int, int]) -> Mask | None:
     share = float(np.mean(vessel))
     border = float(np.mean(np.concatenate([vessel[0], vessel[-1], vessel[:, 0], vessel[:, -1]])))
     if share > _MAX_VESSEL_SHARE or border > _MAX_BORDER_SHARE:
-        raise BenchError(message("the vessel mask covers {share:.0%} of the picture: white must be the vessel", share=share))
+        raise BenchError("the vessel mask covers {share:.0%} of the picture: white must be the vessel", share=share)
     if share < _LEAST_VESSEL_SHARE:
         raise BenchError("the vessel mask is empty: draw the vessel's lumen white")
     if vessel.shape == shape:
@@ -424,12 +417,10 @@ def check_size(bench: Bench, working_size_px: int, where: str) -> None:
     """Raise BenchError for a bench (of the folder `where`) that was made for another working size."""
     if max(bench.size) != working_size_px:
         raise BenchError(
-            message(
-                "{path}: was made for a working size of {a} px, and {b} px are set; make the bench again",
-                path=where,
-                a=max(bench.size),
-                b=working_size_px,
-            )
+            "{path}: was made for a working size of {a} px, and {b} px are set; make the bench again",
+            path=where,
+            a=max(bench.size),
+            b=working_size_px,
         )
 
 
@@ -439,35 +430,35 @@ def read_bench(folder: Path) -> Bench:
     try:
         info = _BenchInfo.model_validate_json(path.read_bytes())
     except OSError as error:
-        raise BenchError(message("{path}: cannot be read ({why}); make the bench again", path=path, why=error.strerror)) from None
+        raise BenchError("{path}: cannot be read ({why}); make the bench again", path=path, why=error.strerror) from None
     except ValidationError as error:
-        raise BenchError(message("{path}: damaged ({why}); make the bench again", path=path, why=first_problem(error))) from None
+        raise BenchError("{path}: damaged ({why}); make the bench again", path=path, why=first_problem(error)) from None
     if info.format > FORMAT:
-        raise BenchError(message("{path}: format {found} is of a newer version; update the program", path=path, found=info.format))
+        raise BenchError("{path}: format {found} is of a newer version; update the program", path=path, found=info.format)
     files: dict[str, bytes] = {}
     for name, wanted in info.sha256.items():
         if name not in _PICTURES:
-            raise BenchError(message("{path}: names {name}, which no bench has; make the bench again", path=path, name=name))
+            raise BenchError("{path}: names {name}, which no bench has; make the bench again", path=path, name=name)
         try:
             files[name] = (folder / name).read_bytes()
         except OSError as error:
             raise BenchError(
-                message("{path}: cannot be read ({why}); make the bench again", path=folder / name, why=error.strerror)
+                "{path}: cannot be read ({why}); make the bench again", path=folder / name, why=error.strerror
             ) from None
         if hashlib.sha256(files[name]).hexdigest() != wanted:
-            raise BenchError(message("{path}: cut or damaged (SHA-256); make the bench again", path=folder / name))
+            raise BenchError("{path}: cut or damaged (SHA-256); make the bench again", path=folder / name)
     try:
         empty = read_image(folder / EMPTY)
         noise = cv2.imdecode(np.frombuffer(files[NOISE], np.uint8), cv2.IMREAD_UNCHANGED)
         known = _decoded_mask(files[KNOWN])
         vessel = _decoded_mask(files[VESSEL]) if VESSEL in files else None
     except (KeyError, ImageError, cv2.error) as error:
-        raise BenchError(message("{path}: lacks a picture ({why}); make the bench again", path=path, why=error)) from None
+        raise BenchError("{path}: lacks a picture ({why}); make the bench again", path=path, why=error) from None
     size = (info.height, info.width)
     if noise is None or known is None or noise.dtype != np.uint16 or empty.shape[:2] != size:
-        raise BenchError(message("{path}: its pictures are damaged; make the bench again", path=path))
+        raise BenchError("{path}: its pictures are damaged; make the bench again", path=path)
     if any(one is not None and one.shape != size for one in (noise, known, vessel)):
-        raise BenchError(message("{path}: its pictures differ in size; make the bench again", path=path))
+        raise BenchError("{path}: its pictures differ in size; make the bench again", path=path)
     landmarks = np.array(info.landmarks, np.float64).reshape(-1, 2)
     return Bench(info.name, empty, np.asarray(noise / np.float32(_NOISE_STEPS), np.float32), known, vessel, landmarks, stamp)
 
@@ -484,7 +475,7 @@ def bench_sha256(folder: Path) -> str:
     try:
         return hashlib.sha256((folder / INFO).read_bytes()).hexdigest()
     except OSError as error:
-        raise BenchError(message("{path}: cannot be read ({why})", path=folder / INFO, why=error.strerror)) from None
+        raise BenchError("{path}: cannot be read ({why})", path=folder / INFO, why=error.strerror) from None
 
 
 def write_bench(bench: Bench, folder: Path) -> None:
@@ -505,7 +496,7 @@ def write_bench(bench: Bench, folder: Path) -> None:
     scratch: Path | None = None
     try:
         if folder.exists() and not (folder.is_dir() and {one.name for one in folder.iterdir()} <= _FILES):
-            raise BenchError(message("{path}: exists and is no bench; choose another folder", path=folder))
+            raise BenchError("{path}: exists and is no bench; choose another folder", path=folder)
         folder.parent.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
         for name, data in files.items():
@@ -521,7 +512,7 @@ def write_bench(bench: Bench, folder: Path) -> None:
             shutil.rmtree(aside, ignore_errors=True)
     except OSError as error:
         raise BenchError(
-            message("{path}: cannot be written ({why}); make room, or choose another folder", path=folder, why=error.strerror)
+            "{path}: cannot be written ({why}); make room, or choose another folder", path=folder, why=error.strerror
         ) from None
     finally:
         if scratch is not None:

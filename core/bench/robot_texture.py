@@ -23,7 +23,6 @@ from core.bench.registration import register
 from core.config.models import PerceptionConfig
 from core.files import write_atomic
 from core.learning.dataset import Sample
-from core.messages import message
 from core.perception import robot_path, skeleton
 from core.types import Image, Mask, Masks, Point, Refusal
 
@@ -141,7 +140,7 @@ def write_textures(textures: Sequence[RobotTexture], folder: Path) -> None:
         else:
             path.unlink(missing_ok=True)
     except OSError as error:
-        raise BenchError(message("{path}: cannot be written ({why})", path=path, why=error.strerror)) from None
+        raise BenchError("{path}: cannot be written ({why})", path=path, why=error.strerror) from None
 
 
 def read_textures(folder: Path) -> list[RobotTexture]:
@@ -152,13 +151,11 @@ def read_textures(folder: Path) -> list[RobotTexture]:
             return []
         with np.load(io.BytesIO(path.read_bytes())) as file:
             if (found_format := int(file["format"])) > _FORMAT:
-                raise BenchError(
-                    message("{path}: format {found} is of a newer version; update the program", path=path, found=found_format)
-                )
+                raise BenchError("{path}: format {found} is of a newer version; update the program", path=path, found=found_format)
             robots = file["robots"].tolist()
             found = [RobotTexture(file[f"rgba_{number}"], radius, (x, y)) for number, (radius, x, y) in enumerate(robots)]
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise BenchError(message("{path}: damaged ({why}); make the bench again", path=path, why=error)) from None
+        raise BenchError("{path}: damaged ({why}); make the bench again", path=path, why=error) from None
     if any(one.rgba.dtype != np.uint8 or one.rgba.shape[1:] != (_COLUMNS, 4) or not one.radius_px > 0.0 for one in found):
-        raise BenchError(message("{path}: damaged ({why}); make the bench again", path=path, why="size"))
+        raise BenchError("{path}: damaged ({why}); make the bench again", path=path, why="size")
     return found

@@ -216,13 +216,11 @@ def _board(spec: BoardSpec) -> Any:
     needed = spec.columns * spec.rows // 2
     if needed > _MARKERS:
         raise BoardError(
-            message(
-                "a board of {a} x {b} squares needs {c} markers, and there are {count}: take fewer squares",
-                a=spec.columns,
-                b=spec.rows,
-                c=needed,
-                count=_MARKERS,
-            )
+            "a board of {a} x {b} squares needs {c} markers, and there are {count}: take fewer squares",
+            a=spec.columns,
+            b=spec.rows,
+            c=needed,
+            count=_MARKERS,
         )
     dictionary = cv2.aruco.getPredefinedDictionary(_DICTIONARY)
     return cv2.aruco.CharucoBoard((spec.columns, spec.rows), spec.square_mm, spec.marker_mm, dictionary)

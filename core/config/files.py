@@ -154,9 +154,7 @@ def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
             note = _kept(path, "had values that are not allowed")
         write_atomic(path, text.encode("utf-8"), durable=True)
     except OSError as error:
-        raise ConfigError(
-            message("{path}: cannot be written ({why}); nothing was changed", path=path, why=error.strerror)
-        ) from None
+        raise ConfigError("{path}: cannot be written ({why}); nothing was changed", path=path, why=error.strerror) from None
     return note
 
 
@@ -374,7 +372,7 @@ class Profiles:
     def load(self, profile: Profile) -> SettingsFile:
         """Its settings. Raises ProfileError when the file is gone; other problems are among ``SettingsFile.problems``."""
         if not profile.path.is_file():
-            raise ProfileError(message("profile {name}: it is no longer there ({path})", name=profile.name, path=profile.path))
+            raise ProfileError("profile {name}: it is no longer there ({path})", name=profile.name, path=profile.path)
         return read_settings(profile.path)
 
     def save(self, name: str, config: Config) -> tuple[Profile, str]:
@@ -387,7 +385,7 @@ class Profiles:
         """
         name = check_name(name)
         if any(profile.is_preset and profile.name.casefold() == name.casefold() for profile in self.all()):
-            raise ProfileError(message("profile {name}: a preset has this name; choose another one", name=name))
+            raise ProfileError("profile {name}: a preset has this name; choose another one", name=name)
         profile = Profile(name, self._folder / f"{name}{_ENDING}")
         try:
             return profile, write_settings(profile.path, config)
@@ -397,15 +395,13 @@ class Profiles:
     def delete(self, profile: Profile) -> None:
         """Delete one of the user's. Raises ProfileError."""
         if profile.is_preset:
-            raise ProfileError(message("profile {name}: it comes with the program and cannot be deleted", name=profile.name))
+            raise ProfileError("profile {name}: it comes with the program and cannot be deleted", name=profile.name)
         try:
             profile.path.unlink()
         except FileNotFoundError:
             pass
         except OSError as error:
-            raise ProfileError(
-                message("profile {name}: cannot be deleted ({why})", name=profile.name, why=error.strerror)
-            ) from None
+            raise ProfileError("profile {name}: cannot be deleted ({why})", name=profile.name, why=error.strerror) from None
 
     def exists(self, name: str) -> bool:
         """Whether the user has one of this name."""

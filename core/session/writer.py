@@ -269,7 +269,7 @@ class RingSaver:
         """Raises SessionError where the disk is nearly full: its last room is for closing what is open."""
         disk = disk_space(self._parent, self._config)
         if disk is not None and disk.full:
-            raise SessionError(message("{why}; make room and save them again", why=disk.full))
+            raise SessionError("{why}; make room and save them again", why=disk.full)
 
 
 def _beginning(first: EncodedFrame, events: Sequence[Event]) -> Iterator[Event]:

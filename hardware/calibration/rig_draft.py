@@ -205,12 +205,10 @@ class RigDraft:
         if found.elsewhere and len(found.servos) < len(JOINT_NAMES):
             others = "; ".join(f"{', '.join(map(str, ids))} at {baud} baud" for baud, ids in found.elsewhere)
             raise DeviceError(
-                message(
-                    "servos at several speeds: {ids} at {a} baud; {others}; set all seven to one",
-                    ids=", ".join(map(str, found.ids)),
-                    a=found.baud,
-                    others=others,
-                )
+                "servos at several speeds: {ids} at {a} baud; {others}; set all seven to one",
+                ids=", ".join(map(str, found.ids)),
+                a=found.baud,
+                others=others,
             )
         if len(found.servos) != len(JOINT_NAMES):
             raise DeviceError(

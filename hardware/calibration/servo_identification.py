@@ -325,7 +325,7 @@ def _check_at_zero(servos: ServosConfig, kept: ZeroConfig, ticks: tuple[int, ...
         model = servos.model_of(joint).number
         offer = zero_offer(joint, model, keep(joint, model, zero_ticks, 0.0, 0.0), now)
         if offer is None or abs(offer.position_mm) > _AT_ZERO_MM:
-            raise DeviceError(message("tendon {name} does not stand at its kept zero: find the zeros first", name=joint.name))
+            raise DeviceError("tendon {name} does not stand at its kept zero: find the zeros first", name=joint.name)
 
 
 def _look(bench: ServoBench, mover: Probe | Steered) -> Look:

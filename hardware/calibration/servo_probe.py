@@ -18,7 +18,6 @@ from typing import Literal
 
 from core.config.safety import JointConfig, JointKind, SafetyConfig, ServosConfig
 from core.control.kept_zero import ZeroBasis, all_at_zero
-from core.messages import message
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
 from hardware.servos.dynamixel_port import NoAnswer, ServoError
@@ -407,4 +406,4 @@ class SteeredRobot:
             self._robot.hold()
             self._robot.torque_off()
             names = ", ".join(f"{state.name} ({abs(state.current_ma or 0.0):.0f} mA)" for state in strained)
-            raise Strained(message("too much current: {names}; the servos were let go: something holds the wires", names=names))
+            raise Strained("too much current: {names}; the servos were let go: something holds the wires", names=names)

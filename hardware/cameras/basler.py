@@ -45,9 +45,7 @@ def load_pypylon() -> tuple[Any, Any]:
     except ModuleNotFoundError:
         raise DeviceError(message("Basler cameras need the package pypylon: pip install pypylon")) from None
     except ImportError as error:
-        raise DeviceError(
-            message("pypylon cannot be loaded ({why}): pip install --force-reinstall pypylon", why=_short(error))
-        ) from None
+        raise DeviceError("pypylon cannot be loaded ({why}): pip install --force-reinstall pypylon", why=_short(error)) from None
     return pylon, genicam
 
 
@@ -75,7 +73,7 @@ def find_cameras(load: Load = load_pypylon) -> list[BaslerInfo]:
     try:
         return [_info(device) for device in pylon.TlFactory.GetInstance().EnumerateDevices()]
     except genicam.GenericException as error:
-        raise DeviceError(message("pylon cannot look for cameras: {why}", why=_short(error))) from None
+        raise DeviceError("pylon cannot look for cameras: {why}", why=_short(error)) from None
 
 
 class BaslerSensor:
@@ -123,7 +121,7 @@ class BaslerSensor:
         except self._genicam.GenericException as error:
             self.stop()
             raise DeviceError(
-                message("{camera} cannot be started ({why}): close other programs that use it", camera=self.name, why=_short(error))
+                "{camera} cannot be started ({why}): close other programs that use it", camera=self.name, why=_short(error)
             ) from None
         except DeviceError:
             self.stop()
@@ -136,7 +134,7 @@ class BaslerSensor:
             arrived_s = time.monotonic()
             if not result.IsValid():
                 if self._camera.IsCameraDeviceRemoved():
-                    raise DeviceError(message("{camera} is lost: check its cable", camera=self.name))
+                    raise DeviceError("{camera} is lost: check its cable", camera=self.name)
                 return None
             try:
                 if not result.GrabSucceeded():
@@ -146,7 +144,7 @@ class BaslerSensor:
             finally:
                 result.Release()
         except self._genicam.GenericException as error:
-            raise DeviceError(message("{camera} is lost ({why}): check its cable", camera=self.name, why=_short(error))) from None
+            raise DeviceError("{camera} is lost ({why}): check its cable", camera=self.name, why=_short(error)) from None
         captured_s = self._clock.captured_s(arrived_s, stamp / self._ticks_per_s if stamp > 0 else None)
         return SensorFrame(image, captured_s, number if 0 <= number < _NO_NUMBER else None)
 
@@ -170,19 +168,13 @@ class BaslerSensor:
         if self._own_serial is not None:
             # Another camera's pictures must not take the place of a lost one's: the operator drives by them.
             raise DeviceError(
-                message("{camera} {serial} is not there any more: check its cable and supply", camera=self.name, serial=wanted)
+                "{camera} {serial} is not there any more: check its cable and supply", camera=self.name, serial=wanted
             )
         if chosen:
-            raise DeviceError(
-                message("{a} Basler cameras ({serials}): set camera.serial to one of them", a=len(chosen), serials=serials)
-            )
+            raise DeviceError("{a} Basler cameras ({serials}): set camera.serial to one of them", a=len(chosen), serials=serials)
         if serials:
             raise DeviceError(
-                message(
-                    "no Basler camera {serial}; there are: {serials}: set camera.serial to one of them",
-                    serial=wanted,
-                    serials=serials,
-                )
+                "no Basler camera {serial}; there are: {serials}: set camera.serial to one of them", serial=wanted, serials=serials
             )
         raise DeviceError(message("no Basler camera: check its cable and supply; main.py doctor --rig basler says more"))
 
@@ -205,12 +197,10 @@ class BaslerSensor:
         rate = self._value("ResultingFrameRate", "BslResultingAcquisitionFrameRate", "ResultingFrameRateAbs")
         if rate is not None and rate < _LEAST_RATE * config.frames_per_second:
             raise DeviceError(
-                message(
-                    "{camera} gives {rate:.1f} pictures/s at {size}: set camera.frames_per_second or camera.exposure_ms lower",
-                    camera=self.name,
-                    rate=rate,
-                    size=f"{config.width_px}x{config.height_px}",
-                )
+                "{camera} gives {rate:.1f} pictures/s at {size}: set camera.frames_per_second or camera.exposure_ms lower",
+                camera=self.name,
+                rate=rate,
+                size=f"{config.width_px}x{config.height_px}",
             )
         self._ticks_per_s = float(self._value("GevTimestampTickFrequency") or _TICKS_PER_S)
 
@@ -223,13 +213,11 @@ class BaslerSensor:
         limits = {name: (int(node.GetMin()), int(node.GetMax()), int(node.GetInc())) for name, node in nodes.items()}
         if any(not low <= asked[name] <= high or (asked[name] - low) % step for name, (low, high, step) in limits.items()):
             raise DeviceError(
-                message(
-                    "{camera} has no {size}: set camera.width_px to {widths}, and camera.height_px to {heights}",
-                    camera=self.name,
-                    size=f"{asked['Width']}x{asked['Height']}",
-                    widths=_range(*limits["Width"]),
-                    heights=_range(*limits["Height"]),
-                )
+                "{camera} has no {size}: set camera.width_px to {widths}, and camera.height_px to {heights}",
+                camera=self.name,
+                size=f"{asked['Width']}x{asked['Height']}",
+                widths=_range(*limits["Width"]),
+                heights=_range(*limits["Height"]),
             )
         for name, node in nodes.items():
             if node.GetValue() != asked[name]:

@@ -16,7 +16,6 @@ import numpy as np
 from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream
 from core.files import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
-from core.messages import message
 from core.session.video import NoPictures, UndecodablePicture, decoded, open_video, pictures_of, upright
 from core.types import Frame, Image
 
@@ -216,9 +215,7 @@ class VideoFile:
         try:
             container = open_video(self._path)
         except (av.error.FFmpegError, OSError) as error:
-            raise DeviceError(
-                message("{path}: cannot be read as a video ({why})", path=self._path, why=error.strerror or error)
-            ) from None
+            raise DeviceError("{path}: cannot be read as a video ({why})", path=self._path, why=error.strerror or error) from None
         try:
             stream = pictures_of(container)
         except NoPictures as error:
@@ -255,7 +252,7 @@ class VideoFile:
         except StopIteration:
             if lack := self._lack():
                 raise DamagedStream(f"{self._path}: cut short: {lack}") from None
-            raise EndOfStream(message("{path}: end of the video", path=self._path)) from None
+            raise EndOfStream("{path}: end of the video", path=self._path) from None
         except av.error.FFmpegError as error:
             where = f"after frame {self._index}" if self._count else "before its first frame"
             raise DamagedStream(f"{self._path}: damaged {where} ({error.strerror or error}), and not read on") from None

@@ -86,7 +86,7 @@ class LiveCamera:
         """Start the camera; raises DeviceError when it is not there or does not start."""
         self.close()
         if self._hung is not None and self._hung.thread.is_alive():
-            raise DeviceError(message("the driver of {camera} does not return: plug the camera out and in again", camera=self.name))
+            raise DeviceError("the driver of {camera} does not return: plug the camera out and in again", camera=self.name)
         self._reader = _Reader(self._sensor, self._config)
         self._reader.thread.start()
         problem = None if self._reader.opened.wait(_OPEN_WITHIN_S) else f"{self.name} does not answer: plug it out and in again"

@@ -20,7 +20,6 @@ import pyrealsense2 as rs
 
 from core.config.models import CameraConfig
 from core.devices import DeviceError, EndOfStream
-from core.messages import message
 from core.types import Frame, Image
 from hardware.cameras.files import Pacer
 from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
@@ -128,7 +127,7 @@ class RealSenseSensor:
         except RuntimeError as error:
             self.stop()
             raise DeviceError(
-                message("{camera} cannot be started ({why}): close other programs that use it", camera=self.name, why=_short(error))
+                "{camera} cannot be started ({why}): close other programs that use it", camera=self.name, why=_short(error)
             ) from None
         except DeviceError:
             self.stop()
@@ -146,7 +145,7 @@ class RealSenseSensor:
             captured_s = self._clock.captured_s(arrived_s, stamp_s, wall_s if on_wall else None)
             return SensorFrame(colour_image(frame), captured_s, int(frame.get_frame_number()))
         except RuntimeError as error:
-            raise DeviceError(message("{camera} is lost ({why}): check its cable", camera=self.name, why=_short(error))) from None
+            raise DeviceError("{camera} is lost ({why}): check its cable", camera=self.name, why=_short(error)) from None
 
     def stop(self) -> None:
         sensor, self._sensor = self._sensor, None
@@ -177,12 +176,10 @@ class RealSenseSensor:
         if devices and self._own_serial is not None:
             # Another camera's pictures must not take the place of a lost one's: the operator drives by them.
             raise DeviceError(
-                message(
-                    "{camera} {serial} is not there any more (there are: {serials}): plug it in, or start again with another one",
-                    camera=self.name,
-                    serial=wanted,
-                    serials=serials,
-                )
+                "{camera} {serial} is not there any more (there are: {serials}): plug it in, or start again with another one",
+                camera=self.name,
+                serial=wanted,
+                serials=serials,
             )
         if len(chosen) > 1:
             raise DeviceError(f"{len(chosen)} RealSense cameras ({serials}): set camera.serial to one of them")

@@ -62,9 +62,7 @@ _LIBREALSENSE = "pyrealsense2"
 
 def _need_realsense() -> None:
     if find_spec(_LIBREALSENSE) is None:
-        raise DeviceError(
-            message("RealSense cameras need the package pyrealsense2: {command}", command=how_to_install(_LIBREALSENSE))
-        )
+        raise DeviceError("RealSense cameras need the package pyrealsense2: {command}", command=how_to_install(_LIBREALSENSE))
 
 
 def _realsense_live(config: CameraConfig) -> Camera:

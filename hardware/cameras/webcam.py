@@ -17,7 +17,6 @@ import numpy as np
 
 from core.config.models import CameraConfig
 from core.devices import DeviceError
-from core.messages import message
 from hardware.cameras import sysfs
 from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
 
@@ -63,11 +62,9 @@ class WebcamSensor:
         try:
             if not capture.isOpened():
                 raise DeviceError(
-                    message(
-                        "{camera} ({node}) cannot be opened: close other programs that use it, or join the group video",
-                        camera=self.name,
-                        node=node,
-                    )
+                    "{camera} ({node}) cannot be opened: close other programs that use it, or join the group video",
+                    camera=self.name,
+                    node=node,
                 )
             self._set_up(capture, node)
         except DeviceError:
@@ -84,7 +81,7 @@ class WebcamSensor:
         if not self._capture.grab():
             if self._is_new and time.monotonic() - asked_s > _AT_ONCE_S:
                 return None
-            raise DeviceError(message("{camera} is lost: check its cable", camera=self.name))
+            raise DeviceError("{camera} is lost: check its cable", camera=self.name)
         self._is_new = False
         arrived_s = time.monotonic()
         # V4L2 stamps frames on the monotonic clock. Some drivers do not, and say 0, or use another one.
@@ -124,11 +121,7 @@ class WebcamSensor:
             if not node.exists():
                 paths = ", ".join(device.path for device in devices) or "none"
                 raise DeviceError(
-                    message(
-                        "webcam {camera} is not there; webcams: {paths}: plug it in, or set camera.device",
-                        camera=wanted,
-                        paths=paths,
-                    )
+                    "webcam {camera} is not there; webcams: {paths}: plug it in, or set camera.device", camera=wanted, paths=paths
                 )
         # Resolved at every start: plugged in again, the stable path may lead to another number.
         node = node.resolve()

@@ -17,7 +17,6 @@ from pathlib import Path
 
 from core.config.models import GamepadConfig
 from core.devices import DeviceError
-from core.messages import message
 from hardware.processes import DeviceThread
 
 EVENT = struct.Struct("IhBB")
@@ -259,9 +258,7 @@ class Gamepad:
         self._report_device(
             None,
             GamepadError(
-                message(
-                    "the gamepad is no longer read ({kind}: {why}): start the program again", kind=type(error).__name__, why=error
-                )
+                "the gamepad is no longer read ({kind}: {why}): start the program again", kind=type(error).__name__, why=error
             ),
         )
 
@@ -293,7 +290,7 @@ def _open(path: str, *, drives: bool) -> tuple[int, str, Layout]:
         device = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except PermissionError as error:
         raise GamepadRefused(
-            message("no permission for gamepad {path}: add your user to the group input, then log in again", path=path)
+            "no permission for gamepad {path}: add your user to the group input, then log in again", path=path
         ) from error
     except (OSError, ValueError) as error:
         missing = isinstance(error, OSError) and error.errno in {errno.ENOENT, errno.ENODEV, errno.ENXIO}
@@ -306,14 +303,14 @@ def _open(path: str, *, drives: bool) -> tuple[int, str, Layout]:
     if layout is None or GAMEPAD_BUTTON not in layout.buttons:
         os.close(device)
         raise GamepadError(
-            message("{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is", path=path)
+            "{path} is no gamepad with two sticks: leave gamepad.device out to take the first that there is", path=path
         )
     raw = (_ask(device, 0x13, 128) or b"").split(b"\0")[0].decode("utf-8", "replace")
     name = " ".join(re.sub(r"[^\x20-\uffff]", " ", raw).split()) or Path(path).name
     if not RIGHT_STICK.issubset(layout.axes):
         os.close(device)
         raise GamepadRefused(
-            message("gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one", name=name)
+            "gamepad {name} has its right stick and buttons elsewhere: switch it to XInput, or take another one", name=name
         )
     try:
         if drives:

@@ -32,7 +32,6 @@ import serial
 
 from core.config.models import PedalConfig
 from core.devices import DeviceError
-from core.messages import message
 from hardware.processes import DeviceThread
 
 _CHUNK = 4096
@@ -85,9 +84,9 @@ class PedalPort:
             return b""
         except OSError as error:
             raise PedalLost(
-                message("the pedal at {port} is gone ({why}): plug its USB cable in", port=self.name, why=error.strerror)
+                "the pedal at {port} is gone ({why}): plug its USB cable in", port=self.name, why=error.strerror
             ) from None
-        raise PedalLost(message("the pedal at {port} is gone: plug its USB cable in", port=self.name))
+        raise PedalLost("the pedal at {port} is gone: plug its USB cable in", port=self.name)
 
     def close(self) -> None:
         """Give the port back at once: a plug that comes back meanwhile gets another name. Never fails."""
@@ -116,29 +115,23 @@ def open_pedal_port(config: PedalConfig) -> PedalPort:
 def _port_error(config: PedalConfig, error: Exception) -> PedalPortError:
     port, code = config.port, getattr(error, "errno", None)
     if code == errno.ENOENT:
-        return PedalPortError(message("pedal port {port} does not exist: plug the pedal in, or set pedal.port", port=port))
+        return PedalPortError("pedal port {port} does not exist: plug the pedal in, or set pedal.port", port=port)
     if code in {errno.EACCES, errno.EPERM}:
         return PedalPortError(
-            message("no permission for pedal port {port}: add your user to the group dialout, then log in again", port=port)
+            "no permission for pedal port {port}: add your user to the group dialout, then log in again", port=port
         )
     if code in {errno.EAGAIN, errno.EBUSY}:
         return PedalPortTaken(
-            message(
-                "pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port", port=port
-            )
+            "pedal port {port} is in use by another program, or by the servos: close it there, or set pedal.port", port=port
         )
     if code in {errno.ENODEV, errno.ENXIO, errno.EIO}:
-        return PedalPortError(
-            message("pedal port {port} has no device behind it: unplug the pedal and plug it in again", port=port)
-        )
+        return PedalPortError("pedal port {port} has no device behind it: unplug the pedal and plug it in again", port=port)
     reason = " ".join(str(error).split())[:120]
     return PedalPortError(
-        message(
-            "{port} cannot be used as pedal port at {a} baud ({why}): set pedal.port and pedal.baud",
-            port=port,
-            a=config.baud,
-            why=reason,
-        )
+        "{port} cannot be used as pedal port at {a} baud ({why}): set pedal.port and pedal.baud",
+        port=port,
+        a=config.baud,
+        why=reason,
     )
 
 
@@ -300,7 +293,7 @@ class Pedal:
         self._on_report = on_report
         self._on_problem = on_problem
         self._thread = DeviceThread("pedal", self._serve, self._fail)
-        self._problem: PedalError | None = PedalUnheard(message("the pedal at {port} has not reported yet", port=config.port))
+        self._problem: PedalError | None = PedalUnheard("the pedal at {port} has not reported yet", port=config.port)
 
     @property
     def problem(self) -> PedalError | None:
@@ -374,9 +367,5 @@ class Pedal:
 
     def _fail(self, error: Exception) -> None:
         self._set_problem(
-            PedalError(
-                message(
-                    "the pedal is no longer read ({kind}: {why}): start the program again", kind=type(error).__name__, why=error
-                )
-            )
+            PedalError("the pedal is no longer read ({kind}: {why}): start the program again", kind=type(error).__name__, why=error)
         )

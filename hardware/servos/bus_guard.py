@@ -25,7 +25,6 @@ from core.control.gate import (
     outside_envelope,
 )
 from core.control.joints import Joints, Retracted, by_hand, by_program, joint_goals, joint_motion
-from core.messages import message
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, IssuedGoals
 from hardware.servos.dynamixel_port import NotReady
 from hardware.servos.registers import MissingServo, ServoReading, ServoState
@@ -384,7 +383,7 @@ class BusGuard:
             servos = by_hand(self._servos, at.positions_mm, None, retracts=Retracted.NONE)
             reasons += [f"outside its envelope: {joint}: {advice}" for joint in outside_envelope(at.positions_mm, servos)]
         if reasons:
-            raise NotReady(message("not armed: {why}", why="; ".join(reasons)))
+            raise NotReady("not armed: {why}", why="; ".join(reasons))
 
     def set_armed(self, now_s: float) -> None:
         """The driver has armed the servos. Orders from before do not count."""

@@ -31,7 +31,6 @@ from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Joints, Retracted
 from core.control.kept_zero import ZeroOffer
 from core.control.robot import SentMotion
-from core.messages import message
 from core.types import Command
 from hardware.processes import MESSAGE_BYTES, DeviceProcess, ParentLink, SharedSlot
 from hardware.servos import dynamixel_port
@@ -374,7 +373,7 @@ class BusClient:
                 self._stays = answer.get(_STAYS, self._stays)
                 if answer.get("id") == number:
                     return answer["error"]  # type: ignore[no-any-return]
-        raise BusProcessLost(message("the servo bus process did not answer within {a:g} s: connect the robot again", a=timeout_s))
+        raise BusProcessLost("the servo bus process did not answer within {a:g} s: connect the robot again", a=timeout_s)
 
     def _read_fatal(self) -> None:
         """Read what the process still said. When it left requests of ours unread, the first try fails, the second does not."""

@@ -34,7 +34,6 @@ from core.config.safety import DRIVES, OF_SERVOS, JointName, SafetyConfig, Servo
 from core.control.faults import Cause, Fault, Reaction
 from core.control.kept_zero import ZeroBasis, ZeroRequest, request_problem, unknown_joint
 from core.devices import UserError
-from core.messages import message
 from hardware.servos.bus_guard import (
     LINGER_S,
     RELAX_MM_S,
@@ -564,7 +563,7 @@ class BusLoop:
 
     def _arm(self) -> None:
         if not self._bus.is_open:
-            raise NotReady(message("not armed: {why}", why=self._open_problem or "the servo port is not open"))
+            raise NotReady("not armed: {why}", why=self._open_problem or "the servo port is not open")
         if not self._guard.armed:
             self._check_answers()
         self._guard.check_arming()
@@ -598,7 +597,7 @@ class BusLoop:
         if len(missing) == len(self._servos.joints):
             raise NotReady("not armed: no servo answers: release the E-stop or switch their supply on, check the cable")
         if missing:
-            raise NotReady(message("not armed: {why}; check its supply and cable", why=_silence_of(missing)))
+            raise NotReady("not armed: {why}; check its supply and cable", why=_silence_of(missing))
 
     def _zero(self, request: Request) -> None:
         """Set zeros; those of an operator may not contradict what is kept."""
@@ -616,7 +615,7 @@ class BusLoop:
         if self._guard.armed:
             raise NotReady("the servos are armed: disarm before zeroing")
         if missing := self._read_all():
-            raise NotReady(message("not zeroed: {why}; check its supply and cable", why=_silence_of(missing)))
+            raise NotReady("not zeroed: {why}; check its supply and cable", why=_silence_of(missing))
         if problem := request_problem(wanted, self._keeper.offers(self._readings), self._servos):
             raise NotReady(problem)
         kept = {name: found for name in wanted.kept if (found := self._keeper.kept(name)) is not None}

@@ -15,7 +15,6 @@ from typing import Protocol
 
 from core.config.safety import JointName, ServosConfig
 from core.control.kept_zero import KeptJoint, ZeroBasis
-from core.messages import message
 from hardware.servos.dynamixel_bus import JointBus, JointLine
 from hardware.servos.dynamixel_port import NoAnswer, NotReady, ServoError, TorqueStillOn, WriteRefused
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState, to_mm
@@ -97,7 +96,7 @@ class DriveBus(JointBus[Drive]):
         states = self._states()
         for joint in self._joints:
             if joint.name in wanted and joint.is_tendon and basis is ZeroBasis.SLACK and states[joint.id].is_on:
-                raise NotReady(message("{joint} holds its wire: switch the torque off and see that it is slack", joint=joint.name))
+                raise NotReady("{joint} holds its wire: switch the torque off and see that it is slack", joint=joint.name)
         for joint in self._joints:
             if joint.name in wanted:
                 self._zeros[joint.id] = states[joint.id].position - round(wanted[joint.name] * joint.ticks_per_mm)
@@ -195,7 +194,7 @@ class DriveBus(JointBus[Drive]):
             doubtful = [joint.name for joint in self._joints if joint.id not in states or states[joint.id].is_on]
             if not doubtful:
                 return
-        raise TorqueStillOn(message("torque of {names} is not proven to be off: cut the servos' power", names=", ".join(doubtful)))
+        raise TorqueStillOn("torque of {names} is not proven to be off: cut the servos' power", names=", ".join(doubtful))
 
     def let_go(self) -> None:
         self._line.open()
@@ -211,5 +210,5 @@ class DriveBus(JointBus[Drive]):
         """Of all axes. Raises NoAnswer."""
         states = self._line.read()
         if silent := ", ".join(f"{joint.name} (id {joint.id})" for joint in self._joints if joint.id not in states):
-            raise NoAnswer(message("{names}: no answer; check the drive's power, its cable and servos.baud", names=silent))
+            raise NoAnswer("{names}: no answer; check the drive's power, its cable and servos.baud", names=silent)
         return states

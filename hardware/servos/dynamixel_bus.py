@@ -14,7 +14,6 @@ from typing import Generic, Protocol, TypeVar
 from core.config.safety import JointConfig, JointName, ServosConfig
 from core.config.servo_models import GOAL_CURRENT, GOAL_PWM, ServoModel, model_name
 from core.control.kept_zero import KeptJoint, ZeroBasis, zero_offer
-from core.messages import message
 from hardware.servos import registers
 from hardware.servos.dynamixel_port import (
     LineCounts,
@@ -388,23 +387,19 @@ class ServoBus(JointBus[ServoLine]):
         """Raise NotReady when the tendon may be pulled: a zero there would add its pull to every later one."""
         if basis is ZeroBasis.SLACK and self._holds(joint):
             raise NotReady(
-                message(
-                    "{joint} holds its wire: let the wizard search where it is taut (menu Rig, Calibrate), or switch the torque "
-                    "off and see that it is slack",
-                    joint=_title(joint),
-                )
+                "{joint} holds its wire: let the wizard search where it is taut (menu Rig, Calibrate), or switch the torque "
+                "off and see that it is slack",
+                joint=_title(joint),
             )
         model, limit_ma = self.config.model_of(joint), self.config.force_limit(joint).current_ma
         friction_ma = min(model.friction_ma, _SLACK_SHARE * (limit_ma or model.friction_ma))
         drawn_ma = model.current_ma(registers.signed(self._line.read(joint.id, _CURRENT, 2)))
         if drawn_ma is not None and abs(drawn_ma) > friction_ma:
             raise NotReady(
-                message(
-                    "{joint} pulls with {a:.0f} mA (friction takes {b:.0f} mA at most): slacken its wire, then zero it",
-                    joint=_title(joint),
-                    a=abs(drawn_ma),
-                    b=friction_ma,
-                )
+                "{joint} pulls with {a:.0f} mA (friction takes {b:.0f} mA at most): slacken its wire, then zero it",
+                joint=_title(joint),
+                a=abs(drawn_ma),
+                b=friction_ma,
             )
 
     def arm(self) -> None:
@@ -551,9 +546,7 @@ class ServoBus(JointBus[ServoLine]):
         answer = self._line.group_read(list(ids), TORQUE, 1)
         doubtful = [joint.name for joint in self._joints if joint.id in ids and answer.data.get(joint.id) != b"\0"]
         if doubtful:
-            raise TorqueStillOn(
-                message("torque of {names} is not proven to be off: cut the servos' power", names=", ".join(doubtful))
-            )
+            raise TorqueStillOn("torque of {names} is not proven to be off: cut the servos' power", names=", ".join(doubtful))
 
     def let_go(self) -> None:
         """``torque_off`` on a closed bus that cannot be opened because not all servos answer: those that hear it obey.
@@ -607,12 +600,10 @@ class ServoBus(JointBus[ServoLine]):
                     f"{_title(joint)} holds in a mode of another program: switch the torque off (the wires go slack), then zero"
                 )
             raise NotReady(
-                message(
-                    "{joint} holds with another {what}: close the program with Relax slowly, or switch the torque off (the wires "
-                    "go slack), then arm",
-                    joint=_title(joint),
-                    what=", ".join(CHANGED[address][0] for address in differences),
-                )
+                "{joint} holds with another {what}: close the program with Relax slowly, or switch the torque off (the wires "
+                "go slack), then arm",
+                joint=_title(joint),
+                what=", ".join(CHANGED[address][0] for address in differences),
             )
 
     def _holds(self, joint: JointConfig) -> bool:

@@ -28,7 +28,6 @@ from dynamixel_sdk import (
 )
 
 from core.devices import DeviceError
-from core.messages import message
 from hardware.processes import holders
 from hardware.servos.registers import TAG_BYTES
 
@@ -192,33 +191,25 @@ class StuffingHandler(Protocol2PacketHandler):  # type: ignore[misc]
 def _port_error(port: str, error: Exception) -> PortError:
     code = getattr(error, "errno", None)
     if code == errno.ENOENT:
-        return PortError(message("servo port {port} does not exist: plug the USB adapter in, or set servos.port", port=port))
+        return PortError("servo port {port} does not exist: plug the USB adapter in, or set servos.port", port=port)
     if code in {errno.EACCES, errno.EPERM}:
-        return PortError(
-            message("no permission for servo port {port}: add your user to the group dialout, then log in again", port=port)
-        )
+        return PortError("no permission for servo port {port}: add your user to the group dialout, then log in again", port=port)
     if code in {errno.EAGAIN, errno.EBUSY}:
         return _port_taken(port)
     if code in {errno.ENODEV, errno.ENXIO, errno.EIO}:
-        return PortError(
-            message("servo port {port} has no device behind it: unplug the USB adapter and plug it in again", port=port)
-        )
+        return PortError("servo port {port} has no device behind it: unplug the USB adapter and plug it in again", port=port)
     return PortError(
-        message(
-            "{port} cannot be used as servo port ({why}): set servos.port to the USB adapter",
-            port=port,
-            why=" ".join(str(error).split()),
-        )
+        "{port} cannot be used as servo port ({why}): set servos.port to the USB adapter",
+        port=port,
+        why=" ".join(str(error).split()),
     )
 
 
 def _port_taken(port: str) -> PortTaken:
     """Names the programs that hold the port, as far as the system shows them to this user."""
     if who := ", ".join(holders(port)):
-        return PortTaken(
-            message("servo port {port} is in use by another program, {who}: close that program first", port=port, who=who)
-        )
-    return PortTaken(message("servo port {port} is in use by another program: close that program first", port=port))
+        return PortTaken("servo port {port} is in use by another program, {who}: close that program first", port=port, who=who)
+    return PortTaken("servo port {port} is in use by another program: close that program first", port=port)
 
 
 LATE_S = 0.04
@@ -339,7 +330,7 @@ class ServoLine:
             with contextlib.suppress(OSError, termios.error, AttributeError):
                 port.closePort()
             raise PortError(
-                message("servo port {port} vanished while it was opened ({why}): check the USB cable", port=self.port, why=error)
+                "servo port {port} vanished while it was opened ({why}): check the USB cable", port=self.port, why=error
             ) from None
         self._port, self._owner = port, threading.get_ident()
         self.counts = LineCounts()
@@ -368,7 +359,7 @@ class ServoLine:
             self.close()
             reason = " ".join(str(error).split())[:80]
             raise PortLost(
-                message("servo port {port} is lost ({why}): check the USB cable, then connect again", port=self.port, why=reason)
+                "servo port {port} is lost ({why}): check the USB cable, then connect again", port=self.port, why=reason
             ) from None
         finally:
             port.is_using = False
@@ -540,12 +531,10 @@ class ServoLine:
             self._note(servo_id, result)
             miss = Miss.SILENT if result == COMM_RX_TIMEOUT else Miss.CORRUPT
         raise NoAnswer(
-            message(
-                "servo {a}: {miss}, {b} times: check its supply and cable, and that no two servos have the same id",
-                a=servo_id,
-                miss=miss,
-                b=_ATTEMPTS,
-            )
+            "servo {a}: {miss}, {b} times: check its supply and cable, and that no two servos have the same id",
+            a=servo_id,
+            miss=miss,
+            b=_ATTEMPTS,
         )
 
     def _note(self, servo_id: int, result: int) -> None:

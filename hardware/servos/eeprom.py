@@ -16,7 +16,6 @@ from pathlib import Path
 from core.config.safety import JointConfig, ServosConfig
 from core.config.servo_models import model_name
 from core.devices import UserError
-from core.messages import message
 from hardware.servos.bus_ipc import ask_for_port
 from hardware.servos.dynamixel_port import ServoError, ServoLine, WrongServo
 
@@ -67,11 +66,9 @@ def keep_eeprom(folder: Path, port: str, table: bytes) -> None:
         write_atomic(path, (json.dumps(content, indent=1) + "\n").encode(), durable=True)
     except OSError as error:
         raise ServoError(
-            message(
-                "{path}: the servo's EEPROM cannot be saved ({why}), so it is not changed: make room, or the folder writable",
-                path=path,
-                why=error.strerror,
-            )
+            "{path}: the servo's EEPROM cannot be saved ({why}), so it is not changed: make room, or the folder writable",
+            path=path,
+            why=error.strerror,
         ) from None
 
 

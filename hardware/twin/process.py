@@ -20,7 +20,6 @@ import numpy as np
 from core.config.models import Config, TwinConfig
 from core.config.safety import ServosConfig
 from core.devices import CameraLost, DeviceError
-from core.messages import message
 from core.types import Command, Frame, RobotStatus
 from hardware.processes import DeviceProcess, SharedSlot
 from hardware.servos.bus_ipc import start_bus
@@ -162,7 +161,7 @@ class RemoteTwin:
         code = self._process.exit_code()
         if code is not None:
             why = self._receive(0.0).get("error", f"exit code {code}")
-            raise DeviceError(message("the bench twin stopped ({why}): start the rig again (F5)", why=why))
+            raise DeviceError("the bench twin stopped ({why}): start the rig again (F5)", why=why)
 
 
 def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
