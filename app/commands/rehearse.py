@@ -5,92 +5,207 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.commands.options import ConfigOption, JsonOption, point_option
-from app.commands.progress import console, progress_bar
+from app.commands.options import ConfigOption, JsonOption, ProgressOption, point_option
+from app.commands.progress import (
+    ProgressWriter,
+    console,
+    end_like_an_interrupt,
+    progress_bar,
+    progress_writer,
+    report_progress,
+)
 from app.commands.workers import over_processes
-from core.config.models import load_config
+from core.config.models import Config, load_config
+from core.devices import UserError
 from core.evaluation.trial import Row, summarise
 
 if TYPE_CHECKING:
-    from core.types import Point
+    from core.types import Point, Points
     from hardware.twin.phantom import Phantom
     from hardware.twin.rehearsal import RehearsalPlan
+    from hardware.twin.trial import Target
+    from hardware.twin.view import CameraView
+
+_FIRST_SHARE = 0.7
+"""Of the time, for the set speeds; slower ones are tried in the rest."""
+_SHOWN_EVERY_S = 2.0
+_FEWEST = 20
+"""Runs, at least, from which a speed is recommended."""
 
 
 def rehearse(
-    bench: Annotated[str, typer.Option(help="the phantom of your bench (see phantom): its folder, model, or rig")],
     target: Annotated[str, typer.Option(help="X,Y: where the robot is to go, in pixels of the bench's picture")],
+    bench: Annotated[
+        str | None, typer.Option(help="the phantom of your bench (see phantom): its folder, model, or rig; default: twin.phantom")
+    ] = None,
     runs: Annotated[int, typer.Option(min=5, max=10_000, help="runs at each speed that is tried")] = 50,
+    minutes: Annotated[float, typer.Option(min=0.1, max=1000.0, help="time that it may take; fewer runs then")] = 30.0,
     workers: Annotated[int, typer.Option(min=1, max=256, help="processes, at low priority")] = min(2, os.cpu_count() or 1),
     seed: Annotated[int, typer.Option(min=0, max=1_000_000, help="of the first run")] = 0,
     head_px: Annotated[float, typer.Option(min=0.0, max=50.0, help="error of the perceived head, median, in px at 640")] = 1.5,
     missing: Annotated[float, typer.Option(min=0.0, max=0.9, help="share of the frames without an answer")] = 0.05,
     max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a run has failed")] = 120.0,
     as_json: JsonOption = False,
+    progress_json: ProgressOption = False,
+    given: Annotated[bool, typer.Option("--given", hidden=True, help="configuration and picture's size on standard input")] = False,
     config_path: ConfigOption = None,
 ) -> None:
-    """Rehearse the way to a target: how many runs arrive, with which wall force, where it is weakest, at which speed to go."""
-    from hardware.twin.own_phantom import with_own_phantom
-    from hardware.twin.phantoms import make_phantom
-    from hardware.twin.rehearsal import SPEEDS, RehearsalPlan, is_good, sharp_turns
-    from hardware.twin.rendering.appearance import Appearance, make_view
-    from hardware.twin.trial import TrialPlan, target_near
+    """Rehearse the way to a target: how many runs arrive, with which wall force, where it is weakest, at which speed to go.
 
-    config = with_own_phantom(load_config(config_path, None, {}), bench)
-    phantom = make_phantom(config.twin.phantom)
-    view = make_view(Appearance(), (config.twin.image_width_px, config.twin.image_height_px), phantom)
-    place = target_near(phantom, view, point_option(target))  # refused here, not by a worker
-    trial = TrialPlan(config, max_seconds=max_seconds, look="bench", wall_force=False, own=True, target_px=place.click_px)
-    sharp: list[dict[str, Any]] = [
-        {"xy": _pixel(phantom, turn.point_mm), "turn_deg": round(turn.turn_deg, 1), "limit_deg": round(turn.limit_deg, 1)}
-        for turn in sharp_turns(phantom, place)
-    ]
-    for turn in sharp if not as_json else ():
+    --json has the band of the heads' paths and the wall force along the way, too: "way" (core/evaluation/rehearsal.py).
+    """
+    from hardware.twin.own_phantom import with_own_phantom
+    from hardware.twin.rehearsal import SPEEDS, RehearsalPlan, is_good
+    from hardware.twin.trial import TrialPlan
+
+    if progress_json:
+        report_progress()
+    end_like_an_interrupt()
+    told = json.loads(sys.stdin.read()) if given else {}
+    config = Config.model_validate(told["config"]) if given else load_config(config_path, None, {})
+    config = with_own_phantom(config, bench) if bench is not None else config
+    picture, target_px = _picture(config, told.get("size_px"), point_option(target))
+    trial = TrialPlan(config, max_seconds=max_seconds, look="bench", wall_force=False, own=True, target_px=target_px)
+    sharp = picture.sharp()
+    for turn in sharp if not (as_json or progress_json) else ():
         console.print(
             f"too sharp: the branch at ({turn['xy'][0]:.0f}, {turn['xy'][1]:.0f}) turns by {turn['turn_deg']:.0f} degrees, the "
             f"head bends by {turn['limit_deg']:.0f} there",
             soft_wrap=True,
         )
-    tried: list[tuple[float, list[Row]]] = []
-    for speed in SPEEDS:
-        rows = _run(RehearsalPlan(trial, head_px, missing, speed), range(seed, seed + runs), workers)
-        tried.append((speed, rows))
-        if is_good(summarise(rows)):
-            break
-    good = [speed for speed, rows in tried if is_good(summarise(rows))]
-    about = _about(tried[0][1], phantom, place.route)
-    about |= {
-        "bench": bench,
-        "target_xy": [round(value, 1) for value in place.click_px],
+    about: dict[str, Any] = {
+        "bench": bench or config.twin.phantom,
+        "target_xy": picture.pixels([picture.target.point_mm])[0],
+        "size_px": picture.seen.size,
         "sharp": sharp,
         "speed_mm_s": config.advice.fast_mm_s,
-        "recommended_speed_mm_s": round(good[0] * config.advice.fast_mm_s, 2) if good else None,
-        "at_speeds": [{"share": speed, **_figures(rows)} for speed, rows in tried],
         "assumed": {"head_px": head_px, "missing": missing, "robot": "twin"},
     }
-    if as_json:
+    began_s, writer = time.monotonic(), progress_writer()
+    tried: list[tuple[float, list[Row]]] = []
+    good: float | None = None
+    for speed in SPEEDS:
+        plan = RehearsalPlan(trial, head_px, missing, speed)
+        share, show = (1.0, None) if tried else (_FIRST_SHARE, None if writer is None else _shows(writer, about, picture))
+        rows = _run(plan, range(seed, seed + runs), workers, began_s + 60.0 * minutes * share, show)
+        if not rows:
+            break
+        tried.append((speed, rows))
+        if len(rows) >= min(runs, _FEWEST) and is_good(summarise(rows)):
+            good = speed
+            break
+    if not tried:
+        raise UserError("no run has ended in this time; give more --minutes")
+    about |= picture.found(tried[0][1])
+    about["recommended_speed_mm_s"] = round(good * config.advice.fast_mm_s, 2) if good is not None else None
+    about["at_speeds"] = [{"share": speed, **_figures(rows)} for speed, rows in tried]
+    if as_json or progress_json:
         sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
     else:
         _print(about)
 
 
-def _run(plan: RehearsalPlan, seeds: range, workers: int) -> list[Row]:
-    """The rows by seed."""
-    from hardware.twin.rehearsal import rehearse_once
+@dataclass(frozen=True, slots=True, eq=False)
+class _Picture:
+    """The picture whose pixels are told, and the way to the target in it."""
 
-    rows = []
-    with progress_bar() as bar:
+    phantom: Phantom
+    seen: CameraView
+    target: Target
+
+    def pixels(self, points_mm: Points | Sequence[Point]) -> list[list[float]]:
+        import numpy as np
+
+        points = np.asarray(points_mm, np.float64).reshape(-1, 2)
+        return [[round(x, 1), round(y, 1)] for x, y in self.seen.project(points).tolist()]
+
+    def sharp(self) -> list[dict[str, Any]]:
+        """Branches on the way that are too sharp."""
+        from hardware.twin.rehearsal import sharp_turns
+
+        turns = sharp_turns(self.phantom, self.target)
+        return [
+            {"xy": self.pixels([one.point_mm])[0], "turn_deg": round(one.turn_deg, 1), "limit_deg": round(one.limit_deg, 1)}
+            for one in turns
+        ]
+
+    def found(self, rows: Sequence[Row]) -> dict[str, Any]:
+        """The figures, the weakest place, and what happened along the way."""
+        from hardware.twin.rehearsal import rehearsed_path, weakest_place
+
+        weakest, path = weakest_place(rows, self.target.route), rehearsed_path(rows, self.target.route)
+        if weakest is not None:
+            weakest = {"xy": self.pixels([weakest.pop("point_mm")])[0], **weakest}
+        way = {
+            "along_mm": path.along_mm.tolist(),
+            "xy": self.pixels(path.middle),
+            "low_xy": self.pixels(path.low),
+            "high_xy": self.pixels(path.high),
+            "wall_force_n": path.force_n.round(4).tolist(),
+            "time_s": path.time_s.round(2).tolist(),
+            "runs": path.runs.tolist(),
+        }
+        return _figures(rows) | {"weakest": weakest, "way": way}
+
+
+def _picture(config: Config, size_px: Sequence[int] | None, target: Point) -> tuple[_Picture, Point]:
+    """The picture of this size, else of the twin's, and the target in the picture of the trials. Raises TargetError."""
+    import numpy as np
+
+    from hardware.twin.phantoms import make_phantom
+    from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
+    from hardware.twin.trial import target_near
+
+    own_px = config.twin.image_width_px, config.twin.image_height_px
+    width, height = size_px or own_px
+    phantom = make_phantom(config.twin.phantom)
+    seen = make_view(appearance_of(config.twin), (width, height), phantom)
+    picture = _Picture(phantom, seen, target_near(phantom, seen, target))
+    x, y = make_view(Appearance(), own_px, phantom).project(np.array([picture.target.point_mm]))[0].tolist()
+    return picture, (x, y)
+
+
+def _shows(writer: ProgressWriter, about: dict[str, Any], picture: _Picture) -> Callable[[Sequence[Row]], None]:
+    """Tells a window what was found so far, every two seconds."""
+    shown_s = time.monotonic()
+
+    def show(rows: Sequence[Row]) -> None:
+        nonlocal shown_s
+        if time.monotonic() - shown_s >= _SHOWN_EVERY_S:
+            shown_s = time.monotonic()
+            writer.write({"so_far": about | picture.found(rows)})
+
+    return show
+
+
+def _run(plan: RehearsalPlan, seeds: range, workers: int, ends_s: float, show: Callable[[Sequence[Row]], None] | None) -> list[Row]:
+    """The rows by seed, of the first ones where the time was too short; a slower speed is given up once it cannot be good."""
+    from hardware.twin.rehearsal import is_hopeless, rehearse_once
+
+    rows: list[Row] = []
+    with progress_bar() as bar, closing(over_processes(workers, partial(rehearse_once, plan), seeds)) as results:
         task = bar.add_task(f"runs at {plan.speed:.0%} speed", total=len(seeds))
-        for row in over_processes(workers, partial(rehearse_once, plan), seeds):
+        for row in results:
             rows.append(row)
             bar.update(task, advance=1, description=f"{sum(r['reached'] for r in rows)} of {len(rows)} arrived")
-    return sorted(rows, key=lambda row: int(row["seed"]))
+            if show is not None:
+                show(rows)
+            if plan.speed < 1.0 and is_hopeless(rows, len(seeds)):
+                return rows
+            if time.monotonic() > ends_s:
+                break
+    rows.sort(key=lambda row: int(row["seed"]))
+    whole = next((k for k, row in enumerate(rows) if row["seed"] != seeds[k]), len(rows))
+    return rows[:whole]  # a run that lasts long has not ended by then: those after it would be the quick ones
 
 
 def _figures(rows: Sequence[Row]) -> dict[str, Any]:
@@ -109,23 +224,6 @@ def _figures(rows: Sequence[Row]) -> dict[str, Any]:
         "time_s": {"median": sums["median_time_s"], "p95": round(float(np.percentile(times, 95)), 2) if times else None},
         "wall_force_n": {"p95": sums["wall_force_p95_n"], "max": sums["wall_force_max_n"]},
     }
-
-
-def _about(rows: Sequence[Row], phantom: Phantom, route: Any) -> dict[str, Any]:
-    """The figures at full speed, and the weakest place in pixels."""
-    from hardware.twin.rehearsal import weakest_place
-
-    weakest = weakest_place(rows, route)
-    if weakest is not None:
-        weakest = {"xy": _pixel(phantom, weakest.pop("point_mm")), **weakest}
-    return _figures(rows) | {"weakest": weakest}
-
-
-def _pixel(phantom: Phantom, point_mm: Point) -> list[float]:
-    import numpy as np
-
-    assert phantom.view is not None
-    return [round(value, 1) for value in phantom.view.project(np.array([point_mm]))[0].tolist()]
 
 
 def _print(about: dict[str, Any]) -> None:

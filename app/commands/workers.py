@@ -11,7 +11,7 @@ import logging
 import multiprocessing
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -30,7 +30,7 @@ class WorkerEnded(UserError):
     """A process was ended from outside."""
 
 
-def over_processes(workers: int, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+def over_processes(workers: int, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Generator[Result, None, None]:
     """Results as they come, of so many processes with one thread each; closing the iterator ends them. Raises WorkerEnded."""
     # Spawned, not forked: physics, OpenCV and OpenVINO own threads that a fork would cut off.
     context = multiprocessing.get_context("spawn")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import Config
-from core.evaluation.trial import Row
+from core.evaluation.trial import Row, TrialSample
 from core.perception.centerline import centerline_at, plan_route
 from core.perception.pose import measure_pose
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
@@ -39,11 +39,15 @@ HEAD_PX, MISSING = 1.5, 0.05
 """Error of the head, median, and share of frames without an answer, where nothing was measured: as on taught benches."""
 _MEMORY_S, _GAP_S = 0.3, 0.2
 """Time over which an error of the head stays, and mean length of a time without answers."""
+_MEDIAN = 1.1774
+"""Of a Rayleigh distribution."""
 _LINE_PX = 40.0
 """Length of the robot's end over which an error of the head fades out."""
 _NICENESS = 10
 _BIN_MM = 10.0
 """Length of the pieces of the way among which the weakest is looked for."""
+_STEP_MM, _BESIDE_MM = 2.5, 12.0
+"""Spacing of the places where all runs are compared; a head further from the way is in another branch."""
 _BLANK: Image = np.zeros((1, 1, 3), np.uint8)
 
 
@@ -147,15 +151,20 @@ class Rehearsal(Trial):
             return replace(scene, refusal=Refusal(Reason.NO_VESSEL))
         return replace(scene, robot_vector=line, vessel_vector=vessel, pose=measure_pose(line, vessel, config.pose))
 
+    def _measure(self, scene: Scene, time_s: float, insertion_mm: float, wall_contact_n: float) -> None:
+        """Without the truth of pose and vessel, which takes a third of a run's time."""
+        head_mm = self._world.physics.head_mm
+        error_px = float(np.hypot(*self._error_px)) * self._eye.head_px / _MEDIAN if scene.path is not None else None
+        self._log.measures.append(TrialSample(time_s, head_mm, insertion_mm, wall_contact_n, head_error_px=error_px))
+        self._update_progress(head_mm, time_s)
+
     def _with_error(self, path: Points, period_s: float) -> Points:
         """The robot's path with its end displaced."""
         keep = math.exp(-period_s / _MEMORY_S)
         self._error_px = keep * self._error_px + math.sqrt(1.0 - keep * keep) * self._rng.normal(0.0, 1.0, 2)
         along = geometry.arc_length(path)
         share = np.clip(1.0 - (along[-1] - along) / _LINE_PX, 0.0, 1.0)
-        return np.asarray(
-            path + share[:, None] * self._error_px * (self._eye.head_px / 1.1774)
-        )  # median of a Rayleigh distribution
+        return np.asarray(path + share[:, None] * self._error_px * (self._eye.head_px / _MEDIAN))
 
 
 def slowed(config: Config, share: float) -> Config:
@@ -169,6 +178,12 @@ def is_good(summary: Mapping[str, Any]) -> bool:
     """Whether the sums over runs (``summarise``) meet the limits of a recommended speed."""
     p95, most = summary["wall_force_p95_n"] or 0.0, summary["wall_force_max_n"] or 0.0
     return bool(summary["reached_share"] >= LEAST_SHARE and p95 <= FORCE_P95_N and most <= FORCE_MAX_N)
+
+
+def is_hopeless(rows: Sequence[Mapping[str, Any]], count: int) -> bool:
+    """Whether `count` runs that begin with these cannot be good any more."""
+    failed = sum(not row["reached"] for row in rows)
+    return failed > (1.0 - LEAST_SHARE) * count + 1e-9 or any(row["wall_contact_n"]["max"] > FORCE_MAX_N for row in rows)
 
 
 def weakest_place(rows: Sequence[Mapping[str, Any]], route: Points) -> dict[str, Any] | None:
@@ -199,3 +214,46 @@ def weakest_place(rows: Sequence[Mapping[str, Any]], route: Points) -> dict[str,
         "ended_here": ends.count(number),
         "wall_force_p95_n": round(worst.get(number, 0.0), 4),
     }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RehearsedPath:
+    """What the runs did at places ``along_mm`` (N,) of the way, as ``core.evaluation.rehearsal.RehearsedWay``; board mm, (N, 2)."""
+
+    along_mm: NDArray[np.float64]
+    middle: Points
+    low: Points
+    high: Points
+    force_n: NDArray[np.float64]
+    time_s: NDArray[np.float64]
+    runs: NDArray[np.int_]
+
+
+def rehearsed_path(rows: Sequence[Mapping[str, Any]], route: Points) -> RehearsedPath:
+    """The band of head paths, wall force and time along the way; places that no head passed are left out."""
+    along = geometry.arc_length(route)
+    at = np.arange(0.0, along[-1] + _STEP_MM, _STEP_MM)
+    places = geometry.point_at(route, along, at)
+    across = geometry.normals(places)
+    found = np.full((3, max(1, len(rows)), len(at)), np.nan)  # offset, force, time
+    for number, row in enumerate(rows):
+        track = row["track"]
+        heads = np.column_stack([track["x_mm"], track["y_mm"]])
+        if not len(heads):
+            continue
+        away = heads[:, None] - places[None]
+        nearest = np.argmin(np.linalg.norm(away, axis=2), axis=1)
+        offset = np.sum(away[np.arange(len(heads)), nearest] * across[nearest], axis=1)
+        is_beside = np.linalg.norm(away[np.arange(len(heads)), nearest], axis=1) <= _BESIDE_MM
+        force, time_s = np.array(track["wall_contact_n"]), np.array(track["time_s"])
+        for place in np.unique(nearest[is_beside]).tolist():
+            here = is_beside & (nearest == place)
+            found[:, number, place] = offset[here].mean(), force[here].max(), time_s[here].min()
+    runs = np.sum(~np.isnan(found[0]), axis=0)
+    there = np.flatnonzero(runs)
+    offset, force, time_s = found[:, :, there]
+    low, middle, high = np.nanpercentile(offset, (5, 50, 95), axis=0) if len(there) else np.zeros((3, 0))
+    lines = [places[there] + one[:, None] * across[there] for one in (middle, low, high)]
+    worst = np.nanpercentile(force, 95, axis=0) if len(there) else np.zeros(0)
+    times = np.nanpercentile(time_s, (5, 50, 95), axis=0).T if len(there) else np.zeros((0, 3))
+    return RehearsedPath(at[there], *lines, worst, times, runs[there])

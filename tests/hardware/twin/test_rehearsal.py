@@ -11,7 +11,17 @@ import pytest
 from core.config.models import Config
 from core.types import GraphEdge, VesselGraph
 from hardware.twin.phantom import Phantom
-from hardware.twin.rehearsal import HEAD_PX, Rehearsal, RehearsalPlan, is_good, sharp_turns, slowed, weakest_place
+from hardware.twin.rehearsal import (
+    HEAD_PX,
+    Rehearsal,
+    RehearsalPlan,
+    is_good,
+    is_hopeless,
+    rehearsed_path,
+    sharp_turns,
+    slowed,
+    weakest_place,
+)
 from hardware.twin.trial import TargetError, TrialPlan, target_near
 from hardware.twin.view import CameraView
 
@@ -87,3 +97,26 @@ def test_a_speed_is_good_within_the_limits() -> None:
     sums = {"reached_share": 0.96, "wall_force_p95_n": 0.1, "wall_force_max_n": 0.3}
     assert is_good(sums)
     assert not any(is_good(sums | bad) for bad in ({"reached_share": 0.9}, {"wall_force_p95_n": 0.2}, {"wall_force_max_n": 0.6}))
+
+
+def test_the_band_of_head_paths_and_the_force_along_the_way() -> None:
+    route = np.column_stack([np.linspace(0.0, 140.0, 400), np.full(400, 75.0)])
+    rows = []
+    for number in range(21):  # side by side, 0.1 mm apart; all but one turn back at 90 mm; one goes astray
+        x = np.arange(30.0, 120.0 if number == 0 else 90.0, 1.0)
+        track = {"x_mm": [*x, 60.0], "y_mm": [*np.full(len(x), 74.0 + 0.1 * number), 100.0], "time_s": [*(x / 10.0), 99.0]}
+        rows.append({"track": track | {"wall_contact_n": [*np.where(abs(x - 60.0) < 1.0, 0.01 * number, 0.0), 5.0]}})
+    path = rehearsed_path(rows, route)
+    at = int(np.searchsorted(path.along_mm, 60.0))
+    assert path.middle[at] == pytest.approx((60.0, 75.0)) and path.runs[at] == 21
+    assert sorted([path.low[at, 1], path.high[at, 1]]) == pytest.approx([74.1, 75.9])
+    assert path.force_n[at] == pytest.approx(0.19) and path.force_n[at + 2] == 0.0
+    assert path.time_s[at] == pytest.approx([5.9, 5.9, 5.9])
+    assert (path.runs[-1], path.along_mm[-1]) == (1, 120.0) and path.along_mm[0] == 30.0
+    assert len(rehearsed_path([], route).along_mm) == 0
+
+
+def test_a_speed_is_given_up_when_it_cannot_be_good_any_more() -> None:
+    good, failed, hard = ({"reached": ok, "wall_contact_n": {"max": n}} for ok, n in ((True, 0.1), (False, 0.1), (True, 0.6)))
+    assert not is_hopeless([good, failed, failed], 50) and is_hopeless([failed] * 3, 50)
+    assert is_hopeless([good, hard], 50) and not is_hopeless([failed], 20)
