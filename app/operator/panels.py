@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.record_bar import RecordBar
+from app.operator.rehearsal_card import RehearsalCard
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import Undriven
@@ -62,7 +63,9 @@ class OperatorPanels(ScenePanels):
         self.toast = Toast(self.live)
         self.offers = OfferStrip(self.live)
         self.offers.lifted.connect(self.toast.lift)
-        self.live.set_covers(self.alerts, self.offers)
+        self.rehearsal = RehearsalCard(self.live, (self.alerts, self.offers))
+        self.offers.lifted.connect(self.rehearsal.place)
+        self.live.set_covers(self.alerts, self.offers, self.rehearsal)
         self.trends = TrendPlot(config.perception.pose)
         self.performance = PerformancePanel()
         self.jog = JogPanel(config.servos)

@@ -161,6 +161,8 @@ class PreflightModel(QObject):
         super().__init__(parent)
         self._config, self._view, self._clock = config, view, clock
         self._command = command if command is not None else module_of("hardware.preflight.preflight")
+        self.sources: list[Callable[[], PreflightFinding | None]] = []
+        """Of findings that another part of the window has."""
         self._child: ChildProcess | None = None
         self._checks: list[Check] = []
         self._checked: str | None = None
@@ -186,7 +188,8 @@ class PreflightModel(QObject):
             else ()
         )
         view = self._view()
-        return Preflight((*live_findings(view), *made), self._child is not None, age_s, self._problem, waiting_for(view))
+        more = tuple(finding for source in self.sources if (finding := source()) is not None)
+        return Preflight((*live_findings(view), *more, *made), self._child is not None, age_s, self._problem, waiting_for(view))
 
     def begin_soon(self) -> None:
         """Make the checks soon after a rig's first picture, so that they are ready before arming."""

@@ -70,6 +70,7 @@ def run_window(
 
     from app.operator.live_menu import LiveMenuController
     from app.operator.manual_drive import OperatorDevices
+    from app.operator.rehearsing import RehearsalController
     from app.operator.rig_engine import EngineMaker
     from app.operator.rig_menu import RigMenuController
     from app.operator.services import WindowServices, tour_at_start
@@ -96,11 +97,13 @@ def run_window(
     settings = SettingsController(window, file, maker.perceive_again)
     if not until_first_frame:
         _keep_layout(window)
+    rehearsal = RehearsalController(window)
+    services.preflight.sources.append(lambda: rehearsal.finding)
     rigs, live, triggers = RigMenuController(window), LiveMenuController(window, outputs), TriggerServer(window)
     devices = OperatorDevices(config, lambda: window.rig.pilot, window.rig.stop, window)
     devices.said.connect(window.say)
     add_menu(window, tr("&Session"), [MenuEntry(tr("&Triggers from other programs..."), triggers.describe)])
-    for close in (settings.close, rigs.close, live.close, devices.close, triggers.close, services.close):
+    for close in (rehearsal.close, settings.close, rigs.close, live.close, devices.close, triggers.close, services.close):
         application.aboutToQuit.connect(close)
 
     def begin() -> None:

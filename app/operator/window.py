@@ -96,6 +96,7 @@ class OperatorWindow(WindowFrame):
 
     source_chosen = Signal(object)
     """The path of a picture, video or folder of pictures to look at instead of the rig's camera."""
+    target_changed = Signal()
 
     def __init__(self, config: Config, open_engine: OpenEngineFor, kind: RigKind, phantoms: Sequence[tuple[str, str]] = ()) -> None:
         super().__init__()
@@ -368,6 +369,7 @@ class OperatorWindow(WindowFrame):
             self.target = target
             self.controls.log_target(target)
             self.panels.live.show_target(target)
+            self.target_changed.emit()
         return is_set
 
     def ask_for_place(self, on_place: Callable[[Point], object] | None) -> None:

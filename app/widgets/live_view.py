@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPoint, QPointF, QRectF, Qt, QTimer, Signal
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPainterPath, QPicture, QResizeEvent, QTransform
 from PySide6.QtWidgets import QLabel, QSizePolicy, QWidget
 
@@ -19,7 +19,7 @@ from app.ui.theme import ON_PICTURE
 from app.ui.workers import Pace
 from app.widgets.basics import column
 from app.widgets.painting import PaintedWidget, set_colours
-from app.widgets.scene_overlay import Layer, Marks, scene_shapes
+from app.widgets.scene_overlay import Layer, Marks, RehearsalShapes, scene_shapes
 from app.widgets.scene_painter import on_screen
 from core.config.models import PursuitConfig
 from core.control.clearance import predict
@@ -311,6 +311,27 @@ class LiveView(QWidget):
         self._target = target
         self._show_marks()
         self._show_loupe()
+
+    def show_rehearsal(self, shapes: RehearsalShapes | None) -> None:
+        """What a rehearsal found on the way to the target; None: nothing."""
+        self._marks.rehearsal = shapes
+        self._draw_marks()
+
+    def free_corner(self, size: QSize, covers: Sequence[QWidget] = ()) -> QPoint:
+        """Where a widget of this size hides the least of what there is to see."""
+        room, edge = self.rect(), 10
+        corners = [
+            QRectF(room.width() - size.width() - edge if right else edge, top, size.width(), size.height())
+            for right, bottom in reversed(_CORNERS)
+            for top in (room.height() - size.height() - edge if bottom else edge,)
+        ]
+        to_view, scene, target = self._to_view(), self.scene, self._target
+        head = scene.to_source(scene.path.head) if scene is not None and scene.path is not None else (-1e6, -1e6)
+        head_at, target_at = (None if at is None else to_view.map(QPointF(*at)) for at in (head, target))
+        over = [QRectF(cover.geometry()) for cover in covers if cover.isVisible()]
+        places = on_screen(self._marks.places(), to_view)
+        assert head_at is not None
+        return corners[LoupeCorner().choose(corners, head_at, target_at, places, over)].topLeft().toPoint()
 
     def set_layer(self, layer: Layer, visible: bool) -> None:
         self._marks.set_layer(layer, visible)

@@ -392,7 +392,7 @@ class ModeBar(PaintedWidget):
         self._mode: Mode | None = None
         self._shown = Undriven.NOT_YET.step
         self._shown_s = 0.0
-        self._checks: tuple[str, str] | None = None
+        self._against: dict[OperatorStep, tuple[str, str] | None] = {}
         self.main = StepButton(filled=True, clock=clock)
         self.second = StepButton(filled=False, clock=clock)
         self.deadman = DeadmanField()
@@ -430,13 +430,16 @@ class ModeBar(PaintedWidget):
 
     def show_checks(self, checks: tuple[str, str] | None) -> None:
         """What the checks before driving say against arming, and what to do; None: nothing. It is shown with the next view."""
-        self._checks = checks
+        self._against[OperatorStep.ARM] = checks
+
+    def show_rehearsal(self, lack: tuple[str, str] | None) -> None:
+        """What a missing rehearsal says against the hand-over, and what to do; None: nothing. It is shown with the next view."""
+        self._against[OperatorStep.HAND_OVER] = lack
 
     def _checked(self, step: NextStep) -> NextStep:
         """A step that the checks would refuse says so, as their list does."""
-        if self._checks is None or step.step is not OperatorStep.ARM or not step.granted:
-            return step
-        return replace(step, granted=False, headline=self._checks[0], rest=self._checks[1])
+        against = self._against.get(step.step)
+        return replace(step, granted=False, headline=against[0], rest=against[1]) if against and step.granted else step
 
     def _is_too_soon(self, step: NextStep, view: DriveView) -> bool:
         """Reasons may alternate with every picture: one that is shown stays long enough to be read."""

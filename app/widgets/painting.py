@@ -136,7 +136,7 @@ def draw_text(
 ) -> None:
     """Write `text` in `box`: with `smallest_px` in a smaller font where it does not fit, `elided` with an ellipsis then."""
     if smallest_px:
-        font = theme.fitted(font, text, int(box.width()), smallest_px)
+        font = theme.fitted(font, text, int(box.width()) - elided, smallest_px)
     painter.setFont(font)
     painter.setPen(QColor(colour))
     painter.drawText(box, align, theme.elide(font, text, int(box.width())) if elided else text)

@@ -16,6 +16,7 @@ from app.ui.texts import signed_degrees
 from app.ui.theme import ON_PICTURE
 from app.widgets.painting import CENTER, Painted, draw_box, draw_text, text_width
 from app.widgets.scene_painter import ScenePainter
+from core.evaluation.rehearsal import RehearsalResult
 from core.types import Point, Points, Pose, Scene, Vector
 
 _MIN_STEP_PX = 5.0  # of polylines, working pixels
@@ -71,6 +72,44 @@ def scene_shapes(scene: Scene, ghost: Points | None = None) -> SceneShapes:
         ghost=scene.points_to_source(ghost) if ghost is not None else None,
         robot_width=2.0 * scene.path.radius_px / scene.scale if scene.path else 0.0,
     )
+
+
+HEAT = ((0.5, ON_PICTURE.VERMILLION), (0.15, ON_PICTURE.ORANGE), (0.05, ON_PICTURE.YELLOW))
+"""Colours of wall forces from so many newtons on; the limits are those of a recommended speed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RehearsalShapes:
+    """What a rehearsal found along the way, in source pixels.
+
+    ``low`` and ``high`` (N, 2) have 90 % of the heads' paths between them. ``heat`` has the pieces where the wall is touched, by
+    colour, hardest last. ``notes`` are places with a text: the weakest one, and branches that are too sharp.
+    """
+
+    low: Points
+    high: Points
+    heat: tuple[tuple[str, tuple[Points, ...]], ...]
+    notes: tuple[tuple[Point, str], ...]
+
+
+def rehearsal_shapes(result: RehearsalResult) -> RehearsalShapes:
+    way = result.way
+    low, middle, high = (np.array(line, np.float64).reshape(-1, 2) for line in (way.low_xy, way.xy, way.high_xy))
+    levels = [sum(force >= limit for limit, _ in HEAT) for force in way.wall_force_n]
+    heat = tuple(
+        (colour, tuple(middle[max(0, k - 1) : k + 2] for k, found in enumerate(levels) if found == len(HEAT) - number))
+        for number, (_, colour) in enumerate(HEAT)
+    )
+    notes = [
+        (turn.xy, tr("turns by {turn:.0f}°, the head by {limit:.0f}°", turn=turn.turn_deg, limit=turn.limit_deg))
+        for turn in result.sharp
+    ]
+    weakest = result.weakest
+    if weakest is not None and weakest.ended_here:
+        notes.append((weakest.xy, tr("weakest: {count} runs ended here", count=weakest.ended_here)))
+    elif weakest is not None and weakest.wall_force_p95_n >= HEAT[-1][0]:
+        notes.append((weakest.xy, tr("weakest bend: {force:.2f} N", force=weakest.wall_force_p95_n)))
+    return RehearsalShapes(low, high, heat[::-1], tuple(notes))
 
 
 def foot(line: Vector, point: Point) -> Point:
@@ -130,6 +169,11 @@ class Layer(Enum):
     GHOST = LayerText(
         "G", mark("Ghost"), mark("Where the head goes in the next two seconds if the advice is followed: the broken tube")
     )
+    REHEARSAL = LayerText(
+        "B",
+        mark("Band"),
+        mark("The rehearsal: 90 % of the heads' paths lie in the band; yellow, orange, red: wall force from 0.05, 0.15, 0.5 N on"),
+    )
 
 
 class Marks:
@@ -141,6 +185,7 @@ class Marks:
     def __init__(self, digits: int = 0) -> None:
         self._digits = digits
         self._shapes: SceneShapes | None = None
+        self.rehearsal: RehearsalShapes | None = None
         self._pose: Pose | None = None
         self.target: Point | None = None
         self._note = ""
@@ -176,11 +221,17 @@ class Marks:
         """
         marks = ScenePainter(painter, to_screen, label_px, room, smooth=smooth)
         shapes, visible = self._shapes, self._visible
+        rehearsal = self.rehearsal if Layer.REHEARSAL in visible else None
+        if rehearsal is not None:
+            marks.band(rehearsal.low, rehearsal.high, ON_PICTURE.TEXT)
+            for colour, pieces in rehearsal.heat:
+                marks.polylines(pieces, colour, 7.0)
         if shapes is not None:
             if Layer.VESSEL in visible:
                 marks.polylines(shapes.vessel_lines, ON_PICTURE.VESSEL, 2.0)
             if Layer.ROUTE in visible and shapes.route is not None:
-                marks.polylines((shapes.route,), ON_PICTURE.ROUTE, 4.0, Qt.PenStyle.DashLine)
+                width = 4.0 if rehearsal is None else 2.0
+                marks.polylines((shapes.route,), ON_PICTURE.ROUTE, width, Qt.PenStyle.DashLine)
             if Layer.ROBOT in visible:
                 if shapes.robot_line is not None:
                     marks.polylines((shapes.robot_line,), ON_PICTURE.ROBOT, 3.0)
@@ -200,6 +251,8 @@ class Marks:
             marks.crosshair(self.target, ON_PICTURE.TARGET, 13.0)
             if tags and self._note:
                 marks.tag(self.target, self._note, ON_PICTURE.TARGET)
+        for place, text in rehearsal.notes if rehearsal is not None else ():
+            marks.warning(place, text if tags else "", ON_PICTURE.ORANGE)
 
     def _draw_vectors(self, marks: ScenePainter, shapes: SceneShapes) -> None:
         robot, vessel = shapes.robot_vector, shapes.vessel_vector
@@ -234,6 +287,8 @@ def _steady_side(side: float, offset_px: float) -> float:
 
 _SEEN = 3.0  # contrast from which on a swatch is seen
 _CHIP_HEIGHT, _CHIP_NARROW, _CHIP_GAP = 30, 54, 5
+_TIGHT = 0.9
+"""Names in a font smaller by this share still fit."""
 _SWATCH_PX = 13
 """Room of a chip's colour; without it the colour is a line below the name."""
 _SWATCH = {
@@ -247,11 +302,12 @@ _SWATCH = {
     Layer.ROUTE: ON_PICTURE.ROUTE,
     Layer.LOUPE: ON_PICTURE.TEXT,
     Layer.GHOST: ON_PICTURE.GHOST,
+    Layer.REHEARSAL: ON_PICTURE.ORANGE,
 }
 
 
 class OverlayBar(QWidget):
-    """``toggled`` carries a layer and whether it is on."""
+    """``toggled`` carries a layer and whether it is on. That of the rehearsal has a chip while there is one."""
 
     toggled = Signal(object, bool)
 
@@ -260,13 +316,24 @@ class OverlayBar(QWidget):
         self._chips = {layer: _Chip(layer, self) for layer in Layer}
         for layer, chip in self._chips.items():
             chip.toggled.connect(lambda on, which=layer: self.toggled.emit(which, on))
+        self._chips[Layer.REHEARSAL].hide()
         policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
         self.setAccessibleName(tr("Overlays"))
 
+    def show_rehearsal(self, is_there: bool) -> None:
+        if self._chips[Layer.REHEARSAL].isHidden() is is_there:
+            self._chips[Layer.REHEARSAL].setVisible(is_there)
+            self._place()
+            self.updateGeometry()
+
+    @property
+    def _shown(self) -> list[_Chip]:
+        return [chip for chip in self._chips.values() if not chip.isHidden()]
+
     def sizeHint(self) -> QSize:
-        return QSize(_full_width(list(self._chips.values())), _CHIP_HEIGHT)
+        return QSize(_full_width(self._shown), _CHIP_HEIGHT)
 
     def minimumSizeHint(self) -> QSize:
         widest = (len(self._chips) + 1) // 2
@@ -277,6 +344,9 @@ class OverlayBar(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        self._place()
+
+    def _place(self) -> None:
         top = 0
         for row in self._rows(self.width()):
             left = 0.0
@@ -289,8 +359,8 @@ class OverlayBar(QWidget):
             top += _CHIP_HEIGHT + _CHIP_GAP
 
     def _rows(self, width: int) -> list[list[_Chip]]:
-        chips = list(self._chips.values())
-        if width >= _full_width(chips) - _SWATCH_PX * len(chips):  # names without colours: the picture needs the height
+        chips = self._shown
+        if width >= _TIGHT * (_full_width(chips) - _SWATCH_PX * len(chips)):  # names without colours: the picture needs the height
             return [chips]
         half = (len(chips) + 1) // 2
         return [chips[:half], chips[half:]]

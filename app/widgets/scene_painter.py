@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPainterPath, 
 
 from app.ui import theme
 from app.ui.theme import ON_PICTURE
-from app.widgets.painting import CENTER, draw_box, draw_text, polygon, set_colours
+from app.widgets.painting import CENTER, Sign, draw_box, draw_text, paint_sign, polygon, set_colours
 from core import geometry
 from core.types import Point, Points, Vector
 
@@ -130,6 +130,32 @@ class ScenePainter:
         self._painter.setBrush(QColor(name))
         self._painter.drawPolygon(QPolygonF([end + ahead * 1.35, end + aside, end - aside]))
 
+    def band(self, low: Points, high: Points, name: str) -> None:
+        """A see-through area between two lines (N, 2)."""
+        if len(low) < 2:
+            return
+        edges = [[QPointF(*at) for at in on_screen(line, self._to_screen).tolist()] for line in (low, high)]
+        set_colours(self._painter, theme.colour(name, 0.6))
+        self._painter.drawPolygon(QPolygonF(edges[0] + edges[1][::-1]))
+        self._painter.setPen(QPen(_EDGE, 1.2))
+        for edge in edges:
+            self._painter.drawPolyline(edge)
+
+    def warning(self, point: Point, text: str, name: str) -> None:
+        """A warning sign at a place, and a text beside it."""
+        at = self._at(point)
+        sign = QRectF(at.x() - 11.0, at.y() - 11.0, 22.0, 22.0)
+        paint_sign(self._painter, sign.adjusted(-2.0, -2.0, 2.0, 2.0), Sign.WARNING, QColor(ON_PICTURE.INK))
+        paint_sign(self._painter, sign, Sign.WARNING, QColor(name))
+        if text:
+            text_font = theme.semi_bold(_TAG_PX)
+            width, height = QFontMetricsF(text_font).horizontalAdvance(text) + 14.0, _TAG_PX + 9.0
+            lefts = (at.x() + 20.0, at.x() - 20.0 - width)
+            boxes = [self._inside(QRectF(left, at.y() - height / 2, width, height)) for left in lefts]
+            box = min(boxes, key=lambda one: self._covered(one) + (1e6 if one.intersects(sign) else 0.0))
+            self._labels += [sign, box]
+            self._text_box(box, text, text_font, name)
+
     def measure(self, foot: Point, point: Point, name: str, style: Qt.PenStyle) -> None:
         """A distance from `foot` on the line to `point`."""
         self._segment(self._at(foot), self._at(point), name, 2.5, style)
@@ -195,6 +221,7 @@ class ScenePainter:
 
     def crosshair(self, point: Point, name: str, radius: float) -> None:
         at = self._at(point)
+        self._labels.append(QRectF(at.x() - radius, at.y() - radius, 2 * radius, 2 * radius))
         path = QPainterPath()
         path.addEllipse(at, radius * 0.7, radius * 0.7)
         for x, y in _DIAMOND:

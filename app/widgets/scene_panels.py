@@ -20,12 +20,13 @@ from app.widgets.distance_bars import ClearanceBar, DistanceBars
 from app.widgets.live_view import LiveView
 from app.widgets.mode_bar import ModeBadge
 from app.widgets.painting import PaintedWidget, draw_box, draw_text, polygon, set_colours
-from app.widgets.scene_overlay import Layer, OverlayBar
+from app.widgets.scene_overlay import Layer, OverlayBar, rehearsal_shapes
 from app.widgets.state_badge import StateBadge
 from app.widgets.theta_gauge import ThetaGauge
 from core.calibration.camera import mm_per_working_px
 from core.config.calibration import ScaleConfig
 from core.config.models import PerceptionConfig, PoseConfig
+from core.evaluation.rehearsal import RehearsalResult
 from core.types import Advice, PoseState, RobotStatus, Scene, Speed, Tick
 
 _LEFT_SHARE = 0.62
@@ -72,6 +73,13 @@ class ScenePanels(QWidget):
     def fit(self) -> None:
         for view in self.views:
             view.fit()
+
+    def show_rehearsal(self, result: RehearsalResult | None) -> None:
+        """What a rehearsal found on the way to the target, over the picture; None: nothing."""
+        shapes = rehearsal_shapes(result) if result is not None else None
+        for view in self.views:
+            view.show_rehearsal(shapes)
+        self.overlay_bar.show_rehearsal(shapes is not None)
 
     # ---- a scene
 

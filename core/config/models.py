@@ -411,13 +411,14 @@ class StreamConfig(ConfigSection):
 
 
 class WindowConfig(ConfigSection):
-    """How the windows look, and where they keep pictures."""
+    """How the windows look, where they keep pictures, and what they ask before a hand-over."""
 
     theme: Literal["dark", "light", "system"] = Field("dark", description="of all windows; system = as the desktop has it")
     language: Literal["auto", "en", "zh"] = Field(
         "auto", description="of all windows; auto = the system's, en = English, zh = Chinese (simplified)"
     )
     pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; empty: LumenPilot in Pictures")
+    needs_rehearsal: bool = Field(False, description="hand-over needs a rehearsal of this destination (menu Robot)")
 
 
 class Config(ConfigSection):

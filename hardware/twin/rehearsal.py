@@ -253,7 +253,8 @@ def rehearsed_path(rows: Sequence[Mapping[str, Any]], route: Points) -> Rehearse
     there = np.flatnonzero(runs)
     offset, force, time_s = found[:, :, there]
     low, middle, high = np.nanpercentile(offset, (5, 50, 95), axis=0) if len(there) else np.zeros((3, 0))
-    lines = [places[there] + one[:, None] * across[there] for one in (middle, low, high)]
+    place, side = places[there], across[there]
     worst = np.nanpercentile(force, 95, axis=0) if len(there) else np.zeros(0)
     times = np.nanpercentile(time_s, (5, 50, 95), axis=0).T if len(there) else np.zeros((0, 3))
-    return RehearsedPath(at[there], *lines, worst, times, runs[there])
+    middle, low, high = (place + offset_mm[:, None] * side for offset_mm in (middle, low, high))
+    return RehearsedPath(at[there], middle, low, high, worst, times, runs[there])

@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 
 from app.ui import theme
 from app.widgets.live_view import LiveView, LoupeCorner, _middle
-from app.widgets.scene_overlay import Layer
+from app.widgets.scene_overlay import Layer, RehearsalShapes
 from core.types import (
     Advice,
     Frame,
@@ -212,6 +212,8 @@ def test_each_layer_draws_something_and_nothing_when_off(view: LiveView, bench: 
     for other in Layer:
         view.set_layer(other, False)
     _show(view, frame, scene, Advice(Speed.FAST, 8.0, 20.0, ""))
+    low, high = (np.array([(100.0, y), (300.0, y)]) for y in (200.0, 220.0))
+    view.show_rehearsal(RehearsalShapes(low, high, (("#D55E00", (low,)),), (((200.0, 210.0), "weakest"),)))
     bare = picture(view)
     view.set_layer(layer, True)
     assert picture(view) != bare

@@ -1,0 +1,78 @@
+"""``rehearse``: what it writes, slower speeds, and too little time; the runs themselves are those of its own tests."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from app.cli import app
+from core.evaluation.rehearsal import RehearsalResult
+
+TARGET = "430,400"
+"""In the tree's lowest branch."""
+
+
+def row(seed: int, *, reached: bool = True, force_n: float = 0.1) -> dict[str, Any]:
+    track: dict[str, list[float | None]] = {
+        "x_mm": [60.0, 80.0],
+        "y_mm": [75.0, 75.0],
+        "time_s": [1.0, 3.0],
+        "wall_contact_n": [0.0, force_n],
+    }
+    track |= {key: [None, None] for key in ("offset_ratio", "theta_error_deg", "head_error_px")}
+    about = {"seed": seed, "reached": reached, "outcome": "reached" if reached else "stuck", "time_s": 3.0, "interventions": 0}
+    return about | {"wall_contact_n": {"max": force_n}, "path_ratio": None, "answered_share": 1.0, "track": track}
+
+
+@pytest.fixture
+def rehearse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[dict[str, Any]]]:
+    config = tmp_path / "tree.toml"
+    config.write_text('[twin]\nphantom = "tree"\n')
+
+    def call(run: Callable[[float, int], dict[str, Any]], *options: str) -> list[dict[str, Any]]:
+        def over(_workers: int, function: partial[Any], seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+            yield from (run(function.args[0].speed, seed) for seed in seeds)
+
+        monkeypatch.setattr("app.commands.rehearse.over_processes", over)
+        result = CliRunner().invoke(app, ["rehearse", "--config", str(config), "--target", TARGET, *options])
+        assert result.exit_code == 0, result.output
+        return [json.loads(line) for line in result.stdout.splitlines() if line.startswith("{")]
+
+    return call
+
+
+def test_a_good_way_is_told_with_its_band(rehearse: Callable[..., list[dict[str, Any]]]) -> None:
+    (told,) = rehearse(lambda _speed, seed: row(seed), "--json", "--runs", "20")
+    found = RehearsalResult.model_validate(told)
+    assert (found.runs, found.arrived.share, found.recommended_speed_mm_s) == (20, 1.0, told["speed_mm_s"])
+    assert found.way.runs == (20, 20) and found.way.wall_force_n == (0.0, 0.1) and found.way.time_s[1] == (3.0, 3.0, 3.0)
+    assert found.target_xy == pytest.approx((430, 400), abs=12) and found.size_px == (640, 480)
+
+
+def test_a_slower_speed_is_tried_and_given_up_early(rehearse: Callable[..., list[dict[str, Any]]]) -> None:
+    asked: list[float] = []
+
+    def run(speed: float, seed: int) -> dict[str, Any]:
+        asked.append(speed)
+        return row(seed, reached=speed == 0.5 or seed % 5 != 0)
+
+    (told,) = rehearse(run, "--json", "--runs", "40")
+    assert [(share, asked.count(share)) for share in (1.0, 0.7, 0.5)] == [(1.0, 40), (0.7, 11), (0.5, 40)]
+    assert told["recommended_speed_mm_s"] == 0.5 * told["speed_mm_s"] and told["outcomes"] == {"reached": 32, "stuck": 8}
+
+
+def test_a_short_time_gives_the_first_runs_and_no_advice(
+    rehearse: Callable[..., list[dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(range(0, 100_000, 4))
+    monkeypatch.setattr("app.commands.rehearse.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    order = [0, 1, 3, 4, 2, *range(5, 50)]  # number 2 has not ended when the time is over
+    (told,) = rehearse(lambda _speed, seed: row(order[seed]), "--json", "--minutes", "0.3")
+    assert told["runs"] == 2 and told["recommended_speed_mm_s"] is None
