@@ -117,7 +117,12 @@ def joint_goals(
         return JointRequest(tuple(measured_mm))
     elapsed_s = min(max(0.0, now_s - last.time_s), safety.command_max_age_s)
     turned = _turned(command, last.goals_mm, elapsed_s, servos)
-    wanted = _tendon_goals(_in_shaft(command, sum(goal for goal, _ in turned)), last.goals_mm, elapsed_s, servos)
+    bent = _tendon_goals(_in_shaft(command, sum(goal for goal, _ in turned)), last.goals_mm, elapsed_s, servos)
+    # On the way to a bend that fits, one that stands at the end of its envelope would be pulled on by the pretension of all.
+    wanted = [
+        (min(max(goal, min(joint.low_mm, at)), max(joint.high_mm, at)), ended)
+        for (goal, ended), at, joint in zip(bent, last.goals_mm, servos.tendons, strict=False)
+    ]
     for kind, speed_mm_s in ((JointKind.ADVANCE, command.advance_mm_s), (JointKind.DELIVERY, command.delivery_mm_s)):
         place = servos.places(kind)
         wanted += _fed(last.goals_mm[place], speed_mm_s, elapsed_s, servos.joints[place])

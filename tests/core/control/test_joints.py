@@ -135,9 +135,9 @@ def test_an_end_stops_both_tendons_of_a_pair_so_that_no_wire_hangs(
     assert request.at_end == ("right", "left")
 
 
-def test_a_pretension_outside_the_envelope_leaves_the_decision_to_the_gate() -> None:
+def test_a_pretension_outside_the_envelope_pulls_nothing_out_of_it() -> None:
     servos = _with("right", high_mm=0.4).model_copy(update={"pretension_mm": 0.5})  # the configuration itself refuses it
-    assert _settled(Command(bend=0.5), servos).goals_mm[0] == pytest.approx(0.5)
+    assert _settled(Command(bend=0.5), servos).goals_mm[0] == pytest.approx(0.4)
 
 
 # --- robots of other shapes ------------------------------------------------------------------------
@@ -179,6 +179,18 @@ def test_one_end_stops_all_three_tendons_in_the_bends_direction() -> None:
     motion = joint_motion(goals, (0.0,) * len(goals), short)
     assert motion.pitch == pytest.approx(0.0, abs=1e-9)
     assert motion.bend == pytest.approx(1.0 / (2.0 * math.cos(math.pi / 6)))
+
+
+@pytest.mark.parametrize("servos", [SERVOS, THREE], ids=["four", "three"])
+def test_a_tendon_at_its_end_is_not_pulled_on_by_the_pretension_while_the_others_turn_the_bend(servos: ServosConfig) -> None:
+    """The gate would reject it, and a command that is held would move nothing any more."""
+    joints = tuple(joint.model_copy(update={"high_mm": 1.2}) if joint.is_tendon else joint for joint in servos.joints)
+    servos = servos.model_copy(update={"joints": joints})
+    at: tuple[float, ...] = (0.0,) * len(joints)
+    for command in (Command(pitch=1.0), Command(bend=0.9, pitch=1.0)):
+        for _ in range(10):
+            at = joint_goals(command, SentGoals(at, 0.0), at, 0.02, servos, SAFETY).goals_mm
+            assert all(joint.low_mm <= goal <= joint.high_mm + 1e-9 for joint, goal in zip(joints, at, strict=True))
 
 
 def test_two_tendons_bend_only_as_far_as_the_shaft_is_turned_into_the_plane() -> None:
