@@ -175,6 +175,11 @@ def test_a_bench_gets_its_phantom_and_keeps_or_renews_it(tmp_path: Path) -> None
     again = read_phantom(name)
     assert len(again.targets) == 3
     assert np.linalg.norm(again.graph.nodes[again.port] - first.graph.nodes[first.port]) < 2.0
+    (folder / "phantom.json").unlink()
+    write_textures([RobotTexture(np.zeros((100, 41, 4), np.uint8), 6.0, (250.0, 50.0))], folder)
+    phantom_for_bench(folder, known.model_copy(update={"port": None}))  # it enters where the robot was seen to enter
+    seen = read_phantom(name)
+    assert VIEW.project(seen.graph.nodes[seen.port][None])[0] == pytest.approx((250, 60), abs=10)
     write_bench(with_vessel(bench, drawn([(100, 240), (200, 240)], [(270, 240), (370, 240)])), folder)
     assert phantom_for_bench(folder, known).startswith("the twin's phantom of this bench stays as it was: the vessel has a gap")
     assert len(read_phantom(name).targets) == 3
