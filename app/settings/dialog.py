@@ -159,7 +159,7 @@ class SettingPage(QScrollArea):
         part.show()  # Qt does it later, and until then the column has no room for it
 
     def _add_head(self, section: Section) -> None:
-        title, meaning = QLabel(tr(section.title)), QLabel(tr(section.description).replace("``", ""))
+        title, meaning = QLabel(self._draft.title(section)), QLabel(tr(section.description).replace("``", ""))
         note, error = QLabel(), QLabel()
         title.setObjectName("section_title")
         title.setIndent(0)
@@ -167,7 +167,7 @@ class SettingPage(QScrollArea):
             label.setObjectName(name)
             label.setWordWrap(True)
         button = QPushButton(tr("Reset section"))
-        button.setAccessibleName(tr("Reset section {title}", title=tr(section.title)))
+        button.setAccessibleName(tr("Reset section {title}", title=title.text()))
         keys = [setting.key for setting in section.all_settings()]
         button.clicked.connect(lambda _on=False: self.reset_asked.emit(keys))
         for widget in (holder(line((title, 1), button)), meaning, note, error):
@@ -341,7 +341,7 @@ class SettingsDialog(QDialog):
         """The settings of a section; of one that only holds others, those too."""
         self._section = section
         groups = [(section, section.settings)] if section.settings else [(part, part.settings) for part in section.sections]
-        self.page.show_groups(groups)
+        self.page.show_groups([group for group in groups if self.draft.title(group[0])])
         item = self._items.get(section.key)
         if item is not None and self.tree.currentItem() is not item:
             self.tree.setCurrentItem(item)
@@ -425,14 +425,16 @@ class SettingsDialog(QDialog):
             if section.key:
                 count, is_wrong = self.draft.changed_in(section), self.draft.is_wrong_in(section)
                 mark = "\N{WARNING SIGN}" if is_wrong else f"\N{BLACK CIRCLE} {count}" if count else ""
-                item = self._items[section.key]
-                if item.text(1) == mark and item.toolTip(0):
+                item, title = self._items[section.key], self.draft.title(section)
+                if (item.text(0), item.text(1)) == (title, mark) and item.toolTip(0):
                     continue
+                item.setHidden(not title)
+                item.setText(0, title)
                 item.setText(1, mark)
                 words = tr("{count} differ from the default", count=count) if count else tr("as by default")
                 words = tr("something is not allowed") if is_wrong else words
                 item.setToolTip(0, f"{section.key}: {words}")
-                item.setData(0, Qt.ItemDataRole.AccessibleTextRole, f"{tr(section.title)}, {words}")
+                item.setData(0, Qt.ItemDataRole.AccessibleTextRole, f"{title}, {words}")
         effects = self.draft.effects()
         may_save = not self._locked and self.draft.config is not None and self.draft.is_dirty
         self.save.setEnabled(may_save)
@@ -470,7 +472,8 @@ class SettingsDialog(QDialog):
             self.show_section(self._section)
             return
         self.tree.clearSelection()
-        self.page.show_groups(search(words), tr("Nothing has {words} in its name, meaning or unit", words=words))
+        found = [group for group in search(words) if self.draft.title(group[0])]
+        self.page.show_groups(found, tr("Nothing has {words} in its name, meaning or unit", words=words))
 
     def _on_tree(self) -> None:
         item = self.tree.currentItem()

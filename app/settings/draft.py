@@ -13,7 +13,8 @@ from app.ui.i18n import tr, tr_text
 from core.config.files import changed_keys
 from core.config.models import Config, load_config
 from core.config.rig_file import sections_of_rig
-from core.config.schema import Effect, FieldKind, Section, Setting, schema, setting_at, settings_by_key, with_value
+from core.config.safety import JOINT_NAMES, JointKind
+from core.config.schema import JOINTS, Effect, FieldKind, Section, Setting, schema, setting_at, settings_by_key, with_value
 
 _SEPARATORS = re.compile(r"[\s_.,]+")
 
@@ -39,11 +40,13 @@ class SettingsDraft:
         self.rig_file = ""
         self._kept: frozenset[str] = frozenset()
         self._in_force: dict[str, Any] = {}
+        self._of_rig: Config | None = None
 
     def show_rig(self, running: Config) -> None:
         """Show what is in force where the rig file of the running configuration keeps it; edits there are dropped."""
         self.rig_file = running.rig.file or ""
         self._kept = sections_of_rig(running, self.saved)
+        self._of_rig = running if "servos" in self._kept else None
         self._in_force = {key: value for key, value in _flat(running.model_dump(mode="json")).items() if self.is_kept(key)}
         for key in self._in_force:
             self._drop_entry(key)
@@ -63,6 +66,20 @@ class SettingsDraft:
     def is_kept(self, key: str) -> bool:
         """Whether the rig file keeps a setting, or a section."""
         return key.partition(".")[0] in self._kept
+
+    def title(self, section: Section) -> str:
+        """As it is shown. A joint has the name that it has in the robot; "" for one that it does not have.
+
+        Nor is a rotation shown, which is in degrees: its values stand in the rig file only.
+        """
+        part, _, place = section.key.rpartition(".")
+        if part != JOINTS:
+            return tr(section.title)
+        joints = (self._of_rig or self._config or self.saved).servos.joints[int(place) : int(place) + 1]
+        if not joints or joints[0].kind is JointKind.ROTATION:
+            return ""
+        name = joints[0].name
+        return tr(section.title) if name == JOINT_NAMES[int(place)] else tr("Joint {name}", name=name.replace("_", " "))
 
     def default_value(self, key: str) -> Any:
         return self._defaults[key]

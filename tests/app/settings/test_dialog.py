@@ -14,6 +14,7 @@ from app.settings.fields import WANTED, NumberEdit, SettingField
 from core.config.files import Profiles
 from core.config.models import RESOURCES, Config, load_config
 from core.config.schema import schema, settings_by_key
+from tests.core.robots import TURNED
 
 D_ALLOW, THETA = "perception.pose.d_allow_px", "perception.pose.theta_allow_deg"
 Key = Qt.Key
@@ -142,6 +143,15 @@ def test_the_tree_tells_where_something_differs_or_is_wrong(dialog: SettingsDial
     type_into(dialog, THETA, "999")
     assert dialog._items["perception.pose"].text(1) == "\N{WARNING SIGN}"
     assert dialog._items["perception.pose"].data(0, Qt.ItemDataRole.AccessibleTextRole).endswith("not allowed")
+
+
+def test_the_tree_has_the_joints_of_the_robot_that_runs(dialog: SettingsDialog) -> None:
+    rig = {"name": "turned", "camera": "twin", "robot": "twin", "file": "turned.toml"}
+    dialog.show_rig(Config.model_validate({**load_config().model_dump(), "rig": rig, "servos": TURNED.model_dump()}))
+    tops = [dialog.tree.topLevelItem(place) for place in range(dialog.tree.topLevelItemCount())]
+    servos = next(item for item in tops if item.text(0) == "Servos")
+    shown = [servos.child(n).text(0) for n in range(servos.childCount()) if not servos.child(n).isHidden()]
+    assert shown == ["Joint tendon 1", "Joint tendon 2", "Joint advance"], "the rotation's degrees stand in its rig file"
 
 
 def test_the_problem_below_leads_to_its_field(dialog: SettingsDialog) -> None:

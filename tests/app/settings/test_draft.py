@@ -176,6 +176,14 @@ def test_a_rig_whose_robot_has_another_shape_is_shown_and_its_joints_stay(draft:
     draft.show_rig(running)
     assert draft.value("servos.joints.0.high_mm") == 2.8
     assert draft.entry("servos.joints.6.high_mm") == "", "it has four joints"
+    joints = [section for section in schema().walk() if section.key.startswith("servos.joints.")]
+    assert [draft.title(one) for one in joints] == [
+        "Joint tendon 1",
+        "Joint tendon 2",
+        "Joint tendon 3",
+        "Joint advance",
+        *[""] * 3,
+    ]
     after = Config.model_validate({**load_config().model_dump(), "hand": {"advance_mm_s": 5.0}})
     changed = with_changes(running, load_config(), after, frozenset({Effect.RIG}))
     assert (changed.hand.advance_mm_s, changed.servos) == (5.0, THREE)
