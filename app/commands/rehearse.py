@@ -216,11 +216,13 @@ def _figures(rows: Sequence[Row]) -> dict[str, Any]:
 
     sums = summarise(rows)
     times = [row["time_s"] for row in rows if row["reached"]]
+    states = {name: [row["state_shares"][name] for row in rows if row["state_shares"][name] is not None] for name in "ABCD"}
     low, high = wilson_95(sums["reached_share"], len(rows))
     return {
         "runs": len(rows),
         "arrived": {"share": sums["reached_share"], "low": round(low, 4), "high": round(high, 4)},
         "outcomes": sums["outcomes"],
+        "states": {name: round(float(np.mean(shares)), 4) for name, shares in states.items() if shares},
         "time_s": {"median": sums["median_time_s"], "p95": round(float(np.percentile(times, 95)), 2) if times else None},
         "wall_force_n": {"p95": sums["wall_force_p95_n"], "max": sums["wall_force_max_n"]},
     }

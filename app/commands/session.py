@@ -46,6 +46,7 @@ from core.session.manifest import (
     write_description,
 )
 from core.session.reader import SessionReader, check_is_session, losses, rows_cut_off
+from core.session.rehearsed_run import runs_beside
 from core.types import Image, PoseState, Tick
 
 session = typer.Typer(help="Recorded sessions: look at them, describe them, recover cut ones, export.", no_args_is_help=True)
@@ -62,7 +63,9 @@ def info(session: SessionArgument, as_json: JsonOption = False) -> None:
         return
     table = Table(title=str(session), show_header=False)
     for key, value in result.items():
-        if isinstance(value, list):
+        if key == "rehearsals":
+            text = "\n".join(map(beside_line, value)) or "none"
+        elif isinstance(value, list):
             text = "\n".join(value) or "none"
         elif isinstance(value, dict):
             text = ", ".join(f"{name} {count}" for name, count in value.items()) or "none"
@@ -109,6 +112,7 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "without_pose": int((line.state < 0).sum()),
         "theta_median_deg": round(float(np.nanmedian(np.abs(line.theta_deg))), 3) if np.isfinite(line.theta_deg).any() else None,
         "modes": {mode.value: int((line.mode == place).sum()) for place, mode in enumerate(Mode) if (line.mode == place).any()},
+        "rehearsals": runs_beside(reader),
         "events": dict(Counter(event.kind.value for event in events)),
         "videos": [path.name for path in reader.videos],
         "codec": manifest.codec if manifest else None,
@@ -116,6 +120,23 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "bytes": sum(path.stat().st_size for path in reader.folder.iterdir() if path.is_file()),
         "problems": [*reader.problems, *losses(reader, events)],
     }
+
+
+def beside_line(run: dict[str, Any]) -> str:
+    """A run beside its rehearsal, for people."""
+    low, middle, high = run["rehearsed_seconds"]
+    parts = [
+        f"to ({run['target_xy'][0]:.0f}, {run['target_xy'][1]:.0f}) {'arrived' if run['arrived'] else 'not arrived'}",
+        f"{run['seconds']:.1f} s (rehearsed {middle:.1f}, {low:.1f} to {high:.1f})",
+        f"{run['inside_share']:.0%} in the band",
+    ]
+    parts += [f"left it at {one['time_s']:.1f} s, {one['along_mm']:.0f} mm in" for one in run["left_band"]]
+    if run["wall_force_max_n"] is not None and run["rehearsed_wall_force_max_n"] is not None:
+        parts.append(f"wall force {run['wall_force_max_n']:.2f} N at most (rehearsed {run['rehearsed_wall_force_max_n']:.2f})")
+    if run["states"] is not None and run["rehearsed_states"] is not None:
+        shares = (f"{name} {share:.0%} ({run['rehearsed_states'].get(name, 0.0):.0%})" for name, share in run["states"].items())
+        parts.append(f"states {', '.join(shares)}")
+    return "; ".join(parts)
 
 
 @session.command("describe")

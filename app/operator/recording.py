@@ -195,9 +195,9 @@ class Recorder(QObject):
             self.said.emit(tr("Mark {number} is in the last seconds: F10 saves them", number=self._marks), False)
         return ""
 
-    def keep_target(self, target: Point | None) -> None:
-        """Keep the operator's destination, source pixels."""
-        self._target = event_of_target(target, self._now_s())
+    def keep_target(self, target: Point | None, rehearsal: dict[str, Any] | None = None) -> None:
+        """Keep the operator's destination, source pixels, and what its rehearsal found."""
+        self._target = event_of_target(target, self._now_s(), rehearsal)
         self._keep(self._target)
 
     def _keep(self, event: Event) -> None:

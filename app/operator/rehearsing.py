@@ -143,6 +143,7 @@ class RehearsalController(QObject):
         if self.result is not None:
             self._card.show_result(self.result)
             self._show_lack()
+            self._window.recorder.keep_target(self._window.target, self.result.model_dump(mode="json"))
             return
         self.forget()
         self._window.say(tr("Not rehearsed: {why}", why=tr_text(said) or tr("exit code {code}", code=code)), is_fault=True)

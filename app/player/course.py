@@ -15,6 +15,7 @@ from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import refusal_text
 from app.widgets.painting import number
+from core.evaluation.rehearsal import RehearsalResult, place_beside
 from core.evaluation.replay import event_target
 from core.session.codec import RecordedRow
 from core.session.manifest import Event, EventKind
@@ -165,8 +166,13 @@ def target_at(events: Sequence[Event], scene: Scene, time_s: float) -> Point | N
     """The operator's destination in source pixels: where the route ends, without one what was chosen last until then."""
     if scene.route is not None:
         return scene.to_source(scene.route.target)
-    chosen = [event for event in events if event.kind is EventKind.TARGET and event.time_s <= time_s]
-    return event_target(chosen[-1]) if chosen else None
+    chosen = chosen_at(events, time_s)
+    return event_target(chosen) if chosen is not None else None
+
+
+def chosen_at(events: Sequence[Event], time_s: float) -> Event | None:
+    """The newest choice of a destination at a time on the recorded clock."""
+    return next((event for event in reversed(events) if event.kind is EventKind.TARGET and event.time_s <= time_s), None)
 
 
 def event_line(event: Event) -> str:
@@ -243,8 +249,8 @@ class PlayClock:
         return True
 
 
-def value_lines(row: RecordedRow) -> list[str]:
-    """The recorded values of a row that no dial shows: frame, latency by stage, robot, drive, servo bus."""
+def value_lines(row: RecordedRow, rehearsal: RehearsalResult | None = None) -> list[str]:
+    """The recorded values of a row that no dial shows: rehearsal, frame, latency by stage, robot, drive, servo bus."""
     scene, status, drive = row.scene, row.status, row.drive
     camera = tr("{skipped} skipped for newer ones, {lost} lost by the camera", skipped=row.dropped_frames, lost=row.camera_lost)
     dropped = tr("{camera}, {count} by the recorder", camera=camera, count=row.dropped_rows)
@@ -253,6 +259,8 @@ def value_lines(row: RecordedRow) -> list[str]:
         tr("frame {index} of the camera, captured at {time:.3f} s, {size} px", index=row.index, time=row.captured_s, size=size),
         tr("{rate:.1f} frames per second, {dropped}", rate=row.frames_per_second, dropped=dropped),
     ]
+    if rehearsal is not None and scene.path is not None:
+        lines.insert(0, beside_line(rehearsal, scene.to_source(scene.path.head)))
     stages = dict(scene.latency_ms)
     total_ms = stages.pop("total", None)
     if total_ms is not None:
@@ -280,6 +288,24 @@ def value_lines(row: RecordedRow) -> list[str]:
     if row.bus is not None:
         lines += ["", tr("servo bus"), *_flattened(row.bus)]
     return lines[:_MOST_LINES]
+
+
+def beside_line(rehearsal: RehearsalResult, head: Point) -> str:
+    """The head beside what was rehearsed."""
+    beside = place_beside(rehearsal, head)
+    if beside is None:
+        return tr("rehearsal: the head is not on the way yet")
+    if beside.outside_px > 0.0:
+        where = tr("{px:.0f} px outside the band", px=beside.outside_px)
+    else:
+        where = tr("within the band")
+    return tr(
+        "rehearsal: {where}, {along:.0f} mm in; the runs were there after {time:.1f} s, with up to {force:.2f} N at the wall",
+        where=where,
+        along=beside.along_mm,
+        time=beside.time_s[1],
+        force=beside.wall_force_n,
+    )
 
 
 def _flattened(values: dict[str, Any], prefix: str = "") -> Iterator[str]:

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QPlainTextEdit, 
 
 from app.operator.recording import AfterSession, open_file
 from app.player.controls import NoteField, PlayerBar, RecordedPlate, SessionEvents
-from app.player.course import Course, JumpKind, PlayClock, neighbour, places_of, target_at, value_lines
+from app.player.course import Course, JumpKind, PlayClock, chosen_at, neighbour, places_of, target_at, value_lines
 from app.player.decoder import Decoded, FrameDecoder
 from app.player.replayed import compared_line
 from app.player.session_model import PlayedSession
@@ -39,6 +39,7 @@ from app.widgets.shortcut_page import KeyPage
 from app.widgets.sim_banner import SimBanner
 from core.config.models import Config
 from core.config.rig_file import scaled
+from core.evaluation.rehearsal import RehearsalResult, rehearsal_of
 from core.session.codec import RecordedRow
 from core.session.exporters import PLUGINS
 from core.session.manifest import Description, Event, EventKind
@@ -151,6 +152,8 @@ class PlayerPanels(ScenePanels):
         super().__init__(config.perception, pixels_per_mm, _TEXT_EVERY_S)
         self._scale = known.scale if known is not None else None
         self._provenance = Provenance()
+        self._chosen: Event | None = None
+        self._rehearsal: RehearsalResult | None = None
         self.banner = SimBanner(RigKind.PLAYBACK)
         self.banner.setFixedWidth(_BANNER_WIDTH)
         self.plate = RecordedPlate(manifest, reader.folder.name, reader.description)
@@ -227,6 +230,13 @@ class PlayerPanels(ScenePanels):
         if renew_text:
             self._show_values(row)
 
+    def show_rehearsal_at(self, events: Sequence[Event], time_s: float) -> None:
+        """What the rehearsal of the destination at this time found, beside the run."""
+        chosen = chosen_at(events, time_s)
+        if chosen is not self._chosen:
+            self._chosen, self._rehearsal = chosen, rehearsal_of(chosen) if chosen is not None else None
+            self.show_rehearsal(self._rehearsal)
+
     def show_other(self, tick: Tick, other: Scene | None) -> None:
         """What a replay saw in the same picture."""
         if self.other is None:
@@ -271,7 +281,7 @@ class PlayerPanels(ScenePanels):
     def _show_values(self, row: RecordedRow | None) -> None:
         bar = self.values.verticalScrollBar()
         at = bar.value()
-        self.values.setPlainText("\n".join(value_lines(row)) if row is not None else "")
+        self.values.setPlainText("\n".join(value_lines(row, self._rehearsal)) if row is not None else "")
         bar.setValue(at)
 
     def show_problems(self, problems: Sequence[str]) -> None:
@@ -544,6 +554,7 @@ class PlayerWindow(WindowFrame):
     def _show(self, found: Decoded) -> None:
         if found.row is not None and found.tick is not None:
             target = target_at(self.session.events, found.tick.scene, found.row.captured_s)
+            self.panels.show_rehearsal_at(self.session.events, found.row.captured_s)
             self.panels.show_row(found.row, found.tick, target, renew_text=not self.clock.is_playing)
             self.panels.show_other(found.tick, found.other)
         else:

@@ -1,9 +1,17 @@
-"""What a rehearsal found, as ``rehearse --json`` writes it, the window shows it and a session keeps it. Places are pixels."""
+"""What a rehearsal found: ``rehearse --json`` writes it, the window shows it, a session keeps it with the destination's event.
+
+Places are pixels of the picture.
+"""
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from dataclasses import dataclass
 
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from core import geometry
+from core.session.manifest import REHEARSAL, Event
 from core.types import Point
 
 
@@ -76,6 +84,7 @@ class RehearsalResult(_Part):
     runs: int
     arrived: ArrivedShare
     outcomes: dict[str, int] = {}
+    states: dict[str, float] = Field({}, description="share of the answers")
     time_s: ArrivalTime = ArrivalTime()
     wall_force_n: WallForce = WallForce()
     weakest: WeakestPlace | None = None
@@ -83,3 +92,38 @@ class RehearsalResult(_Part):
     sharp: tuple[SharpBranch, ...] = ()
     speed_mm_s: float
     recommended_speed_mm_s: float | None = None
+
+
+def rehearsal_of(event: Event) -> RehearsalResult | None:
+    """Of the destination's event; None where it was not rehearsed."""
+    try:
+        return RehearsalResult.model_validate(event.data[REHEARSAL]) if REHEARSAL in event.data else None
+    except ValidationError:  # of another version
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceBeside:
+    """A head beside the rehearsed way: how far it is in, px outside the band (0: within), and what the runs had there."""
+
+    along_mm: float
+    outside_px: float
+    wall_force_n: float
+    time_s: tuple[float, float, float]
+
+
+def place_beside(result: RehearsalResult, head: Point) -> PlaceBeside | None:
+    """None before the way begins, where no run had its head."""
+    way = result.way
+    if len(way.xy) < 2:
+        return None
+    middle = np.array(way.xy)
+    along = geometry.arc_length(middle)
+    _, at_px, foot = geometry.nearest(middle, head, along)
+    if at_px <= 0.0:
+        return None
+    place = int(np.argmin(np.abs(along - at_px)))
+    across = geometry.normals(middle)[place]
+    offset, *sides = (float(np.subtract(at, foot) @ across) for at in (head, way.low_xy[place], way.high_xy[place]))
+    outside_px = max(0.0, offset - max(sides), min(sides) - offset)
+    return PlaceBeside(way.along_mm[place], outside_px, way.wall_force_n[place], way.time_s[place])

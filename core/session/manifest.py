@@ -413,11 +413,16 @@ def event_of_alert(alert: Alert, time_s: float) -> Event:
     return Event(time_s, EventKind.ALERT, alert.spec.text, data)
 
 
-def event_of_target(point: Point | None, time_s: float) -> Event:
-    """The destination was chosen (source pixels) or cleared."""
+REHEARSAL = "rehearsal"
+"""Key of what a rehearsal of the destination found, in its event (``core/evaluation/rehearsal.py``)."""
+
+
+def event_of_target(point: Point | None, time_s: float, rehearsal: dict[str, Any] | None = None) -> Event:
+    """The destination was chosen (source pixels) or cleared, or it was rehearsed."""
     if point is None:
         return Event(time_s, EventKind.TARGET, "cleared")
-    return Event(time_s, EventKind.TARGET, f"{point[0]:.0f}, {point[1]:.0f}", {"xy": [round(point[0], 2), round(point[1], 2)]})
+    text, data = f"{point[0]:.0f}, {point[1]:.0f}", {"xy": [round(point[0], 2), round(point[1], 2)]}
+    return Event(time_s, EventKind.TARGET, text, data | ({REHEARSAL: rehearsal} if rehearsal is not None else {}))
 
 
 def frames_lost(events: Iterable[Event]) -> int:

@@ -28,7 +28,13 @@ def row(seed: int, *, reached: bool = True, force_n: float = 0.1) -> dict[str, A
     }
     track |= {key: [None, None] for key in ("offset_ratio", "theta_error_deg", "head_error_px")}
     about = {"seed": seed, "reached": reached, "outcome": "reached" if reached else "stuck", "time_s": 3.0, "interventions": 0}
-    return about | {"wall_contact_n": {"max": force_n}, "path_ratio": None, "answered_share": 1.0, "track": track}
+    return about | {
+        "wall_contact_n": {"max": force_n},
+        "path_ratio": None,
+        "answered_share": 1.0,
+        "track": track,
+        "state_shares": dict.fromkeys("ABCD", 0.25),
+    }
 
 
 @pytest.fixture

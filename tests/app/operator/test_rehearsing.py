@@ -16,7 +16,7 @@ from app.operator.rehearsing import RehearsalController
 from app.operator.window import OperatorWindow
 from app.ui.texts import OperatorStep
 from core.config.models import Config
-from core.evaluation.rehearsal import RehearsalResult
+from core.evaluation.rehearsal import RehearsalResult, rehearsal_of
 from core.types import Point
 from hardware.preflight.preflight import Level
 from hardware.rig import RigKind
@@ -28,6 +28,7 @@ FOUND: dict[str, Any] = {
     "runs": 50,
     "arrived": {"share": 0.96, "low": 0.865, "high": 0.989},
     "outcomes": {"reached": 48, "stuck": 2},
+    "states": {"A": 0.7, "B": 0.1, "C": 0.1, "D": 0.1},
     "time_s": {"median": 14.2, "p95": 19.0},
     "wall_force_n": {"p95": 0.06, "max": 0.31},
     "weakest": {"xy": [200.0, 180.0], "along_mm": 75.0, "turn_deg": 40.0, "ended_here": 2, "wall_force_p95_n": 0.2},
@@ -92,6 +93,8 @@ def test_a_destination_is_rehearsed_and_forgotten_with_it(make: MakeController, 
     card.button.click()
     assert card.button.text() == "Cancel"
     until(qtbot, lambda: controller.result is not None and controller._child is None)
+    target = window.recorder._target
+    assert target is not None and rehearsal_of(target) == controller.result
     told = json.loads(given.read_text())
     assert told["size_px"] == [640, 480] and Config.model_validate(told["config"]) == window.rig.config
     assert "96 % of 50 runs arrived" in card.text and "86 to 99 %" in card.text

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import QAbstractButton
 from pytestqt.qtbot import QtBot
 
 from app.annotator.sources import default_store, session_rows
+from app.commands.session import beside_line, describe
 from app.player import session_model
 from app.player.course import JumpKind
 from app.player.window import PlayerWindow
@@ -30,7 +31,7 @@ from core.annotation.store import AnnotationStore, ItemKey, find_images
 from core.config.models import Config
 from core.control.modes import Mode
 from core.session.codec import scene_to_json
-from core.session.files import LineFile
+from core.session.files import LineFile, add_event
 from core.session.manifest import (
     Description,
     Event,
@@ -691,3 +692,31 @@ def test_the_player_says_what_the_session_is_about_and_keeps_changes(
 def test_the_command_refuses_what_is_no_session_in_one_line(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, str(MAIN), "play", str(tmp_path)], capture_output=True, text=True, check=False)
     assert (done.returncode, "not a session" in done.stderr, "Traceback" in done.stderr) == (2, True, False)
+
+
+def test_a_run_is_shown_beside_its_rehearsal(open_player: Open, session: Path, tmp_path: Path, qtbot: QtBot) -> None:
+    folder = tmp_path / session.name
+    shutil.copytree(session, folder)
+    bench = FakeBench()
+    paths = [bench.scene_at(k, FIRST_S + k * STEP_S)[1].path for k in range(0, COUNT, 2)]
+    heads = [path.head for path in paths if path is not None]
+    way: dict[str, object] = {"along_mm": [*range(len(heads))], "xy": heads, "runs": [50] * len(heads)}
+    way |= {"low_xy": [(x, y + 4.0) for x, y in heads], "high_xy": [(x, y - 4.0) for x, y in heads]}
+    way |= {"wall_force_n": [0.2] * len(heads), "time_s": [(k, k + 1, k + 2) for k in range(len(heads))]}
+    share = {"share": 0.96, "low": 0.86, "high": 0.99}
+    found = {"target_xy": heads[-1], "size_px": (640, 480), "runs": 50, "arrived": share, "way": way, "speed_mm_s": 8.0}
+    add_event(folder, event_of_target(heads[-1], FIRST_S + 2.0, found))
+    window = opened_at_start(open_player, folder, qtbot)
+    assert window.panels.live._marks.rehearsal is None
+    window.go(45)
+    until(qtbot, lambda: window.place == 45)
+    assert window.panels.live._marks.rehearsal is not None
+    line = window.panels.values.toPlainText().splitlines()[0]
+    assert line.startswith("rehearsal: within the band") and line.endswith("with up to 0.20 N at the wall")
+    window.go(5)
+    until(qtbot, lambda: window.place == 5)
+    assert window.panels.live._marks.rehearsal is None
+    with SessionReader(folder) as reader:
+        reader.wait()
+        (run,) = describe(reader)["rehearsals"]
+    assert run["inside_share"] == 1.0 and run["left_band"] == [] and "100% in the band" in beside_line(run)

@@ -1,0 +1,87 @@
+"""The runs of a session beside the rehearsals of their destinations: time, path, wall force and states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from core.control.modes import Mode
+from core.evaluation.rehearsal import PlaceBeside, RehearsalResult, place_beside, rehearsal_of
+from core.session.manifest import EventKind
+from core.session.reader import SessionReader
+from core.types import Point, PoseState
+
+_BESIDE_PX = 4.0
+"""Of a picture of 640 px: so far off a head may be perceived; the band is one of true heads."""
+_LEFT_S = 0.5
+"""A head that is outside for so long has left the band."""
+_ARRIVED_MM = 5.0
+
+
+def runs_beside(reader: SessionReader) -> list[dict[str, Any]]:
+    """Each run of a session to a rehearsed destination beside its rehearsal, as ``session info --json`` has it.
+
+    A run begins with the hand-over, without one when the destination was rehearsed; it ends at the destination, or with it.
+    """
+    line, chosen = reader.timeline(), [event for event in reader.events if event.kind is EventKind.TARGET]
+    ends_s = [event.time_s for event in chosen[1:]] + [np.inf]
+    driven, runs = line.mode == list(Mode).index(Mode.AUTONOMOUS), []
+    for event, end_s in zip(chosen, ends_s, strict=True):
+        if (result := rehearsal_of(event)) is None:
+            continue
+        within = (line.time_s >= event.time_s) & (line.time_s < end_s)
+        places = np.flatnonzero(within & driven)
+        places = np.flatnonzero(within)[np.flatnonzero(within) >= (places[0] if len(places) else 0)]
+        if (run := _run_beside(reader, result, places.tolist())) is not None:
+            runs.append(run)
+    return runs
+
+
+def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence[int]) -> dict[str, Any] | None:
+    """None where the head was never on the rehearsed way."""
+    found: list[tuple[float, PlaceBeside, Point]] = []
+    states, forces = [], []
+    limit_px = _BESIDE_PX * max(result.size_px) / 640
+    for place in places:
+        row = reader.row(place)
+        if row is None:
+            continue
+        states += [row.scene.pose.state] if row.scene.pose is not None else []
+        if row.status is not None and row.status.wall_contact_n is not None:
+            forces.append(row.status.wall_contact_n)
+        head = row.scene.to_source(row.scene.path.head) if row.scene.path is not None else None
+        if head is not None and (beside := place_beside(result, head)) is not None:
+            found.append((row.captured_s, beside, head))
+            if beside.along_mm >= result.way.along_mm[-1] - _ARRIVED_MM:
+                break
+    if not found:
+        return None
+    (began_s, first, _), (ended_s, last, _) = found[0], found[-1]
+    outside = [(time_s, at, head) for time_s, at, head in found if at.outside_px > limit_px]
+    left: list[dict[str, Any]] = []
+    since, is_told, zero_s = None, False, float(reader.timeline().time_s[0])
+    for time_s, at, head in found:
+        if at.outside_px <= limit_px:
+            since, is_told = None, False
+            continue
+        since = since or (time_s, at, head)
+        if time_s - since[0] >= _LEFT_S and not is_told:
+            is_told = True
+            xy = [round(value, 1) for value in since[2]]
+            left.append({"time_s": round(since[0] - zero_s, 2), "along_mm": since[1].along_mm, "xy": xy})
+    return {
+        "target_xy": list(result.target_xy),
+        "runs": result.runs,
+        "arrived_share": result.arrived.share,
+        "arrived": last.along_mm >= result.way.along_mm[-1] - _ARRIVED_MM,
+        "seconds": round(ended_s - began_s, 2),
+        "rehearsed_seconds": [round(value - first.time_s[1], 2) for value in last.time_s],
+        "inside_share": round(1.0 - len(outside) / len(found), 4),
+        "left_band": left,
+        "wall_force_max_n": round(max(forces), 4) if forces else None,
+        "rehearsed_wall_force_max_n": result.wall_force_n.max,
+        "states": {state.value: round(states.count(state) / len(states), 4) for state in PoseState} if states else None,
+        "rehearsed_states": result.states or None,
+    }

@@ -1,0 +1,87 @@
+"""A run of a session beside the rehearsal of its destination."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from core.control.modes import Mode
+from core.evaluation.rehearsal import RehearsalResult, place_beside, rehearsal_of
+from core.session.manifest import Event, EventKind, event_of_target
+from core.session.reader import SessionReader
+from core.session.rehearsed_run import runs_beside
+from core.types import PoseState
+
+XS = [100.0, 110.0, 120.0, 130.0, 140.0]
+FOUND = RehearsalResult.model_validate(
+    {
+        "target_xy": [140, 200],
+        "size_px": [640, 480],
+        "runs": 50,
+        "arrived": {"share": 1.0, "low": 0.93, "high": 1.0},
+        "states": {"A": 0.8, "B": 0.1, "C": 0.1, "D": 0.0},
+        "wall_force_n": {"p95": 0.05, "max": 0.2},
+        "way": {
+            "along_mm": [30, 40, 50, 60, 70],
+            "xy": [[x, 200] for x in XS],
+            "low_xy": [[x, 203] for x in XS],
+            "high_xy": [[x, 195] for x in XS],
+            "wall_force_n": [0, 0, 0.1, 0, 0],
+            "time_s": [[t, t + 1, t + 2] for t in range(5)],
+            "runs": [50] * 5,
+        },
+        "speed_mm_s": 8.0,
+    }
+)
+
+
+def test_a_head_beside_the_way() -> None:
+    inside = place_beside(FOUND, (121.0, 197.0))
+    assert inside is not None and (inside.along_mm, inside.outside_px, inside.wall_force_n) == (50.0, 0.0, 0.1)
+    assert inside.time_s == (2.0, 3.0, 4.0)
+    for y, away in ((190.0, 5.0), (210.0, 7.0)):
+        beside = place_beside(FOUND, (121.0, y))
+        assert beside is not None and beside.outside_px == pytest.approx(away)
+    assert place_beside(FOUND, (90.0, 200.0)) is None
+
+
+def reader_of(heads: list[tuple[float, float]], events: list[Event], driven_from: int) -> SessionReader:
+    """A row every 0.1 s."""
+    times = 10.0 + 0.1 * np.arange(len(heads))
+    mode = np.where(np.arange(len(heads)) >= driven_from, list(Mode).index(Mode.AUTONOMOUS), 0)
+
+    def row(place: int) -> Any:
+        scene = SimpleNamespace(
+            path=SimpleNamespace(head=heads[place]), pose=SimpleNamespace(state=PoseState.A), to_source=lambda point: point
+        )
+        return SimpleNamespace(scene=scene, captured_s=times[place], status=SimpleNamespace(wall_contact_n=0.01 * place))
+
+    line = SimpleNamespace(time_s=times, mode=mode)
+    return cast(SessionReader, SimpleNamespace(timeline=lambda: line, events=tuple(events), row=row))
+
+
+def test_a_run_that_left_the_band_says_when() -> None:
+    xs = np.linspace(98.0, 140.0, 22)
+    ys = np.where((xs > 115) & (xs < 130), 215.0, 200.0)  # seven rows: 0.7 s outside
+    ys[3] = 230.0  # one picture is no leaving
+    heads = list(zip(xs.tolist(), ys.tolist(), strict=True))
+    chosen = event_of_target((140.0, 200.0), 9.0)
+    rehearsed = event_of_target((140.0, 200.0), 9.5, FOUND.model_dump(mode="json"))
+    (run,) = runs_beside(reader_of(heads, [chosen, rehearsed], 2))
+    assert run["arrived"] and run["seconds"] == pytest.approx(1.9 - 0.1 * 2) and run["runs"] == 50
+    assert run["rehearsed_seconds"] == [3.0, 4.0, 5.0]
+    assert [(one["time_s"], one["along_mm"]) for one in run["left_band"]] == [(0.9, 50.0)]
+    assert run["inside_share"] == pytest.approx(1 - 8 / 18, abs=1e-3) and run["wall_force_max_n"] == 0.19
+    assert run["states"]["A"] == 1.0 and run["rehearsed_states"]["A"] == 0.8
+
+
+def test_a_destination_without_a_rehearsal_has_no_run() -> None:
+    chosen = event_of_target((140.0, 200.0), 9.0)
+    assert rehearsal_of(chosen) is None and runs_beside(reader_of([(120.0, 200.0)], [chosen], 0)) == []
+    damaged = Event(9.0, EventKind.TARGET, "", {"rehearsal": {"runs": 3}})
+    assert runs_beside(reader_of([(120.0, 200.0)], [damaged], 0)) == []
+    rehearsed = event_of_target((140.0, 200.0), 9.0, FOUND.model_dump(mode="json"))
+    assert runs_beside(reader_of([(50.0, 200.0)], [rehearsed], 0)) == []
