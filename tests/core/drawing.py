@@ -1,12 +1,15 @@
 """Masks for the tests: drawn with characters where the answer is counted by hand, as tubes where it is known by construction."""
 
+from collections.abc import Iterable
+from pathlib import Path
+
 import cv2
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from core import geometry
-from core.types import Mask, Masks, Point, Points
+from core.types import Image, Mask, Masks, Point, Points
 
 SIZE = (640, 480)
 
@@ -63,3 +66,26 @@ def curve(*points: tuple[float, float]) -> Points:
     corners = np.asarray(points, np.float64)
     along = geometry.arc_length(corners)
     return geometry.resample(CubicSpline(along, corners)(np.linspace(0.0, along[-1], 400)), 1.0)
+
+
+def film(
+    path: Path, images: Iterable[Image], codec: str = "mpeg4", rate: int = 30, *, quantizer: int | None = None, **options: str
+) -> Path:
+    """A video of pictures; `options` are the container's (``movflags``) or the encoder's."""
+    import av
+
+    first, *rest = images
+    with av.open(str(path), "w", options={key: options.pop(key) for key in ("movflags",) if key in options}) as container:
+        stream = container.add_stream(codec, rate=rate, options=options)
+        stream.height, stream.width, stream.pix_fmt = *first.shape[:2], "yuv420p"
+        if quantizer is not None:
+            stream.codec_context.qmin = stream.codec_context.qmax = quantizer
+        for image in (first, *rest):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode(None))
+    return path
+
+
+def greys(levels: Iterable[int]) -> Iterable[Image]:
+    """Pictures of 64x48 pixels, of one grey each."""
+    return (np.full((48, 64, 3), level, np.uint8) for level in levels)

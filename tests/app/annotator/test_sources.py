@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
 from pathlib import Path
 
 import av
@@ -16,6 +15,7 @@ from app.annotator.sources import default_store, image_files, recorded_angles, s
 from core.annotation.store import DEFAULT_NAME
 from core.devices import UserError
 from core.learning.dataset import write_png
+from tests.core.drawing import film, greys
 from tests.core.session_data import QUICK, record, tick_of
 
 
@@ -33,24 +33,13 @@ def test_a_link_that_leads_nowhere_keeps_nobody_from_the_rest(tmp_path: Path) ->
         image_files([some / "b.png"], 4)
 
 
-def film(video: Path, greys: Sequence[int], options: dict[str, str] | None = None) -> Path:
-    with av.open(str(video), "w") as container:
-        stream = container.add_stream("libx264", rate=30, options=options or {})
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for grey in greys:
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), grey, np.uint8), format="rgb24")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode())
-    return video
-
-
 def grey_of(path: Path) -> float:
     return float(cv2.imread(str(path)).mean())
 
 
 def test_videos_whose_names_differ_in_their_endings_have_pictures_of_their_own(tmp_path: Path) -> None:
-    film(tmp_path / "run.mkv", [40] * 5)
-    film(tmp_path / "run.mp4", [200] * 5)
+    film(tmp_path / "run.mkv", greys([40] * 5), "libx264")
+    film(tmp_path / "run.mp4", greys([200] * 5), "libx264")
     files = image_files([tmp_path], 2)
     assert [path.parent.name for path in files] == ["run.mkv_frames"] * 2 + ["run.mp4_frames"] * 2
     assert [round(grey_of(path), -1) for path in files] == [40, 40, 200, 200]
@@ -58,9 +47,9 @@ def test_videos_whose_names_differ_in_their_endings_have_pictures_of_their_own(t
 
 def test_a_video_that_pictures_were_taken_of_is_gone_on_with_those(tmp_path: Path) -> None:
     """The second rater's call does not say how many: a study of 500 must not become one of 48."""
-    video = film(tmp_path / "run.mp4", [4 * k for k in range(60)])
+    video = film(tmp_path / "run.mp4", greys([4 * k for k in range(60)]), "libx264")
     assert [len(image_files([video], count)) for count in (55, None)] == [55, 55]
-    other = film(tmp_path / "other.mp4", [4 * k for k in range(60)])
+    other = film(tmp_path / "other.mp4", greys([4 * k for k in range(60)]), "libx264")
     assert len(image_files([other], None)) == 48
 
 
@@ -75,9 +64,9 @@ def test_a_session_in_several_files_is_one_recording(tmp_path: Path) -> None:
 
 
 def test_pictures_of_an_older_video_of_its_name_are_not_taken_for_its_own(tmp_path: Path) -> None:
-    video = film(tmp_path / "take.mp4", [40] * 5)
+    video = film(tmp_path / "take.mp4", greys([40] * 5), "libx264")
     files = image_files([video], 2)
-    film(video, [200] * 5)
+    film(video, greys([200] * 5), "libx264")
     for reuse in (False, True):
         with pytest.raises(UserError, match=r"take_frames: holds pictures of another video than take.mp4 is now; move it away"):
             image_files([video], 2, reuse=reuse)
@@ -85,13 +74,13 @@ def test_pictures_of_an_older_video_of_its_name_are_not_taken_for_its_own(tmp_pa
     (video.with_name("take_frames") / "video.json").unlink()  # as folders were before they knew whose they are
     with pytest.raises(UserError, match="holds pictures of another video"):
         image_files([video], 2)
-    film(video, [40] * 5)
+    film(video, greys([40] * 5), "libx264")
     assert image_files([video], 2) == files
     assert (files[0].parent / "video.json").is_file()
 
 
 def test_a_damaged_frame_is_left_out_and_no_neighbour_taken_for_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)], {"g": "1", "bf": "0"})
+    video = film(tmp_path / "run.mkv", greys([8 * k for k in range(31)]), "libx264", g="1", bf="0")
     with av.open(str(video)) as container:
         packets = [(packet.pos, packet.size) for packet in container.demux(video=0) if packet.size]
     data = bytearray(video.read_bytes())
@@ -103,7 +92,7 @@ def test_a_damaged_frame_is_left_out_and_no_neighbour_taken_for_it(tmp_path: Pat
 
 
 def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
-    video = film(tmp_path / "run.mkv", [8 * k for k in range(31)])
+    video = film(tmp_path / "run.mkv", greys([8 * k for k in range(31)]), "libx264")
     files = image_files([video], 4)
     assert [path.name for path in files] == ["run_000000.png", "run_000010.png", "run_000020.png", "run_000030.png"]
     assert image_files([video], 4) == files, "written once"

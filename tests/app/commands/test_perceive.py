@@ -19,6 +19,7 @@ from core.devices import UserError
 from core.files import read_image
 from hardware.twin.world import TwinWorld
 from tests.app.program import MAIN, run, run_apart
+from tests.core.drawing import film
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
 
@@ -131,15 +132,7 @@ def test_pictures_of_nothing_or_without_a_robot_have_no_pose_and_a_named_reason(
 
 
 def test_a_video_is_perceived_frame_by_frame(picture: Path, tmp_path: Path) -> None:
-    import av
-
-    image = read_image(picture)
-    with av.open(str(tmp_path / "v.mkv"), "w") as container:
-        stream = container.add_stream("mpeg4", rate=30, options={"qscale": "2"})
-        stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 640, 480, "yuv420p", 8_000_000
-        for _ in range(3):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode())
+    film(tmp_path / "v.mkv", [read_image(picture)] * 3, quantizer=2)
     assert run("perceive", tmp_path / "v.mkv", "--jsonl", tmp_path / "o.jsonl").returncode == 0
     found = rows(tmp_path / "o.jsonl")
     assert [row["image"].rsplit("#")[-1] for row in found] == ["0", "1", "2"]
@@ -297,10 +290,3 @@ def test_bad_input_is_one_clear_line_and_exit_code_2(arguments: list[str], words
     assert len(lines) == 1
     assert words in lines[0]
     assert "Traceback" not in done.stderr
-
-
-def test_help_names_every_command() -> None:
-    done = run("--help")
-    assert done.returncode == 0
-    for command in ("gui", "perceive", "synth", "train", "benchmark"):
-        assert command in done.stdout

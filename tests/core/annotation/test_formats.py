@@ -21,6 +21,7 @@ from core.annotation.store import FoundImage, ImageRecord, ItemKey, StoredAnnota
 from core.learning.dataset import write_png
 from core.program import ROOT
 from core.types import Mask
+from tests.core.annotation.test_masks import shoelace
 
 SIZE = (64, 48)
 VESSEL_BOX = MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (50.0, 10.0), (50.0, 30.0), (10.0, 30.0)))
@@ -240,12 +241,6 @@ def test_labelme_has_the_parts_that_labelme_reads(image: FoundImage, tmp_path: P
     assert hole["points"] == [[5, 5], [59, 39]]
     with Image.open(io.BytesIO(base64.b64decode(hole["mask"]))) as patch:
         assert np.array_equal(np.array(patch) > 0, with_hole()[5:40, 5:60])
-
-
-def shoelace(points: np.ndarray) -> float:
-    """The area of a polygon (N, 2)."""
-    (x0, y0), (x1, y1) = points.T, np.roll(points, -1, axis=0).T
-    return abs(float(np.sum(x0 * y1 - x1 * y0))) / 2.0
 
 
 def labelme(**more: Any) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from core.devices import DamagedPicture, DeviceError, EndOfStream
 from core.files import read_image
 from core.session.video import open_video, upright
 from hardware.cameras.files import VideoFile
+from tests.core.drawing import film, greys
 
 
 def test_a_damaged_title_costs_no_picture(tmp_path: Path) -> None:
@@ -34,30 +35,17 @@ def test_a_damaged_title_costs_no_picture(tmp_path: Path) -> None:
         assert len(list(container.decode(video=0))) == 3
 
 
-def film(path: Path, codec: str = "libx264", frames: int = 12, **options: str) -> Path:
+def cornered(path: Path, frames: int = 12) -> Path:
     """Pictures of one grey each, brighter one by one, with a white corner (the upper left one)."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=10, options=options)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for index in range(frames):
-            image = np.full((48, 64, 3), 10 + 15 * index, np.uint8)
-            image[:8, :8] = 255
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode(None))
-    return path
+    images = list(greys(10 + 15 * index for index in range(frames)))
+    for image in images:
+        image[:8, :8] = 255
+    return film(path, images, "libx264", 10)
 
 
-def film_of_greys(path: Path, codec: str, frames: int = 30, **options: str) -> Path:
+def film_of_greys(path: Path, codec: str, **options: str) -> Path:
     """A longer one, without a corner."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=10, options=options)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        stream.codec_context.qmin = stream.codec_context.qmax = 2
-        for index in range(frames):
-            image = np.full((48, 64, 3), 10 + 8 * index, np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode(None))
-    return path
+    return film(path, greys(10 + 8 * index for index in range(30)), codec, 10, quantizer=2, **options)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +94,7 @@ def test_damage_in_an_avi_loses_no_count_and_moves_no_whole_picture(place: int, 
 
 
 def test_a_video_that_nothing_here_can_decode_is_one_clear_line(tmp_path: Path) -> None:
-    path = film(tmp_path / "film.mp4")
+    path = cornered(tmp_path / "film.mp4")
     path.write_bytes(path.read_bytes().replace(b"avc1", b"zzzz"))
     with pytest.raises(DeviceError, match=r"film\.mp4: has a video of a kind that cannot be decoded here"):
         VideoFile(path).open()
@@ -137,7 +125,7 @@ def test_pixels_of_an_absurd_shape_are_taken_for_square(aspect: str, tmp_path: P
     ],
 )
 def test_pictures_are_turned_and_mirrored_as_the_file_says(matrix: tuple[int, int, int, int], corner: str, tmp_path: Path) -> None:
-    path = film(tmp_path / "film.mp4", frames=1)
+    path = cornered(tmp_path / "film.mp4", 1)
     plain, one = struct.pack(">5i", 65536, 0, 0, 0, 65536), 65536
     a, b, c, d = (one * value for value in matrix)
     data = path.read_bytes()

@@ -15,27 +15,24 @@ import pytest
 
 from core.config.models import TwinConfig
 from core.devices import Camera, DamagedPicture, DamagedStream, DeviceError, EndOfStream
-from core.types import Frame
+from core.types import Frame, Image
 from hardware.cameras import files
 from hardware.cameras.files import ImageFolder, VideoFile
 from hardware.cameras.live import LiveCamera
 from hardware.cameras.realsense import RealSenseRecording, realsense_camera
 from hardware.cameras.webcam import WebcamSensor
 from hardware.twin.world import TwinCamera, TwinWorld
+from tests.core.drawing import film
 from tests.hardware.soft_cameras import CONFIG as SOFT
 from tests.hardware.soft_cameras import SoftRealSense, SoftWebcam, write_bag
 
 
-def _video(path: Path, frames: int = 12, rate: int = 30, *, first_index: bool = False) -> Path:
-    """With `first_index` an MP4 can be opened when its end is cut off."""
-    with av.open(str(path), "w", options={"movflags": "faststart"} if first_index else {}) as container:
-        stream = container.add_stream("mpeg4", rate=rate)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for index in range(frames):
-            image = np.random.default_rng(index).integers(0, 255, (48, 64, 3), np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        container.mux(stream.encode())
-    return path
+def _noise(count: int) -> Iterator[Image]:
+    return (np.random.default_rng(index).integers(0, 255, (48, 64, 3), np.uint8) for index in range(count))
+
+
+def _video(path: Path, frames: int = 12, rate: int = 30, **options: str) -> Path:
+    return film(path, _noise(frames), rate=rate, **options)
 
 
 def _pictures(folder: Path) -> Path:
@@ -157,7 +154,7 @@ def test_a_whole_video_in_a_fine_clock_is_not_cut(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["v.mp4", "v.avi"])
 def test_a_cut_video_that_knows_its_length_says_that_it_is_cut(tmp_path: Path, name: str) -> None:
-    path = _video(tmp_path / name, 40, first_index=True)
+    path = _video(tmp_path / name, 40, movflags="faststart")  # so that it can be opened when its end is cut off
     count, end = _ends(path)
     assert (count, isinstance(end, DamagedStream)) == (40, False)
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 6 // 10])
@@ -182,8 +179,7 @@ def _h264(path: Path, frames: int = 40, broken: int | None = None, aspect: Fract
         if aspect is not None:
             stream.sample_aspect_ratio = aspect
         packets = []
-        for index in range(frames):
-            image = np.random.default_rng(index).integers(0, 255, (48, 64, 3), np.uint8)
+        for image in _noise(frames):
             packets += stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24"))
         for index, packet in enumerate(packets + stream.encode()):
             if index == broken:

@@ -13,17 +13,12 @@ from core.devices import DamagedStream
 from core.types import Frame
 from hardware.cameras.files import VideoFile
 from hardware.cameras.picture_files import own_stems, pictures
+from tests.core.drawing import film, greys
 from tests.core.session_data import record, tick_of
 
 
 def video(path: Path, frames: int = 4) -> Path:
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("mpeg4", rate=30)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for index in range(frames):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.full((48, 64, 3), 40 * index, np.uint8), format="rgb24")))
-        container.mux(stream.encode())
-    return path
+    return film(path, greys(40 * index for index in range(frames)))
 
 
 def test_a_video_named_damaged_is_not_damaged(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -116,12 +117,12 @@ def _until(bus: ServoBus, index: int, wanted: Callable[[object], bool]) -> objec
     raise AssertionError(f"not seen: {reading}")
 
 
-@pytest.fixture
-def mixed() -> Iterator[tuple[SoftServoBus, ServoBus]]:
-    """Four small servos of 5 V for the tendons, three strong ones of 12 V, armed."""
-    joints = tuple(j.model_copy(update={"model": 1200}) if j.id <= 4 else j for j in CONFIG.joints)
+@contextmanager
+def _armed_with(clock: Clock, **tendon: object) -> Iterator[tuple[SoftServoBus, ServoBus]]:
+    """Tendons of another kind than the rest; armed."""
+    joints = tuple(j.model_copy(update=tendon) if j.id <= 4 else j for j in CONFIG.joints)
     config = ServosConfig.model_validate({**CONFIG.model_dump(), "joints": joints})
-    twin = SoftServoBus(config, positions=[1000] * 7)
+    twin = SoftServoBus(config, clock=clock, positions=[1000] * 7)
     twin.start()
     bus = ServoBus(config, twin.port)
     bus.open()
@@ -130,6 +131,13 @@ def mixed() -> Iterator[tuple[SoftServoBus, ServoBus]]:
     yield twin, bus
     bus.close()
     twin.stop()
+
+
+@pytest.fixture
+def mixed(clock: Clock) -> Iterator[tuple[SoftServoBus, ServoBus]]:
+    """Four small servos of 5 V for the tendons, three strong ones of 12 V."""
+    with _armed_with(clock, model=1200) as armed:
+        yield armed
 
 
 # --- millimetres and registers ---------------------------------------------------------------------------------------------------
@@ -843,9 +851,7 @@ def test_hold_stops_where_it_is(twin: SoftServoBus, armed: ServoBus) -> None:
     armed.write([0.0, 0.0, 0.0, 0.0, 50.0, 0.0, 0.0])
     _until(armed, 4, lambda reading: isinstance(reading, ServoState) and reading.velocity_mm_s > 5.0)
     held = armed.hold()[4]
-    assert isinstance(held, ServoState)
     state = _until(armed, 4, lambda reading: isinstance(reading, ServoState) and reading.ticks == reading.goal_ticks)
-    assert isinstance(state, ServoState)
     assert state.position_mm == pytest.approx(held.position_mm)
     assert state.position_mm < 40.0
 
@@ -1103,30 +1109,14 @@ def test_a_force_limit_that_another_master_takes_away_is_seen(twin: SoftServoBus
     assert [state.is_limited for state in _states(armed)] == [True] * 5 + [False, True]
 
 
-@pytest.fixture
-def load_bus(clock: Clock) -> Iterator[tuple[SoftServoBus, ServoBus]]:
-    """Tendons with a model that reports no current: its duty is limited."""
-    joints = tuple(j.model_copy(update={"model": 1080, "max_force_n": 40.0}) if j.id <= 4 else j for j in CONFIG.joints)
-    config = ServosConfig.model_validate({**CONFIG.model_dump(), "joints": joints})
-    twin = SoftServoBus(config, clock=clock, positions=[1000] * 7)
-    twin.start()
-    bus = ServoBus(config, twin.port)
-    bus.open()
-    bus.set_zero()
-    bus.arm()
-    yield twin, bus
-    bus.close()
-    twin.stop()
-
-
-def test_a_model_without_current_is_limited_by_its_duty(load_bus: tuple[SoftServoBus, ServoBus]) -> None:
-    twin, bus = load_bus
-    # 40 N on a drum of 40 mm a turn: 0.2546 Nm of 1.9 Nm at 12 V, at 14.8 V 10.9 %: 96 of 885
-    assert [twin.servo(joint.id).table["goal_pwm"] for joint in CONFIG.joints] == [96] * 4 + [885] * 3
-    assert [twin.servo(joint.id).table["operating_mode"] for joint in CONFIG.joints] == [4] * 4 + [5] * 3
-    assert [state.current_ma is None for state in _states(bus)] == [True] * 4 + [False] * 3
-    twin.modify_servo(2, lambda servo: servo.answer(3, 100, data=(885).to_bytes(2, "little")))
-    assert [state.is_limited for state in _states(bus)] == [True, False, True, True, True, True, True]
+def test_a_model_without_current_is_limited_by_its_duty(clock: Clock) -> None:
+    with _armed_with(clock, model=1080, max_force_n=40.0) as (twin, bus):
+        # 40 N on a drum of 40 mm a turn: 0.2546 Nm of 1.9 Nm at 12 V, at 14.8 V 10.9 %: 96 of 885
+        assert [twin.servo(joint.id).table["goal_pwm"] for joint in CONFIG.joints] == [96] * 4 + [885] * 3
+        assert [twin.servo(joint.id).table["operating_mode"] for joint in CONFIG.joints] == [4] * 4 + [5] * 3
+        assert [state.current_ma is None for state in _states(bus)] == [True] * 4 + [False] * 3
+        twin.modify_servo(2, lambda servo: servo.answer(3, 100, data=(885).to_bytes(2, "little")))
+        assert [state.is_limited for state in _states(bus)] == [True, False, True, True, True, True, True]
 
 
 def _has_backup(servo: SoftServo, startup: int) -> None:
@@ -1346,8 +1336,6 @@ def test_currents_of_several_models_are_told_in_their_units(mixed: tuple[SoftSer
     twin.modify_servo(1, lambda servo: servo.grind(200.0))  # in the winding: 208 mA, of 1470 mA at stall
     twin.modify_servo(5, lambda servo: servo.grind(50.0))
     small, strong = (_until(bus, index, lambda r: isinstance(r, ServoState) and (r.current_ma or 0.0) > 25.0) for index in (0, 4))
-    assert isinstance(small, ServoState)
-    assert isinstance(strong, ServoState)
     assert small.current_ma == pytest.approx(208.0**2 / 1470.0, abs=1.0), "of the supply"
     assert strong.current_ma == pytest.approx(58.0, abs=3.0)
 
