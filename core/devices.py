@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from core.messages import message
@@ -19,6 +22,15 @@ class UserError(Exception):
 
     def __init__(self, text: str = "", /, **values: object) -> None:
         super().__init__(message(text, **values) if values else text)
+
+
+@contextmanager
+def disk_errors(kind: type[UserError], path: Path | str, what: str, then: str = "") -> Iterator[None]:
+    """Tell an OSError within as an error of `kind`: what is the matter with `path`, and what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{path}: {what} ({error.strerror}){then}") from None
 
 
 class DeviceError(UserError):

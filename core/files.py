@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.system import MAX_PIXELS
 from core.types import Image
 
@@ -115,10 +115,8 @@ def read_image(path: Path) -> Image:
 
     Raises ImageError: missing, empty, truncated, not a picture, or larger than ``MAX_PIXELS``.
     """
-    try:
+    with disk_errors(ImageError, path, "cannot be read"):
         data = path.read_bytes()
-    except OSError as error:
-        raise ImageError(f"{path}: cannot be read ({error.strerror})") from None
     if not data:
         raise ImageError(f"{path}: empty file")
     if _is_cut(data):

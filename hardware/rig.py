@@ -16,7 +16,7 @@ from core.config.rig_file import RESERVED, calibration_of, find_rig, has_rig, wi
 from core.config.safety import ServosConfig
 from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
 from core.control.robot import GuardedRobot
-from core.devices import Camera, DeviceError, UserError
+from core.devices import Camera, DeviceError, UserError, disk_errors
 from hardware.cameras.registry import CAMERA_KINDS, FoundCamera, camera_kind
 from hardware.cameras.undistorted import UndistortedCamera
 
@@ -307,10 +307,8 @@ def rig_config(
 
 def with_source(config: Config, source: Path) -> Config:
     """The configuration with a recording, file or folder of pictures instead of the rig's camera. Raises DeviceError, UserError."""
-    try:
+    with disk_errors(DeviceError, source, "cannot be read"):
         exists = source.exists()
-    except OSError as error:
-        raise DeviceError(f"{source}: cannot be read ({error.strerror})") from None
     if not exists:
         raise DeviceError(f"{source}: no such file or folder")
     from core.files import VIDEO_ENDINGS

@@ -34,7 +34,7 @@ from core.annotation.store import AnnotationStore, FoundImage, ItemKey, StoredAn
 from core.annotation.study import QueueOrder, StudySettings, Task, queue_order, repeat_views, settings_from, tasks
 from core.config.files import own_config
 from core.config.models import Config, choose_model, load_config
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.files import write_atomic
 from core.perception import compiled
 from core.program import COMMAND, program_id
@@ -183,10 +183,8 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
         done, notes = comparable_answers(annotations, images, config, options.study.asked, str(store_path))
         print_warnings(notes)
         rows, _, _, missed = compare_with_algorithm(done, images, config)
-        try:
+        with disk_errors(AnnotationError, options.out, "cannot be written", "; choose another --out"):
             write_measurements(options.out, rows)
-        except OSError as error:
-            raise AnnotationError(f"{options.out}: cannot be written ({error.strerror}); choose another --out") from None
         said = f"{len(rows)} image{'s' if len(rows) != 1 else ''} in {options.out}"
         sys.stderr.write(f"{said}; next: {COMMAND} evaluate --csv {options.out} --out DIR\n")
         unfinished = {one.key.sha256 for one in annotations} - {one.key.sha256 for one in finished(annotations)}

@@ -21,7 +21,7 @@ from core.annotation.agreement_report import write_measures
 from core.annotation.model import AngleProvenance
 from core.annotation.store import FoundImage, StoredAnnotation
 from core.config.models import Config, choose_model, load_config
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.evaluation import evaluation
 from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, read_measurements, write_measurements
 from core.evaluation.paper import PAPER, against_paper, choose_images, measure_twice, wanted_images
@@ -149,10 +149,8 @@ def _insert_repeatability(metrics: dict[str, Any], within: dict[str, Any]) -> No
 
 def _make_out(out: Path) -> None:
     """Make the folder before the work; raises EvaluationError."""
-    try:
+    with disk_errors(EvaluationError, out, "cannot be made", "; choose another --out"):
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise EvaluationError(f"{out}: cannot be made ({error.strerror}); choose another --out") from None
     if not os.access(out, os.W_OK | os.X_OK):
         raise EvaluationError(f"{out}: cannot be written to; choose another --out")
 

@@ -25,7 +25,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.session.manifest import EVENTS, FRAMES, MANIFEST
 
 _EVERY_S = 0.1
@@ -207,13 +207,11 @@ def check_no_session(folder: Path, option: str) -> None:
 
 def make_folder(folder: Path) -> None:
     """Make a folder for results; raises UserError where it cannot be written."""
-    try:
+    with disk_errors(UserError, folder, "cannot be written", "; choose another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".write-probe"
         probe.write_bytes(b"")
         probe.unlink()
-    except OSError as error:
-        raise UserError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
 
 class LeftOut:

@@ -23,7 +23,7 @@ from app.commands.progress import (
     report_progress,
 )
 from app.commands.synth import make_set
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.learning.training_plan import TrainingPlan
 from core.program import need_package
 
@@ -190,10 +190,8 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
         notes |= {"scenes": len(scenes), "scene_sets": [_described(folder) for folder in options.scenes]}
     if without := _never_seen(options.without, began_with):
         notes |= {"without": without}
-    try:
+    with disk_errors(DatasetError, out.parent, "cannot be written", "; choose another --out"):
         log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
-    except OSError as error:
-        raise DatasetError(f"{out.parent}: cannot be written ({error.strerror}); choose another --out") from None
     writer = progress_writer()
     held_out = HeldOutMonitor(options.held_out, out, writer, log.write)
     with log, Interrupt() as interrupt, progress_bar() as bar:

@@ -23,7 +23,7 @@ from app.commands.progress import console, progress_bar
 from app.commands.workers import over_cluster, over_processes
 from core.config.models import POLICIES, choose_model, load_config
 from core.config.rig_file import find_rig, read_rig
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.evaluation.trial import Row, TrialLog, summarise, trial_row, worst
 from core.files import write_atomic
 from core.program import program_line
@@ -104,10 +104,8 @@ def trial(
     rows, interrupted = _run(plan, jobs, out, workers, scheduler)
     by_policy: dict[str, list[Row]] = {name: [row for row in rows if row["policy"] == name] for name in policies}
     if out is not None:
-        try:
+        with disk_errors(TrialError, out, "the report cannot be written", "; free some space"):
             write_report(out, by_policy, plan)
-        except OSError as error:
-            raise TrialError(f"{out}: the report cannot be written ({error.strerror}); free some space") from None
     sums = {name: summarise(own) for name, own in by_policy.items()}
     if as_json:
         for row in rows:
@@ -161,11 +159,9 @@ class KeptTrials:
         self.rows[row["policy"], row["seed"]] = row
         if self._file is None:
             return
-        try:
+        with disk_errors(TrialError, self._file, "cannot be written", "; free some space and go on"):
             with self._file.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(row, allow_nan=False) + "\n")
-        except OSError as error:
-            raise TrialError(f"{self._file}: cannot be written ({error.strerror}); free some space and go on") from None
 
     def _open(self, out: Path, plan: TrialPlan) -> None:
         described, path = _described(plan), out / "plan.json"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.ui.i18n import tr
 from app.ui.texts import signed_degrees
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.evaluation.replay import Change, frame_result
 from core.session.codec import InvalidRecord, PerceivedLine, read_json, scene_from_json
 from core.session.files import lines_of, read_line
@@ -32,7 +32,7 @@ class Replayed:
         self._places: dict[int, tuple[int, int]] = {}
         self._values: dict[int, tuple[float, int]] = {}
         self.skipped = 0
-        try:
+        with disk_errors(UserError, path, "cannot be read"):
             for line in lines_of(path):
                 try:
                     record = read_line(partial(read_json, PerceivedLine), line)
@@ -44,8 +44,6 @@ class Replayed:
                     self._places[row] = line.offset, len(line.data or b"")
                 except InvalidRecord:
                     self.skipped += 1
-        except OSError as error:
-            raise UserError(f"{path}: cannot be read ({error.strerror})") from None
         if not self._places:
             raise UserError(f"{path}: no results in it; write them with: replay SESSION --jsonl FILE")
 

@@ -6,7 +6,7 @@ from io import BytesIO
 from pathlib import Path
 
 from core.calibration.camera import BoardSpec, board_bitmap
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.files import write_atomic
 
 _PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0)}
@@ -69,10 +69,8 @@ def print_board(path: Path, spec: BoardSpec) -> str:
     printed = BytesIO()  # on a full disk, the PDF writer ends in an error of its compressor, and leaves an empty file
     kind = path.suffix.lower().removeprefix(".")
     figure.savefig(printed, format=kind, dpi=_PNG_DPI, metadata={"Title": "LumenPilot calibration board"})
-    try:
+    with disk_errors(BoardPrintError, path, "cannot be written"):
         write_atomic(path, printed.getvalue())
-    except OSError as error:
-        raise BoardPrintError(f"{path}: cannot be written ({error.strerror})") from None
     return paper
 
 

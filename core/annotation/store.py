@@ -33,6 +33,7 @@ from core.annotation.model import (
     Readout,
     annotation_from_json,
 )
+from core.devices import disk_errors
 from core.files import ImageError, name_as_text, read_image
 from core.program import known_program_id
 
@@ -234,11 +235,9 @@ DEFAULT_NAME = "annotations.lumenpilot.sqlite"
 
 def image_sha256(path: Path) -> str:
     """SHA-256 of the file's bytes; raises AnnotationError."""
-    try:
+    with disk_errors(AnnotationError, path, "cannot be read"):
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise AnnotationError(f"{path}: cannot be read ({error.strerror})") from None
 
 
 class AnnotationStore:
@@ -614,10 +613,8 @@ def find_images(
 
 
 def _identified(path: Path, store: AnnotationStore) -> FoundImage:
-    try:
+    with disk_errors(ImageError, path, "cannot be read"):
         state = path.stat()
-    except OSError as error:
-        raise ImageError(f"{path}: cannot be read ({error.strerror})") from None
     name = name_as_text(os.path.relpath(path.resolve(), store.path.parent.resolve()))
     record = store.image_as_last_seen(name, state.st_size, state.st_mtime_ns)
     if record is None:

@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError, model_validator
 from core.config.models import Config
 from core.config.safety import JOINT_NAMES, JointName, wiring_of
 from core.config.section import ConfigSection, first_problem
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.files import write_atomic
 from core.program import as_called, program_commit, program_version
 
@@ -263,10 +263,8 @@ def write_acceptance(rig_file: Path, accepted: Acceptance, *, keeps_older: bool 
     """Save it atomically; with `keeps_older` the one before stays as NAME.acceptance.older.json. Raises AcceptanceError."""
     path = acceptance_path(rig_file)
     older = rig_file.with_name(rig_file.stem + _OLDER) if keeps_older else None
-    try:
+    with disk_errors(AcceptanceError, path, "cannot be saved"):
         write_atomic(path, (accepted.model_dump_json(indent=1) + "\n").encode(), durable=True, older=older)
-    except OSError as error:
-        raise AcceptanceError(f"{path}: cannot be saved ({error.strerror})") from None
     return path
 
 

@@ -24,7 +24,7 @@ from core.config.files import settings_folder
 from core.config.models import CAMERAS, RECORDED, CameraConfig, CameraName, Config, RigConfig, SegmentationConfig, TwinConfig
 from core.config.safety import OF_SERVOS, AtClose, ServosConfig
 from core.config.section import ConfigSection, first_problem
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.files import write_atomic
 from core.messages import message
 
@@ -190,26 +190,22 @@ def write_rig(rig: RigFile, path: Path | None = None, *, keeps_older: bool = Tru
     document = tomlkit.document()
     document.add(tomlkit.comment(_HEADER))
     document.update(rig.model_dump(mode="json", exclude_none=True))
-    try:
+    with disk_errors(RigFileError, target, "cannot be saved"):
         target.parent.mkdir(parents=True, exist_ok=True)
         older = target.with_name(target.stem + _OLDER) if keeps_older else None
         write_atomic(target, tomlkit.dumps(document).encode(), durable=True, older=older)
-    except OSError as error:
-        raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
     return target
 
 
 def check_can_save(name: str) -> None:
     """Raise RigFileError when a rig of this name could not be saved: before minutes of calibration, not after them."""
     target = rig_path(name)
-    try:
+    with disk_errors(RigFileError, target, "cannot be saved"):
         target.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=target.parent):
             pass  # permissions alone do not show that a disk is mounted read-only
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-    except OSError as error:
-        raise RigFileError(f"{target}: cannot be saved ({error.strerror})") from None
 
 
 def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -> RigFile:

@@ -22,6 +22,7 @@ import numpy as np
 
 from core.bench.bench import PHANTOM_FILE
 from core.config.models import SegmentationConfig
+from core.devices import disk_errors
 from core.files import replace_folder, sync_folder
 from core.perception.inference import open_second_look, open_segmenter
 from core.perception.model_file import (
@@ -292,7 +293,7 @@ def _replace(folder: Path, scratch: Path) -> None:
 
 def _carry_over(old: Path, new: Path) -> None:
     """Move what is not the model's own to its new folder; raises ModelError for what cannot be moved and stays where it is."""
-    try:
+    with disk_errors(ModelError, old, "holds what lay in the older model's folder and cannot be moved"):
         for entry in list(old.iterdir()):
             if entry.name == SECOND_LOOK and entry.is_dir() and not entry.is_symlink():
                 _carry_over(entry, new / SECOND_LOOK)
@@ -301,8 +302,6 @@ def _carry_over(old: Path, new: Path) -> None:
             elif entry.name not in (WEIGHTS, ONNX, ONNX_INT8, INFO, _INFO_SCRATCH):
                 new.mkdir(exist_ok=True)
                 os.replace(entry, new / entry.name)
-    except OSError as error:
-        raise ModelError(f"{old}: holds what lay in the older model's folder and cannot be moved ({error.strerror})") from None
 
 
 def _copy(folder: Path, to: Path) -> None:
@@ -375,14 +374,12 @@ def write_calibration(
 def _update(folder: Path, changes: dict[str, Any]) -> None:
     info = read_model_info(folder).model_copy(update=changes)
     scratch = folder / _INFO_SCRATCH
-    try:
+    with disk_errors(ModelError, folder / INFO, "cannot be written", "; copy the model to a folder of your own"):
         with scratch.open("wb") as file:
             file.write(info.model_dump_json(indent=1).encode() + b"\n")
             file.flush()
             os.fsync(file.fileno())  # or a power cut would leave an empty manifest, and with it no model
         os.replace(scratch, folder / INFO)
-    except OSError as error:
-        raise ModelError(f"{folder / INFO}: cannot be written ({error.strerror}); copy the model to a folder of your own") from None
 
 
 def write_eight_bit(folder: Path, examples: Sequence[Image]) -> None:

@@ -17,7 +17,7 @@ import platformdirs
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from core.config.models import RESOURCES
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.quality import ConfidenceCalibration
 from core.program import import_problem
@@ -109,11 +109,9 @@ def own_models() -> Path:
 def model_folder(name: str) -> Path:
     """The folder of a model: the name of a shipped or of the user's own, or a path. Raises ModelError with the known names."""
     for folder in (MODELS / name, own_models() / name, Path(name)):
-        try:
+        with disk_errors(ModelError, folder, "cannot be read"):
             if (folder / INFO).is_file():
                 return folder
-        except OSError as error:
-            raise ModelError(f"{folder}: cannot be read ({error.strerror})") from None
     known = ", ".join(sorted(found.name for place in (MODELS, own_models()) for found in models_in(place))) or "none"
     raise ModelError(f"no model {name!r} (looked for {INFO} in {MODELS / name} and {Path(name)}); installed models: {known}")
 
@@ -146,10 +144,8 @@ def check_files(info: ModelInfo, folder: Path, names: Sequence[str]) -> None:
         file = folder / name
         if wanted[name] is None:
             raise ModelError(f"{folder / INFO}: the model has no {name}; choose precision fp32, or train it again")
-        try:
+        with disk_errors(ModelError, file, "cannot be read", "; restore the model folder"):
             found = sha256_of(file)
-        except OSError as error:
-            raise ModelError(f"{file}: cannot be read ({error.strerror}); restore the model folder") from None
         if found != wanted[name]:
             raise ModelError(f"{file}: SHA-256 differs from {INFO}: the file is cut or damaged; restore the model folder")
 

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from core.config.models import RecordConfig
+from core.devices import disk_errors
 from core.files import name_as_text
 from core.locks import lock_file
 from core.program import program_id
@@ -217,7 +218,7 @@ def add_event(session: Path, event: Event) -> Event:
     line = sealed(json.dumps(event_to_json(event), allow_nan=False)) + "\n"
     if is_being_written(session):
         raise SessionError(f"{session}: is being recorded; stop the recording first")
-    try:
+    with disk_errors(SessionError, path, "cannot be written", "; the note was not kept"):
         with path.open("a+b", buffering=0) as file:
             with contextlib.suppress(OSError):  # a drive without locks
                 lock_file(file.fileno(), waits=True)
@@ -232,20 +233,16 @@ def add_event(session: Path, event: Event) -> Event:
                 with contextlib.suppress(OSError):
                     os.ftruncate(file.fileno(), end)
                 raise
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be written ({error.strerror}); the note was not kept") from None
     return event
 
 
 def check_parent(folder: Path) -> None:
     """Raises SessionError when no session could be made in `folder`; it is made if it is not there."""
     probe = folder / f".write-probe-{os.getpid()}"
-    try:
+    with disk_errors(SessionError, folder, "cannot be written", "; choose another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         probe.write_bytes(b"")
         probe.unlink()
-    except OSError as error:
-        raise SessionError(f"{folder}: cannot be written ({error.strerror}); choose another folder") from None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -298,14 +295,12 @@ class SessionFiles:
         self.counts = Counts()
         self.dropped_before = 0
         """Frames that the recorder had dropped before the session began."""
-        try:
+        with disk_errors(SessionError, parent, "cannot be written", "; choose another folder"):
             parent.mkdir(parents=True, exist_ok=True)
             self.folder.mkdir()
             self.counts.bytes += write_manifest(self.folder, self._manifest)
             self._rows = LineFile(self.folder / FRAMES)
             self._events = LineFile(self.folder / EVENTS)
-        except OSError as error:
-            raise SessionError(f"{parent}: cannot be written ({error.strerror}); choose another folder") from None
         self._track: VideoTrack | None = None
         self._encoder: FrameEncoder | None = None
         self._track_from_s = 0.0

@@ -29,7 +29,7 @@ from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.gate import Source
 from core.control.modes import ARMED_MODES, DRIVING_MODES, Mode
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.files import write_atomic
 from core.perception.model_file import ModelError, model_folder, read_model_info
 from core.program import known_program_id, program_id
@@ -297,10 +297,8 @@ def write_description(folder: Path, description: Description) -> None:
         raise
     except SessionError:  # damaged: what is given now takes its place
         pass
-    try:
+    with disk_errors(SessionError, path, "cannot be written", "; nothing was changed: make the folder writable"):
         write_atomic(path, (json.dumps({"format": FORMAT} | description.model_dump(), indent=1) + "\n").encode(), durable=True)
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be written ({error.strerror}); nothing was changed: make the folder writable") from None
 
 
 def remembered_folder() -> Path:

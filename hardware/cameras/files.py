@@ -13,7 +13,7 @@ import av
 import av.error
 import numpy as np
 
-from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream
+from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream, disk_errors
 from core.files import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
 from core.session.video import NoPictures, UndecodablePicture, decoded, open_video, pictures_of, upright
@@ -62,15 +62,13 @@ class FolderWatch:
 
     def _list(self) -> dict[str, _Print]:
         found = {}
-        try:
+        with disk_errors(DeviceError, self._folder, "cannot be watched", ": check the folder"):
             with os.scandir(self._folder) as entries:
                 for entry in entries:
                     if entry.name.lower().endswith(IMAGE_ENDINGS) and not entry.name.startswith("."):
                         with contextlib.suppress(FileNotFoundError):  # gone again meanwhile
                             stat = entry.stat()
                             found[entry.name] = (stat.st_size, stat.st_mtime_ns)
-        except OSError as error:
-            raise DeviceError(f"{self._folder}: cannot be watched ({error.strerror}): check the folder") from None
         return found
 
 

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream, UserError
+from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream, UserError, disk_errors
 from core.files import VIDEO_ENDINGS, ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
 from core.session.manifest import SessionError
@@ -42,14 +42,12 @@ def expand(paths: Sequence[Path]) -> list[Path]:
     """Folders become their pictures and videos in name order; files stay as they are. Links that lead nowhere count."""
     files: list[Path] = []
     for path in paths:
-        try:
+        with disk_errors(UserError, path, "cannot be read"):
             if not path.is_dir():
                 files.append(path)
                 continue
             named = sorted(file for file in path.iterdir() if file.suffix.lower() in IMAGE_ENDINGS + VIDEO_ENDINGS)
             files += [file for file in named if file.is_file() or (file.is_symlink() and not file.exists())]
-        except OSError as error:
-            raise UserError(f"{path}: cannot be read ({error.strerror})") from None
     return files
 
 

@@ -25,7 +25,7 @@ from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import CleaningConfig, Config
 from core.config.rig_file import find_rig, has_rig, list_rigs
 from core.config.section import first_problem
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.files import write_atomic
 from core.learning.dataset import WORKING_SIZE_PX
 from core.messages import message
@@ -414,11 +414,9 @@ def write_phantom(phantom: Phantom, folder: Path) -> None:
         nodes_mm=np.round(phantom.graph.nodes, 3).tolist(),
         edges=edges,
     )
-    try:
+    with disk_errors(PhantomError, folder, "cannot be written", "; make room, or choose another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         write_atomic(folder / PHANTOM_FILE, file.model_dump_json().encode() + b"\n")
-    except OSError as error:
-        raise PhantomError(f"{folder}: cannot be written ({error.strerror}); make room, or choose another folder") from None
 
 
 def read_phantom(name: str) -> Phantom:
