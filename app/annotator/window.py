@@ -49,7 +49,8 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("&Train on my annotations..."), window.train),
             None,
             MenuEntry(tr("Show where it is &saved"), window.show_where_saved, ("Ctrl+S",)),
-        ]
+        ],
+        has_recent=True,
     )
     view = window.add_view_menu(
         [

@@ -440,6 +440,7 @@ def _rater_window(
     from app.annotator.model import AnnotationModel
     from app.annotator.window import AnnotatorWindow
     from app.ui.layout_state import LayoutState, Parts, Switch, toggling
+    from app.ui.opening import note_recent
     from app.ui.window_base import run_until_closed
 
     program_id()  # asks git once, before the rater begins
@@ -453,6 +454,8 @@ def _rater_window(
     bar = window.panels.bar
     switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
     LayoutState(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
+    if len(paths) == 1 and not name:  # opened again, a study would not be blind
+        note_recent(paths[0])
     return run_until_closed(application, window, window.show_message), window.next_rater
 
 

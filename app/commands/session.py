@@ -271,12 +271,14 @@ def play(
 
         from app.player.window import PlayerWindow
         from app.ui.layout_state import LayoutState, Parts, overlay_switches
+        from app.ui.opening import note_recent
         from app.widgets.scene_overlay import Layer
 
         window = PlayerWindow(reader, config, against)
         panels = window.panels
         switches = overlay_switches(panels.overlay_bar, without=(Layer.LOUPE,) if against is not None else ())
         LayoutState(window, "player", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
+        note_recent(session)
         code = run_until_closed(application, window, window.show_message)
     sys.exit(code)
 

@@ -312,6 +312,7 @@ class RigMenuController(QObject):
         wizard.finished.connect(self._on_finished)
         desk.closed.connect(self._on_closed)
         self.wizard = wizard
+        self._window.panels.mode_bar.stop.setEnabled(False)
         wizard.show()
 
     @Slot(str)
@@ -321,6 +322,7 @@ class RigMenuController(QObject):
     @Slot(int)
     def _on_finished(self, _result: int) -> None:
         self._closing, self.wizard = self.wizard, None
+        self._window.panels.mode_bar.stop.setEnabled(True)
         QTimer.singleShot(_SLOW_MS, self._report_slow)
 
     @Slot()

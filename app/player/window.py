@@ -70,7 +70,8 @@ def add_player_menus(window: PlayerWindow) -> None:
             None,
             MenuEntry(tr("&Describe the session..."), window.describe, ("D",)),
             MenuEntry(tr("Session &library"), window.open_library, ("Ctrl+L",)),
-        ]
+        ],
+        has_recent=True,
     )
     view = add_scene_view_menu(
         window,

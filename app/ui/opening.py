@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QMimeData, QObject, Signal
+from PySide6.QtWidgets import QMenu, QWidget
 
 from app.ui.i18n import tr, tr_text
+from app.ui.layout_state import layout_settings
 from app.ui.workers import ChildProcess, command_of
 from core.session.manifest import MANIFEST
 
@@ -54,3 +58,36 @@ class OtherWindows(QObject):
 def dropped_paths(data: QMimeData) -> list[Path]:
     """The files and folders of a drag; an empty list for anything else."""
     return [Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()]
+
+
+_RECENT, _MOST_RECENT = "recent", 9
+
+
+def recent_paths() -> list[Path]:
+    """What was opened last in annotator or player, the newest first; some may be gone."""
+    kept = layout_settings().value(_RECENT) or []
+    return [Path(text) for text in ([kept] if isinstance(kept, str) else kept)]  # an INI file gives back one of one as it is
+
+
+def note_recent(path: Path) -> None:
+    """`path` is opened now; a disk that refuses is ignored."""
+    settings = layout_settings()
+    settings.setValue(_RECENT, [str(one) for one in dict.fromkeys([path.resolve(), *recent_paths()])][:_MOST_RECENT])
+    settings.sync()
+
+
+class RecentMenu(QMenu):
+    """What was opened last; `open_path` gets the one that is chosen."""
+
+    def __init__(self, parent: QWidget, open_path: Callable[[Path], None]) -> None:
+        super().__init__(parent)
+        self._open_path = open_path
+        self.aboutToShow.connect(self._fill)
+
+    def _fill(self) -> None:
+        self.clear()
+        for number, path in enumerate(recent_paths(), start=1):
+            folder = str(path.parent).replace(str(Path.home()), "~", 1).replace("&", "&&")
+            self.addAction(f"&{number}  {path.name.replace('&', '&&')}\t{folder}", partial(self._open_path, path))
+        if self.isEmpty():
+            self.addAction(tr("Nothing was opened yet")).setEnabled(False)

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import QAbstractButton, QLabel, QMainWindow
 from app.ui import theme
 from app.ui.actions import MenuEntry, action_of, add_menu
 from app.ui.i18n import tr
-from app.ui.opening import OtherWindows, dropped_paths
+from app.ui.opening import OtherWindows, RecentMenu, dropped_paths
 from app.widgets.basics import takes_enter
 from core.config.models import WindowConfig
 
@@ -103,9 +103,13 @@ class WindowFrame(QMainWindow):
 
     # ---- menus: File comes first and View second, Help (``app.ui.actions``) last
 
-    def add_file_menu(self, entries: Sequence[MenuEntry | None]) -> None:
-        """Ends with Quit."""
-        add_menu(self, tr("&File"), [*entries, None, MenuEntry(tr("&Quit"), self.close, ("Ctrl+Q",))])
+    def add_file_menu(self, entries: Sequence[MenuEntry | None], *, has_recent: bool = False) -> None:
+        """Ends with Quit; what was opened last stands behind the first entry."""
+        recent = [MenuEntry(tr("Open recent"), lambda: None)] if has_recent else []
+        ended = [*entries[:1], *recent, *entries[1:], None, MenuEntry(tr("&Quit"), self.close, ("Ctrl+Q",))]
+        actions = add_menu(self, tr("&File"), ended)
+        if has_recent:
+            actions[1].setMenu(RecentMenu(self, self.open_path))
 
     def add_view_menu(self, entries: Sequence[MenuEntry | None]) -> list[QAction]:
         """Ends with Full screen; returns the actions without the separators."""

@@ -142,7 +142,10 @@ _UP = (QEvent.Type.MouseButtonRelease, QEvent.Type.Hide, QEvent.Type.UngrabMouse
 
 
 class StopButton(_BarButton):
-    """STOP. ``asked`` comes when any mouse button goes down, again at each press, and even when it is disabled."""
+    """STOP. ``asked`` comes when any mouse button goes down, again at each press, and even when it is disabled.
+
+    It is disabled, and pale, while another window has the servos: that one has a STOP of its own.
+    """
 
     asked = Signal()
 
@@ -175,6 +178,8 @@ class StopButton(_BarButton):
     def paint(self, painter: QPainter) -> None:
         plate = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         back, ink = QColor(theme.VERMILLION), QColor(Qt.GlobalColor.white)
+        if not self.isEnabled():
+            back, ink = QColor(theme.LINE), QColor(theme.TEXT_DIM)
         is_marked = self.hasFocus() or self.underMouse()
         set_colours(painter, back.darker(150) if self.isDown() else back, theme.TEXT if is_marked else None, 2)
         painter.drawPolygon(octagon(plate, 12.0))

@@ -252,9 +252,11 @@ def test_the_wizard_gets_a_rig_that_is_closed_and_gives_it_back(window: Operator
     until(qtbot, lambda: desk.wizard is not None and not desk.wizard.model.is_busy)
     assert window.shown_tick is None
     assert desk.wizard.isModal()
+    assert not window.panels.mode_bar.stop.isEnabled(), "one bright STOP: that of the wizard"
     assert len(opened) == 2
     desk.wizard.reject()
     assert desk.wizard is None
+    assert window.panels.mode_bar.stop.isEnabled()
     until(qtbot, lambda: len(opened) == 3 and window.shown_tick is not None)
 
 
