@@ -88,7 +88,7 @@ def rehearse(
         "size_px": picture.seen.size,
         "sharp": sharp,
         "speed_mm_s": config.advice.fast_mm_s,
-        "assumed": {"head_px": head_px, "missing": missing, "robot": "twin"},
+        "assumed": {"head_px": head_px, "missing": missing, "robot": "identified" if config.twin.behaviour else "twin"},
     }
     began_s, writer = time.monotonic(), progress_writer()
     tried: list[tuple[float, list[Row]]] = []

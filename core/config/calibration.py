@@ -124,6 +124,37 @@ class PortConfig(ConfigSection):
     y_share: float = Field(ge=0.0, le=1.0)
 
 
+class Estimate(ConfigSection):
+    """A value and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Self:
+        if not self.low <= self.value <= self.high:
+            raise ValueError("value must lie between low and high")
+        return self
+
+
+class BehaviourConfig(ConfigSection):
+    """How the robot follows its servos, fitted to a recorded jog (``rig identify``)."""
+
+    session: str = Field(max_length=200, description="that it was found in")
+    bend_right_deg_per_mm: Estimate = Field(description="turn of the head per pull to the right beyond the slack")
+    bend_left_deg_per_mm: Estimate
+    slack_right_mm: Estimate = Field(description="pull to the right that bends nothing")
+    slack_left_mm: Estimate
+    play_mm: Estimate = Field(description="pull that is lost where its direction changes")
+    shaft_to_head: Estimate = Field(description="bending stiffness of the shaft over that of the head")
+    feed_share: Estimate = Field(description="way of the robot over that of the feed's joint, drawn back")
+    feed_slip: Estimate = Field(description="share of it that is lost forward")
+    delay_s: Estimate = Field(description="from a joint's motion to that in the picture")
+    head_p50_mm: float = Field(ge=0.0, description="distance of the predicted and the seen head in the half that was not fitted")
+    head_p95_mm: float = Field(ge=0.0)
+
+
 class CalibrationConfig(ConfigSection):
     """All that was calibrated; None: not calibrated."""
 

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 import platformdirs
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
+from core.config.calibration import BehaviourConfig
 from core.config.safety import SafetyConfig, ServosConfig
 from core.config.section import ConfigSection, plain_message
 from core.devices import UserError
@@ -381,6 +382,7 @@ class TwinConfig(ConfigSection):
         0.0, ge=-180.0, le=180.0, description="turn of the robot about its axis; 0: right and left act in the picture"
     )
     lens_distortion: float = Field(0.0, ge=-0.14, le=0.3, description="of its camera's lens; negative: barrel, 0: none")
+    behaviour: BehaviourConfig | None = Field(None, description="of its robot; empty: the nominal one's")
 
     @model_validator(mode="before")
     @classmethod

@@ -19,7 +19,7 @@ from typing import Any, Literal, Self
 import tomlkit
 from pydantic import Field, ValidationError, model_validator
 
-from core.config.calibration import CalibrationConfig, PortConfig
+from core.config.calibration import BehaviourConfig, CalibrationConfig, PortConfig
 from core.config.files import settings_folder
 from core.config.models import CAMERAS, RECORDED, CameraConfig, CameraName, Config, RigConfig, SegmentationConfig, TwinConfig
 from core.config.safety import OF_SERVOS, AtClose, ServosConfig
@@ -55,6 +55,7 @@ class RigFile(ConfigSection):
     calibration: CalibrationConfig | None = None
     bench: str | None = Field(None, min_length=1, description="folder of the bench, from the rig file's own folder")
     model: str | None = Field(None, min_length=1, description="model that was taught on this bench; empty: as in the settings")
+    behaviour: BehaviourConfig | None = Field(None, description="of the robot, for the twin of this bench; empty: not identified")
     keyboard_deadman: bool = Field(False, description="real servos: the program may drive with the deadman on the keyboard alone")
 
     @model_validator(mode="after")
@@ -234,6 +235,7 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
                 "calibration": calibration,
                 "bench": bench,
                 "model": before[1].model if before is not None else None,
+                "behaviour": before[1].behaviour if before is not None else None,
                 "keyboard_deadman": before is not None and before[1].keyboard_deadman,
             }
         )
@@ -358,6 +360,11 @@ def set_at_close(path: Path, how: AtClose) -> None:
     """Save in a rig file what becomes of servos that hold when the program is closed. Raises RigFileError."""
     rig = read_rig(path)
     write_rig(rig.model_copy(update={"servos": rig.servos.model_copy(update={"at_close": how})}), path, keeps_older=False)
+
+
+def set_behaviour(path: Path, behaviour: BehaviourConfig) -> None:
+    """Save in a rig file how its robot behaves. Raises RigFileError."""
+    write_rig(read_rig(path).model_copy(update={"behaviour": behaviour}), path, keeps_older=False)
 
 
 def set_port(path: Path, port: PortConfig | None) -> None:

@@ -12,6 +12,7 @@ import itertools
 import logging
 import math
 import threading
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skimage.measure import approximate_polygon, find_contours
 
+from core.config.calibration import BehaviourConfig, Estimate
 from core.control.joints import unit_vector
 from core.types import Command, Point, Points, RobotStatus, VesselGraph
 from hardware.twin.phantom import Phantom
@@ -160,6 +162,12 @@ class Specimen:
     friction: float = 0.1
     tip_set_deg: float = 0.0
     feed_force_mn: float = 600.0
+
+    @property
+    def bend_deg_per_mm(self) -> float:
+        """Bend of the free head by pull: its own stiffness and the spring of its tendons share the pull."""
+        own = self.tip_ei / (STEERABLE_LINKS * LINK_MM * _TENDON_KP_MN_MM * TENDON_OFFSET_MM**2)
+        return math.degrees(1.0 / TENDON_OFFSET_MM) / (1.0 + own)
 
     @staticmethod
     def drawn(seed: int) -> Specimen:
@@ -401,7 +409,7 @@ class LinkChain:
 
 MAX_PULL_MM = 2.0
 """Tendon pull at a bend or pitch of 1; the tip bends about 47 degrees per millimetre."""
-
+NOMINAL_DEG_PER_MM = Specimen().bend_deg_per_mm
 
 _ROTATION_PLAY_DEG = 4.0
 """Between the servo that turns the shaft and the head: the shaft twists against its friction."""
@@ -409,11 +417,41 @@ _ROTATION_PLAY_DEG = 4.0
 
 @dataclass(frozen=True, slots=True)
 class DriveProperties:
-    """``backlash_mm`` is the play between motor and tendon, ``dead_zone_mm`` the slack that must be taken up before it pulls."""
+    """What lies between the commands and the robot.
+
+    ``backlash_mm`` is the play between motor and tendon, ``dead_zone_mm`` the slack that must be taken up before it pulls (to the
+    left ``dead_zone_left_mm``, None: as to the right); beyond it a tendon moves by ``gain`` (right, left) of the motor's way. Of
+    the feed's way the robot makes ``feed_share``, forward less by the share ``feed_slip``. All comes ``delay_s`` late.
+    """
 
     slew_mm_s: float = 10.0
     backlash_mm: float = 0.08
     dead_zone_mm: float = 0.02
+    dead_zone_left_mm: float | None = None
+    gain: tuple[float, float] = (1.0, 1.0)
+    feed_share: float = 1.0
+    feed_slip: float = 0.0
+    delay_s: float = 0.0
+
+    @staticmethod
+    def identified(known: BehaviourConfig, max_pull_mm: float, rng: np.random.Generator | None = None) -> DriveProperties:
+        """Those of a robot whose full pull is `max_pull_mm`; with `rng` drawn from the intervals, else the values."""
+
+        def of(one: Estimate, unit: float = 1.0) -> float:
+            drawn = one.value if rng is None else one.value + rng.normal() * (one.high - one.low) / 3.92
+            return unit * float(np.clip(drawn, one.low, one.high))
+
+        real_mm = max_pull_mm / MAX_PULL_MM
+        right, left = (of(one, real_mm / NOMINAL_DEG_PER_MM) for one in (known.bend_right_deg_per_mm, known.bend_left_deg_per_mm))
+        return DriveProperties(
+            backlash_mm=of(known.play_mm, 1.0 / real_mm),
+            dead_zone_mm=of(known.slack_right_mm, 1.0 / real_mm),
+            dead_zone_left_mm=of(known.slack_left_mm, 1.0 / real_mm),
+            gain=(right, left),
+            feed_share=of(known.feed_share),
+            feed_slip=of(known.feed_slip),
+            delay_s=of(known.delay_s),
+        )
 
 
 class ShaftDrive:
@@ -456,8 +494,11 @@ class TendonDrive:
 
     @property
     def pull_mm(self) -> float:
-        beyond = max(0.0, abs(self._carried_mm) - self._properties.dead_zone_mm)
-        return beyond if self._carried_mm > 0 else -beyond
+        properties = self._properties
+        if self._carried_mm > 0:
+            return properties.gain[0] * max(0.0, self._carried_mm - properties.dead_zone_mm)
+        slack_mm = properties.dead_zone_mm if properties.dead_zone_left_mm is None else properties.dead_zone_left_mm
+        return -properties.gain[1] * max(0.0, -self._carried_mm - slack_mm)
 
 
 STEERABLE_MM = STEERABLE_LINKS * LINK_MM
@@ -474,8 +515,8 @@ class TwinPhysics:
     Parameters
     ----------
     phantom : where it moves.
-    seed : which robot (see ``Specimen``); 0 is the nominal one.
-    drive : the actuator layer of the tendons.
+    seed : which robot (see ``Specimen``); 0 is the nominal one, and `specimen` another one.
+    drive : the actuator layer.
     tendons_deg : directions of the tendons around the shaft; default: right, left, up, down.
 
     Notes
@@ -490,9 +531,10 @@ class TwinPhysics:
         seed: int = 0,
         drive: DriveProperties | None = None,
         tendons_deg: Sequence[float] = DEFAULT_TENDONS_DEG,
+        specimen: Specimen | None = None,
     ) -> None:
         self.phantom = phantom
-        self.specimen = Specimen.drawn(seed)
+        self.specimen = specimen or Specimen.drawn(seed)
         outlines = lumen_outline(phantom.graph)
         walls, self._port = wall_boxes(phantom, outlines)
         routes_mm = node_distances_mm(phantom)[phantom.port, list(phantom.targets)]
@@ -503,7 +545,8 @@ class TwinPhysics:
         self._centers = cKDTree(self._discs[0])
         self._outline = cKDTree(np.concatenate(outlines))
         self._lock = threading.RLock()
-        self._bend, self._pitch = TendonDrive(drive or DriveProperties()), TendonDrive(drive or DriveProperties())
+        self._drive = drive = drive or DriveProperties()
+        self._bend, self._pitch = TendonDrive(drive), TendonDrive(drive)
         self._shaft = ShaftDrive()
         self._tendons_deg = tuple(tendons_deg)
         self._tendons = tuple(map(unit_vector, tendons_deg))
@@ -522,6 +565,7 @@ class TwinPhysics:
             self._delivery_mm = 0.0
             self._contact_mn = 0.0
             self._due_s = 0.0
+            self._on_the_way = deque([Command()] * round(self._drive.delay_s / TIMESTEP_S))
 
     def _chain_of(self, size: int) -> LinkChain:
         """The chain with (`size` + 1) * 20 shaft links, at most what the longest route of the phantom needs.
@@ -573,7 +617,8 @@ class TwinPhysics:
             while self._due_s >= TIMESTEP_S / 2:
                 self._due_s -= TIMESTEP_S
                 self._fit_chain()
-                self._actuate(command)
+                self._on_the_way.append(command)
+                self._actuate(self._on_the_way.popleft())
                 self._chain.step()
                 self._contact_mn += (self._chain.wall_force_mn() - self._contact_mn) * TIMESTEP_S / _CONTACT_LOWPASS_S
 
@@ -598,6 +643,7 @@ class TwinPhysics:
         """
         insertion_mm, speed_mm_s = self._chain.insertion_mm, float(self._chain.data.qvel[0])
         slip_mm, lag_s = self.specimen.feed_force_mn / FEED_KP_MN_MM, FEED_KV / FEED_KP_MN_MM
+        advance_mm_s *= self._drive.feed_share * (1.0 - self._drive.feed_slip * (advance_mm_s > 0.0))
         moved = self._feed_mm + advance_mm_s * TIMESTEP_S
         moved = max(insertion_mm - slip_mm, min(insertion_mm + slip_mm, moved))
         self._feed_mm = max(-DRAWN_OUT_MM, min(self.chain_mm, moved))

@@ -112,6 +112,8 @@ class Rehearsal(Trial):
     def __init__(self, plan: RehearsalPlan, seed: int) -> None:
         rng = np.random.default_rng([FIRST_SEED + seed, 60013])
         drive = DriveProperties(backlash_mm=float(rng.uniform(*PLAY_MM)), dead_zone_mm=float(rng.uniform(*SLACK_MM)))
+        if (known := plan.trial.config.twin.behaviour) is not None:
+            drive = DriveProperties.identified(known, plan.trial.config.servos.max_pull_mm, rng)
         trial = replace(plan.trial, config=slowed(plan.trial.config, plan.speed))
         super().__init__(trial, seed, trial.config.policy.name, None, drive=drive)
         self._start_mm = max(5.0, self._start_mm + float(rng.uniform(-START_MM, START_MM)))

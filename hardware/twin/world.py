@@ -29,7 +29,7 @@ from hardware.simulated_clock import STEP_S, WorldClock
 from hardware.twin.actuation import DirectJoints
 from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
-from hardware.twin.physics import DriveProperties, TwinPhysics
+from hardware.twin.physics import DriveProperties, Specimen, TwinPhysics
 from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
 from hardware.twin.rendering.renderer import RenderedFrame, Renderer
 from hardware.twin.truth import RouteFollower, Truth, true_graph, truth_of
@@ -150,7 +150,12 @@ class TwinWorld:
         self._perception = perception or PerceptionConfig()
         size = (config.image_width_px, config.image_height_px)
         self.view = make_view(self.appearance, size, self.phantom)
-        self.physics = TwinPhysics(self.phantom, seed, drive, tendons_deg=[joint.angle_deg or 0.0 for joint in servos.tendons])
+        known, specimen = config.behaviour, None
+        if known is not None:
+            drive, specimen = drive or DriveProperties.identified(known, servos.max_pull_mm), Specimen.drawn(seed)
+            specimen = replace(specimen, shaft_ei=known.shaft_to_head.value * specimen.tip_ei)
+        tendons_deg = [joint.angle_deg or 0.0 for joint in servos.tendons]
+        self.physics = TwinPhysics(self.phantom, seed, drive, tendons_deg, specimen)
         self.robot = TwinRobot(self.physics)
         self._renderer = Renderer(self.phantom, self.appearance, size, seed)
         self.appearance = self._renderer.appearance

@@ -241,6 +241,25 @@ def test_the_drive_slews_and_has_play() -> None:
     assert drive.step(7.0, 1.0) == pytest.approx(MAX_PULL_MM - 0.05 - 0.02)
 
 
+def test_each_side_has_its_slack_and_its_gain() -> None:
+    drive = TendonDrive(DriveProperties(backlash_mm=0.0, dead_zone_mm=0.1, dead_zone_left_mm=0.2, gain=(1.5, 0.5)))
+    assert drive.step(0.5, 1.0) == pytest.approx(1.5 * (1.0 - 0.1))
+    assert drive.step(-0.5, 1.0) == pytest.approx(-0.5 * (1.0 - 0.2))
+
+
+def test_feed_and_delay_of_another_robot() -> None:
+    robot = DriveProperties(feed_share=1.2, feed_slip=0.25, delay_s=0.1)
+    physics = TwinPhysics(channel((-1, 75), (100, 75), 40.0), drive=robot)
+    physics.step(Command(advance_mm_s=20.0), 0.1)
+    assert physics.insertion_mm == 0.0
+    physics.step(Command(advance_mm_s=20.0), 0.9)
+    physics.step(Command(), 0.5)
+    assert physics.insertion_mm == pytest.approx(20.0 * 1.2 * 0.75, abs=0.05)
+    physics.step(Command(advance_mm_s=-10.0), 1.0)
+    physics.step(Command(), 0.5)
+    assert physics.insertion_mm == pytest.approx(20.0 * 1.2 * 0.75 - 12.0, abs=0.05)
+
+
 def test_a_controller_on_the_true_centerline_reaches_the_tree() -> None:
     """10 mm look-ahead, 20 mm/s, into the end that asks for two turns."""
     phantom = make_phantom("tree")
