@@ -1,8 +1,9 @@
-"""``rig``: list and show rigs, calibrate one without a window, and print the board."""
+"""``rig``: list and show rigs, calibrate one without a window, identify its robot, and print the board."""
 
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import sys
 from collections.abc import Iterator
@@ -12,11 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.commands.accept import accept_rig, acceptance_lines, config_of
-from app.commands.options import ConfigOption, JsonOption
+from app.commands.options import ConfigOption, JsonOption, SessionArgument
+from app.commands.progress import progress_bar
+from app.commands.workers import over_processes
 from app.ui.texts import calibrated_parts, calibration_lines, rig_line
 from core.calibration.camera import BoardError, BoardSpec
 from core.config.acceptance import read_acceptance
-from core.config.calibration import DrumsConfig
+from core.config.calibration import BehaviourConfig, DrumsConfig
 from core.config.models import Config
 from core.config.rig_file import (
     RESERVED,
@@ -27,11 +30,14 @@ from core.config.rig_file import (
     has_rig,
     list_rigs,
     rigs_folder,
+    set_behaviour,
     with_rig,
     write_rig,
 )
+from core.config.safety import JointKind, ServosConfig
 from core.devices import UserError
 from core.program import CALLED
+from core.session.reader import SessionReader
 from hardware.rig import RigKind, kind_of, rig_config
 
 if TYPE_CHECKING:
@@ -86,6 +92,7 @@ def _print_rig(path: Path, found: RigFile, notes: list[str] | None = None, *, as
         sys.stdout.write(json.dumps({**result, **found.model_dump(mode="json")}) + "\n")
     else:
         lines = [f"{found.name} ({path})", rig_line(found), *calibration_lines(found), *(notes or [])]
+        lines += behaviour_lines(found.behaviour, found.servos) if found.behaviour is not None else []
         if found.robot == "servos":
             lines += acceptance_lines(read_acceptance(path), config_of(path, found))
         sys.stdout.write("\n".join(lines) + "\n")
@@ -194,6 +201,64 @@ def calibration_steps(draft: RigDraft, steps: tuple[str, ...], pictures: int) ->
 
 
 rig.command("accept")(accept_rig)
+
+
+@rig.command("identify")
+def identify_robot(
+    session: SessionArgument,
+    kept_in: Annotated[str | None, typer.Option("--rig", help="keep it in the file of this rig, for the twin of its bench")] = None,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="processes")] = min(2, os.cpu_count() or 1),
+    as_json: JsonOption = False,
+) -> None:
+    """How the robot follows its servos, from a recorded jog of a minute: docs/bench.md says how to drive it."""
+    from hardware.twin.identification import RUNS, bench_of_session, identify, jog_of_session
+
+    rig_file = find_rig(kept_in)[0] if kept_in is not None else None
+    with SessionReader(session) as reader:
+        bench = bench_of_session(reader, rig_file.stem if rig_file is not None else None)
+        jog = jog_of_session(reader, bench)
+        assert reader.manifest is not None
+        servos = ServosConfig.model_validate(reader.manifest.config["servos"])
+    with progress_bar() as bar:
+        task = bar.add_task("runs of the twin", total=RUNS)
+
+        def spread(function: Any, tasks: Any) -> Iterator[Any]:
+            for result in over_processes(workers, function, tasks):
+                bar.advance(task)
+                yield result
+
+        found = identify(bench.phantom, jog, session.name, servos, spread)
+    if rig_file is not None:
+        set_behaviour(rig_file, found)
+    if as_json:
+        sys.stdout.write(json.dumps({"kept": str(rig_file) if rig_file else None, **found.model_dump(mode="json")}) + "\n")
+        return
+    kept = f"kept in {rig_file}" if rig_file else "not kept; --rig NAME keeps it in the rig's file"
+    sys.stdout.write("\n".join([*behaviour_lines(found, servos), kept]) + "\n")
+
+
+def behaviour_lines(found: BehaviourConfig, servos: ServosConfig) -> list[str]:
+    """What was identified, a line each, and how well it predicts."""
+    turn_mm = sum(joint.mm_per_turn for joint in servos.joints[servos.places(JointKind.ADVANCE)])
+    rows = [
+        ("bend to the right", found.bend_right_deg_per_mm, 1.0, ".1f", "deg per mm of pull"),
+        ("bend to the left", found.bend_left_deg_per_mm, 1.0, ".1f", "deg per mm of pull"),
+        ("slack to the right", found.slack_right_mm, 1.0, ".3f", "mm"),
+        ("slack to the left", found.slack_left_mm, 1.0, ".3f", "mm"),
+        ("play", found.play_mm, 1.0, ".3f", "mm"),
+        ("stiffness of the shaft", found.shaft_to_head, 1.0, ".1f", "times the head's"),
+        ("feed", found.feed_share, turn_mm, ".2f", "mm per turn"),
+        ("slip forward", found.feed_slip, 100.0, ".1f", "%"),
+        ("delay", found.delay_s, 1000.0, ".0f", "ms"),
+    ]
+    lines = [
+        f"{name + ':':24}{scale * one.value:{form}} {unit} ({scale * one.low:{form}} to {scale * one.high:{form}})"
+        for name, one, scale, form, unit in rows
+    ]
+    return [
+        *lines,
+        f"head path of the half that was not fitted: {found.head_p50_mm:.2f} mm off (50 %), {found.head_p95_mm:.2f} (95 %)",
+    ]
 
 
 @rig.command("restore-servos")

@@ -26,7 +26,7 @@ COMMANDS = (
 )  # fmt: skip
 INNER = {
     "session": ("info", "describe", "recover", "export"),
-    "rig": ("list", "show", "calibrate", "accept", "restore-servos", "board"),
+    "rig": ("list", "show", "calibrate", "accept", "identify", "restore-servos", "board"),
 }
 SLOW = ("PySide6", "numpy", "torch", "openvino", "cv2", "scipy", "mujoco", "pydantic", "rich")
 

@@ -16,9 +16,9 @@ from app import cli
 from app.commands.rig import calibrate_rig
 from app.rig_wizard.board_print import BoardPrintError, paper_for
 from core.calibration.camera import BoardError, BoardSpec, BoardView, find_board
-from core.config.calibration import CalibrationConfig, ScaleConfig
+from core.config.calibration import BehaviourConfig, CalibrationConfig, Estimate, ScaleConfig
 from core.config.models import load_config
-from core.config.rig_file import find_rig, make_rig, rig_path, write_rig
+from core.config.rig_file import find_rig, make_rig, rig_path, with_rig, write_rig
 from core.config.safety import ServosConfig
 from core.devices import DeviceError, UserError
 from hardware.calibration.rig_draft import RigDraft
@@ -27,6 +27,7 @@ from hardware.rig import RigKind
 from hardware.servos.dynamixel_bus import ServoBus
 from hardware.servos.eeprom import backups_folder
 from hardware.twin.servos.bus import SoftServoBus
+from tests.core import session_data
 
 runner = CliRunner()
 
@@ -51,6 +52,37 @@ def test_rigs_are_listed() -> None:
     assert "no TOML" in lines[1]
     found = json.loads(_run("list", "--json"))
     assert [(one["name"], one["problem"] is None) for one in found["rigs"]] == [("bench 1", True), ("broken", False)]
+
+
+@pytest.fixture
+def identified(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A session whose robot is identified at once."""
+    one = {"value": 1.0, "low": 0.9, "high": 1.1}
+    names = [name for name, field in BehaviourConfig.model_fields.items() if field.annotation is Estimate]
+    found = BehaviourConfig.model_validate({"session": "jog", "head_p50_mm": 0.2, "head_p95_mm": 0.5, **dict.fromkeys(names, one)})
+    monkeypatch.setattr("hardware.twin.identification.jog_of_session", lambda *_: None)
+    monkeypatch.setattr("hardware.twin.identification.identify", lambda *_: found)
+    session = session_data.record(tmp_path, [session_data.tick_of(0, 1.0)])
+    manifest = json.loads((session / "manifest.json").read_text())
+    manifest |= {"rig": "bench 1", "config": load_config().model_dump(mode="json")}
+    (session / "manifest.json").write_text(json.dumps(manifest))
+    return session
+
+
+def test_what_was_identified_is_kept_where_it_was_asked_for(identified: Path) -> None:
+    path = write_rig(make_rig(load_config(), "bench 1", None))
+    before = path.read_bytes()
+    assert "not kept" in _run("identify", str(identified)) and path.read_bytes() == before
+    write_rig(make_rig(load_config(), "bench 2", None))
+    with pytest.raises(UserError, match="is of the rig bench 1, not of bench 2"):
+        _run("identify", str(identified), "--rig", "bench 2")
+    result = json.loads(_run("identify", str(identified), "--rig", "Bench 1", "--json"))
+    assert result["play_mm"] == {"value": 1.0, "low": 0.9, "high": 1.1} and result["kept"] == str(path)
+    behaviour = find_rig("bench 1")[1].behaviour
+    assert behaviour is not None and behaviour.head_p95_mm == 0.5
+    assert make_rig(with_rig(load_config(), find_rig("bench 1")[1], path), "bench 1", None).behaviour == behaviour
+    shown = _run("show", "bench 1")
+    assert "play:                   1.000 mm (0.900 to 1.100)" in shown and "0.50 (95 %)" in shown
 
 
 def test_a_rig_is_shown() -> None:
