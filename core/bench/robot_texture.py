@@ -140,7 +140,9 @@ def write_textures(textures: Sequence[RobotTexture], folder: Path) -> None:
         else:
             path.unlink(missing_ok=True)
     except OSError as error:
-        raise BenchError("{path}: cannot be written ({why})", path=path, why=error.strerror) from None
+        raise BenchError(
+            "{path}: cannot be written ({why}); make room, or choose another folder", path=path, why=error.strerror
+        ) from None
 
 
 def read_textures(folder: Path) -> list[RobotTexture]:
