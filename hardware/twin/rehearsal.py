@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,11 +22,12 @@ from core.evaluation.trial import Row, TrialSample
 from core.perception.centerline import centerline_at, plan_route
 from core.perception.pose import measure_pose
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
-from core.types import Frame, Image, Point, Points, Reason, Refusal, RobotPath, Scene
+from core.types import Frame, Image, Masks, Point, Points, Reason, Refusal, RobotPath, Scene
 from hardware.twin.phantom import Phantom
 from hardware.twin.physics import MAX_PULL_MM, ROBOT_RADIUS_MM, STEERABLE_MM, DriveProperties
 from hardware.twin.trial import FIRST_SEED, Target, Trial, TrialPlan
 from hardware.twin.truth import true_graph, visible_path, with_caps
+from hardware.twin.world import TwinWorld
 
 BEND_DEG_PER_MM = 47.0
 """Bend of the head per millimetre of pull, as measured in the twin."""
@@ -121,6 +123,7 @@ class Rehearsal(Trial):
         view = self._world.view
         self._scale = trial.config.perception.working_size_px / max(view.size)
         self._graph = true_graph(self._world.phantom, view, self._scale)
+        self._masks_shown = _vessel_masks(self._world, self._scale)
         self._error_px, self._is_blind = rng.normal(0.0, 1.0, 2), False
 
     def _read(self) -> Frame:
@@ -148,7 +151,7 @@ class Rehearsal(Trial):
         if line is not None:
             centerline = centerline_at(self._graph, robot.head, line.direction, config.vectors.vessel_half_length_px, route)
         vessel = fit_vessel_vector(centerline) if centerline is not None else None
-        scene = replace(scene, path=robot, vessel_graph=self._graph, route=route, centerline=centerline)
+        scene = replace(scene, masks=self._masks_shown, path=robot, vessel_graph=self._graph, route=route, centerline=centerline)
         if line is None or vessel is None:
             return replace(scene, refusal=Refusal(Reason.NO_VESSEL))
         return replace(scene, robot_vector=line, vessel_vector=vessel, pose=measure_pose(line, vessel, config.pose))
@@ -167,6 +170,14 @@ class Rehearsal(Trial):
         along = geometry.arc_length(path)
         share = np.clip(1.0 - (along[-1] - along) / _LINE_PX, 0.0, 1.0)
         return np.asarray(path + share[:, None] * self._error_px * (self._eye.head_px / _MEDIAN))
+
+
+def _vessel_masks(world: TwinWorld, scale: float) -> Masks:
+    """The true vessel at working size, without a robot."""
+    vessel = world.picture(world.physics.robot_points_mm()).vessel.astype(np.float32)
+    size = round(world.view.size[0] * scale), round(world.view.size[1] * scale)
+    seen = np.asarray(cv2.resize(vessel, size, interpolation=cv2.INTER_AREA), np.float32)
+    return Masks(seen >= 0.5, np.zeros(seen.shape, bool), seen, np.zeros(seen.shape, np.float32))
 
 
 def slowed(config: Config, share: float) -> Config:

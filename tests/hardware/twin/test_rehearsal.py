@@ -72,6 +72,10 @@ def test_a_run_is_the_same_for_its_seed_and_perceives_with_errors(monkeypatch: p
     assert rows[0] == rows[1] and rows[0]["outcome"] == "time out"
     assert rows[0]["answered_share"] == 1.0 and rows[2]["answered_share"] < 0.5
     assert 0.2 * HEAD_PX < rows[0]["head_error_median_px"] < 4.0 * HEAD_PX
+    run = Rehearsal(replace(plan, missing=0.0), 3)
+    run._world.insert(30.0, target=run.target.node)
+    scene = run._perceive(run._read())
+    assert scene.masks is not None and scene.masks.vessel[240, 320] and not scene.masks.vessel[5, 5], "what lies in sight counts"
 
 
 def test_slower_is_a_share_of_all_advised_speeds() -> None:
