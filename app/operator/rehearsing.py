@@ -25,6 +25,8 @@ from hardware.preflight.preflight import Level
 from hardware.rig import RigKind
 
 RUNS, MINUTES = 50, 2
+_LONGEST_MS = 150_000
+"""On a busy computer no run may have ended after these minutes."""
 _WATCH_MS = 1000
 """Settings change without a signal."""
 _LACKING = mark("this destination was not rehearsed")
@@ -58,6 +60,8 @@ class RehearsalController(QObject):
         window.rig.add_guard(self._may_ask)
         self._card.pressed.connect(self.toggle)
         self._card.closed.connect(self._card.hide)
+        self._limit = QTimer(self, singleShot=True, interval=_LONGEST_MS)
+        self._limit.timeout.connect(self._on_too_long)
         self._watch = QTimer(self, interval=_WATCH_MS)
         self._watch.timeout.connect(self._show_lack)
         self._watch.start()
@@ -122,6 +126,7 @@ class RehearsalController(QObject):
         child.ended.connect(self._on_ended)
         self._child, self._done, self._so_far, self.result = child, 0, None, None
         self._card.show_running(0, RUNS, None)
+        self._limit.start()
         child.start()
 
     def _on_told(self, record: dict[str, Any]) -> None:
@@ -140,6 +145,7 @@ class RehearsalController(QObject):
 
     def _on_ended(self, code: int, said: str) -> None:
         self._child = None
+        self._limit.stop()
         if self.result is not None:
             self._card.show_result(self.result)
             self._show_lack()
@@ -148,7 +154,12 @@ class RehearsalController(QObject):
         self.forget()
         self._window.say(tr("Not rehearsed: {why}", why=tr_text(said) or tr("exit code {code}", code=code)), is_fault=True)
 
+    def _on_too_long(self) -> None:
+        self.forget()
+        self._window.say(tr("Not rehearsed: the computer is too busy; close other programs, and rehearse again"), is_fault=True)
+
     def _end(self) -> None:
+        self._limit.stop()
         child, self._child = self._child, None
         if child is not None:
             child.leave()

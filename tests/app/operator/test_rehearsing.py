@@ -130,6 +130,10 @@ def test_it_is_cancelled_at_once(make: MakeController, given: Path, qtbot: QtBot
     assert card.button.text() == "Rehearse  (T)" and window.panels.live._marks.rehearsal is None
     until(qtbot, lambda: not child.is_running)
     assert controller.result is None
+    controller._limit.setInterval(1)
+    controller.toggle()
+    until(qtbot, lambda: controller._child is None)
+    assert window.panels.toast.text().startswith("Not rehearsed: the computer is too busy")
 
 
 def test_what_prevents_it_is_one_line(make: MakeController, given: Path, qtbot: QtBot) -> None:
