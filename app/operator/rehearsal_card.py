@@ -76,9 +76,13 @@ class RehearsalCard(QFrame):
         """How many runs have ended, and what they say."""
         self._show(tr("Cancel"), tr("Rehearsing: {done} of {total}", done=done, total=total), result, done / max(1, total))
 
-    def show_result(self, result: RehearsalResult) -> None:
+    def show_result(self, result: RehearsalResult, *, is_real: bool = False) -> None:
+        """`is_real`: the bench has a robot of its own."""
         title = tr("{share:.0f} % of {runs} runs arrived", share=100 * result.arrived.share, runs=result.runs)
         self._show("", title, result)
+        if is_real and result.assumed.get("robot") != "identified":
+            note = tr("With the nominal robot: rig identify measures yours")
+            self._detail.setText(f"{self._detail.text()}\n{note}")
         said, colour = advice_of(result)
         self._advice.setText(said)
         self._advice.setStyleSheet(_LABEL.format(colour, 13, 600))

@@ -103,7 +103,7 @@ class RehearsalController(QObject):
         if self._child is not None:
             self.forget()
         elif self.result is not None and self._card.isHidden():
-            self._card.show_result(self.result)
+            self._card.show_result(self.result, is_real=self._window.rig.kind is RigKind.LIVE)
         else:
             self._begin()
 
@@ -147,7 +147,7 @@ class RehearsalController(QObject):
         self._child = None
         self._limit.stop()
         if self.result is not None:
-            self._card.show_result(self.result)
+            self._card.show_result(self.result, is_real=self._window.rig.kind is RigKind.LIVE)
             self._show_lack()
             self._window.recorder.keep_target(self._window.target, self.result.model_dump(mode="json"))
             return

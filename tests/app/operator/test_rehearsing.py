@@ -44,6 +44,7 @@ FOUND: dict[str, Any] = {
     "sharp": [{"xy": [200.0, 180.0], "turn_deg": 74.0, "limit_deg": 61.0}],
     "speed_mm_s": 8.0,
     "recommended_speed_mm_s": 5.6,
+    "assumed": {"head_px": 1.5, "missing": 0.05, "robot": "twin"},
 }
 WAITS = "sleep 60"
 TARGET: Point = (300.0, 200.0)
@@ -175,3 +176,14 @@ def test_a_hand_over_may_need_one(make: MakeController, given: Path, qtbot: QtBo
 
 def test_the_result_is_read_as_it_is_written() -> None:
     assert RehearsalResult.model_validate(FOUND).model_dump(mode="json") | {"size_px": [640, 480]} == FOUND
+
+
+def test_the_card_says_whose_robot_it_was(make: MakeController) -> None:
+    card = card_of(make(said(FOUND)))
+    result = RehearsalResult.model_validate(FOUND)
+    card.show_result(result)
+    assert "rig identify" not in card.text
+    card.show_result(result, is_real=True)
+    assert "With the nominal robot: rig identify measures yours" in card.text
+    card.show_result(result.model_copy(update={"assumed": {"robot": "identified"}}), is_real=True)
+    assert "rig identify" not in card.text
