@@ -538,7 +538,8 @@ class SessionWriter:
         self._clock = clock
         self._changed = threading.Condition()
         self._waiting: deque[RecordedTick | _Order] = deque()
-        self._pictures_waiting = 0
+        self.pictures_waiting = 0
+        """Handed over and not yet taken up."""
         self._starts_waiting = 0
         self._dropped = 0
         self._ends_waiting: deque[int] = deque()
@@ -593,10 +594,10 @@ class SessionWriter:
         with self._changed:
             if self._is_closing or not self._thread.is_alive():
                 return False
-            if self._pictures_waiting >= self._max_queue:
+            if self.pictures_waiting >= self._max_queue:
                 self._dropped += 1
                 return False
-            self._pictures_waiting += 1
+            self.pictures_waiting += 1
             self._waiting.append(RecordedTick(tick, drive, bus, self._dropped))
             self._changed.notify()
         return True
@@ -620,11 +621,6 @@ class SessionWriter:
     def is_alive(self) -> bool:
         """False once it is closed, or has ended because of a fault of the program (see the status)."""
         return self._thread.is_alive()
-
-    @property
-    def pictures_waiting(self) -> int:
-        """Handed over and not yet taken up."""
-        return self._pictures_waiting
 
     def status(self) -> RecordStatus:
         """How it is going, now."""
@@ -703,7 +699,7 @@ class SessionWriter:
                     self._changed.wait(_DISK_CHECK_S)
                 if self._waiting:
                     item = self._waiting.popleft()
-                    self._pictures_waiting -= isinstance(item, RecordedTick)
+                    self.pictures_waiting -= isinstance(item, RecordedTick)
                     return item
                 if self._is_closing:
                     return None

@@ -43,7 +43,6 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
                 for number, handler in handlers.items():
                     signal.signal(number, handler)
         texts = [stream.read() for stream in (output, errors) if stream.seek(0) == 0]
-    assert isinstance(code, int)
     return subprocess.CompletedProcess(command, code, *texts)
 
 

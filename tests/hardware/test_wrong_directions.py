@@ -53,7 +53,6 @@ def _handed_over(
     bench: FaultBench, wiring: Wiring, seconds: float, target: Point = TARGET, *, roll_deg: float = 0.0, side: int = 1
 ) -> Course:
     robot = bench.robot
-    assert isinstance(robot, LockStepServos)
     joints = JointsToTwin(bench.config.servos, wiring(robot.positions_mm()), roll_deg)
     bench.world.drive = lambda duration_s: joints.command(wiring(robot.positions_mm()), duration_s)
     bench.engine.set_target(target)

@@ -120,7 +120,7 @@ class SoftServoBus:
     -----
     To a test: ``modify_servo`` reaches one servo (see ``SoftServo``), ``faults`` spoils answers, ``brown_out`` dips the supply of
     all, ``write_by_other`` writes as another program on the same line would, ``attach_wire`` loads a joint with an elastic wire,
-    and ``wire_n`` and ``motor_n`` tell the forces.
+    and ``wire_n`` tells its force.
 
     Packets without stuffing, or with a wrong CRC, speed or length are ignored. As in the vendor's protocol the answers to a group
     read follow one another, so a silent servo also silences those behind it.
@@ -218,13 +218,6 @@ class SoftServoBus:
             self._advance()
             motor = self._servos[servo_id].motor
             return abs(motor.wire.torque_mnm(motor.position)) / _radius_mm(self._joint(servo_id)) if motor.wire is not None else 0.0
-
-    def motor_n(self, servo_id: int) -> float:
-        """Force (N) of a joint's motor at its drum, in the joint's positive direction, friction of the gear included."""
-        with self._lock:
-            self._advance()
-            joint = self._joint(servo_id)
-            return joint.sign * self._servos[servo_id].torque_mnm / _radius_mm(joint)
 
     def _joint(self, servo_id: int) -> JointConfig:
         return next(joint for joint in self._joints if joint.id == servo_id)

@@ -14,7 +14,7 @@ from app.operator.window import OperatorWindow
 from core.config.models import Config, load_config
 from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.perception.model_file import own_models
-from core.types import Reason, Refusal, Tick
+from core.types import Reason, Refusal
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeEngine, until
 
@@ -32,7 +32,6 @@ def side(running: OperatorWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def refuse(window: OperatorWindow, refusal: Refusal | None) -> None:
     """The picture on the screen has this refusal."""
     tick = window.shown_tick
-    assert isinstance(tick, Tick)
     window.shown_tick = replace(tick, scene=replace(tick.scene, refusal=refusal))
 
 

@@ -158,7 +158,6 @@ def test_a_long_section_never_stands_squeezed(settings: SettingsDialog) -> None:
 def test_an_empty_field_says_so_and_what_that_means(settings: SettingsDialog) -> None:
     settings.go_to("camera.exposure_ms")
     field = settings.page.fields["camera.exposure_ms"]
-    assert isinstance(field.editor, QLineEdit)
     assert field.editor.placeholderText() == "not set"
     assert field.default_text == "not set"
     assert field.setting.description.startswith("empty: automatic")

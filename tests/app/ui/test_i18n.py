@@ -13,7 +13,7 @@ from unittest.mock import Mock
 import pytest
 from PySide6.QtCore import QCoreApplication, QLocale, Qt, QTranslator
 from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QApplication, QDialogButtonBox, QMenu
+from PySide6.QtWidgets import QApplication, QDialogButtonBox
 from pytestqt.qtbot import QtBot
 
 from app.annotator.panels import QueueModel
@@ -278,7 +278,6 @@ def _menu_texts(window: OperatorWindow) -> list[str]:
     texts = []
     for action in window.menuBar().actions():
         menu = action.menu()
-        assert isinstance(menu, QMenu)
         texts += [plain(action.text()), *(plain(entry.text()) for entry in menu.actions() if not entry.isSeparator())]
     return texts
 

@@ -17,7 +17,7 @@ from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_wo
 from core.config.safety import SafetyConfig
 from core.control.kept_zero import ZeroRequest
 from hardware.servos.bus_ipc import BusPhase, BusStatus, CycleTimes
-from hardware.servos.registers import HardwareError, MissingServo, ServoState
+from hardware.servos.registers import HardwareError, MissingServo
 from tests.app.bus_status import DASH, MINUS, SERVOS, bus, servo
 from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
@@ -327,7 +327,6 @@ def test_a_robot_of_another_shape_has_rows_of_its_own(qtbot: QtBot) -> None:
     assert three.title == "tendon 1 + tendon 2 + tendon 3"
     assert three.wanted_mm == pytest.approx(0.9)
     state = replace(servo(3), name="rotation", position_mm=30.0)
-    assert isinstance(state, ServoState)
     rows = servo_rows(replace(bus(), servos=(*bus().servos[:2], bus().servos[4], state), zeroed=(True,) * 4), TURNED, SAFETY)
     tips = [cell.tip for cell in rows[3]]
     assert any("envelope -200 to 200°" in tip for tip in tips), tips

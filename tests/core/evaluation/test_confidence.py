@@ -14,7 +14,7 @@ from core.perception.model_file import ModelError, read_model_info
 from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures, confidence_features
 from core.perception.unet import DualUNet, UNetShape
 from core.perception.vectors import fit_robot_vector
-from core.types import Centerline, Masks, RobotPath, Vector
+from core.types import Centerline, Masks, RobotPath
 
 CONFIG = PerceptionConfig()
 SHAPE = (120, 200)
@@ -32,7 +32,6 @@ def _masks(robot_probability: float = 1.0) -> Masks:
 
 def _collect(masks: Masks, bridged_px: float = 0.0) -> ConfidenceFeatures:
     vector = fit_robot_vector(LINE, 40.0)
-    assert isinstance(vector, Vector)
     path = RobotPath(LINE, 1.3, 0.9, True, bridged_px, 4.5)
     return confidence_features(path, vector, PIECE, masks, CONFIG)
 
