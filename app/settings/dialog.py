@@ -607,7 +607,8 @@ class SettingsDialog(QDialog):
         self._items["perception"].setExpanded(True)
 
     def _lay_out(self) -> None:
-        self.search.setPlaceholderText(tr("Search name, meaning, unit (Ctrl+F); Space is STOP while the robot can move"))
+        self.search.setPlaceholderText(tr("Search (Ctrl+F); Space may be STOP"))
+        self.search.setToolTip(tr("Search name, meaning, unit (Ctrl+F); Space is STOP while the robot can move"))
         self.search.setAccessibleName(tr("Search settings"))
         self.search.setClearButtonEnabled(True)
         self.tree.setColumnCount(2)

@@ -254,12 +254,15 @@ QSpinBox::up-arrow, QDoubleSpinBox::up-arrow { width: 0; height: 0; border-left:
 QSpinBox::down-arrow, QDoubleSpinBox::down-arrow { width: 0; height: 0; border-left: 4px solid @RAISED;
     border-right: 4px solid @RAISED; border-top: 5px solid @TEXT_DIM; }
 QComboBox::drop-down { border: none; width: 24px; }
-QComboBox::down-arrow { width: 0; height: 0; border-left: 4px solid @RAISED; border-right: 4px solid @RAISED;
-    border-top: 5px solid @TEXT_DIM; margin-right: 10px; }
+QComboBox::down-arrow, QPushButton::menu-indicator { width: 0; height: 0; border-left: 4px solid @RAISED;
+    border-right: 4px solid @RAISED; border-top: 5px solid @TEXT_DIM; margin-right: 10px; }
+QPushButton::menu-indicator { subcontrol-origin: padding; subcontrol-position: right center; right: -3px; }
 QComboBox QAbstractItemView { background: @RAISED; color: @TEXT; border: 1px solid @LINE;
     selection-background-color: @SKY; selection-color: @INK; outline: none; }
 QPushButton { background: @RAISED; color: @TEXT; border: 1px solid @LINE; border-radius: 5px;
     padding: 4px 12px; min-height: 22px; }
+QProgressBar[textVisible="false"] { background: @LINE; border: none; border-radius: 3px; }
+QProgressBar[textVisible="false"]::chunk { background: @SKY; border-radius: 3px; }
 QTabWidget::pane { border: none; }
 QTabBar { background: transparent; }
 QTabBar::tab { background: @WINDOW; color: @TEXT_DIM; border: 1px solid @LINE; border-bottom: none;
