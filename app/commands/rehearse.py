@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -25,6 +25,7 @@ from app.commands.progress import (
 )
 from app.commands.workers import over_processes
 from core.config.models import Config, load_config
+from core.config.rig_file import find_rig, set_pursuit
 from core.devices import UserError
 from core.evaluation.trial import Row, summarise
 
@@ -54,6 +55,8 @@ def rehearse(
     head_px: Annotated[float, typer.Option(min=0.0, max=50.0, help="error of the perceived head, median, in px at 640")] = 1.5,
     missing: Annotated[float, typer.Option(min=0.0, max=0.9, help="share of the frames without an answer")] = 0.05,
     max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a run has failed")] = 120.0,
+    tune: Annotated[bool, typer.Option("--tune", help="search better settings of pursuit for this way, instead")] = False,
+    kept_in: Annotated[str | None, typer.Option("--rig", help="--tune: keep them in the file of this rig")] = None,
     as_json: JsonOption = False,
     progress_json: ProgressOption = False,
     given: Annotated[bool, typer.Option("--given", hidden=True, help="configuration and picture's size on standard input")] = False,
@@ -67,6 +70,8 @@ def rehearse(
     from hardware.twin.rehearsal import SPEEDS, RehearsalPlan, is_good
     from hardware.twin.trial import TrialPlan
 
+    if kept_in is not None and not tune:
+        raise UserError("--rig keeps what --tune finds: give both, or --bench for the bench of a rig")
     if progress_json:
         report_progress()
     end_like_an_interrupt()
@@ -82,6 +87,9 @@ def rehearse(
             f"head bends by {turn['limit_deg']:.0f} there",
             soft_wrap=True,
         )
+    if tune:
+        _tune(RehearsalPlan(trial, head_px, missing), runs, seed, workers, kept_in, as_json=as_json)
+        return
     about: dict[str, Any] = {
         "bench": bench or config.twin.phantom,
         "target_xy": picture.pixels([picture.target.point_mm])[0],
@@ -112,6 +120,62 @@ def rehearse(
         sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
     else:
         _print(about)
+
+
+def _tune(plan: RehearsalPlan, runs: int, seed: int, workers: int, rig: str | None, *, as_json: bool) -> None:
+    """Search settings of pursuit, compare them with the configured ones on other seeds, and keep them where they are better."""
+    from hardware.twin.tuning import SEARCH_RUNS, SEARCH_SEEDS, SETTINGS, compared, run_candidate, search
+
+    path = find_rig(rig)[0] if rig is not None else None
+    with progress_bar() as bar:
+        task = bar.add_task("runs of the search", total=SEARCH_RUNS)
+
+        def spread(function: Any, tasks: Any) -> Iterator[Any]:
+            for result in over_processes(workers, function, tasks):
+                bar.advance(task)
+                yield result
+
+        own = {name: float(getattr(plan.trial.config.policy.pursuit, name)) for name in SETTINGS}
+        found = search(plan, seed, spread)
+        rows: tuple[list[Row], list[Row]] = ([], [])
+        if found != own:
+            task = bar.add_task("runs of the comparison", total=2 * runs)
+            seeds = range(seed + SEARCH_SEEDS, seed + SEARCH_SEEDS + runs)
+            tasks = [(place, tuned, one) for one in seeds for place, tuned in enumerate((own, found))]
+            for place, row in spread(partial(run_candidate, plan), tasks):
+                rows[place].append(row)
+    before, after = (sorted(part, key=lambda row: int(row["seed"])) for part in rows)
+    about: dict[str, Any] = {"configured": own, "found": found, "search_runs": SEARCH_RUNS, "kept": None}
+    if before:
+        about |= {"before": _figures(before), "after": _figures(after), "changes": compared(before, after)}
+    is_better = bool(before) and about["changes"]["is_better"]
+    if path is not None and is_better:
+        set_pursuit(path, found)
+        about["kept"] = str(path)
+    if as_json:
+        sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
+        return
+    _print_tuned(about, is_better=is_better)
+
+
+def _print_tuned(about: dict[str, Any], *, is_better: bool) -> None:
+    own, found = about["configured"], about["found"]
+    lines = [f"{name} {value:g} -> {found[name]:g}" for name, value in own.items() if found[name] != value]
+    for title in ("before", "after") if lines else ():
+        one, arrived = about[title], about[title]["arrived"]
+        time_s, p95_n = one["time_s"]["median"], one["wall_force_n"]["p95"] or 0.0
+        took = "" if time_s is None else f", {time_s:.1f} s (median)"
+        lines.append(
+            f"{title}: {arrived['share']:.0%} of {one['runs']} arrived ({arrived['low']:.0%} to {arrived['high']:.0%}){took}, "
+            f"{p95_n:.3f} N (95 %)"
+        )
+    for name in ("time", "wall_force") if lines else ():
+        one = about["changes"][name]
+        lines.append(f"{name.replace('_', ' ')} {one['change']:+.0%} ({one['low']:+.0%} to {one['high']:+.0%})")
+    kept = f"kept in {about['kept']}" if about["kept"] else "not kept; --rig NAME keeps them in the rig's file"
+    lines.append(kept if is_better else "the configured settings stay: none is surely better")
+    for line in lines:
+        console.print(line, soft_wrap=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,6 +9,7 @@ import errno
 import os
 import re
 import tomllib
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -21,7 +22,17 @@ from pydantic import Field, ValidationError, model_validator
 
 from core.config.calibration import BehaviourConfig, CalibrationConfig, PortConfig
 from core.config.files import settings_folder
-from core.config.models import CAMERAS, RECORDED, CameraConfig, CameraName, Config, RigConfig, SegmentationConfig, TwinConfig
+from core.config.models import (
+    CAMERAS,
+    RECORDED,
+    CameraConfig,
+    CameraName,
+    Config,
+    PursuitConfig,
+    RigConfig,
+    SegmentationConfig,
+    TwinConfig,
+)
 from core.config.safety import OF_SERVOS, AtClose, ServosConfig
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError, disk_errors
@@ -56,11 +67,16 @@ class RigFile(ConfigSection):
     bench: str | None = Field(None, min_length=1, description="folder of the bench, from the rig file's own folder")
     model: str | None = Field(None, min_length=1, description="model that was taught on this bench; empty: as in the settings")
     behaviour: BehaviourConfig | None = Field(None, description="of the robot, for the twin of this bench; empty: not identified")
+    pursuit: dict[str, float] | None = Field(None, description="settings of policy.pursuit, tuned on this bench (rehearse --tune)")
     keyboard_deadman: bool = Field(False, description="real servos: the program may drive with the deadman on the keyboard alone")
 
     @model_validator(mode="after")
     def _check_parts(self) -> Self:
         check_rig_name(self.name)
+        try:
+            PursuitConfig.model_validate(PursuitConfig().model_dump() | (self.pursuit or {}))
+        except ValidationError as error:
+            raise ValueError(f"pursuit: {first_problem(error)}") from None
         if self.kind in RECORDED:
             raise ValueError("kind must be that of a camera")
         if (self.kind == "twin") is not (self.twin is not None):
@@ -236,6 +252,7 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
                 "bench": bench,
                 "model": before[1].model if before is not None else None,
                 "behaviour": before[1].behaviour if before is not None else None,
+                "pursuit": before[1].pursuit if before is not None else None,
                 "keyboard_deadman": before is not None and before[1].keyboard_deadman,
             }
         )
@@ -331,6 +348,12 @@ def _steered(config: Config, known: CalibrationConfig | None) -> Config:
     return config.model_copy(update={"policy": config.policy.model_copy(update={"drive": drive})})
 
 
+def with_pursuit(config: Config, tuned: Mapping[str, float]) -> Config:
+    """The configuration with these settings of ``policy.pursuit``."""
+    pursuit = config.policy.pursuit.model_copy(update=dict(tuned))
+    return config.model_copy(update={"policy": config.policy.model_copy(update={"pursuit": pursuit})})
+
+
 _LEAST_TURN_DEG, _MOST_TURN_DEG = 10.0, 720.0
 """Ends of ``policy.drive.turn_deg`` from a rig file: less turn than that would make the steering too strong."""
 
@@ -340,6 +363,7 @@ def as_calibrated(config: Config) -> Config:
     found = rig_in_use(config)
     known = found[1].calibration if found is not None else None
     config = _steered(scaled(config, known), known)
+    config = with_pursuit(config, found[1].pursuit or {}) if found is not None else config
     if found is not None and found[1].bench is not None:
         bench = str(found[0].parent / found[1].bench)  # an absolute one stays
         config = config.model_copy(update={"perception": config.perception.model_copy(update={"bench": bench})})
@@ -365,6 +389,11 @@ def set_at_close(path: Path, how: AtClose) -> None:
 def set_behaviour(path: Path, behaviour: BehaviourConfig) -> None:
     """Save in a rig file how its robot behaves. Raises RigFileError."""
     write_rig(read_rig(path).model_copy(update={"behaviour": behaviour}), path, keeps_older=False)
+
+
+def set_pursuit(path: Path, tuned: Mapping[str, float]) -> None:
+    """Save in a rig file which settings of ``policy.pursuit`` were tuned on its bench. Raises RigFileError."""
+    write_rig(read_rig(path).model_copy(update={"pursuit": dict(tuned)}), path, keeps_older=False)
 
 
 def set_port(path: Path, port: PortConfig | None) -> None:

@@ -22,9 +22,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from core import geometry
 from core.bench.bench import INFO, PHANTOM_FILE, read_bench
 from core.bench.robot_texture import entry_of, read_textures
-from core.config.calibration import BehaviourConfig, CalibrationConfig, ScaleConfig
+from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import CleaningConfig, Config
-from core.config.rig_file import find_rig, has_rig, list_rigs
+from core.config.rig_file import RigFile, find_rig, has_rig, list_rigs
 from core.config.section import first_problem
 from core.devices import UserError, disk_errors
 from core.files import write_atomic
@@ -108,31 +108,31 @@ def phantom_name(bench: str) -> str:
 def with_own_phantom(config: Config, bench: str) -> Config:
     """The configuration with the twin in the phantom of a bench, seen at the size and scale of its picture, in that picture.
 
-    A look that is configured stays; the robot behaves as that of the bench's rig, where it was identified. Raises PhantomError.
+    A look that is configured stays. The robot behaves, and pursuit is tuned, as the bench's rig file says. Raises PhantomError.
     """
     name = phantom_name(bench)
     view = read_phantom(name).view
     assert view is not None
     (width, height), working = view.size, config.perception.working_size_px
     twin: dict[str, Any] = {"phantom": name, "image_width_px": max(width, 160), "image_height_px": max(height, 120)}
-    if (behaviour := _behaviour_of(bench)) is not None:
-        twin["behaviour"] = behaviour
+    rig = _rig_of(bench)
+    if rig is not None and rig.behaviour is not None:
+        twin["behaviour"] = rig.behaviour
     if config.twin.look is None and not config.twin.appearance_seed:
         twin["look"] = OWN_LOOK
     zoom = view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2)) * working / max(view.size)
-    pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom})
+    pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom} | (rig.pursuit or {} if rig is not None else {}))
     policy = config.policy.model_copy(update={"pursuit": pursuit})
     return config.model_copy(update={"twin": config.twin.model_copy(update=twin), "policy": policy})
 
 
-def _behaviour_of(bench: str) -> BehaviourConfig | None:
-    """What was identified of the robot of a bench: of the rig of this name, else of the first one that has this bench."""
+def _rig_of(bench: str) -> RigFile | None:
+    """The rig of this name, else the first one that has this bench."""
     if has_rig(bench):
-        return find_rig(bench)[1].behaviour
+        return find_rig(bench)[1]
     folder = bench_folder(bench)
-    rigs = [(one.path.parent, one.rig) for one in list_rigs() if one.rig is not None]
-    found = (rig.behaviour for place, rig in rigs if rig.behaviour and rig.bench and (place / rig.bench).resolve() == folder)
-    return next(found, None)
+    rigs = ((one.path.parent, one.rig) for one in list_rigs())
+    return next((rig for place, rig in rigs if rig and rig.bench and (place / rig.bench).resolve() == folder), None)
 
 
 def view_of_scale(scale: ScaleConfig, size: tuple[int, int]) -> CameraView:

@@ -13,6 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
+from core.config.models import load_config
+from core.config.rig_file import as_calibrated, find_rig, make_rig, with_rig, write_rig
 from core.evaluation.rehearsal import RehearsalResult
 
 TARGET = "430,400"
@@ -82,3 +84,35 @@ def test_a_short_time_gives_the_first_runs_and_no_advice(
     order = [0, 1, 3, 4, 2, *range(5, 50)]  # number 2 has not ended when the time is over
     (told,) = rehearse(lambda _speed, seed: row(order[seed]), "--json", "--minutes", "0.3")
     assert told["runs"] == 2 and told["recommended_speed_mm_s"] is None
+
+
+@pytest.mark.usefixtures("own_folder")
+def test_tuned_settings_are_kept_where_they_are_better_and_it_was_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = tmp_path / "tree.toml"
+    config.write_text('[twin]\nphantom = "tree"\n')
+    path = write_rig(make_rig(load_config(), "bench 1", None))
+    gain_of_best = 0.0
+
+    def over(_workers: int, _function: object, tasks: Sequence[Any]) -> Iterator[tuple[int, dict[str, Any]]]:
+        for number, tuned, seed in tasks:  # less gain is quicker
+            told = row(seed) | {"time_s": 3.0 + max(tuned["gain"], gain_of_best) + 0.01 * (seed % 3)}
+            yield number, told | {"wall_contact_n": {"p95": 0.1, "max": 0.1}}
+
+    def tune(*options: str) -> str:
+        arguments = ["rehearse", "--config", str(config), "--target", TARGET, "--runs", "8", *options]
+        result = CliRunner().invoke(app, arguments)
+        assert result.exit_code == 0, result.output
+        return result.stdout if "--json" in options else result.output
+
+    monkeypatch.setattr("app.commands.rehearse.over_processes", over)
+    assert "not kept" in tune("--tune") and find_rig("bench 1")[1].pursuit is None
+    told = json.loads(tune("--tune", "--rig", "bench 1", "--json"))
+    kept = find_rig("bench 1")[1].pursuit
+    assert kept == told["found"] and kept["gain"] < 1.0 and told["kept"] == str(path)
+    running = as_calibrated(with_rig(load_config(), find_rig("bench 1")[1], path))
+    assert running.policy.pursuit.gain == kept["gain"]
+    gain_of_best = 9.0  # all alike
+    assert "the configured settings stay" in tune("--tune", "--rig", "bench 1")
+    assert find_rig("bench 1")[1].pursuit == kept
