@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -78,6 +79,10 @@ HEAT = ((0.5, ON_PICTURE.VERMILLION), (0.15, ON_PICTURE.ORANGE), (0.05, ON_PICTU
 """Colours of wall forces from so many newtons on; the limits are those of a recommended speed."""
 
 
+_ONE_PLACE = 0.06
+"""Of the picture's longer side: signs that are nearer to each other are one."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RehearsalShapes:
     """What a rehearsal found along the way, in source pixels.
@@ -104,11 +109,15 @@ def rehearsal_shapes(result: RehearsalResult) -> RehearsalShapes:
         (turn.xy, tr("turns by {turn:.0f}°, the head by {limit:.0f}°", turn=turn.turn_deg, limit=turn.limit_deg))
         for turn in result.sharp
     ]
-    weakest = result.weakest
-    if weakest is not None and weakest.ended_here:
-        notes.append((weakest.xy, tr("weakest: {count} runs ended here", count=weakest.ended_here)))
-    elif weakest is not None and weakest.wall_force_p95_n >= HEAT[-1][0]:
-        notes.append((weakest.xy, tr("weakest bend: {force:.2f} N", force=weakest.wall_force_p95_n)))
+    if (weakest := result.weakest) is not None and (weakest.ended_here or weakest.wall_force_p95_n >= HEAT[-1][0]):
+        what = tr("weakest bend: {force:.2f} N", force=weakest.wall_force_p95_n)
+        what = tr("{count} runs ended here", count=weakest.ended_here) if weakest.ended_here else what
+        near = [math.dist(place, weakest.xy) < _ONE_PLACE * max(result.size_px) for place, _ in notes]
+        if True in near:
+            place, text = notes[near.index(True)]
+            notes[near.index(True)] = place, f"{text}; {what}"
+        else:
+            notes.append((weakest.xy, what))
     return RehearsalShapes(low, high, heat[::-1], tuple(notes))
 
 

@@ -102,10 +102,7 @@ def test_a_destination_is_rehearsed_and_forgotten_with_it(make: MakeController, 
     assert "A branch on the way turns off more sharply" in card.text
     assert card.text.endswith("Go at 70 % of the set speeds: advice.fast_mm_s = 5.6")
     shapes = window.panels.live._marks.rehearsal
-    assert shapes is not None and [text for _, text in shapes.notes] == [
-        "turns by 74°, the head by 61°",
-        "weakest: 2 runs ended here",
-    ]
+    assert shapes is not None and [text for _, text in shapes.notes] == ["turns by 74°, the head by 61°; 2 runs ended here"]
     assert len(window.panels.overlay_bar._shown) == 11
     card.cross.click()
     assert card.isHidden() and window.panels.live._marks.rehearsal is not None
