@@ -19,7 +19,7 @@ from app.commands.options import ConfigOption
 from app.commands.progress import LeftOut, progress_bar
 from core.config.models import PerceptionConfig, load_config
 from core.perception.quality import ConfidenceCalibration
-from core.program import CALLED
+from core.program import CALLED, need_package
 from core.types import Image
 
 if TYPE_CHECKING:
@@ -50,6 +50,9 @@ def calibrate(
     from core.learning.model_writer import changed, check_can_change, renew_eight_bit
     from core.perception.model_file import model_folder
 
+    if eight_bit:
+        need_package("torch")
+        need_package("onnx")
     check_can_change(model)
     samples, truth = find_labelled(folder, POSE_KEYS)
     pictures = [picture for known in (folder, *(knows or ())) for picture in find_known(known)]

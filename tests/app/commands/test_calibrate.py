@@ -14,6 +14,7 @@ from app.commands import calibrate as calibrate_command
 from app.commands.benchmark import benchmark
 from app.commands.calibrate import calibrate
 from core.config.models import PerceptionConfig
+from core.devices import UserError
 from core.evaluation import confidence as fitting
 from core.evaluation import confidence as knowing
 from core.evaluation.confidence import CalibrationError
@@ -187,3 +188,11 @@ def looked_at(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     seen: list[object] = []
     monkeypatch.setattr("core.evaluation.accuracy.score_set", lambda samples, *_: seen.append(samples) or iter(()))
     return seen
+
+
+def test_eight_bit_copies_need_torch_and_that_is_told_before_any_frame_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("core.program.util.find_spec", lambda _name: None)
+    with pytest.raises(UserError, match="this needs the package torch, which is not installed: make setup"):
+        calibrate(tmp_path / "none", eight_bit=True)
