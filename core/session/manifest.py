@@ -420,7 +420,9 @@ def event_of_target(point: Point | None, time_s: float, rehearsal: dict[str, Any
     if point is None:
         return Event(time_s, EventKind.TARGET, "cleared")
     text, data = f"{point[0]:.0f}, {point[1]:.0f}", {"xy": [round(point[0], 2), round(point[1], 2)]}
-    return Event(time_s, EventKind.TARGET, text, data | ({REHEARSAL: rehearsal} if rehearsal is not None else {}))
+    if rehearsal is None:
+        return Event(time_s, EventKind.TARGET, text, data)
+    return Event(time_s, EventKind.TARGET, f"{text}, rehearsed", data | {REHEARSAL: rehearsal})
 
 
 def frames_lost(events: Iterable[Event]) -> int:

@@ -67,8 +67,13 @@ def given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def make(make_window: Callable[..., OperatorWindow], qtbot: QtBot) -> Iterator[MakeController]:
     made: list[RehearsalController] = []
 
-    def one(command: list[str], kind: RigKind = RigKind.SIM, *, is_needed: bool = False) -> RehearsalController:
-        config = Config.model_validate({"record": {"ring_s": 0}, "window": {"needs_rehearsal": is_needed}})
+    def one(
+        command: list[str], kind: RigKind = RigKind.SIM, *, is_needed: bool = False, bench: Path | None = None
+    ) -> RehearsalController:
+        perception = {"bench": str(bench)} if bench is not None else {}
+        config = Config.model_validate(
+            {"record": {"ring_s": 0}, "window": {"needs_rehearsal": is_needed}, "perception": perception}
+        )
         window = make_window(config=config, kind=kind)
         window.start()
         until(qtbot, lambda: window.shown_tick is not None)
@@ -184,3 +189,12 @@ def test_the_card_says_whose_robot_it_was(make: MakeController) -> None:
     assert "With the nominal robot: rig identify measures yours" in card.text
     card.show_result(result.model_copy(update={"assumed": {"robot": "identified"}}), is_real=True)
     assert "rig identify" not in card.text
+
+
+def test_a_real_bench_is_rehearsed_on_its_own_phantom(make: MakeController, tmp_path: Path) -> None:
+    controller = make(said(FOUND), RigKind.LIVE, bench=tmp_path)
+    controller._window.set_target(TARGET)
+    assert card_of(controller).isHidden()
+    (tmp_path / "phantom.json").touch()
+    controller._window.set_target(TARGET)
+    assert card_of(controller).button.text() == "Rehearse  (T)" and controller._bench == ("--bench", str(tmp_path))
