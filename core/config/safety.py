@@ -221,6 +221,11 @@ class JointConfig(ConfigSection):
         return math.radians(self.mm_per_turn) if self.kind is JointKind.ROTATION else self.mm_per_turn
 
     @property
+    def braking_mm(self) -> float:
+        """Its way from full speed to a stop."""
+        return self.max_speed_mm_s**2 / (2.0 * self.max_acceleration_mm_s2)
+
+    @property
     def max_turn_nmm(self) -> float:
         """Its servo's greatest torque (N mm) at the horn, times a whole turn (2 pi)."""
         return self.max_force_n * self.drum_mm_per_turn
@@ -398,6 +403,10 @@ class ServosConfig(ConfigSection):
                 if getattr(joint, name) > limit:
                     key = _FIELDS_OF_ROTATION[name] if joint.kind is JointKind.ROTATION else name
                     return f"joint {joint.name}: {key} must be {limit:g} at most with real servos"
+            # STOP must end every motion within the way that one order may take, and a joint that runs away is noticed beyond it
+            if joint.braking_mm > (most := _CEILINGS[joint.kind][0]):
+                way = f"brakes from full speed in {joint.braking_mm:.3g} {joint.unit}, at most {most:g} with real servos"
+                return f"joint {joint.name}: it {way}: lower its greatest speed or raise its greatest acceleration"
         if self.unattended_s < _LEAST_UNATTENDED_S:
             return f"unattended_s must be {_LEAST_UNATTENDED_S:g} at least with real servos"
         return "" if self.bus_hz >= _MIN_BUS_HZ else f"bus_hz must be {_MIN_BUS_HZ:g} at least with real servos"

@@ -35,7 +35,7 @@ def _moved_mm(joint: JointConfig, within_s: float) -> float:
 
 def drift_limit_mm(joint: JointConfig) -> float:
     """How far a healthy joint goes on past a goal that is suddenly behind it, at most: to brake from full speed, and one step."""
-    return joint.max_step_mm + joint.max_speed_mm_s**2 / (2.0 * joint.max_acceleration_mm_s2)
+    return joint.max_step_mm + joint.braking_mm
 
 
 @dataclass(slots=True)

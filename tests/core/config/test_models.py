@@ -101,6 +101,19 @@ def test_what_a_joint_may_do_has_a_ceiling_with_real_servos(changes: dict[str, A
     assert ServosConfig.model_validate({**changes, "joints": joints}).too_loose == words
 
 
+@pytest.mark.parametrize(
+    ("name", "changes", "words"),
+    [
+        ("advance", {"max_speed_mm_s": 28.0}, ""),
+        ("advance", {"max_speed_mm_s": 200.0}, "joint advance: it brakes from full speed in 100 mm, at most 2 with real servos"),
+        ("up", {"max_acceleration_mm_s2": 10.0}, "joint up: it brakes from full speed in 5 mm, at most 1 with real servos"),
+    ],
+)
+def test_a_joint_stops_within_what_one_order_may_take(name: str, changes: dict[str, float], words: str) -> None:
+    joints = [joint.model_copy(update=changes if joint.name == name else {}) for joint in ServosConfig().joints]
+    assert ServosConfig.model_validate({"joints": joints}).too_loose.partition(": lower its")[0] == words
+
+
 def test_a_joint_of_an_older_file_gets_the_force_of_its_kind(tmp_path: Path) -> None:
     joints = [{k: v for k, v in joint.items() if k != "max_force_n"} for joint in _joints_with("up", id=30)]
     text = "[servos]\nmax_current_ma = 600.0\n" + "".join(
