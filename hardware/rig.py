@@ -13,8 +13,8 @@ from core.config.calibration import ZeroConfig
 from core.config.files import settings_folder
 from core.config.models import CAMERAS, CameraConfig, Config, RigConfig, load_config
 from core.config.rig_file import RESERVED, calibration_of, find_rig, has_rig, with_rig
-from core.config.safety import ServosConfig
-from core.control.kept_zero import ALL_AT_ZERO, ZeroRequest
+from core.config.safety import JointKind, ServosConfig
+from core.control.kept_zero import ZeroRequest, all_at_zero
 from core.control.robot import GuardedRobot
 from core.devices import Camera, DeviceError, UserError, disk_errors
 from hardware.cameras.registry import CAMERA_KINDS, FoundCamera, camera_kind
@@ -224,9 +224,9 @@ def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
 
 def _zero_of_twin(servos: ServosConfig) -> ZeroRequest:
     """Its wires are slack, as nothing has pulled yet; the robot is inserted already, as far as its feed's envelope lets it be."""
-    advance = next(joint for joint in servos.joints if joint.name == "advance")
-    inserted_mm = max(advance.low_mm, min(advance.high_mm, START_INSERTION_MM))
-    return ZeroRequest(positions_mm={**ALL_AT_ZERO.positions_mm, "advance": inserted_mm})
+    feeds = servos.joints[servos.places(JointKind.ADVANCE)]
+    inserted_mm = {joint.name: max(joint.low_mm, min(joint.high_mm, START_INSERTION_MM)) for joint in feeds}
+    return ZeroRequest(positions_mm=all_at_zero(servos).positions_mm | inserted_mm)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from core.config.calibration import CalibrationConfig, LensConfig
-from core.config.models import CAMERAS, CameraConfig, Config, load_config
-from core.config.rig_file import RigFileError, make_rig, with_rig, write_rig
+from core.config.models import CAMERAS, RESOURCES, CameraConfig, Config, load_config
+from core.config.rig_file import RigFileError, make_rig, read_rig, with_rig, write_rig
 from core.devices import DeviceError
 from hardware.cameras import realsense, sysfs
 from hardware.cameras.live import LiveCamera
@@ -18,6 +18,8 @@ from hardware.cameras.realsense import RealSenseInfo, RealSenseSensor
 from hardware.cameras.registry import CAMERA_KINDS
 from hardware.cameras.undistorted import UndistortedCamera
 from hardware.rig import RigKind, find_devices, open_rig, with_camera, with_port
+from hardware.servos.registers import ServoState
+from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.bus import SoftServoBus
 from tests.hardware.soft_cameras import (
     CONFIG,
@@ -189,3 +191,22 @@ def test_a_rig_whose_file_is_broken_is_not_opened() -> None:
     path.write_text("format = ")
     with pytest.raises(RigFileError, match="no TOML"):
         open_rig(config)
+
+
+@pytest.mark.real_time
+@pytest.mark.usefixtures("no_process_stays_behind")
+@pytest.mark.parametrize("name", ["three_tendons", "two_tendons_rotation"])
+def test_a_robot_of_another_shape_is_driven_by_its_own_servos_in_the_twin(name: str) -> None:
+    path = RESOURCES / "rigs" / f"{name}.toml"
+    rig = open_rig(with_rig(load_config(), read_rig(path), path))
+    robot = rig.robot
+    assert isinstance(robot, ServoRobot)
+    try:
+        robot.arm()
+        status = robot.bus_status()
+        assert status is not None
+        at_mm = {servo.name: servo.position_mm for servo in status.servos if isinstance(servo, ServoState)}
+        assert [name for name, at in at_mm.items() if at is not None and at > 1.0] == ["advance"], "its wires are slack"
+    finally:
+        robot.close()
+        rig.camera.close()
