@@ -96,7 +96,7 @@ class PursuitConfig(ConfigSection):
     preview_px: float = Field(50.0, ge=5.0, le=400.0, description="bends and bifurcations so far ahead slow the robot down")
     brake_px: float = Field(16.0, ge=5.0, le=400.0, description="way left at which it begins to slow down for the target")
     gentle_turn_deg: float = Field(25.0, gt=0.0, le=180.0, description="turn within the preview that still allows full speed")
-    slow_steer_deg: float = Field(10.0, gt=0.0, le=180.0, description="steering error above which the robot goes slow")
+    slow_steer_deg: float = Field(20.0, gt=0.0, le=180.0, description="missing turn above which the robot goes slow")
     wall_share: float = Field(0.85, gt=0.1, le=1.5, description="head's distance over the room it has: above, near the wall")
     contact_slow_n: float = Field(0.06, gt=0.0, le=5.0, description="rise of the contact force that slows the robot down")
     lean_mm: float = Field(5.0, gt=0.1, le=100.0, description="way over which a contact force becomes the body's own lean")

@@ -18,6 +18,10 @@ _IN_SIGHT_DEG, _IN_SIGHT_PX = 60.0, 90.0
 """Where the way continues within this angle and distance of the head, with free lumen between, it is not behind."""
 _ON_ROUTE_PX = 2.0
 """A node of the vessel graph within this distance of the way lies on it."""
+_HEAD_MM = 20.0
+"""Length of the robot's end that bends."""
+SHARP_MM = 12.0, 40.0
+"""Between these distances ahead a branch that is too sharp is told."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +33,7 @@ class LookAhead:
     points : (N, 2) from the place beside the ``head``, or, where that leads back, from the place in sight ahead of it.
     left_px : way left to the ``target``; None: no target.
     error_deg : the missing turn, positive to the right.
+    steer_deg : of it what is steered for at once: no more than along the tightest arc.
     behind : the way leaves backwards.
     turn_deg : sharpest turn within the preview.
     junction_px : distance to the next bifurcation on the way; None: none within the preview.
@@ -40,6 +45,7 @@ class LookAhead:
     left_px: float | None
     target: Point | None
     error_deg: float
+    steer_deg: float
     behind: bool
     turn_deg: float
     junction_px: float | None
@@ -85,7 +91,8 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, roundi
         points=points,
         left_px=left_px,
         target=target,
-        error_deg=limited(error_deg, sharpest_deg),
+        error_deg=error_deg,
+        steer_deg=limited(error_deg, sharpest_deg),
         behind=behind,
         turn_deg=_turn_deg(points, config.preview_px),
         junction_px=_junction_px(scene.vessel_graph, points, config.preview_px),
@@ -144,12 +151,40 @@ def _turn_deg(points: Points, preview_px: float) -> float:
 
 
 def _junction_px(graph: VesselGraph | None, points: Points, preview_px: float) -> float | None:
+    return min((at for at, _ in _junctions(graph, geometry.cut(points, 0.0, preview_px), _ON_ROUTE_PX)), default=None)
+
+
+def _junctions(graph: VesselGraph | None, line: Points, most_away: float) -> list[tuple[float, Point]]:
+    """The bifurcations on a line: how far along it, and where."""
     if graph is None or len(graph.nodes) == 0:
-        return None
+        return []
     degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
-    line = geometry.cut(points, 0.0, preview_px)
-    found = (geometry.nearest(line, (x, y)) for x, y in graph.nodes[degree >= 3].tolist())
-    return min((position for away_px, position, _ in found if away_px <= _ON_ROUTE_PX), default=None)
+    found = ((geometry.nearest(line, (x, y)), (x, y)) for x, y in graph.nodes[degree >= 3].tolist())
+    return [(at, place) for (away, at, _), place in found if away <= most_away]
+
+
+def sharp_branches(
+    graph: VesselGraph, route: Points, robot_radius: float, bend_deg: float, span_mm: tuple[float, float], per_mm: float = 1.0
+) -> list[tuple[Point, float, float]]:
+    """The branches on a route (N, 2) that turn more sharply than the head bends: place, turn, and the turn that the head reaches.
+
+    A head of full bend turns by `bend_deg`. In a wide lumen it tilts away first, by the angle that the free width leaves over its
+    length. Turns are taken from 7 mm before a junction to 15 mm behind it. Lengths have `per_mm` units to the millimetre; looked at
+    is the part of the route within `span_mm`.
+    """
+    found, along = [], geometry.arc_length(route)
+    for at, place in _junctions(graph, geometry.cut(route, 0.0, span_mm[1] * per_mm), _ON_ROUTE_PX / 3.0 * per_mm):
+        if at < span_mm[0] * per_mm:
+            continue
+        places = geometry.point_at(route, along, at + per_mm * np.array([-12.0, -6.0, -2.0, 10.0, 20.0]))
+        turn_deg = abs(_angle_deg(_step(places[0], places[2]), _step(places[3], places[4])))
+        x, y = places[1].tolist()
+        edge = min(graph.edges, key=lambda one: geometry.nearest(one.points, (x, y))[0])
+        radius = float(edge.radius[np.argmin(np.hypot(edge.points[:, 0] - x, edge.points[:, 1] - y))])
+        tilt_deg = math.degrees(math.atan2(2.0 * max(0.0, radius - robot_radius), _HEAD_MM * per_mm))
+        if turn_deg > bend_deg - tilt_deg:
+            found.append((place, turn_deg, bend_deg - tilt_deg))
+    return found
 
 
 def _step(start: Points | Point, end: Points | Point) -> Point:

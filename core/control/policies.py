@@ -105,7 +105,7 @@ def make_policy(name: str, config: Config, seed: int = 0) -> Policy:
     """A new policy; `seed` is for the random operator. Raises PluginError."""
     policy: Policy
     if name == "pursuit":
-        policy = Pursuit(config.policy.pursuit, config.advice)
+        policy = Pursuit(config.policy.pursuit, config.advice, config.policy.drive.turn_deg)
     elif name == "table":
         policy = Memoryless(lambda scene: table_policy(scene, config.advice))
     elif name == "push":  # baseline: straight on at moderate speed, whatever the picture shows

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from core.config.models import AdviceConfig, PursuitConfig
 from core.control.joints import limited
-from core.control.look_ahead import LookAhead, look_ahead
+from core.control.look_ahead import SHARP_MM, LookAhead, look_ahead, sharp_branches
 from core.messages import message
 from core.types import Advice, Point, RobotStatus, Scene, Speed
 
@@ -238,15 +238,16 @@ _PAUSE_S = 0.5
 class Pursuit:
     """Pure pursuit with smoothed steering, which backs off from walls and missed branches until there is room."""
 
-    def __init__(self, config: PursuitConfig, advice: AdviceConfig) -> None:
+    def __init__(self, config: PursuitConfig, advice: AdviceConfig, bend_deg: float = 94.0) -> None:
         self._config = config
         self._words = advice
+        self._bend_deg = bend_deg
         self.reset()
 
     def reset(self) -> None:
         """Forget the frames before."""
         self._speed_mm_s = 0.0
-        self._steer_deg = 0.0
+        self._steer_deg = self._error_deg = 0.0
         self._last_s: float | None = None
         self._stall = StallMonitor(self._config)
         self._contact_limit = ContactLimit(self._config)
@@ -282,9 +283,10 @@ class Pursuit:
         contact_n = status.wall_contact_n if status is not None else None
         # counted down, not reset: where head and branch lie in a wide bifurcation, single frames still see the way ahead
         self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
-        wanted_deg = limited(config.gain * way.error_deg, self._words.max_steer_deg)
+        wanted_deg = limited(config.gain * way.steer_deg, self._words.max_steer_deg)
         keep = math.exp(-since_s / config.smoothing_s) if config.smoothing_s > 0.0 and since_s > 0.0 else 0.0
         self._steer_deg = keep * self._steer_deg + (1.0 - keep) * wanted_deg
+        self._error_deg = keep * self._error_deg + (1.0 - keep) * way.error_deg
         fed_mm_s, fed_mm = self._feed.update(status, self._speed_mm_s, elapsed_s)
         stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)
         self._retries.update(way)
@@ -300,7 +302,7 @@ class Pursuit:
         return (
             self._backing_advice(way, contact_n, rises, stuck, fed_mm)
             or self._give_up_advice(way)
-            or self._forward_advice(way, rises)
+            or self._forward_advice(way, rises, scene)
         )
 
     def _backing_advice(self, way: LookAhead, contact_n: float | None, rises: bool, stuck: bool, fed_mm: float) -> Advice | None:
@@ -355,16 +357,16 @@ class Pursuit:
             )
         return None
 
-    def _forward_advice(self, way: LookAhead, rises: bool) -> Advice:
+    def _forward_advice(self, way: LookAhead, rises: bool, scene: Scene) -> Advice:
         config, words = self._config, self._words
         limits = [(words.fast_mm_s, "along the route")]
         if way.turn_deg > config.gentle_turn_deg:
             limits.append((words.fast_mm_s * config.gentle_turn_deg / way.turn_deg, "a bend ahead"))
         if way.junction_px is not None:
             limits.append((words.moderate_mm_s, "a bifurcation ahead"))
-        if abs(self._steer_deg) > config.slow_steer_deg:
+        if (error_deg := abs(self._error_deg)) > config.slow_steer_deg:
             # no step where it begins: an error that trembles about the limit must not make the feed stutter
-            share = (config.slow_steer_deg / abs(self._steer_deg)) ** 2
+            share = (config.slow_steer_deg / error_deg) ** 2
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
         if way.wall > config.wall_share:
             limits.append((words.moderate_mm_s, "the head is near the wall"))
@@ -373,6 +375,9 @@ class Pursuit:
         if way.left_px is not None and way.left_px < config.brake_px:
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * way.left_px / config.brake_px), "the target is near"))
         speed_mm_s, why = min(limits)
+        graph, path, px = scene.vessel_graph, scene.path, config.pixels_per_mm
+        if way.left_px and graph and path and sharp_branches(graph, way.points, path.radius_px, self._bend_deg, SHARP_MM, px):
+            why = message("{why}; a branch ahead may turn more sharply than the head bends", why=why)
         return self._advise(speed_mm_s, self._steer_deg, why)
 
     def _advise(self, speed_mm_s: float, steer_deg: float, why: str) -> Advice:

@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import Config
+from core.control.look_ahead import sharp_branches
 from core.evaluation.trial import Row, TrialSample
 from core.perception.centerline import centerline_at, plan_route
 from core.perception.pose import measure_pose
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.types import Frame, Image, Masks, Point, Points, Reason, Refusal, RobotPath, Scene
 from hardware.twin.phantom import Phantom
-from hardware.twin.physics import MAX_PULL_MM, ROBOT_RADIUS_MM, STEERABLE_MM, DriveProperties
+from hardware.twin.physics import MAX_PULL_MM, ROBOT_RADIUS_MM, DriveProperties
 from hardware.twin.trial import FIRST_SEED, Target, Trial, TrialPlan
 from hardware.twin.truth import true_graph, visible_path, with_caps
 from hardware.twin.world import TwinWorld
@@ -65,27 +66,11 @@ class SharpTurn:
 def sharp_turns(phantom: Phantom, target: Target) -> list[SharpTurn]:
     """The branches on the way to the target that are too sharp.
 
-    A head of full bend turns by 94 degrees. In a wide lumen it tilts away first, by the angle that the free width leaves over its
-    length. Turns are taken from 7 mm before a junction to 15 mm behind it. A warning: of the trial seeds 100 to 199 it names six
-    (108, 149, 167, 179, 184, 186); one run of each: two stopped short, three arrived with 0.2 to 0.4 N at the wall, one easily.
+    A warning (``sharp_branches``): of the trial seeds 100 to 199 it names six (108, 149, 167, 179, 184, 186); one run of each: two
+    stopped short, three arrived with 0.2 to 0.4 N at the wall, one easily.
     """
-    graph, along = phantom.graph, geometry.arc_length(target.route)
-    degree = np.bincount([node for edge in graph.edges for node in (edge.start, edge.end)], minlength=len(graph.nodes))
-    found = []
-    for node in np.flatnonzero(degree >= 3).tolist():
-        x, y = graph.nodes[node].tolist()
-        away, at, _ = geometry.nearest(target.route, (x, y), along)
-        if away > 0.5 or at > target.at_mm:
-            continue
-        places = geometry.point_at(target.route, along, at + np.array([-12.0, -6.0, -2.0, 10.0, 20.0]))
-        turn = _turn_deg(places[2] - places[0], places[4] - places[3])
-        edge = min(graph.edges, key=lambda one: geometry.nearest(one.points, (float(places[1, 0]), float(places[1, 1])))[0])
-        radius = float(edge.radius[np.argmin(np.linalg.norm(edge.points - places[1], axis=1))])
-        tilt = math.degrees(math.atan2(2.0 * max(0.0, radius - ROBOT_RADIUS_MM), STEERABLE_MM))
-        limit = BEND_DEG_PER_MM * MAX_PULL_MM - tilt
-        if turn > limit:
-            found.append(SharpTurn((x, y), turn, limit))
-    return found
+    found = sharp_branches(phantom.graph, target.route, ROBOT_RADIUS_MM, BEND_DEG_PER_MM * MAX_PULL_MM, (0.0, target.at_mm))
+    return [SharpTurn(*one) for one in found]
 
 
 def _turn_deg(before: NDArray[np.float64], after: NDArray[np.float64]) -> float:

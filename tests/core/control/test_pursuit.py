@@ -13,7 +13,7 @@ from core.control.look_ahead import LookAhead
 from core.control.policies import RandomOperator, make_policy
 from core.control.pursuit import ContactLimit, FeedMonitor, Pursuit, speed_word
 from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene, Speed
-from tests.core.driving_scenes import BEND, FORK, STRAIGHT, scene_at, status
+from tests.core.driving_scenes import BEND, FORK, STRAIGHT, edge, line, scene_at, status
 
 CONFIG, WORDS = PursuitConfig(smoothing_s=0.0), AdviceConfig()
 
@@ -43,6 +43,19 @@ def test_a_bifurcation_ahead_slows_it_down_even_straight_on() -> None:
     assert far.speed is Speed.FAST
 
 
+def test_a_branch_that_is_too_sharp_is_told_before_the_head_is_there() -> None:
+    sharp = replace(FORK, edges=(*FORK.edges[:2], edge(1, 3, line((200, 100), (220, 213)))))
+    sharp = replace(sharp, nodes=np.vstack([FORK.nodes[:3], [(220.0, 213.0)]]))
+    told = "a branch ahead may turn more sharply than the head bends"
+    assert [told in Pursuit(CONFIG, WORDS)(scene_at(sharp, (x, 100), (218, 203))).why for x in (40, 110, 185)] == [
+        False,
+        True,
+        False,
+    ]
+    assert told not in Pursuit(CONFIG, WORDS)(scene_at(sharp, (110, 100), (390, 100))).why, "straight on"
+    assert told not in Pursuit(CONFIG, WORDS, 130.0)(scene_at(sharp, (110, 100), (218, 203))).why, "a head that bends further"
+
+
 def test_the_more_the_head_must_turn_the_slower_and_never_by_a_jump() -> None:
     pointing = PursuitConfig(smoothing_s=0.0, follow_arc=0.0, min_bend_radius_px=5.0)  # the error is the heading
     errors_deg, speeds = [], []
@@ -56,6 +69,11 @@ def test_the_more_the_head_must_turn_the_slower_and_never_by_a_jump() -> None:
     assert (np.diff(speeds) <= 1e-9).all()
     assert np.diff(speeds).min() > -0.1 * WORDS.fast_mm_s
     assert speeds[-1] < WORDS.slow_mm_s
+
+
+def test_a_head_that_must_turn_far_turns_almost_in_place() -> None:
+    advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 112), (380, 100), 80.0))
+    assert (advice.advance_mm_s, advice.why) == (WORDS.slowest_mm_s, "the head must turn first")
 
 
 def test_the_nearer_the_target_the_slower_and_there_it_stops() -> None:
@@ -407,7 +425,9 @@ def test_the_feed_is_known_though_frames_and_statuses_do_not_come_in_step(fps: f
 
 def way(left_px: float | None, target: tuple[float, float] | None = (380.0, 100.0)) -> LookAhead:
     """As it is where only the target and the way left to it matter."""
-    return LookAhead((0.0, 0.0), np.zeros((2, 2)), left_px, target if left_px is not None else None, 0.0, False, 0.0, None, 0.0)
+    return LookAhead(
+        (0.0, 0.0), np.zeros((2, 2)), left_px, target if left_px is not None else None, 0.0, 0.0, False, 0.0, None, 0.0
+    )
 
 
 def test_the_contact_limit_rises_where_the_head_presses_and_falls_back_farther_on() -> None:
