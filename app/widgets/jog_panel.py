@@ -162,6 +162,8 @@ class JogReadout(PaintedWidget):
         draw_text(painter, room, self.speeds, label, colour, smallest_px=_SMALLEST_PX, elided=True)
 
 
+_SPEEDS = mark("speeds: feed {feed:.3g}, sheath {sheath:.3g}, tendons {wires} mm/s")
+_SPEEDS_BARE = mark("speeds: feed {feed:.3g}, tendons {wires} mm/s")
 _FED = mark("{motion}: hold to move, release to stop; {speed:.3g} mm/s")
 _TURNED = mark("{motion}: hold to move, release to stop; {speed:.3g} °/s")
 _PULLED = mark("{motion}: hold to move, release to stop; the tendons are pulled {speed:.3g} mm/s")
@@ -241,15 +243,10 @@ class JogPanel(QWidget):
         if self._rig is None:
             return
         speeds = hand_speeds(*self._rig, self._speed.currentData())
-        bend, pitch = f"{speeds.bend_mm_s:.3g}", f"{speeds.pitch_mm_s:.3g}"
-        self._readout.show_speeds(
-            tr(
-                "speeds: feed {feed:.3g}, sheath {sheath:.3g}, tendons {wires} mm/s",
-                feed=speeds.advance_mm_s,
-                sheath=speeds.delivery_mm_s,
-                wires=bend if bend == pitch else f"{bend}/{pitch}",
-            )
-        )
+        bend, pitch, had = f"{speeds.bend_mm_s:.3g}", f"{speeds.pitch_mm_s:.3g}", motions_of(self._servos)
+        wires = bend if bend == pitch or Motion.PITCH_UP not in had else f"{bend}/{pitch}"
+        text = _SPEEDS if Motion.DELIVER in had else _SPEEDS_BARE
+        self._readout.show_speeds(tr(text, feed=speeds.advance_mm_s, sheath=speeds.delivery_mm_s, wires=wires))
         for text, speed_mm_s, motions in (
             (_FED, speeds.advance_mm_s, (Motion.ADVANCE, Motion.RETRACT)),
             (_FED, speeds.delivery_mm_s, (Motion.DELIVER, Motion.WITHDRAW)),

@@ -28,6 +28,8 @@ def test_jog_panel_says_what_a_held_key_makes(own: Own) -> None:
     assert panel.speeds == "speeds: feed 5, sheath 4, tendons 1.2 mm/s"
     panel.set_speeds(JogConfig(), ServosConfig(max_pull_mm=1.0))
     assert panel.speeds == "speeds: feed 5, sheath 5, tendons 0.6 mm/s", "another rig has the chosen share, too"
+    panel.set_speeds(JogConfig(), TURNED)
+    assert panel.speeds == "speeds: feed 5, tendons 1.2 mm/s", "this one has no sheath"
 
 
 def test_key_caps_light_up_and_can_be_held_with_the_mouse(own: Own, qtbot: QtBot) -> None:
