@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
-from core.config.models import load_config
+from core.config.models import Config, load_config
 from core.config.rig_file import as_calibrated, find_rig, make_rig, with_rig, write_rig
 from core.evaluation.rehearsal import RehearsalResult
 
@@ -116,3 +116,21 @@ def test_tuned_settings_are_kept_where_they_are_better_and_it_was_asked_for(
     gain_of_best = 9.0  # all alike
     assert "the configured settings stay" in tune("--tune", "--rig", "bench 1")
     assert find_rig("bench 1")[1].pursuit == kept
+
+
+def test_a_window_gives_configuration_and_picture_size_and_reads_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    def over(_workers: int, _function: object, seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+        yield from (row(seed) for seed in seeds)
+
+    monkeypatch.setattr("app.commands.rehearse.over_processes", over)
+    monkeypatch.setattr("app.commands.rehearse._SHOWN_EVERY_S", 0.0)
+    monkeypatch.setattr("app.commands.progress._writers", [])
+    given = json.dumps(
+        {"config": Config.model_validate({"twin": {"phantom": "tree"}}).model_dump(mode="json"), "size_px": [1280, 960]}
+    )
+    words = ["rehearse", "--given", "--target", "860,800", "--progress-json", "--runs", "5"]
+    result = CliRunner().invoke(app, words, input=given)
+    told = [json.loads(line) for line in result.stdout.splitlines()]
+    assert any(line.get("done") == 5 for line in told) and RehearsalResult.model_validate(told[1]["so_far"]).runs == 1
+    found = RehearsalResult.model_validate(told[-1])
+    assert found.size_px == (1280, 960) and found.target_xy == pytest.approx((860, 800), abs=24)
