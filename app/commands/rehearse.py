@@ -263,6 +263,8 @@ def _run(plan: RehearsalPlan, seeds: range, workers: int, ends_s: float, show: C
             bar.update(task, advance=1, description=f"{sum(r['reached'] for r in rows)} of {len(rows)} arrived")
             if show is not None:
                 show(rows)
+            if (writer := progress_writer()) is not None and not writer.is_read:
+                raise KeyboardInterrupt  # the window has gone
             if plan.speed < 1.0 and is_hopeless(rows, len(seeds)):
                 return rows
             if time.monotonic() > ends_s:
