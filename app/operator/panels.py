@@ -131,10 +131,11 @@ class OperatorPanels(ScenePanels):
             self.alerts.show_view(view)
         why_still = tr("This rig has no robot") if why_not is Undriven.NO_ROBOT else self._blank_title
         self.jog.set_enabled(view is not None, "" if view is not None else why_still)
-        self.jog.show_known(known_joints(bus, self._servo_config, time.monotonic()))
+        now_s = view.time_s if view is not None else time.monotonic()
+        self.jog.show_known(known_joints(bus, self._servo_config, now_s))
         if not self._has_picture:  # a robot in a vessel is brought back by hand, and the operator must see how far
             self.jog.show_status(status_by_servos(bus, self._servo_config))
-        self.servos.show_status(bus, self._servo_config)
+        self.servos.show_status(bus, self._servo_config, now_s)
         self.commands.show_view(view, bus)
 
     def show_alerts(self, alerts: tuple[Alert, ...]) -> None:

@@ -155,7 +155,7 @@ def servo_rows(status: BusStatus | None, servos: ServosConfig, safety: SafetyCon
 def known_joints(status: BusStatus | None, servos: ServosConfig, now_s: float) -> tuple[bool, ...]:
     """Which joints have a known position: those that are zeroed, and whose servo has answered lately.
 
-    Without a bus all of them: such a robot reports its own position. `now_s` is monotonic, as ``BusStatus.time_s`` is.
+    Without a bus all of them: such a robot reports its own position. `now_s` is by the clock of ``BusStatus.time_s``.
     """
     if status is None:
         return (True,) * len(servos.joints)
@@ -618,10 +618,13 @@ class ServoTable(QWidget):
     def bus_text(self) -> str:
         return self._bus.text()
 
-    def show_status(self, status: BusStatus | None, servos: ServosConfig) -> None:
-        """The newest status of the bus, None without one; a status that is older than a second is shown as silence."""
+    def show_status(self, status: BusStatus | None, servos: ServosConfig, now_s: float | None = None) -> None:
+        """The newest status of the bus, None without one; a status that is older than a second is shown as silence.
+
+        `now_s` is by the clock of the rig, which is slower than the wall's where the twin waits for a busy computer.
+        """
         self._servos = servos
-        silence_s = self._clock() - status.time_s if status is not None else 0.0
+        silence_s = (self._clock() if now_s is None else now_s) - status.time_s if status is not None else 0.0
         is_silent = silence_s > SILENT_AFTER_S
         kind = (status is None, is_silent, status.phase if status is not None else None)
         if self._pace.due() or kind != self._kind:

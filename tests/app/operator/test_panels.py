@@ -7,8 +7,10 @@ from pytestqt.qtbot import QtBot
 
 from app.operator.panels import OperatorPanels
 from core.config.models import Config
+from core.control.drive_view import DriveView
 from core.types import Frame, Tick
 from hardware.rig import RigKind
+from tests.app.bus_status import bus
 from tests.core.pilot_bench import ADVICE, Bench, scene_at
 
 
@@ -40,3 +42,15 @@ def test_another_rig_brings_the_speeds_of_its_keys(qtbot: QtBot) -> None:
     slow = Config().hand.model_copy(update={"advance_mm_s": 3.0})
     panels.set_config(Config().model_copy(update={"hand": slow}))
     assert panels.jog.speeds == "speeds: feed 3, sheath 10, tendons 2.4 mm/s"
+
+
+def test_positions_of_a_twin_that_waits_for_the_computer_are_known_ones(qtbot: QtBot) -> None:
+    """Its clock is behind the wall's, further and further; a bus counts as silent by that clock."""
+    panels = OperatorPanels(Config(), RigKind.SIM, [])
+    qtbot.addWidget(panels)
+    panels.show_drive(DriveView(100.2), bus())
+    assert "inserted 20 mm" in panels.jog._readout.text
+    assert "nothing heard" not in panels.servos.bus_text
+    panels.show_drive(DriveView(103.0), bus())
+    assert "inserted 20 mm" not in panels.jog._readout.text
+    assert "nothing heard from the servo bus for 3 s" in panels.servos.bus_text
