@@ -164,7 +164,9 @@ def bench_of_session(reader: SessionReader, rig: str | None = None) -> Identifie
         twin = config.twin
     phantom = make_phantom(twin.phantom)
     size = phantom.view.size if phantom.view is not None else (twin.image_width_px, twin.image_height_px)
-    look = replace(appearance_of(twin), distortion=0.0)  # sessions have the undistorted picture
+    look = appearance_of(twin)
+    if manifest.kind != "SIM" or (manifest.known is not None and manifest.known.lens is not None):
+        look = replace(look, distortion=0.0)  # its pictures are undistorted
     return IdentifiedBench(phantom, port_of(phantom), make_view(look, size, phantom))
 
 

@@ -95,8 +95,9 @@ def test_without_walls_each_parameter_shows_by_itself() -> None:
 def test_the_fit_through_the_physics_comes_near_the_robot() -> None:
     phantom, true, whole = make_phantom("s_curve"), np.array([TRUE[name] for name in NAMES]), free_jog()
     joint_s = whole.joint_s - 9.0  # begins with bends
-    jog = JogRecord(whole.time_s[:25], whole.body_mm[:25], whole.length_mm[:25], joint_s, whole.bend_mm, whole.feed_mm)
+    jog = JogRecord(whole.time_s[:15], whole.body_mm[:15], whole.length_mm[:15], joint_s, whole.bend_mm, whole.feed_mm)
     target = target_of(phantom, jog)
+    true[NAMES.index("start_mm")] = 25.0
     jog = replace(jog, body_mm=predicted(phantom, target, jog, true))
     start = true * np.array([1.15, 0.9, *[1.0] * 10])
     found, errors = refined(phantom, target, jog, start)
