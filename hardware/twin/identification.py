@@ -69,7 +69,7 @@ _MOST_RUNS = 7
 class FittedParameter:
     """``start`` is the nominal twin's value, ``step`` that of the differences; it lies between ``low`` and ``high``.
 
-    ``spread`` is the standard deviation among robots, of a parameter that is taken into account and not told; None: told.
+    ``spread`` is the standard deviation about the first guess, of a parameter that is taken into account and not told; None: told.
     """
 
     start: float
@@ -89,7 +89,7 @@ PARAMETERS = {
     "feed_share": FittedParameter(1.0, 0.01, 0.3, 3.0),
     "feed_slip": FittedParameter(0.0, 0.01, -0.3, 0.6),
     "delay_s": FittedParameter(0.05, 0.02, 0.0, 0.5),
-    "start_mm": FittedParameter(40.0, 0.5, 0.0, 1000.0),
+    "start_mm": FittedParameter(40.0, 0.5, 0.0, 1000.0, 0.5),
     "friction": FittedParameter(0.1, 0.03, 0.0, 0.5, 0.03),
     "set_deg": FittedParameter(0.0, 2.0, -20.0, 20.0, 2.5),
 }
@@ -98,9 +98,7 @@ RUNS = len(PARAMETERS) + 1
 """Of the twin, for the slopes."""
 _NAMES = tuple(PARAMETERS)
 _TOLD = tuple(name for name in _NAMES if name in BehaviourConfig.model_fields)
-_START, _STEPS, _LOW, _HIGH = (
-    np.array([getattr(one, name) for one in PARAMETERS.values()]) for name in ("start", "step", "low", "high")
-)
+_STEPS, _LOW, _HIGH = (np.array([getattr(one, name) for one in PARAMETERS.values()]) for name in ("step", "low", "high"))
 _SPREAD = np.array([one.spread or np.inf for one in PARAMETERS.values()])
 _HIDDEN = np.isfinite(_SPREAD)
 
@@ -353,11 +351,11 @@ def refined(phantom: Phantom, target: int, jog: JogRecord, start: Floats, spread
     weights = 1.0 / np.maximum(_LEAST_NOISE_MM, np.median(errors, axis=0))[:, None]
 
     def weighed(body_mm: Floats) -> Floats:
-        # Without the mean place: the robot lies above or below the plane of the scale, so all of it is seen shifted.
-        return np.asarray(((body_mm - body_mm.mean(axis=(0, 1))) * weights).ravel())
+        # Without each place's mean: what lies above or below the plane of the scale is seen shifted, and perception errs alike.
+        return np.asarray(((body_mm - body_mm.mean(axis=0)) * weights).ravel())
 
     def all_errors(scaled: Floats) -> Floats:
-        away = (scaled * _STEPS - _START)[_HIDDEN] / _SPREAD[_HIDDEN]
+        away = (scaled * _STEPS - start)[_HIDDEN] / _SPREAD[_HIDDEN]
         return np.concatenate([weighed(predicted(phantom, target, jog, scaled * _STEPS)) - seen, away])
 
     seen, here = weighed(jog.body_mm), weighed(found[-1])

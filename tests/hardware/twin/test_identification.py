@@ -95,14 +95,15 @@ def test_without_walls_each_parameter_shows_by_itself() -> None:
 def test_the_fit_through_the_physics_comes_near_the_robot() -> None:
     phantom, true, whole = make_phantom("s_curve"), np.array([TRUE[name] for name in NAMES]), free_jog()
     joint_s = whole.joint_s - 9.0  # begins with bends
-    jog = JogRecord(whole.time_s[:15], whole.body_mm[:15], whole.length_mm[:15], joint_s, whole.bend_mm, whole.feed_mm)
+    jog = JogRecord(whole.time_s[:25], whole.body_mm[:25], whole.length_mm[:25], joint_s, whole.bend_mm, whole.feed_mm)
     target = target_of(phantom, jog)
     true[NAMES.index("start_mm")] = 25.0
     jog = replace(jog, body_mm=predicted(phantom, target, jog, true))
-    start = true * np.array([1.15, 0.9, *[1.0] * 10])
+    start = true * np.array([1.3, *[1.0] * 11])
     found, errors = refined(phantom, target, jog, start)
-    before, after = (np.abs(predicted(phantom, target, jog, values) - jog.body_mm).max() for values in (start, found))
-    assert before > 0.3 and after < 0.7 * before
+    away = [predicted(phantom, target, jog, values) - jog.body_mm for values in (start, found)]
+    before, after = (float(np.abs(one - one.mean(axis=0)).max()) for one in away)
+    assert after < 0.5 * before and found[0] == pytest.approx(true[0], rel=0.06)
     assert np.isfinite(errors).all() and (errors >= 0.0).all()
 
 
