@@ -2222,6 +2222,141 @@ Torque off now: the wires spring back at once.</source>
         <translation>退出码 {code}</translation>
     </message>
     <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>{share:.0f} % of {runs} runs arrived</source>
+        <translation>{runs} 次中 {share:.0f} % 到达</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>95 % interval {low:.0f} to {high:.0f} %</source>
+        <translation>95 % 区间 {low:.0f} 至 {high:.0f} %</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Go at {share:.0f} % of the set speeds: advice.fast_mm_s = {speed:g}</source>
+        <translation>以设定速度的 {share:.0f} % 行进：advice.fast_mm_s = {speed:g}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Close the rehearsal</source>
+        <translation>关闭预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Rehearsal</source>
+        <translation>预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Rehearse  ({key})</source>
+        <translation>预演  ({key})</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Rehearsing: {done} of {total}</source>
+        <translation>正在预演：{done} / {total}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>With the nominal robot: rig identify measures yours</source>
+        <translation>使用标称机器人：rig identify 可测量您的机器人</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>{time:.0f} s (median)</source>
+        <translation>{time:.0f} 秒（中位数）</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>wall force {p95:.2f} N, {max:.2f} N at most</source>
+        <translation>壁面力 {p95:.2f} N，最大 {max:.2f} N</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>A branch on the way turns off more sharply than the head bends</source>
+        <translation>途中有一个分支的转角超过头部的弯曲能力</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>No speed that was tried is good: choose another destination, or steer yourself</source>
+        <translation>试过的速度都不合适：请选择其他目标点，或自行操纵</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>The set speed is good</source>
+        <translation>设定的速度合适</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>wall force</source>
+        <translation>壁面力</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>this destination was not rehearsed</source>
+        <translation>此目标点尚未预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>no phantom of this bench for the twin: teach the bench, or python main.py phantom BENCH</source>
+        <translation>数字孪生没有此台架的体模：请示教台架，或运行 python main.py phantom BENCH</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>&amp;Robot</source>
+        <translation>机器人(&amp;R)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>Not rehearsed: {why}</source>
+        <translation>未预演：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>Not rehearsed: the computer is too busy; close other programs, and rehearse again</source>
+        <translation>未预演：计算机太忙；请关闭其他程序后重新预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>rehearsal</source>
+        <translation>预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>press {key}: two minutes beside the window</source>
+        <translation>按 {key}：在窗口旁运行约两分钟</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>First click the destination, then rehearse</source>
+        <translation>请先单击目标点，再预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>the hand-over needs one</source>
+        <translation>移交需要预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>no destination yet</source>
+        <translation>尚无目标点</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>click it, and press {key}</source>
+        <translation>单击目标点，然后按 {key}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>Not handed over: {what}. {fix}</source>
+        <translation>未移交：{what}。{fix}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>Re&amp;hearse this destination</source>
+        <translation>预演此目标点(&amp;H)</translation>
+    </message>
+    <message>
         <location filename="../../app/operator/rig_menu.py"/>
         <source>Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again</source>
         <translation>正在等待向导归还相机和舵机；如果驱动程序卡住，请重新启动程序</translation>
@@ -2360,11 +2495,6 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/services.py"/>
         <source>An empty picture, the vessel's outline and a minute of moving the robot; then five minutes of waiting.</source>
         <translation>一张空台架图像、血管轮廓和一分钟的机器人移动；然后等待五分钟。</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/services.py"/>
-        <source>&amp;Robot</source>
-        <translation>机器人(&amp;R)</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -2986,6 +3116,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/course.py"/>
+        <source>rehearsal: {where}, {along:.0f} mm in; the runs were there after {time:.1f} s, with up to {force:.2f} N at the wall</source>
+        <translation>预演：{where}，已进入 {along:.0f} mm；各次运行在 {time:.1f} 秒后到达此处，壁面力最大 {force:.2f} N</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/course.py"/>
         <source>dropped</source>
         <translation>丢弃</translation>
     </message>
@@ -3033,6 +3168,21 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/course.py"/>
         <source>{rate:.1f} frames per second, {dropped}</source>
         <translation>每秒 {rate:.1f} 帧，{dropped}</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/course.py"/>
+        <source>rehearsal: the head is not on the way yet</source>
+        <translation>预演：头部尚未进入路径</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/course.py"/>
+        <source>{px:.0f} px outside the band</source>
+        <translation>超出范围带 {px:.0f} px</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/course.py"/>
+        <source>within the band</source>
+        <translation>在范围带内</translation>
     </message>
     <message>
         <location filename="../../app/player/course.py"/>
@@ -4421,6 +4571,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
+        <source>Search (Ctrl+F); Space may be STOP</source>
+        <translation>搜索 (Ctrl+F)；空格键可能是 STOP</translation>
+    </message>
+    <message>
+        <location filename="../../app/settings/dialog.py"/>
         <source>Search name, meaning, unit (Ctrl+F); Space is STOP while the robot can move</source>
         <translation>搜索名称、含义、单位 (Ctrl+F)；机器人可动时空格即停止</translation>
     </message>
@@ -4548,6 +4703,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/settings/draft.py"/>
         <source>; allowed: {range}</source>
         <translation>；允许：{range}</translation>
+    </message>
+    <message>
+        <location filename="../../app/settings/draft.py"/>
+        <source>Joint {name}</source>
+        <translation>关节 {name}</translation>
     </message>
     <message>
         <location filename="../../app/settings/draft.py"/>
@@ -5648,6 +5808,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>该窗口以退出码 {code} 结束</translation>
     </message>
     <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>Nothing was opened yet</source>
+        <translation>尚未打开任何文件</translation>
+    </message>
+    <message>
         <location filename="../../app/ui/snapshot.py"/>
         <source>Snapshot saved: {path} (with _overlay.png and .json)</source>
         <translation>截图已保存：{path}（及 _overlay.png 和 .json）</translation>
@@ -6623,6 +6788,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <translation>退出(&amp;Q)</translation>
     </message>
     <message>
+        <location filename="../../app/ui/window_base.py"/>
+        <source>Open recent</source>
+        <translation>打开最近的文件</translation>
+    </message>
+    <message>
         <location filename="../../app/widgets/alerts.py"/>
         <source>+{count} more</source>
         <translation>另有 {count} 项</translation>
@@ -6994,6 +7164,16 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
+        <source>speeds: feed {feed:.3g}, sheath {sheath:.3g}, tendons {wires} mm/s</source>
+        <translation>速度：进给 {feed:.3g}，鞘管 {sheath:.3g}，腱 {wires} mm/s</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
+        <source>speeds: feed {feed:.3g}, tendons {wires} mm/s</source>
+        <translation>速度：推进 {feed:.3g}，腱绳 {wires} mm/s</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/jog_panel.py"/>
         <source>{motion}: hold to move, release to stop; {speed:.3g} mm/s</source>
         <translation>{motion}：按住移动，松开停止；{speed:.3g} mm/s</translation>
     </message>
@@ -7086,11 +7266,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/widgets/jog_panel.py"/>
         <source>Keys that move the robot</source>
         <translation>移动机器人的按键</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/jog_panel.py"/>
-        <source>speeds: feed {feed:.3g}, sheath {sheath:.3g}, tendons {wires} mm/s</source>
-        <translation>速度：进给 {feed:.3g}，鞘管 {sheath:.3g}，腱 {wires} mm/s</translation>
     </message>
     <message>
         <location filename="../../app/widgets/jog_panel.py"/>
@@ -7308,6 +7483,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/scene_overlay.py"/>
+        <source>weakest bend: {force:.2f} N</source>
+        <translation>最薄弱弯道：{force:.2f} N</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_overlay.py"/>
         <source>What the network took for vessel (blue) and robot (orange)</source>
         <translation>网络判为血管（蓝）和机器人（橙）的部分</translation>
     </message>
@@ -7395,6 +7575,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/scene_overlay.py"/>
         <source>Where the head goes in the next two seconds if the advice is followed: the broken tube</source>
         <translation>若遵循建议，头端在接下来两秒的去处：虚线管形</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_overlay.py"/>
+        <source>Band</source>
+        <translation>范围带</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_overlay.py"/>
+        <source>The rehearsal: 90 % of the heads' paths lie in the band; yellow, orange, red: wall force from 0.05, 0.15, 0.5 N on</source>
+        <translation>预演：90 % 的头部路径在范围带内；黄、橙、红：壁面力分别从 0.05、0.15、0.5 N 起</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_overlay.py"/>
+        <source>turns by {turn:.0f}°, the head by {limit:.0f}°</source>
+        <translation>转角 {turn:.0f}°，头部可弯 {limit:.0f}°</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/scene_overlay.py"/>
+        <source>{count} runs ended here</source>
+        <translation>{count} 次运行在此结束</translation>
     </message>
     <message>
         <location filename="../../app/widgets/scene_overlay.py"/>
@@ -8298,13 +8498,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/config/files.py"/>
-        <source>{path}: cannot be read ({why}); the defaults are used</source>
-        <translation>{path}：无法读取（{why}）；使用默认值</translation>
+        <source>profile {name}: cannot be deleted ({why})</source>
+        <translation>配置方案 {name}：无法删除（{why}）</translation>
     </message>
     <message>
         <location filename="../../core/config/files.py"/>
-        <source>profile {name}: cannot be deleted ({why})</source>
-        <translation>配置方案 {name}：无法删除（{why}）</translation>
+        <source>{path}: cannot be read ({why}); the defaults are used</source>
+        <translation>{path}：无法读取（{why}）；使用默认值</translation>
     </message>
     <message>
         <location filename="../../core/config/files.py"/>
@@ -8470,6 +8670,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../core/control/pursuit.py"/>
         <source>backing off: {why}</source>
         <translation>后退：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../core/control/pursuit.py"/>
+        <source>{why}; a branch ahead may turn more sharply than the head bends</source>
+        <translation>{why}；前方分支的转角可能超过头部的弯曲能力</translation>
     </message>
     <message>
         <location filename="../../core/control/pursuit.py"/>
@@ -8643,6 +8848,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/calibration/rig_draft.py"/>
+        <source>servos at several speeds: {ids} at {a} baud; {others}; set all seven to one</source>
+        <translation>舵机波特率不一致：{ids} 为 {a} baud；{others}；请将七个舵机设为同一波特率</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/calibration/rig_draft.py"/>
         <source>seven servos at {a} baud: {ids}</source>
         <translation>{a} 波特，七个舵机：{ids}</translation>
     </message>
@@ -8663,11 +8873,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/calibration/rig_draft.py"/>
-        <source>servos at several speeds: {ids} at {a} baud; {others}; set all seven to one</source>
-        <translation>舵机波特率不一致：{ids} 为 {a} baud；{others}；请将七个舵机设为同一波特率</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/calibration/rig_draft.py"/>
         <source>where the servos stand could not be kept ({why}): learn the steering, which keeps it, too</source>
         <translation>舵机当前位置未能保存（{why}）：请学习转向，其结果会一并保存</translation>
     </message>
@@ -8675,6 +8880,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/calibration/servo_identification.py"/>
         <source>servo {a}: nothing clear was seen</source>
         <translation>舵机 {a}：没有看到明确的变化</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/calibration/servo_identification.py"/>
+        <source>tendon {name} does not stand at its kept zero: find the zeros first</source>
+        <translation>拉线 {name} 不在其保留的零点：请先寻找零点</translation>
     </message>
     <message>
         <location filename="../../hardware/calibration/servo_identification.py"/>
@@ -8688,11 +8898,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/calibration/servo_identification.py"/>
-        <source>tendon {name} does not stand at its kept zero: find the zeros first</source>
-        <translation>拉线 {name} 不在其保留的零点：请先寻找零点</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/calibration/servo_identification.py"/>
         <source>servo {a} {function} ({seen}), direction {sign}</source>
         <translation>舵机 {a}{function}（{seen}），方向 {sign}</translation>
     </message>
@@ -8700,16 +8905,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/calibration/servo_probe.py"/>
         <source>too much current: {names}; the servos were let go: something holds the wires</source>
         <translation>电流过大：{names}；舵机已放开：有东西卡住驱动丝</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/cameras/basler.py"/>
-        <source>no Basler camera: check its cable and supply; main.py doctor --rig basler says more</source>
-        <translation>没有 Basler 相机：检查其线缆和电源；main.py doctor --rig basler 给出更多信息</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/cameras/basler.py"/>
-        <source>Basler cameras need the package pypylon: pip install pypylon</source>
-        <translation>Basler 相机需要软件包 pypylon：pip install pypylon</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/basler.py"/>
@@ -8738,6 +8933,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/cameras/basler.py"/>
+        <source>no Basler camera: check its cable and supply; main.py doctor --rig basler says more</source>
+        <translation>没有 Basler 相机：检查其线缆和电源；main.py doctor --rig basler 给出更多信息</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
         <source>{camera} gives {rate} pictures/s at {size}: set camera.frames_per_second or camera.exposure_ms lower</source>
         <translation>{camera} 在 {size} 时为每秒 {rate} 帧：调低 camera.frames_per_second 或 camera.exposure_ms</translation>
     </message>
@@ -8745,6 +8945,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/cameras/basler.py"/>
         <source>{camera} has no {size}: set camera.width_px to {widths}, and camera.height_px to {heights}</source>
         <translation>{camera} 没有 {size}：将 camera.width_px 设为 {widths}，camera.height_px 设为 {heights}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/basler.py"/>
+        <source>Basler cameras need the package pypylon: pip install pypylon</source>
+        <translation>Basler 相机需要软件包 pypylon：pip install pypylon</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/basler.py"/>
@@ -8788,6 +8993,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/cameras/registry.py"/>
+        <source>RealSense cameras need the package pyrealsense2: {command}</source>
+        <translation>RealSense 相机需要软件包 pyrealsense2:{command}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/cameras/registry.py"/>
         <source>no Basler camera {serial}; there are: {serials}</source>
         <translation>没有 Basler 相机 {serial}；现有：{serials}</translation>
     </message>
@@ -8800,11 +9010,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/cameras/registry.py"/>
         <source>no Basler camera</source>
         <translation>没有 Basler 相机</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/cameras/registry.py"/>
-        <source>RealSense cameras need the package pyrealsense2: {command}</source>
-        <translation>RealSense 相机需要软件包 pyrealsense2:{command}</translation>
     </message>
     <message>
         <location filename="../../hardware/cameras/registry.py"/>
@@ -9140,6 +9345,26 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../hardware/servos/tracking.py"/>
         <source>{joint} stands {a} mm from its goal for {b} ms</source>
         <translation>{joint}停在距目标 {a} mm 处已 {b} ms</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/twin/own_phantom.py"/>
+        <source>the twin has a phantom of this bench: gui --bench {folder}</source>
+        <translation>数字孪生已有此台架的体模：gui --bench {folder}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/twin/own_phantom.py"/>
+        <source>calibrate the rig, or say how much the picture shows: python main.py phantom {folder} --width-mm MM</source>
+        <translation>请标定装置，或说明画面的实际宽度：python main.py phantom {folder} --width-mm MM</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/twin/own_phantom.py"/>
+        <source>the twin has no phantom of this bench: {why}</source>
+        <translation>数字孪生没有此台架的体模：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../hardware/twin/own_phantom.py"/>
+        <source>the twin's phantom of this bench stays as it was: {why}</source>
+        <translation>数字孪生中此台架的体模保持不变：{why}</translation>
     </message>
     <message>
         <location filename="../../hardware/twin/process.py"/>
@@ -13268,8 +13493,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>steering error above which the robot goes slow</source>
-        <translation>转向误差大于此，机器人慢行</translation>
+        <source>missing turn above which the robot goes slow</source>
+        <translation>尚缺转角超过此值时机器人慢行</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -14253,8 +14478,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>How the windows look, and where they keep pictures.</source>
-        <translation>窗口的外观，以及图片保存的位置。</translation>
+        <source>How the windows look, where they keep pictures, and what they ask before a hand-over.</source>
+        <translation>窗口的外观、图片的保存位置，以及移交前的检查。</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -14285,6 +14510,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>where snapshots go; empty: LumenPilot in Pictures</source>
         <translation>截图保存的位置；留空：“图片”中的 LumenPilot</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Needs rehearsal</source>
+        <translation>需要预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>hand-over needs a rehearsal of this destination (menu Robot)</source>
+        <translation>移交需要先预演此目标点（“机器人”菜单）</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
