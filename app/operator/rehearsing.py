@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from PySide6.QtCore import QObject, QTimer, Slot
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.preflight import PreflightFinding
-from app.operator.rehearsal_card import KEY
+from app.operator.rehearsal_card import KEY, advice_of
 from app.operator.window import OperatorWindow
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.i18n import mark, tr, tr_text
@@ -47,8 +48,8 @@ class RehearsalController(QObject):
         self._window, self._command = window, command
         self._card = window.panels.rehearsal
         self._child: ChildProcess | None = None
-        self._bench: tuple[str, ...] | None = None
-        """Options that name the phantom; None: there is none."""
+        self._bench: tuple[tuple[str, ...], int] | None = None
+        """Options that name the phantom, and when it was made; None: there is none."""
         self._done = 0
         self._so_far: RehearsalResult | None = None
         self.result: RehearsalResult | None = None
@@ -63,18 +64,20 @@ class RehearsalController(QObject):
         self._limit = QTimer(self, singleShot=True, interval=_LONGEST_MS)
         self._limit.timeout.connect(self._on_too_long)
         self._watch = QTimer(self, interval=_WATCH_MS)
-        self._watch.timeout.connect(self._show_lack)
+        self._watch.timeout.connect(self._look_again)
         self._watch.start()
         self._offer()
 
     # ---- what may be rehearsed
 
-    def _known_bench(self) -> tuple[str, ...] | None:
+    def _known_bench(self) -> tuple[tuple[str, ...], int] | None:
         rig = self._window.rig
         if rig.kind is RigKind.SIM:
-            return ()
-        bench = rig.calibrated(rig.config).perception.bench if rig.kind is RigKind.LIVE else None
-        return ("--bench", bench) if bench is not None and (Path(bench) / PHANTOM_FILE).is_file() else None
+            return (), 0
+        if rig.kind is RigKind.LIVE and (bench := rig.calibrated(rig.config).perception.bench) is not None:
+            with contextlib.suppress(OSError):
+                return ("--bench", bench), (Path(bench) / PHANTOM_FILE).stat().st_mtime_ns
+        return None
 
     @Slot()
     def _offer(self) -> None:
@@ -94,6 +97,13 @@ class RehearsalController(QObject):
         self.result = None
         self._window.panels.show_rehearsal(None)
         self._offer()
+
+    @Slot()
+    def _look_again(self) -> None:
+        """A phantom may be made or changed beside the window."""
+        if self._known_bench() != self._bench:
+            self.forget()
+        self._show_lack()
 
     # ---- a rehearsal
 
@@ -119,7 +129,7 @@ class RehearsalController(QObject):
         height, width = tick.frame.image.shape[:2]
         config = window.rig.calibrated(window.rig.config).model_dump(mode="json")
         options = ["--target", f"{target[0]:.1f},{target[1]:.1f}", "--given", "--progress-json", "--runs", str(RUNS)]
-        options += ["--minutes", str(MINUTES), "--workers", str(max(2, (os.cpu_count() or 2) - 2)), *bench]
+        options += ["--minutes", str(MINUTES), "--workers", str(max(2, (os.cpu_count() or 2) - 2)), *bench[0]]
         given = json.dumps({"config": config, "size_px": [width, height]})
         child = ChildProcess(self._command("rehearse", *options), self, given=given)
         child.told.connect(self._on_told)
@@ -180,7 +190,11 @@ class RehearsalController(QObject):
         name, result = tr("rehearsal"), self.result
         if result is not None:
             share = tr("{share:.0f} % of {runs} runs arrived", share=100 * result.arrived.share, runs=result.runs)
-            return PreflightFinding(name, Level.GOOD if result.recommended_speed_mm_s is not None else Level.WARNING, share)
+            if (result.recommended_speed_mm_s or 0.0) >= result.speed_mm_s:
+                return PreflightFinding(name, Level.GOOD, share)
+            return PreflightFinding(name, Level.WARNING, share, advice_of(result)[0])
+        if self._child is not None:
+            return PreflightFinding(name, Level.WARNING, tr("the rehearsal is not finished"), tr("wait for its result"))
         if self._bench is None:
             return PreflightFinding(name, Level.WARNING, tr("the hand-over needs one"), tr(_NO_PHANTOM))
         if self._window.target is None:

@@ -171,9 +171,21 @@ def test_a_hand_over_may_need_one(make: MakeController, given: Path, qtbot: QtBo
     controller.toggle()
     until(qtbot, lambda: controller.result is not None and controller._child is None)
     assert rig.may_ask(OperatorStep.HAND_OVER)
+    finding = controller.finding
+    assert finding is not None and finding.level is Level.WARNING and finding.fix.startswith("Go at 70 %")
+    controller._on_told(FOUND | {"recommended_speed_mm_s": 8.0})
     assert controller.finding is not None and controller.finding.level is Level.GOOD
     window.set_target((310.0, 200.0))
     assert not rig.may_ask(OperatorStep.HAND_OVER)
+
+
+def test_a_hand_over_waits_for_the_rehearsal_that_goes_on(make: MakeController, given: Path) -> None:
+    controller = make(said(then=f"exec {WAITS}"), is_needed=True)
+    window = controller._window
+    window.set_target(TARGET)
+    controller.toggle()
+    assert not window.rig.may_ask(OperatorStep.HAND_OVER)
+    assert window.panels.toast.text() == "Not handed over: the rehearsal is not finished. Wait for its result."
 
 
 def test_the_result_is_read_as_it_is_written() -> None:
@@ -196,5 +208,12 @@ def test_a_real_bench_is_rehearsed_on_its_own_phantom(make: MakeController, tmp_
     controller._window.set_target(TARGET)
     assert card_of(controller).isHidden()
     (tmp_path / "phantom.json").touch()
-    controller._window.set_target(TARGET)
-    assert card_of(controller).button.text() == "Rehearse  (T)" and controller._bench == ("--bench", str(tmp_path))
+    controller._look_again()
+    assert card_of(controller).button.text() == "Rehearse  (T)"
+    assert controller._bench is not None and controller._bench[0] == ("--bench", str(tmp_path))
+    controller._on_told(FOUND)
+    controller._look_again()
+    assert controller.result is not None
+    os.utime(tmp_path / "phantom.json", (0, 0))
+    controller._look_again()
+    assert controller.result is None, "of another phantom"
