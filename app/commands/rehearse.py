@@ -27,6 +27,7 @@ from app.commands.workers import over_processes
 from core.config.models import Config, load_config
 from core.config.rig_file import find_rig, set_pursuit
 from core.devices import UserError
+from core.evaluation.rehearsal import FEWEST_RUNS
 from core.evaluation.trial import Row, summarise
 
 if TYPE_CHECKING:
@@ -39,8 +40,6 @@ if TYPE_CHECKING:
 _FIRST_SHARE = 0.7
 """Of the time, for the set speeds; slower ones are tried in the rest."""
 _SHOWN_EVERY_S = 2.0
-_FEWEST = 20
-"""Runs, at least, from which a speed is recommended."""
 
 
 def rehearse(
@@ -108,7 +107,7 @@ def rehearse(
         if not rows:
             break
         tried.append((speed, rows))
-        if len(rows) >= min(runs, _FEWEST) and is_good(summarise(rows)):
+        if len(rows) >= min(runs, FEWEST_RUNS) and is_good(summarise(rows)):
             good = speed
             break
     if not tried:
@@ -119,7 +118,7 @@ def rehearse(
     if as_json or progress_json:
         sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
     else:
-        _print(about)
+        _print(about, runs)
 
 
 def _tune(plan: RehearsalPlan, runs: int, seed: int, workers: int, rig: str | None, *, as_json: bool) -> None:
@@ -294,7 +293,7 @@ def _figures(rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _print(about: dict[str, Any]) -> None:
+def _print(about: dict[str, Any], runs: int) -> None:
     arrived, force, weakest, speed = about["arrived"], about["wall_force_n"], about["weakest"], about["recommended_speed_mm_s"]
     lines = [
         f"{arrived['share']:.0%} of {about['runs']} runs arrived (95 % interval {arrived['low']:.0%} to {arrived['high']:.0%}): "
@@ -311,7 +310,12 @@ def _print(about: dict[str, Any]) -> None:
             f"weakest at ({x:.0f}, {y:.0f}), {weakest['along_mm']:.0f} mm in, a turn of {weakest['turn_deg']:.0f} degrees: {why}"
         )
     if speed is None:
-        lines.append("no speed that was tried is good: choose another target")
+        few = about["runs"] < min(runs, FEWEST_RUNS)
+        lines.append(
+            "too few runs ended to recommend a speed: give more --minutes"
+            if few
+            else "no speed that was tried is good: choose another target"
+        )
     else:
         lines.append(f"recommended: {speed / about['speed_mm_s']:.0%} of the set speeds, advice.fast_mm_s = {speed:g}")
     for line in lines:

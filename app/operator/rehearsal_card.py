@@ -10,7 +10,7 @@ from app.ui.i18n import tr
 from app.widgets.basics import OnResize, column, line, text_button
 from app.widgets.live_view import LiveView
 from app.widgets.scene_overlay import HEAT
-from core.evaluation.rehearsal import RehearsalResult
+from core.evaluation.rehearsal import FEWEST_RUNS, RehearsalResult
 
 KEY = "T"
 _INK = theme.ON_PICTURE
@@ -136,6 +136,8 @@ def figures_of(result: RehearsalResult) -> str:
 def advice_of(result: RehearsalResult) -> tuple[str, str]:
     """What to do after it, and its colour over the picture."""
     speed = result.recommended_speed_mm_s
+    if speed is None and result.runs < FEWEST_RUNS:
+        return tr("Too few runs ended to recommend a speed: close other programs, and rehearse again"), _INK.ORANGE
     if speed is None:
         return tr("No speed that was tried is good: choose another destination, or steer yourself"), _INK.FAULT
     if speed >= result.speed_mm_s:

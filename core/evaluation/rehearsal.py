@@ -14,6 +14,9 @@ from core import geometry
 from core.session.manifest import REHEARSAL, Event
 from core.types import Point
 
+FEWEST_RUNS = 20
+"""Runs, at least, from which a speed is recommended."""
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from core import geometry
 from core.control.modes import Mode
 from core.evaluation.rehearsal import PlaceBeside, RehearsalResult, place_beside, rehearsal_of
 from core.session.manifest import EventKind
@@ -18,6 +20,7 @@ _BESIDE_PX = 4.0
 _LEFT_S = 0.5
 """A head that is outside for so long has left the band."""
 _ARRIVED_MM = 5.0
+"""Of the destination: the rehearsed way may end before it."""
 
 
 def runs_beside(reader: SessionReader) -> list[dict[str, Any]]:
@@ -43,7 +46,9 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
     """None where the head was never on the rehearsed way."""
     found: list[tuple[float, PlaceBeside, Point]] = []
     states, forces = [], []
-    limit_px = _BESIDE_PX * max(result.size_px) / 640
+    limit_px, way = _BESIDE_PX * max(result.size_px) / 640, result.way
+    px_per_mm = float(geometry.arc_length(np.array(way.xy))[-1]) / (way.along_mm[-1] - way.along_mm[0]) if len(way.xy) > 1 else 0.0
+    arrived = False
     for place in places:
         row = reader.row(place)
         if row is None:
@@ -54,7 +59,7 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
         head = row.scene.to_source(row.scene.path.head) if row.scene.path is not None else None
         if head is not None and (beside := place_beside(result, head)) is not None:
             found.append((row.captured_s, beside, head))
-            if beside.along_mm >= result.way.along_mm[-1] - _ARRIVED_MM:
+            if arrived := math.dist(head, result.target_xy) <= _ARRIVED_MM * px_per_mm:
                 break
     if not found:
         return None
@@ -75,7 +80,7 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
         "target_xy": list(result.target_xy),
         "runs": result.runs,
         "arrived_share": result.arrived.share,
-        "arrived": last.along_mm >= result.way.along_mm[-1] - _ARRIVED_MM,
+        "arrived": arrived,
         "seconds": round(ended_s - began_s, 2),
         "rehearsed_seconds": [round(value - first.time_s[1], 2) for value in last.time_s],
         "inside_share": round(1.0 - len(outside) / len(found), 4),

@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
+from app.commands.rehearse import _print
 from core.config.models import Config, load_config
 from core.config.rig_file import as_calibrated, find_rig, make_rig, with_rig, write_rig
 from core.evaluation.rehearsal import RehearsalResult
@@ -77,13 +78,15 @@ def test_a_slower_speed_is_tried_and_given_up_early(rehearse: Callable[..., list
 
 
 def test_a_short_time_gives_the_first_runs_and_no_advice(
-    rehearse: Callable[..., list[dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
+    rehearse: Callable[..., list[dict[str, Any]]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = iter(range(0, 100_000, 4))
     monkeypatch.setattr("app.commands.rehearse.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
     order = [0, 1, 3, 4, 2, *range(5, 50)]  # number 2 has not ended when the time is over
     (told,) = rehearse(lambda _speed, seed: row(order[seed]), "--json", "--minutes", "0.3")
     assert told["runs"] == 2 and told["recommended_speed_mm_s"] is None
+    _print(told, 50)
+    assert "too few runs ended to recommend a speed: give more --minutes" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("own_folder")

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.operator.rehearsal_card import RehearsalCard
+from app.operator.rehearsal_card import RehearsalCard, advice_of
 from app.operator.rehearsing import RehearsalController
 from app.operator.window import OperatorWindow
 from app.ui.texts import OperatorStep
@@ -192,11 +192,13 @@ def test_the_result_is_read_as_it_is_written() -> None:
     assert RehearsalResult.model_validate(FOUND).model_dump(mode="json") | {"size_px": [640, 480]} == FOUND
 
 
-def test_the_card_says_whose_robot_it_was(make: MakeController) -> None:
+def test_the_card_says_whose_robot_it_was_and_what_to_do(make: MakeController) -> None:
     card = card_of(make(said(FOUND)))
     result = RehearsalResult.model_validate(FOUND)
     card.show_result(result)
     assert "rig identify" not in card.text
+    for runs, advice in ((50, "No speed that was tried is good"), (12, "Too few runs ended to recommend a speed")):
+        assert advice_of(result.model_copy(update={"runs": runs, "recommended_speed_mm_s": None}))[0].startswith(advice)
     card.show_result(result, is_real=True)
     assert "With the nominal robot: rig identify measures yours" in card.text
     card.show_result(result.model_copy(update={"assumed": {"robot": "identified"}}), is_real=True)

@@ -78,6 +78,14 @@ def test_a_run_that_left_the_band_says_when() -> None:
     assert run["states"]["A"] == 1.0 and run["rehearsed_states"]["A"] == 0.8
 
 
+def test_the_end_of_the_rehearsed_way_is_no_destination() -> None:
+    stuck = FOUND.model_copy(update={"target_xy": (180.0, 200.0)})  # no run came there
+    rehearsed = event_of_target((180.0, 200.0), 9.0, stuck.model_dump(mode="json"))
+    for last_px, arrived in ((150.0, False), (180.0, True)):
+        heads = [(x, 200.0) for x in np.arange(110.0, last_px + 1.0, 2.0).tolist()]
+        assert [run["arrived"] for run in runs_beside(reader_of(heads, [rehearsed], 0))] == [arrived]
+
+
 def test_a_destination_without_a_rehearsal_has_no_run() -> None:
     chosen = event_of_target((140.0, 200.0), 9.0)
     assert rehearsal_of(chosen) is None and runs_beside(reader_of([(120.0, 200.0)], [chosen], 0)) == []
