@@ -21,6 +21,7 @@ from core import geometry
 from core.bench.bench import ROBOT_FILE, Bench, BenchError
 from core.bench.registration import register
 from core.config.models import PerceptionConfig
+from core.devices import disk_errors
 from core.files import write_atomic
 from core.learning.dataset import Sample
 from core.perception import robot_path, skeleton
@@ -134,15 +135,11 @@ def write_textures(textures: Sequence[RobotTexture], folder: Path) -> None:
     data = io.BytesIO()
     arrays |= {"format": _FORMAT, "robots": [(one.radius_px, *one.tail_px) for one in textures]}
     np.savez_compressed(data, **arrays)
-    try:
+    with disk_errors(BenchError, path, "cannot be written", "; make room, or choose another folder"):
         if textures:
             write_atomic(path, data.getvalue())
         else:
             path.unlink(missing_ok=True)
-    except OSError as error:
-        raise BenchError(
-            "{path}: cannot be written ({why}); make room, or choose another folder", path=path, why=error.strerror
-        ) from None
 
 
 def read_textures(folder: Path) -> list[RobotTexture]:
