@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from core.bench.bench import bench_from_pictures, bench_sha256, write_bench
-from core.config.calibration import CalibrationConfig, LensConfig, PortConfig, ScaleConfig
+from core.config.calibration import BehaviourConfig, CalibrationConfig, Estimate, LensConfig, PortConfig, ScaleConfig
 from core.config.models import Config, load_config
 from core.config.rig_file import (
     RigFileError,
@@ -23,6 +23,7 @@ from core.config.rig_file import (
     rigs_folder,
     scaled,
     sections_of_rig,
+    set_behaviour,
     set_bench,
     set_port,
     with_rig,
@@ -227,6 +228,14 @@ def test_a_rig_that_is_calibrated_again_keeps_what_it_was_taught(tmp_path: Path)
     assert (again.bench, again.model) == (str(tmp_path / "lab"), "mine")
     assert make_rig(REAL, "bench 2", KNOWN).bench is None
     running = with_rig(REAL, read_rig(path), path)
+    one = Estimate(value=1.0, low=0.9, high=1.1)
+    fitted = {name for name, field in BehaviourConfig.model_fields.items() if field.annotation is Estimate}
+    robot = BehaviourConfig(session="jog", head_p50_mm=0.2, head_p95_mm=0.5, **dict.fromkeys(fitted, one))
+    set_behaviour(path, robot)
+    assert make_rig(running, "bench 1", KNOWN).behaviour == robot
+    joints = tuple(joint.model_copy(update={"mm_per_turn": 1.1 * joint.mm_per_turn}) for joint in running.servos.joints)
+    other = running.model_copy(update={"servos": running.servos.model_copy(update={"joints": joints})})
+    assert make_rig(other, "bench 1", KNOWN).behaviour is None, "identified with other ways per turn"
     path.unlink()
     assert make_rig(running, "bench 1", KNOWN).bench is None
 
