@@ -32,12 +32,11 @@ What the program does in each fault. `python -m tools.fault_campaign --out docs/
 
 **HOLD** stops an autonomous motion and may clear itself within half a second; **DISARM** holds, leaves autonomy and must be
 acknowledged; **STOP** does so in every mode and blocks the bus. Times count from the injection on, ages from the frame before it.
-A case counts as listed only if the modes, the alerts, the record in the session and, for faults of camera and perception, the
-blanked advice are as listed.
+"As listed" includes modes, alerts, the session's record and, for camera and perception, the blanked advice.
 """
 _WAYS = {
     True: """Measured live: seven software servos on a pseudo-terminal, the real driver in its own process, the wall's clock. The
-twin's masks stand in for the network unless a case says otherwise. A try that the machine disturbs is repeated, twice at most.
+twin's masks stand in for the network. A try that the machine disturbs is repeated, twice at most.
 """,
     False: "Measured in lock-step where a case allows it: simulated time, ideal servos behind the real gate.\n",
 }
