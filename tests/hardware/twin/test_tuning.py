@@ -77,3 +77,11 @@ def test_better_is_what_is_surely_better_and_nowhere_worse(change: dict[str, Any
     found = compared(before, after)
     assert found["is_better"] is is_better
     assert found["time"]["low"] <= found["time"]["change"] <= found["time"]["high"]
+
+
+@pytest.mark.parametrize(("force_n", "is_better"), [(0.1, True), (0.2, False)])
+def test_more_that_arrive_count_before_the_time(force_n: float, is_better: bool) -> None:
+    before = [row(seed, reached=seed % 3 > 0) for seed in range(30)]
+    after = [row(seed, time_s=12.0, force_n=force_n) for seed in range(30)]
+    found = compared(before, after)
+    assert found["arrived"]["low"] > 0.0 and found["time"]["low"] > 0.0 and found["is_better"] is is_better
