@@ -79,7 +79,7 @@ def rehearse(
     config = with_own_phantom(config, bench) if bench is not None else config
     picture, target_px = _picture(config, told.get("size_px"), point_option(target))
     trial = TrialPlan(config, max_seconds=max_seconds, look="bench", wall_force=False, own=True, target_px=target_px)
-    sharp = picture.sharp()
+    sharp = picture.sharp(config)
     for turn in sharp if not (as_json or progress_json) else ():
         console.print(
             f"too sharp: the branch at ({turn['xy'][0]:.0f}, {turn['xy'][1]:.0f}) turns by {turn['turn_deg']:.0f} degrees, the "
@@ -191,11 +191,11 @@ class _Picture:
         points = np.asarray(points_mm, np.float64).reshape(-1, 2)
         return [[round(x, 1), round(y, 1)] for x, y in self.seen.project(points).tolist()]
 
-    def sharp(self) -> list[dict[str, Any]]:
+    def sharp(self, config: Config) -> list[dict[str, Any]]:
         """Branches on the way that are too sharp."""
         from hardware.twin.rehearsal import sharp_turns
 
-        turns = sharp_turns(self.phantom, self.target)
+        turns = sharp_turns(self.phantom, self.target, config)
         return [
             {"xy": self.pixels([one.point_mm])[0], "turn_deg": round(one.turn_deg, 1), "limit_deg": round(one.limit_deg, 1)}
             for one in turns

@@ -63,13 +63,18 @@ class SharpTurn:
     limit_deg: float
 
 
-def sharp_turns(phantom: Phantom, target: Target) -> list[SharpTurn]:
-    """The branches on the way to the target that are too sharp.
+def sharp_turns(phantom: Phantom, target: Target, config: Config) -> list[SharpTurn]:
+    """The branches on the way to the target that are too sharp for the twin's robot, or for the weaker side of an identified one.
 
     A warning (``sharp_branches``): of the trial seeds 100 to 199 it names six (108, 149, 167, 179, 184, 186); one run of each: two
     stopped short, three arrived with 0.2 to 0.4 N at the wall, one easily.
     """
-    found = sharp_branches(phantom.graph, target.route, ROBOT_RADIUS_MM, BEND_DEG_PER_MM * MAX_PULL_MM, (0.0, target.at_mm))
+    bend_deg = BEND_DEG_PER_MM * MAX_PULL_MM
+    if (known := config.twin.behaviour) is not None:
+        drive = DriveProperties.identified(known, config.servos.max_pull_mm)
+        slack_mm = max(drive.dead_zone_mm, drive.dead_zone_left_mm or 0.0)
+        bend_deg = BEND_DEG_PER_MM * min(drive.gain) * (MAX_PULL_MM - slack_mm)
+    found = sharp_branches(phantom.graph, target.route, ROBOT_RADIUS_MM, bend_deg, (0.0, target.at_mm))
     return [SharpTurn(*one) for one in found]
 
 

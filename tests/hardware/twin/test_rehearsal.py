@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.config.models import Config
+from core.config.calibration import Estimate
+from core.config.models import Config, TwinConfig
 from core.types import GraphEdge, VesselGraph
 from hardware.twin.phantom import Phantom
 from hardware.twin.rehearsal import (
@@ -24,6 +25,7 @@ from hardware.twin.rehearsal import (
 )
 from hardware.twin.trial import TargetError, TrialPlan, target_near
 from hardware.twin.view import CameraView
+from tests.hardware.twin.test_identification import behaviour
 
 VIEW = CameraView(np.diag([3.2, 3.2, 1.0]), (640, 480))
 
@@ -57,11 +59,14 @@ def test_the_target_lies_in_the_vessel_nearest_to_the_click() -> None:
 def test_a_branch_is_too_sharp_by_its_turn_and_the_lumen_s_width(turn_deg: float, radius_mm: float, count: int) -> None:
     phantom = forked(turn_deg, radius_mm)
     x, y = VIEW.project(phantom.graph.nodes[3:4])[0] - (0, 10)
-    found = sharp_turns(phantom, target_near(phantom, VIEW, (x, y)))
+    target = target_near(phantom, VIEW, (x, y))
+    found = sharp_turns(phantom, target, Config())
     assert len(found) == count
     if found:
         assert found[0].turn_deg == pytest.approx(turn_deg, abs=1.0) and found[0].point_mm == pytest.approx((60, 75))
-    assert sharp_turns(phantom, target_near(phantom, VIEW, (320, 240))) == []  # straight on
+    assert sharp_turns(phantom, target_near(phantom, VIEW, (320, 240)), Config()) == []  # straight on
+    stiff = behaviour(bend_left_deg_per_mm=Estimate(value=20.0, low=18.0, high=22.0))
+    assert len(sharp_turns(phantom, target, Config(twin=TwinConfig(behaviour=stiff)))) == 1  # a robot that bends less
 
 
 def test_a_run_is_the_same_for_its_seed_and_perceives_with_errors(monkeypatch: pytest.MonkeyPatch) -> None:
