@@ -2278,6 +2278,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Too few runs ended to recommend a speed: close other programs, and rehearse again</source>
+        <translation>结束的运行太少，无法推荐速度：请关闭其他程序后重新预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
         <source>No speed that was tried is good: choose another destination, or steer yourself</source>
         <translation>试过的速度都不合适：请选择其他目标点，或自行操纵</translation>
     </message>
@@ -2330,6 +2335,16 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/rehearsing.py"/>
         <source>First click the destination, then rehearse</source>
         <translation>请先单击目标点，再预演</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>the rehearsal is not finished</source>
+        <translation>预演尚未结束</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>wait for its result</source>
+        <translation>请等待其结果</translation>
     </message>
     <message>
         <location filename="../../app/operator/rehearsing.py"/>
