@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -29,12 +30,11 @@ def runs_beside(reader: SessionReader) -> list[dict[str, Any]]:
     A run begins with the hand-over, without one when the destination was rehearsed; it ends at the destination, or with it.
     """
     line, chosen = reader.timeline(), [event for event in reader.events if event.kind is EventKind.TARGET]
-    ends_s = [event.time_s for event in chosen[1:]] + [np.inf]
     driven, runs = line.mode == list(Mode).index(Mode.AUTONOMOUS), []
-    for event, end_s in zip(chosen, ends_s, strict=True):
+    for event, following in zip_longest(chosen, chosen[1:]):
         if (result := rehearsal_of(event)) is None:
             continue
-        within = (line.time_s >= event.time_s) & (line.time_s < end_s)
+        within = (line.time_s >= event.time_s) & (line.time_s < (following.time_s if following is not None else np.inf))
         places = np.flatnonzero(within & driven)
         places = np.flatnonzero(within)[np.flatnonzero(within) >= (places[0] if len(places) else 0)]
         if (run := _run_beside(reader, result, places.tolist())) is not None:

@@ -62,8 +62,8 @@ LEAST_S, LEAST_BEND_MM, LEAST_FEED_MM = 40.0, 0.5, 10.0
 _MOVED_SHARE = 0.02
 _LEAST_NOISE_MM = 0.1
 _WITHIN = 5.3
-"""Standard errors of the least squares that hold 95 % of the values: of 180 of twenty hidden twins (``tools.identified_twins``), since
-what perception always sees alike is not in them."""
+"""Standard errors of the least squares that hold 95 % of the values: of 180 of twenty hidden twins (``tools.identified_twins``),
+since what perception always sees alike is not in them."""
 _MOST_RUNS = 7
 """Of the twin for the fit, besides those for the slopes."""
 
