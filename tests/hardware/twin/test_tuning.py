@@ -65,6 +65,7 @@ def test_the_search_keeps_to_its_runs_and_all_candidates_get_the_same_seeds() ->
         ({"time_s": 8.0}, True),
         ({"force_n": 0.07}, True),
         ({"time_s": 8.0, "force_n": 0.2}, False),
+        ({"time_s": 8.0, "force_n": 0.101}, False),
         ({"time_s": 8.0, "reached": False}, False),
         ({}, False),
     ],
