@@ -49,7 +49,7 @@ class RehearsalController(QObject):
         self._card = window.panels.rehearsal
         self._child: ChildProcess | None = None
         self._bench: tuple[tuple[str, ...], int] | None = None
-        """Options that name the phantom, and when it was made; None: there is none."""
+        """Options that name the phantom, and when it was made; None: no phantom."""
         self._done = 0
         self._so_far: RehearsalResult | None = None
         self.result: RehearsalResult | None = None

@@ -88,7 +88,7 @@ def texture_of(image: Image, robot: Mask, doubtful: Mask, bench: Bench) -> Robot
     is_seen &= (contrast > _COVERED_SHARE * np.median(contrast)) & (above[:, middle].max(axis=(1, 2)) < _COVERING_LEVELS)
     is_seen[: round(3 * radius)] = True  # a tip may have little contrast
     is_seen = cv2.erode(is_seen.view(np.uint8)[:, None], np.ones((_COVER_ROWS, 1), np.uint8))[:, 0] > 0
-    seen, behind = (np.asarray(255.0 * (one - above) / (255.0 - above), np.float32) for one in (seen, behind))  # beneath the lines
+    seen, behind = (np.asarray(255.0 * (one - above) / (255.0 - above), np.float32) for one in (seen, behind))  # below the lines
     if is_seen.sum() < _LEAST_ROWS:
         return None
     alpha = np.asarray(cv2.blur(alpha, (1, _EVEN_ROWS)), np.float32)

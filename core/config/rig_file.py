@@ -238,7 +238,7 @@ def make_rig(config: Config, name: str, calibration: CalibrationConfig | None) -
     with suppress(RigFileError):  # a file that has gone since must not cost the calibration
         before = rig_in_use(config)
     bench = str((before[0].parent / before[1].bench).absolute()) if before is not None and before[1].bench is not None else None
-    # the identified robot is one of these ways per turn: with others its pull and feed are counted anew
+    # the identified robot is one of these ways per turn: with others its pull and feed are counted again
     is_same = before is not None and [one.mm_per_turn for one in before[1].servos.joints] == [
         one.mm_per_turn for one in config.servos.joints
     ]

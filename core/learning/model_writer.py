@@ -233,7 +233,7 @@ def install_model(made: Path, folder: Path, bench: Path | None = None) -> None:
         if bench is not None:
             shutil.copytree(bench, scratch / BENCH)
             if (phantom := folder / BENCH / PHANTOM_FILE).is_file() and not (bench / PHANTOM_FILE).exists():
-                shutil.copy2(phantom, scratch / BENCH)  # made anew where there is a scale (hardware/twin/own_phantom.py)
+                shutil.copy2(phantom, scratch / BENCH)  # made again where there is a scale (hardware/twin/own_phantom.py)
 
 
 @contextmanager

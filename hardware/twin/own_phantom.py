@@ -155,14 +155,14 @@ def scale_and_port(known: CalibrationConfig | None, size: tuple[int, int]) -> tu
 
 
 def phantom_for_bench(folder: Path, known: CalibrationConfig | None) -> str:
-    """Make the phantom of a bench's vessel, or make it anew: by a calibration, else by scale and port of the one before.
+    """Make the phantom of a bench's vessel, or make it again: by a calibration, else by scale and port of the one before.
 
     Returns a line that says what was made, or why not and what to do: the one before stays then. Raises nothing.
     """
     has_one = (folder / PHANTOM_FILE).is_file()
     try:
         bench, before = read_bench(folder), None
-        with contextlib.suppress(PhantomError):  # a damaged one is made anew
+        with contextlib.suppress(PhantomError):  # a damaged one is made again
             before = read_phantom(f"{OWN}{folder}") if has_one else None
         scale, port_px = scale_and_port(known, bench.size)
         view = view_of_scale(scale, bench.size) if scale is not None else None
