@@ -13,6 +13,7 @@ import time
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
+import hypothesis
 import psutil
 import pytest
 from _pytest.runner import runtestprotocol
@@ -21,6 +22,11 @@ from _pytest.runner import runtestprotocol
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 for pool in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(pool, "1")
+
+# The default profile fails an example that takes over 200 ms, as any may on a busy machine, and draws other ones in each run.
+_SLOW = hypothesis.HealthCheck.too_slow
+hypothesis.settings.register_profile("tests", deadline=None, derandomize=True, database=None, suppress_health_check=[_SLOW])
+hypothesis.settings.load_profile("tests")
 
 _home = Path(tempfile.mkdtemp(prefix="lumenpilot_tests_"))
 atexit.register(shutil.rmtree, _home, ignore_errors=True)

@@ -195,7 +195,7 @@ _rates = st.lists(st.floats(-140.0, 140.0), min_size=2, max_size=6)
 
 
 @given(rates=_rates, share=st.floats(0.0, 1.0), feed=st.floats(-8.0, 8.0), late_s=st.floats(0.02, 0.24))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_robot_that_is_wired_right_never_seems_to_go_the_other_way(
     rates: list[float], share: float, feed: float, late_s: float
 ) -> None:
@@ -214,7 +214,7 @@ def test_a_robot_that_is_wired_right_never_seems_to_go_the_other_way(
 
 
 @given(rate=st.floats(12.0, 140.0), share=st.floats(0.6, 1.0), sign=st.sampled_from([-1.0, 1.0]), late_s=st.floats(0.02, 0.14))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_robot_that_is_wired_the_other_way_is_always_noticed(rate: float, share: float, sign: float, late_s: float) -> None:
     monitor, most_deg = DirectionMonitor(), 0.0
     for step in range(round(1.5 / TURN_S)):

@@ -22,7 +22,7 @@ def walk(seed: int, count: int) -> Points:
     return np.cumsum(steps, axis=0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), count=st.integers(1, 60), step=st.floats(0.3, 20.0))
 def test_arc_length_and_places_along_it(seed: int, count: int, step: float) -> None:
     points = walk(seed, count)
@@ -41,7 +41,7 @@ def test_arc_length_and_places_along_it(seed: int, count: int, step: float) -> N
     np.testing.assert_allclose(part[1:-1], inner)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), count=st.integers(1, 40), x=st.floats(-30.0, 30.0), y=st.floats(-30.0, 30.0))
 def test_the_nearest_place_is_none_farther_than_any_other(seed: int, count: int, x: float, y: float) -> None:
     points = walk(seed, count)
@@ -52,7 +52,7 @@ def test_the_nearest_place_is_none_farther_than_any_other(seed: int, count: int,
     assert geometry.point_at(points, geometry.arc_length(points), np.array([position]))[0] == pytest.approx(place, abs=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 70), sigma=st.floats(0.5, 6.0), keeps=st.booleans())
 def test_smoothing_is_a_weighted_mean_of_the_line_mirrored_through_its_ends(
     seed: int, count: int, sigma: float, keeps: bool
@@ -127,7 +127,7 @@ def test_a_line_of_points_that_are_no_numbers_is_one_clear_error() -> None:
         geometry.resample(np.array([[0.0, 0.0], [1.0, 1.0]]), 0.0)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(seed=st.integers(0, 10**6), expected=st.floats(0.0, 30.0), turn=st.floats(0.0, 6.3), blur=st.sampled_from([0.0, 1.0, 3.0]))
 def test_walls_are_where_the_level_first_falls_through_a_half(seed: int, expected: float, turn: float, blur: float) -> None:
     rng = np.random.default_rng(seed)
@@ -149,7 +149,7 @@ def test_walls_are_where_the_level_first_falls_through_a_half(seed: int, expecte
             assert slope[side, i] == pytest.approx((inside[low] - inside[high]) / (high - low), abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), side=st.integers(1, 12))
 def test_the_middle_of_the_robot_is_the_mean_place_of_what_falls_outwards(seed: int, side: int) -> None:
     rng = np.random.default_rng(seed)

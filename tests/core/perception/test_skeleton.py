@@ -42,7 +42,7 @@ def test_half_size_thinning_keeps_loops_and_narrow_walls(shape: tuple[int, int])
     assert not (skeleton & ~mask).any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 10**6), sigma=st.floats(0.0, 5.0), share=st.floats(0.05, 0.95), height=st.integers(1, 60))
 def test_thinning_is_scikit_images_pixel_for_pixel(seed: int, sigma: float, share: float, height: int) -> None:
     noise = gaussian_filter(np.random.default_rng(seed).random((height, 47)), sigma)
