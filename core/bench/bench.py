@@ -6,6 +6,7 @@ A bench is made from pictures of the empty bench, or from frames with the robot 
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import shutil
 import tempfile
@@ -33,7 +34,7 @@ INFO, EMPTY, NOISE, KNOWN, VESSEL = "bench.json", "empty.png", "noise.png", "kno
 _PICTURES = frozenset({EMPTY, NOISE, KNOWN, VESSEL})
 PHANTOM_FILE, ROBOT_FILE = "phantom.json", "robot.npz"
 """The twin's phantom of this bench (``hardware/twin/own_phantom.py``) and what its robot looks like (``robot_texture.py``), which
-stay when the bench is written again."""
+stay when the bench is written again; the phantom only where the camera sees it as before."""
 _FILES = frozenset({INFO, *_PICTURES, PHANTOM_FILE, ROBOT_FILE})
 
 SHARP_SHARE = 0.9
@@ -43,6 +44,8 @@ LEAST_SHARPNESS = 0.05
 LEAST_LIKENESS = 0.3
 """Correlation of the fine structure of two pictures of one bench: above 0.65 on four benches with a robot, other light or out of
 focus, and below 0.1 between them."""
+_SAME_PLACE_SHARE = 0.01
+"""Shift between two empty pictures, of the longer side, up to which the camera was not moved."""
 _MAX_VESSEL_SHARE, _LEAST_VESSEL_SHARE = 0.5, 0.002
 """Share of the picture that a vessel may cover: more is a mask with vessel and background exchanged, less is a speck."""
 _MAX_BORDER_SHARE = 0.6
@@ -504,9 +507,9 @@ def write_bench(bench: Bench, folder: Path) -> None:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-        for kept in (folder / PHANTOM_FILE, folder / ROBOT_FILE):
-            if kept.is_file():
-                shutil.copy2(kept, scratch)
+        for kept in (ROBOT_FILE,) if was_moved(bench, folder) else (PHANTOM_FILE, ROBOT_FILE):
+            if (folder / kept).is_file():
+                shutil.copy2(folder / kept, scratch)
         scratch.chmod(0o755)
         if (aside := replace_folder(scratch, folder)) is not None:
             shutil.rmtree(aside, ignore_errors=True)
@@ -517,3 +520,16 @@ def write_bench(bench: Bench, folder: Path) -> None:
     finally:
         if scratch is not None:
             shutil.rmtree(scratch, ignore_errors=True)
+
+
+def was_moved(bench: Bench, folder: Path) -> bool:
+    """Whether the camera sees another place than in the bench that is in `folder`."""
+    try:
+        old = read_bench(folder)
+    except BenchError:  # none, or a damaged one
+        return False
+    if old.size != bench.size or likeness(bench.empty, old.empty) < LEAST_LIKENESS:
+        return True
+    now, then = (cv2.cvtColor(one.empty, cv2.COLOR_RGB2GRAY).astype(np.float32) for one in (bench, old))
+    shift, _ = cv2.phaseCorrelate(now, then, cv2.createHanningWindow(bench.size, cv2.CV_32F))
+    return math.hypot(*shift) > _SAME_PLACE_SHARE * max(bench.size)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from core.bench.bench import PHANTOM_FILE
+from core.bench.bench import PHANTOM_FILE, read_bench, was_moved
 from core.config.models import SegmentationConfig
 from core.devices import disk_errors
 from core.files import replace_folder, sync_folder
@@ -232,7 +232,8 @@ def install_model(made: Path, folder: Path, bench: Path | None = None) -> None:
             _copy(near, scratch / SECOND_LOOK)
         if bench is not None:
             shutil.copytree(bench, scratch / BENCH)
-            if (phantom := folder / BENCH / PHANTOM_FILE).is_file() and not (bench / PHANTOM_FILE).exists():
+            phantom = folder / BENCH / PHANTOM_FILE
+            if phantom.is_file() and not (bench / PHANTOM_FILE).exists() and not was_moved(read_bench(bench), phantom.parent):
                 shutil.copy2(phantom, scratch / BENCH)  # made again where there is a scale (hardware/twin/own_phantom.py)
 
 

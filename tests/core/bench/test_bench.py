@@ -111,6 +111,19 @@ def test_a_bench_is_read_as_it_was_written(bench: Bench, tmp_path: Path) -> None
     assert [path.name for path in folder.parent.iterdir()] == ["one"]
 
 
+def test_the_phantom_of_a_bench_goes_when_the_camera_was_moved(bench: Bench, tmp_path: Path) -> None:
+    folder = tmp_path / "one"
+    write_bench(bench, folder)
+    for name in ("phantom.json", "robot.npz"):
+        (folder / name).write_text("made")
+    again = bench_from_pictures([noisy(board(), 3.0, 5)], None, "lab 3", 320)
+    write_bench(again, folder)
+    assert (folder / "phantom.json").is_file()
+    moved = np.roll(board(), 12, axis=1)
+    write_bench(bench_from_pictures([noisy(moved, 3.0, 6)], None, "lab 3", 320), folder)
+    assert not (folder / "phantom.json").is_file() and (folder / "robot.npz").is_file()
+
+
 def test_a_damaged_bench_is_named(bench: Bench, tmp_path: Path) -> None:
     folder = tmp_path / "one"
     with pytest.raises(BenchError, match="cannot be read"):
