@@ -24,7 +24,8 @@ def synth(
         list[str] | None,
         typer.Option(
             help="only these families of looks, rare ones among them (gel, drape, stage_light, glow, tank, picture, resin: drawn "
-            "only where they are named), bench: the twin's own, or painted: drawn from geometry alone; may be repeated"
+            "only where they are named), bench: the twin's own, own: your bench's picture (--bench), or painted: drawn from "
+            "geometry alone; may be repeated"
         ),
     ] = None,
     phantom: Annotated[str | None, typer.Option(help="one named phantom instead of random ones")] = None,

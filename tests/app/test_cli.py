@@ -16,6 +16,8 @@ from app.commands import synth
 from app.commands.options import bare_stream, with_outputs
 from core.config.models import Config
 from core.session.manifest import read_manifest
+from hardware.twin.catalog import BENCH_LOOK, OWN_LOOK
+from hardware.twin.dataset import PAINTED_LOOK
 from hardware.twin.rendering.presets import RARE_FAMILIES
 from tests.core.session_data import record, tick_of
 
@@ -152,9 +154,11 @@ def test_a_name_that_the_output_cannot_hold_is_no_traceback(tmp_path: Path, enco
     assert recovered.origin.endswith("\\xff")
 
 
-def test_the_help_of_synth_names_every_rare_look() -> None:
+def test_the_help_of_synth_names_every_look_beside_the_ten() -> None:
     """It is written out there: whoever asks for help does not wait for the twin to be imported."""
-    assert f"({', '.join(RARE_FAMILIES)}: drawn" in " ".join(help_of("synth").split())
+    said = " ".join(help_of("synth").split())
+    assert f"({', '.join(RARE_FAMILIES)}: drawn" in said
+    assert all(f"{name}:" in said for name in (BENCH_LOOK, OWN_LOOK, PAINTED_LOOK))
 
 
 def test_stream_may_have_a_port_and_need_not() -> None:
