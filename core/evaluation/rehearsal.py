@@ -5,6 +5,7 @@ Places are pixels of the picture.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,7 +109,7 @@ def rehearsal_of(event: Event) -> RehearsalResult | None:
 
 @dataclass(frozen=True, slots=True)
 class PlaceBeside:
-    """A head beside the rehearsed way: how far it is in, px outside the band (0: within), and what the runs had there."""
+    """A head beside the rehearsed way: how far it is in, px outside the band or beyond its end, what the runs had there."""
 
     along_mm: float
     outside_px: float
@@ -129,5 +130,6 @@ def place_beside(result: RehearsalResult, head: Point) -> PlaceBeside | None:
     place = int(np.argmin(np.abs(along - at_px)))
     across = geometry.normals(middle)[place]
     offset, *sides = (float(np.subtract(at, foot) @ across) for at in (head, way.low_xy[place], way.high_xy[place]))
-    outside_px = max(0.0, offset - max(sides), min(sides) - offset)
+    beyond_px = math.sqrt(max(0.0, math.dist(head, foot) ** 2 - offset**2)) - (along[-1] - along[-2])  # one place after the last
+    outside_px = max(0.0, offset - max(sides), min(sides) - offset, beyond_px if at_px >= along[-1] else 0.0)
     return PlaceBeside(way.along_mm[place], outside_px, way.wall_force_n[place], way.time_s[place])

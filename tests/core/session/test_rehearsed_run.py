@@ -46,6 +46,9 @@ def test_a_head_beside_the_way() -> None:
         beside = place_beside(FOUND, (121.0, y))
         assert beside is not None and beside.outside_px == pytest.approx(away)
     assert place_beside(FOUND, (90.0, 200.0)) is None
+    for x, away in ((148.0, 0.0), (165.0, 15.0)):  # the last place is at 140, the one before at 130
+        beyond = place_beside(FOUND, (x, 199.0))
+        assert beyond is not None and (beyond.along_mm, beyond.outside_px) == (70.0, pytest.approx(away))
 
 
 def reader_of(heads: list[tuple[float, float]], events: list[Event], driven_from: int) -> SessionReader:
