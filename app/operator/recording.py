@@ -32,6 +32,7 @@ from core.files import write_atomic
 from core.program import program_id
 from core.session.live_output import LiveOutput
 from core.session.manifest import (
+    REHEARSAL,
     About,
     Description,
     Event,
@@ -199,6 +200,12 @@ class Recorder(QObject):
         """Keep the operator's destination, source pixels, and what its rehearsal found."""
         self._target = event_of_target(target, self._now_s(), rehearsal)
         self._keep(self._target)
+
+    def forget_rehearsal(self) -> None:
+        """What the rehearsal found does not hold any more."""
+        if self._target is not None and REHEARSAL in self._target.data:
+            x, y = self._target.data["xy"]
+            self.keep_target((x, y))
 
     def _keep(self, event: Event) -> None:
         if self._writer is not None:

@@ -95,6 +95,7 @@ class RehearsalController(QObject):
         """Nothing is known of a destination; a rehearsal that goes on is given up."""
         self._end()
         self.result = None
+        self._window.recorder.forget_rehearsal()
         self._window.panels.show_rehearsal(None)
         self._offer()
 

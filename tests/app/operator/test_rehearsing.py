@@ -213,9 +213,12 @@ def test_a_real_bench_is_rehearsed_on_its_own_phantom(make: MakeController, tmp_
     controller._look_again()
     assert card_of(controller).button.text() == "Rehearse  (T)"
     assert controller._bench is not None and controller._bench[0] == ("--bench", str(tmp_path))
+    recorder = controller._window.recorder
     controller._on_told(FOUND)
+    controller._on_ended(0, "")
     controller._look_again()
-    assert controller.result is not None
+    assert controller.result is not None and recorder._target is not None and rehearsal_of(recorder._target) is not None
     os.utime(tmp_path / "phantom.json", (0, 0))
     controller._look_again()
     assert controller.result is None, "of another phantom"
+    assert rehearsal_of(recorder._target) is None and recorder._target.data["xy"] == list(TARGET)
