@@ -213,14 +213,19 @@ def _perceive_annotated(annotations: Path, config: Config, notes: list[str], stu
 
 
 def _session_of(folder: Path) -> dict[str, Any]:
-    """What the session in a folder is about, and which program recorded it; nothing where it holds none."""
-    from core.session.manifest import MANIFEST, SessionError, read_description, read_manifest
+    """What the session in a folder is about, its runs beside their rehearsals, and which program recorded it; {} for no session."""
+    from core.session.manifest import MANIFEST, SessionError, read_manifest
+    from core.session.reader import SessionReader
+    from core.session.rehearsed_run import runs_beside
 
     if not (folder / MANIFEST).is_file():
         return {}
     try:
         manifest = read_manifest(folder)
-        return {"session": {"recorded_by": manifest.program} | read_description(folder, manifest).model_dump(mode="json")}
+        with SessionReader(folder) as reader:
+            reader.wait()
+            about = reader.description.model_dump(mode="json") | {"rehearsals": runs_beside(reader)}
+        return {"session": {"recorded_by": manifest.program} | about}
     except SessionError:  # damaged: the annotations are evaluated without it
         return {}
 

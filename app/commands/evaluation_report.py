@@ -16,6 +16,7 @@ from core.config.models import RESOURCES
 from core.evaluation.metrics import RESAMPLES
 from core.evaluation.paper import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureFormat, FigureKind, Verdict, verdict
 from core.program import program_line
+from core.session.rehearsed_run import beside_line
 
 _NAMED = 8
 """Figures that are not bettered are named up to this number; the tables have them all."""
@@ -121,6 +122,7 @@ def render_report(metrics: Mapping[str, Any], figures: Mapping[str, bytes]) -> s
     notes = [*([summary_against_paper(verdicts)] if verdicts else []), *metrics["notes"]]
     if session_notes := source.get("session", {}).get("notes"):
         notes.append(f"Notes on the session: {session_notes}")
+    notes += [f"A run beside its rehearsal: {beside_line(run)}." for run in source.get("session", {}).get("rehearsals", ())]
     return render_page(
         "evaluation.html.j2",
         title=f"Evaluation of {source['name']}",

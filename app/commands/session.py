@@ -46,7 +46,7 @@ from core.session.manifest import (
     write_description,
 )
 from core.session.reader import SessionReader, check_is_session, losses, rows_cut_off
-from core.session.rehearsed_run import runs_beside
+from core.session.rehearsed_run import beside_line, runs_beside
 from core.types import Image, PoseState, Tick
 
 session = typer.Typer(help="Recorded sessions: look at them, describe them, recover cut ones, export.", no_args_is_help=True)
@@ -120,23 +120,6 @@ def describe(reader: SessionReader) -> dict[str, Any]:
         "bytes": sum(path.stat().st_size for path in reader.folder.iterdir() if path.is_file()),
         "problems": [*reader.problems, *losses(reader, events)],
     }
-
-
-def beside_line(run: dict[str, Any]) -> str:
-    """A run beside its rehearsal, for people."""
-    low, middle, high = run["rehearsed_seconds"]
-    parts = [
-        f"to ({run['target_xy'][0]:.0f}, {run['target_xy'][1]:.0f}) {'arrived' if run['arrived'] else 'not arrived'}",
-        f"{run['seconds']:.1f} s (rehearsed {middle:.1f}, {low:.1f} to {high:.1f})",
-        f"{run['inside_share']:.0%} in the band",
-    ]
-    parts += [f"left it at {one['time_s']:.1f} s, {one['along_mm']:.0f} mm in" for one in run["left_band"]]
-    if run["wall_force_max_n"] is not None and run["rehearsed_wall_force_max_n"] is not None:
-        parts.append(f"wall force {run['wall_force_max_n']:.2f} N at most (rehearsed {run['rehearsed_wall_force_max_n']:.2f})")
-    if run["states"] is not None and run["rehearsed_states"] is not None:
-        shares = (f"{name} {share:.0%} ({run['rehearsed_states'].get(name, 0.0):.0%})" for name, share in run["states"].items())
-        parts.append(f"states {', '.join(shares)}")
-    return "; ".join(parts)
 
 
 @session.command("describe")

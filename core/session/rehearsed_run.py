@@ -90,3 +90,20 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
         "states": {state.value: round(states.count(state) / len(states), 4) for state in PoseState} if states else None,
         "rehearsed_states": result.states or None,
     }
+
+
+def beside_line(run: dict[str, Any]) -> str:
+    """A run beside its rehearsal, for people."""
+    low, middle, high = run["rehearsed_seconds"]
+    parts = [
+        f"to ({run['target_xy'][0]:.0f}, {run['target_xy'][1]:.0f}) {'arrived' if run['arrived'] else 'not arrived'}",
+        f"{run['seconds']:.1f} s (rehearsed {middle:.1f}, {low:.1f} to {high:.1f})",
+        f"{run['inside_share']:.0%} in the band",
+    ]
+    parts += [f"left it at {one['time_s']:.1f} s, {one['along_mm']:.0f} mm in" for one in run["left_band"]]
+    if run["wall_force_max_n"] is not None and run["rehearsed_wall_force_max_n"] is not None:
+        parts.append(f"wall force {run['wall_force_max_n']:.2f} N at most (rehearsed {run['rehearsed_wall_force_max_n']:.2f})")
+    if run["states"] is not None and run["rehearsed_states"] is not None:
+        shares = (f"{name} {share:.0%} ({run['rehearsed_states'].get(name, 0.0):.0%})" for name, share in run["states"].items())
+        parts.append(f"states {', '.join(shares)}")
+    return "; ".join(parts)

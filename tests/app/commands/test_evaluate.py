@@ -21,16 +21,20 @@ import pytest
 from matplotlib.figure import Figure
 
 from app.commands import evaluate as command
+from app.commands.evaluation_report import render_report
 from app.commands.figures import save_figure
 from core.config.models import TwinConfig
 from core.devices import UserError
 from core.evaluation.evaluation import Measurement, read_measurements, write_measurements
 from core.evaluation.paper import PAPER_CONFUSION
 from core.learning.dataset import write_png
+from core.session.manifest import event_of_target
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
 from tests.app.program import MAIN, run
 from tests.core.evaluation.test_metrics import label_pairs
+from tests.core.session.test_rehearsed_run import FOUND
+from tests.core.session_data import record, tick_of
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
 
@@ -178,6 +182,19 @@ def test_the_report_says_that_whole_sessions_are_drawn(paper_csv: Path, tmp_path
         encoding="utf-8"
     )
     assert read_measurements(tmp_path / "out" / "measurements.csv") == rows
+
+
+def test_the_report_has_a_session_s_runs_beside_their_rehearsals(paper_csv: Path, tmp_path: Path) -> None:
+    xs = (10.0, 20.0, 30.0, 40.0, 48.0)
+    sides = {name: tuple((x, y) for x in xs) for name, y in (("xy", 32.0), ("low_xy", 36.0), ("high_xy", 28.0))}
+    found = FOUND.model_copy(update={"target_xy": (49.0, 32.0), "way": FOUND.way.model_copy(update=sides)})
+    chosen = event_of_target((49.0, 32.0), 9.0, found.model_dump(mode="json"))
+    session = record(tmp_path / "sessions", [tick_of(place, 10.0 + 0.1 * place, full=True) for place in range(3)], events=[chosen])
+    about = command._session_of(session)
+    assert [run["runs"] for run in about["session"]["rehearsals"]] == [50]
+    metrics = evaluate(csv=paper_csv, out=tmp_path / "out")
+    page = render_report(metrics | {"source": metrics["source"] | about}, {})
+    assert "A run beside its rehearsal: to (49, 32) arrived; 0.0 s (rehearsed 0.0, -1.0 to 1.0); 100% in the band" in page
 
 
 def test_figures_carry_units_and_are_valid_svg(paper_csv: Path, drawn: Path) -> None:
