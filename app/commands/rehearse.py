@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,11 +31,7 @@ from core.evaluation.rehearsal import FEWEST_RUNS
 from core.evaluation.trial import Row, summarise
 
 if TYPE_CHECKING:
-    from core.types import Point, Points
-    from hardware.twin.phantom import Phantom
-    from hardware.twin.rehearsal import RehearsalPlan
-    from hardware.twin.trial import Target
-    from hardware.twin.view import CameraView
+    from hardware.twin.rehearsal import RehearsalPicture, RehearsalPlan
 
 _FIRST_SHARE = 0.7
 """Of the time, for the set speeds; slower ones are tried in the rest."""
@@ -66,7 +62,7 @@ def rehearse(
     --json has the band of the heads' paths and the wall force along the way, too: "way" (core/evaluation/rehearsal.py).
     """
     from hardware.twin.own_phantom import with_own_phantom
-    from hardware.twin.rehearsal import SPEEDS, RehearsalPlan, is_good
+    from hardware.twin.rehearsal import SPEEDS, RehearsalPicture, RehearsalPlan, figures, is_good
     from hardware.twin.trial import TrialPlan
 
     if kept_in is not None and not tune:
@@ -77,23 +73,24 @@ def rehearse(
     told = json.loads(sys.stdin.read()) if given else {}
     config = Config.model_validate(told["config"]) if given else load_config(config_path, None, {})
     config = with_own_phantom(config, bench) if bench is not None else config
-    picture, target_px = _picture(config, told.get("size_px"), point_option(target))
-    trial = TrialPlan(config, max_seconds=max_seconds, look="bench", wall_force=False, own=True, target_px=target_px)
-    sharp = picture.sharp(config)
+    picture = RehearsalPicture.of(config, point_option(target), told.get("size_px"))
+    trial = TrialPlan(config, max_seconds=max_seconds, look="bench", wall_force=False, own=True, target_px=picture.trial_px)
+    plan, sharp = RehearsalPlan(trial, head_px, missing), picture.sharp(config)
     for turn in sharp if not (as_json or progress_json) else ():
+        x, y = turn.xy
         console.print(
-            f"too sharp: the branch at ({turn['xy'][0]:.0f}, {turn['xy'][1]:.0f}) turns by {turn['turn_deg']:.0f} degrees, the "
-            f"head bends by {turn['limit_deg']:.0f} there",
+            f"too sharp: the branch at ({x:.0f}, {y:.0f}) turns by {turn.turn_deg:.0f} degrees, the head bends by "
+            f"{turn.limit_deg:.0f} there",
             soft_wrap=True,
         )
     if tune:
-        _tune(RehearsalPlan(trial, head_px, missing), runs, seed, workers, kept_in, as_json=as_json)
+        _tune(plan, runs, seed, workers, kept_in, as_json=as_json)
         return
     about: dict[str, Any] = {
         "bench": bench or config.twin.phantom,
         "target_xy": picture.pixels([picture.target.point_mm])[0],
-        "size_px": picture.seen.size,
-        "sharp": sharp,
+        "size_px": picture.view.size,
+        "sharp": [turn.model_dump(mode="json") for turn in sharp],
         "speed_mm_s": config.advice.fast_mm_s,
         "assumed": {"head_px": head_px, "missing": missing, "robot": "identified" if config.twin.behaviour else "twin"},
     }
@@ -101,9 +98,9 @@ def rehearse(
     tried: list[tuple[float, list[Row]]] = []
     good: float | None = None
     for speed in SPEEDS:
-        plan = RehearsalPlan(trial, head_px, missing, speed)
-        share, show = (1.0, None) if tried else (_FIRST_SHARE, None if writer is None else _shows(writer, about, picture))
-        rows = _run(plan, range(seed, seed + runs), workers, began_s + 60.0 * minutes * share, show)
+        ends_s = began_s + 60.0 * minutes * (1.0 if tried else _FIRST_SHARE)
+        show = None if tried or writer is None else _shows(writer, about, picture)
+        rows = _run(replace(plan, speed=speed), range(seed, seed + runs), workers, (ends_s, began_s + 60.0 * minutes), show)
         if not rows:
             break
         tried.append((speed, rows))
@@ -111,10 +108,11 @@ def rehearse(
             good = speed
             break
     if not tried:
-        raise UserError("no run has ended in this time; give more --minutes")
+        busy = "the computer is too busy; close other programs, and rehearse again"  # translated in the window
+        raise UserError(busy if given else "no run has ended in this time; give more --minutes")
     about |= picture.found(tried[0][1])
     about["recommended_speed_mm_s"] = round(good * config.advice.fast_mm_s, 2) if good is not None else None
-    about["at_speeds"] = [{"share": speed, **_figures(rows)} for speed, rows in tried]
+    about["at_speeds"] = [{"share": speed, **figures(rows)} for speed, rows in tried]
     if as_json or progress_json:
         sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
     else:
@@ -123,38 +121,26 @@ def rehearse(
 
 def _tune(plan: RehearsalPlan, runs: int, seed: int, workers: int, rig: str | None, *, as_json: bool) -> None:
     """Search settings of pursuit, compare them with the configured ones on other seeds, and keep them where they are better."""
-    from hardware.twin.tuning import SEARCH_RUNS, SEARCH_SEEDS, SETTINGS, compared, run_candidate, search
+    from hardware.twin.tuning import SEARCH_RUNS, tuned
 
     path = find_rig(rig)[0] if rig is not None else None
     with progress_bar() as bar:
-        task = bar.add_task("runs of the search", total=SEARCH_RUNS)
+        task = bar.add_task("runs of search and comparison", total=SEARCH_RUNS + 2 * runs)
 
         def spread(function: Any, tasks: Any) -> Iterator[Any]:
             for result in over_processes(workers, function, tasks):
                 bar.advance(task)
                 yield result
 
-        own = {name: float(getattr(plan.trial.config.policy.pursuit, name)) for name in SETTINGS}
-        found = search(plan, seed, spread)
-        rows: tuple[list[Row], list[Row]] = ([], [])
-        if found != own:
-            task = bar.add_task("runs of the comparison", total=2 * runs)
-            seeds = range(seed + SEARCH_SEEDS, seed + SEARCH_SEEDS + runs)
-            tasks = [(place, tuned, one) for one in seeds for place, tuned in enumerate((own, found))]
-            for place, row in spread(partial(run_candidate, plan), tasks):
-                rows[place].append(row)
-    before, after = (sorted(part, key=lambda row: int(row["seed"])) for part in rows)
-    about: dict[str, Any] = {"configured": own, "found": found, "search_runs": SEARCH_RUNS, "kept": None}
-    if before:
-        about |= {"before": _figures(before), "after": _figures(after), "changes": compared(before, after)}
-    is_better = bool(before) and about["changes"]["is_better"]
+        about = tuned(plan, seed, runs, spread)
+    is_better = about.get("changes", {}).get("is_better", False)
     if path is not None and is_better:
-        set_pursuit(path, found)
-        about["kept"] = str(path)
+        set_pursuit(path, about["found"])
+    about["kept"] = str(path) if path is not None and is_better else None
     if as_json:
         sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
-        return
-    _print_tuned(about, is_better=is_better)
+    else:
+        _print_tuned(about, is_better=is_better)
 
 
 def _print_tuned(about: dict[str, Any], *, is_better: bool) -> None:
@@ -177,67 +163,7 @@ def _print_tuned(about: dict[str, Any], *, is_better: bool) -> None:
         console.print(line, soft_wrap=True)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Picture:
-    """The picture whose pixels are told, and the way to the target in it."""
-
-    phantom: Phantom
-    seen: CameraView
-    target: Target
-
-    def pixels(self, points_mm: Points | Sequence[Point]) -> list[list[float]]:
-        import numpy as np
-
-        points = np.asarray(points_mm, np.float64).reshape(-1, 2)
-        return [[round(x, 1), round(y, 1)] for x, y in self.seen.project(points).tolist()]
-
-    def sharp(self, config: Config) -> list[dict[str, Any]]:
-        """Branches on the way that are too sharp."""
-        from hardware.twin.rehearsal import sharp_turns
-
-        turns = sharp_turns(self.phantom, self.target, config)
-        return [
-            {"xy": self.pixels([one.point_mm])[0], "turn_deg": round(one.turn_deg, 1), "limit_deg": round(one.limit_deg, 1)}
-            for one in turns
-        ]
-
-    def found(self, rows: Sequence[Row]) -> dict[str, Any]:
-        """The figures, the weakest place, and what happened along the way."""
-        from hardware.twin.rehearsal import rehearsed_path, weakest_place
-
-        weakest, path = weakest_place(rows, self.target.route), rehearsed_path(rows, self.target.route)
-        if weakest is not None:
-            weakest = {"xy": self.pixels([weakest.pop("point_mm")])[0], **weakest}
-        way = {
-            "along_mm": path.along_mm.tolist(),
-            "xy": self.pixels(path.middle),
-            "low_xy": self.pixels(path.low),
-            "high_xy": self.pixels(path.high),
-            "wall_force_n": path.force_n.round(4).tolist(),
-            "time_s": path.time_s.round(2).tolist(),
-            "runs": path.runs.tolist(),
-        }
-        return _figures(rows) | {"weakest": weakest, "way": way}
-
-
-def _picture(config: Config, size_px: Sequence[int] | None, target: Point) -> tuple[_Picture, Point]:
-    """The picture of this size, else of the twin's, and the target in the picture of the trials. Raises TargetError."""
-    import numpy as np
-
-    from hardware.twin.phantoms import make_phantom
-    from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
-    from hardware.twin.trial import target_near
-
-    own_px = config.twin.image_width_px, config.twin.image_height_px
-    width, height = size_px or own_px
-    phantom = make_phantom(config.twin.phantom)
-    seen = make_view(appearance_of(config.twin), (width, height), phantom)
-    picture = _Picture(phantom, seen, target_near(phantom, seen, target))
-    x, y = make_view(Appearance(), own_px, phantom).project(np.array([picture.target.point_mm]))[0].tolist()
-    return picture, (x, y)
-
-
-def _shows(writer: ProgressWriter, about: dict[str, Any], picture: _Picture) -> Callable[[Sequence[Row]], None]:
+def _shows(writer: ProgressWriter, about: dict[str, Any], picture: RehearsalPicture) -> Callable[[Sequence[Row]], None]:
     """Tells a window what was found so far, every two seconds."""
     shown_s = time.monotonic()
 
@@ -250,47 +176,41 @@ def _shows(writer: ProgressWriter, about: dict[str, Any], picture: _Picture) -> 
     return show
 
 
-def _run(plan: RehearsalPlan, seeds: range, workers: int, ends_s: float, show: Callable[[Sequence[Row]], None] | None) -> list[Row]:
-    """The rows by seed, of the first ones where the time was too short; a slower speed is given up once it cannot be good."""
+def _run(
+    plan: RehearsalPlan,
+    seeds: range,
+    workers: int,
+    ends_s: tuple[float, float],
+    show: Callable[[Sequence[Row]], None] | None,
+) -> list[Row]:
+    """The rows by seed, of the first ones where the time was too short; a slower speed is given up once it cannot be good.
+
+    `ends_s` : after the run that ends first from then on, and at the latest.
+    """
     from hardware.twin.rehearsal import is_hopeless, rehearse_once
 
     rows: list[Row] = []
-    with progress_bar() as bar, closing(over_processes(workers, partial(rehearse_once, plan), seeds)) as results:
-        task = bar.add_task(f"runs at {plan.speed:.0%} speed", total=len(seeds))
+    left_s = ends_s[1] - time.monotonic()
+    writer = progress_writer()
+    if writer is not None:
+        writer.write({"speed": plan.speed})
+    with progress_bar() as bar, closing(over_processes(workers, partial(rehearse_once, plan), seeds, left_s)) as results:
+        task = bar.add_task(f"{plan.speed:.0%} speed", total=len(seeds))
         for row in results:
             rows.append(row)
-            bar.update(task, advance=1, description=f"{sum(r['reached'] for r in rows)} of {len(rows)} arrived")
+            arrived = sum(r["reached"] for r in rows)
+            bar.update(task, advance=1, description=f"{plan.speed:.0%} speed: {arrived} of {len(rows)} arrived")
             if show is not None:
                 show(rows)
-            if (writer := progress_writer()) is not None and not writer.is_read:
+            if writer is not None and not writer.is_read:
                 raise KeyboardInterrupt  # the window has gone
             if plan.speed < 1.0 and is_hopeless(rows, len(seeds)):
                 return rows
-            if time.monotonic() > ends_s:
+            if time.monotonic() > ends_s[0]:
                 break
     rows.sort(key=lambda row: int(row["seed"]))
     whole = next((k for k, row in enumerate(rows) if row["seed"] != seeds[k]), len(rows))
     return rows[:whole]  # a run that lasts long has not ended by then: those after it would be the quick ones
-
-
-def _figures(rows: Sequence[Row]) -> dict[str, Any]:
-    """Share that arrived with its interval, times, forces."""
-    import numpy as np
-
-    from core.evaluation.metrics import wilson_95
-
-    sums = summarise(rows)
-    times = [row["time_s"] for row in rows if row["reached"]]
-    states = {name: [row["state_shares"][name] for row in rows if row["state_shares"][name] is not None] for name in "ABCD"}
-    low, high = wilson_95(sums["reached_share"], len(rows))
-    return {
-        "runs": len(rows),
-        "arrived": {"share": sums["reached_share"], "low": round(low, 4), "high": round(high, 4)},
-        "outcomes": sums["outcomes"],
-        "states": {name: round(float(np.mean(shares)), 4) for name, shares in states.items() if shares},
-        "time_s": {"median": sums["median_time_s"], "p95": round(float(np.percentile(times, 95)), 2) if times else None},
-        "wall_force_n": {"p95": sums["wall_force_p95_n"], "max": sums["wall_force_max_n"]},
-    }
 
 
 def _print(about: dict[str, Any], runs: int) -> None:

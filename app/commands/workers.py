@@ -30,15 +30,23 @@ class WorkerEnded(UserError):
     """A process was ended from outside."""
 
 
-def over_processes(workers: int, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Generator[Result, None, None]:
-    """Results as they come, of so many processes with one thread each; closing the iterator ends them. Raises WorkerEnded."""
+def over_processes(
+    workers: int, function: Callable[[Task], Result], tasks: Sequence[Task], within_s: float | None = None
+) -> Generator[Result, None, None]:
+    """Results as they come, of so many processes with one thread each; closing the iterator ends them, and `within_s` does.
+
+    Raises WorkerEnded.
+    """
     # Spawned, not forked: physics, OpenCV and OpenVINO own threads that a fork would cut off.
     context = multiprocessing.get_context("spawn")
     with _one_thread_each(), ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker) as pool:
         futures = [pool.submit(function, task) for task in tasks]
         try:
-            for future in as_completed(futures):
+            for future in as_completed(futures, within_s):
                 yield future.result()
+        except TimeoutError:
+            if within_s is None:
+                raise
         except BrokenProcessPool:
             raise WorkerEnded("a worker ended (out of memory?); run the same command with fewer --workers") from None
         finally:

@@ -72,9 +72,12 @@ class RehearsalCard(QFrame):
         """The destination can be rehearsed."""
         self._show(tr("Rehearse  ({key})", key=KEY), "", None)
 
-    def show_running(self, done: int, total: int, result: RehearsalResult | None) -> None:
-        """How many runs have ended, and what they say."""
-        self._show(tr("Cancel"), tr("Rehearsing: {done} of {total}", done=done, total=total), result, done / max(1, total))
+    def show_running(self, done: int, total: int, result: RehearsalResult | None, speed: float = 1.0) -> None:
+        """How many runs have ended at this share of the set speeds, and what those at the set ones say."""
+        title = tr("Rehearsing: {done} of {total}", done=done, total=total)
+        if speed < 1.0:
+            title = tr("At {share:.0f} % of the set speeds: {done} of {total}", share=100 * speed, done=done, total=total)
+        self._show(tr("Cancel"), title, result, done / max(1, total))
 
     def show_result(self, result: RehearsalResult, *, is_real: bool = False) -> None:
         """`is_real`: the bench has a robot of its own."""

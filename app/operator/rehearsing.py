@@ -26,8 +26,6 @@ from hardware.preflight.preflight import Level
 from hardware.rig import RigKind
 
 RUNS, MINUTES = 50, 2
-_LONGEST_MS = 150_000
-"""On a busy computer no run may have ended after these minutes."""
 _WATCH_MS = 1000
 """Settings change without a signal."""
 _LACKING = mark("this destination was not rehearsed")
@@ -50,7 +48,7 @@ class RehearsalController(QObject):
         self._child: ChildProcess | None = None
         self._bench: tuple[tuple[str, ...], int] | None = None
         """Options that name the phantom, and when it was made; None: no phantom."""
-        self._done = 0
+        self._done, self._speed = 0, 1.0
         self._so_far: RehearsalResult | None = None
         self.result: RehearsalResult | None = None
         """Of the present destination; None: it was not rehearsed."""
@@ -61,8 +59,6 @@ class RehearsalController(QObject):
         window.rig.add_guard(self._may_ask)
         self._card.pressed.connect(self.toggle)
         self._card.closed.connect(self._card.hide)
-        self._limit = QTimer(self, singleShot=True, interval=_LONGEST_MS)
-        self._limit.timeout.connect(self._on_too_long)
         self._watch = QTimer(self, interval=_WATCH_MS)
         self._watch.timeout.connect(self._look_again)
         self._watch.start()
@@ -135,9 +131,8 @@ class RehearsalController(QObject):
         child = ChildProcess(self._command("rehearse", *options), self, given=given)
         child.told.connect(self._on_told)
         child.ended.connect(self._on_ended)
-        self._child, self._done, self._so_far, self.result = child, 0, None, None
+        self._child, self._done, self._speed, self._so_far, self.result = child, 0, 1.0, None, None
         self._card.show_running(0, RUNS, None)
-        self._limit.start()
         child.start()
 
     def _on_told(self, record: dict[str, Any]) -> None:
@@ -146,17 +141,18 @@ class RehearsalController(QObject):
                 self._so_far = RehearsalResult.model_validate(so_far)
             elif "arrived" in record:
                 self.result = self._so_far = RehearsalResult.model_validate(record)
+            elif isinstance(record.get("speed"), int | float):
+                self._done, self._speed = 0, float(record["speed"])
             elif isinstance(record.get("done"), int | float):
                 self._done = int(record["done"])
         except ValidationError:  # of another version
             return
         if self._so_far is not None:
             self._window.panels.show_rehearsal(self._so_far)
-        self._card.show_running(self._done, RUNS, self._so_far)
+        self._card.show_running(self._done, RUNS, self._so_far, self._speed)
 
     def _on_ended(self, code: int, said: str) -> None:
         self._child = None
-        self._limit.stop()
         if self.result is not None:
             self._card.show_result(self.result, is_real=self._window.rig.kind is RigKind.LIVE)
             self._show_lack()
@@ -165,12 +161,7 @@ class RehearsalController(QObject):
         self.forget()
         self._window.say(tr("Not rehearsed: {why}", why=tr_text(said) or tr("exit code {code}", code=code)), is_fault=True)
 
-    def _on_too_long(self) -> None:
-        self.forget()
-        self._window.say(tr("Not rehearsed: the computer is too busy; close other programs, and rehearse again"), is_fault=True)
-
     def _end(self) -> None:
-        self._limit.stop()
         child, self._child = self._child, None
         if child is not None:
             child.leave()

@@ -104,6 +104,7 @@ FIXED = (
     "the twin's servos did not answer in time: close other programs, then try again; F5 starts the twin again", "bus speed",
     "adapter power", "screen lock", "inhibited while the servos follow",
     "switch screen lock and sleep off in the desktop's settings", "sleep cannot be inhibited: systemd-inhibit is not there",
+    "the computer is too busy; close other programs, and rehearse again",
     "with DYNAMIXEL Wizard 2.0 set Baud Rate (8) of all seven to 1 Mbps, then servos.baud = 1000000",
 )  # fmt: skip
 

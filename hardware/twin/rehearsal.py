@@ -14,20 +14,24 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from core import geometry
 from core.config.models import Config
 from core.control.look_ahead import sharp_branches
-from core.evaluation.trial import Row, TrialSample
+from core.evaluation.metrics import wilson_95
+from core.evaluation.rehearsal import RehearsedWay, SharpBranch, WeakestPlace
+from core.evaluation.trial import Row, TrialSample, summarise
 from core.perception.centerline import centerline_at, plan_route
 from core.perception.pose import measure_pose
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.types import Frame, Image, Masks, Point, Points, Reason, Refusal, RobotPath, Scene
 from hardware.twin.phantom import Phantom
+from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import MAX_PULL_MM, ROBOT_RADIUS_MM, DriveProperties
-from hardware.twin.trial import FIRST_SEED, Target, Trial, TrialPlan
+from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
+from hardware.twin.trial import FIRST_SEED, Target, Trial, TrialPlan, target_near
 from hardware.twin.truth import true_graph, visible_path, with_caps
+from hardware.twin.view import CameraView
 from hardware.twin.world import TwinWorld
 
 BEND_DEG_PER_MM = 47.0
@@ -52,34 +56,6 @@ _BIN_MM = 10.0
 _STEP_MM, _BESIDE_MM = 2.5, 12.0
 """Spacing of the places where all runs are compared; a head further from the way is in another branch."""
 _BLANK: Image = np.zeros((1, 1, 3), np.uint8)
-
-
-@dataclass(frozen=True, slots=True)
-class SharpTurn:
-    """A branch that turns off more sharply than the head bends there: ``turn_deg`` over the length of the head."""
-
-    point_mm: Point
-    turn_deg: float
-    limit_deg: float
-
-
-def sharp_turns(phantom: Phantom, target: Target, config: Config) -> list[SharpTurn]:
-    """The branches on the way to the target that are too sharp for the twin's robot, or for the weaker side of an identified one.
-
-    A warning (``sharp_branches``): of the trial seeds 100 to 199 it names six (108, 149, 167, 179, 184, 186); one run of each: two
-    stopped short, three arrived with 0.2 to 0.4 N at the wall, one easily.
-    """
-    bend_deg = BEND_DEG_PER_MM * MAX_PULL_MM
-    if (known := config.twin.behaviour) is not None:
-        drive = DriveProperties.identified(known, config.servos.max_pull_mm)
-        slack_mm = max(drive.dead_zone_mm, drive.dead_zone_left_mm or 0.0)
-        bend_deg = BEND_DEG_PER_MM * min(drive.gain) * (MAX_PULL_MM - slack_mm)
-    found = sharp_branches(phantom.graph, target.route, ROBOT_RADIUS_MM, bend_deg, (0.0, target.at_mm))
-    return [SharpTurn(*one) for one in found]
-
-
-def _turn_deg(before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
-    return abs(math.degrees(math.atan2(before[0] * after[1] - before[1] * after[0], float(before @ after))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,75 +165,129 @@ def is_hopeless(rows: Sequence[Mapping[str, Any]], count: int) -> bool:
     return failed > (1.0 - LEAST_SHARE) * count + 1e-9 or any(row["wall_contact_n"]["max"] > FORCE_MAX_N for row in rows)
 
 
-def weakest_place(rows: Sequence[Mapping[str, Any]], route: Points) -> dict[str, Any] | None:
-    """Where on the way runs ended before the target, or else where the wall force is largest (95th percentile); None: nowhere."""
-    along = geometry.arc_length(route)
-
-    def place(x: float, y: float) -> int:
-        return int(geometry.nearest(route, (x, y), along)[1] // _BIN_MM)
-
-    ends = [
-        place(row["track"]["x_mm"][-1], row["track"]["y_mm"][-1]) for row in rows if not row["reached"] and row["track"]["x_mm"]
-    ]
-    forces: dict[int, list[float]] = {}
-    for row in rows:
-        track = row["track"]
-        for x, y, force in zip(track["x_mm"], track["y_mm"], track["wall_contact_n"], strict=True):
-            forces.setdefault(place(x, y), []).append(force)
-    worst = {number: float(np.percentile(values, 95)) for number, values in forces.items()}
-    if not worst:
-        return None
-    number = max(set(ends), key=ends.count) if ends else max(worst, key=worst.__getitem__)
-    at = (number + 0.5) * _BIN_MM
-    points = geometry.point_at(route, along, at + np.array([-10.0, -5.0, 0.0, 5.0, 10.0]))
-    return {
-        "point_mm": points[2].tolist(),
-        "along_mm": round(at, 1),
-        "turn_deg": round(_turn_deg(points[1] - points[0], points[4] - points[3]), 1),
-        "ended_here": ends.count(number),
-        "wall_force_p95_n": round(worst.get(number, 0.0), 4),
-    }
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class RehearsedPath:
-    """What the runs did at places ``along_mm`` (N,) of the way, as ``core.evaluation.rehearsal.RehearsedWay``; board mm, (N, 2)."""
+class RehearsalPicture:
+    """The picture whose pixels are told, and the way to the target in it; the runs have their target at ``trial_px``."""
 
-    along_mm: NDArray[np.float64]
-    middle: Points
-    low: Points
-    high: Points
-    force_n: NDArray[np.float64]
-    time_s: NDArray[np.float64]
-    runs: NDArray[np.int_]
+    phantom: Phantom
+    view: CameraView
+    target: Target
+    trial_px: Point
+
+    @staticmethod
+    def of(config: Config, target: Point, size_px: tuple[int, int] | None = None) -> RehearsalPicture:
+        """The picture of this size, else of the twin's. Raises TargetError."""
+        own_px = config.twin.image_width_px, config.twin.image_height_px
+        phantom = make_phantom(config.twin.phantom)
+        view = make_view(appearance_of(config.twin), size_px or own_px, phantom)
+        found = target_near(phantom, view, target)
+        x, y = make_view(Appearance(), own_px, phantom).project(np.array([found.point_mm]))[0].tolist()
+        return RehearsalPicture(phantom, view, found, (x, y))
+
+    def pixels(self, points_mm: Points | Sequence[Point]) -> list[Point]:
+        return [(round(x, 1), round(y, 1)) for x, y in self.view.project(np.asarray(points_mm, np.float64)).tolist()]
+
+    def sharp(self, config: Config) -> list[SharpBranch]:
+        """The branches on the way that are too sharp for the twin's robot, or for the weaker side of an identified one.
+
+        A warning (``sharp_branches``): of the trial seeds 100 to 199 it names six (108, 149, 167, 179, 184, 186); one run of each:
+        two stopped short, three arrived with 0.2 to 0.4 N at the wall, one easily.
+        """
+        bend_deg = BEND_DEG_PER_MM * MAX_PULL_MM
+        if (known := config.twin.behaviour) is not None:
+            drive = DriveProperties.identified(known, config.servos.max_pull_mm)
+            slack_mm = max(drive.dead_zone_mm, drive.dead_zone_left_mm or 0.0)
+            bend_deg = BEND_DEG_PER_MM * min(drive.gain) * (MAX_PULL_MM - slack_mm)
+        turns = sharp_branches(self.phantom.graph, self.target.route, ROBOT_RADIUS_MM, bend_deg, (0.0, self.target.at_mm))
+        return [
+            SharpBranch(xy=self.pixels([point_mm])[0], turn_deg=round(turn_deg, 1), limit_deg=round(limit_deg, 1))
+            for point_mm, turn_deg, limit_deg in turns
+        ]
+
+    def weakest(self, rows: Sequence[Row]) -> WeakestPlace | None:
+        """Where runs ended before the target, or else where the wall force is largest (95th percentile); None: nowhere."""
+        route = self.target.route
+        along = geometry.arc_length(route)
+
+        def place(x: float, y: float) -> int:
+            return int(geometry.nearest(route, (x, y), along)[1] // _BIN_MM)
+
+        tracks = [(row["reached"], row["track"]) for row in rows]
+        ends = [place(track["x_mm"][-1], track["y_mm"][-1]) for reached, track in tracks if not reached and track["x_mm"]]
+        forces: dict[int, list[float]] = {}
+        for _, track in tracks:
+            for x, y, force in zip(track["x_mm"], track["y_mm"], track["wall_contact_n"], strict=True):
+                forces.setdefault(place(x, y), []).append(force)
+        worst = {number: float(np.percentile(values, 95)) for number, values in forces.items()}
+        if not worst:
+            return None
+        number = max(set(ends), key=ends.count) if ends else max(worst, key=worst.__getitem__)
+        at = (number + 0.5) * _BIN_MM
+        points = geometry.point_at(route, along, at + np.array([-10.0, -5.0, 0.0, 5.0, 10.0]))
+        (ax, ay), (bx, by) = points[1] - points[0], points[4] - points[3]
+        return WeakestPlace(
+            xy=self.pixels(points[2:3])[0],
+            along_mm=round(at, 1),
+            turn_deg=round(abs(math.degrees(math.atan2(ax * by - ay * bx, ax * bx + ay * by))), 1),
+            ended_here=ends.count(number),
+            wall_force_p95_n=round(worst.get(number, 0.0), 4),
+        )
+
+    def way(self, rows: Sequence[Row]) -> RehearsedWay:
+        """The band of head paths, wall force and time along the way; places that no head passed are left out."""
+        along = geometry.arc_length(self.target.route)
+        at = np.arange(0.0, along[-1] + _STEP_MM, _STEP_MM)
+        places = geometry.point_at(self.target.route, along, at)
+        across = geometry.normals(places)
+        found = np.full((3, max(1, len(rows)), len(at)), np.nan)  # offset, force, time
+        for number, row in enumerate(rows):
+            track = row["track"]
+            heads = np.column_stack([track["x_mm"], track["y_mm"]])
+            if not len(heads):
+                continue
+            away = heads[:, None] - places[None]
+            nearest = np.argmin(np.linalg.norm(away, axis=2), axis=1)
+            offset = np.sum(away[np.arange(len(heads)), nearest] * across[nearest], axis=1)
+            is_beside = np.linalg.norm(away[np.arange(len(heads)), nearest], axis=1) <= _BESIDE_MM
+            force, time_s = np.array(track["wall_contact_n"]), np.array(track["time_s"])
+            for place in np.unique(nearest[is_beside]).tolist():
+                here = is_beside & (nearest == place)
+                found[:, number, place] = offset[here].mean(), force[here].max(), time_s[here].min()
+        runs = np.sum(~np.isnan(found[0]), axis=0)
+        there = np.flatnonzero(runs)
+        if not len(there):
+            return RehearsedWay()
+        offset, force, time_s = found[:, :, there]
+        band = np.nanpercentile(offset, (50, 5, 95), axis=0)[..., None] * across[there] + places[there]
+        middle, low, high = (tuple(self.pixels(line)) for line in band)
+        return RehearsedWay(
+            along_mm=at[there].tolist(),
+            xy=middle,
+            low_xy=low,
+            high_xy=high,
+            wall_force_n=np.nanpercentile(force, 95, axis=0).round(4).tolist(),
+            time_s=np.nanpercentile(time_s, (5, 50, 95), axis=0).T.round(2).tolist(),
+            runs=runs[there].tolist(),
+        )
+
+    def found(self, rows: Sequence[Row]) -> dict[str, Any]:
+        """The figures, the weakest place, and what happened along the way, as ``RehearsalResult`` has them."""
+        weakest = self.weakest(rows)
+        parts = {"weakest": weakest.model_dump(mode="json") if weakest else None, "way": self.way(rows).model_dump(mode="json")}
+        return figures(rows) | parts
 
 
-def rehearsed_path(rows: Sequence[Mapping[str, Any]], route: Points) -> RehearsedPath:
-    """The band of head paths, wall force and time along the way; places that no head passed are left out."""
-    along = geometry.arc_length(route)
-    at = np.arange(0.0, along[-1] + _STEP_MM, _STEP_MM)
-    places = geometry.point_at(route, along, at)
-    across = geometry.normals(places)
-    found = np.full((3, max(1, len(rows)), len(at)), np.nan)  # offset, force, time
-    for number, row in enumerate(rows):
-        track = row["track"]
-        heads = np.column_stack([track["x_mm"], track["y_mm"]])
-        if not len(heads):
-            continue
-        away = heads[:, None] - places[None]
-        nearest = np.argmin(np.linalg.norm(away, axis=2), axis=1)
-        offset = np.sum(away[np.arange(len(heads)), nearest] * across[nearest], axis=1)
-        is_beside = np.linalg.norm(away[np.arange(len(heads)), nearest], axis=1) <= _BESIDE_MM
-        force, time_s = np.array(track["wall_contact_n"]), np.array(track["time_s"])
-        for place in np.unique(nearest[is_beside]).tolist():
-            here = is_beside & (nearest == place)
-            found[:, number, place] = offset[here].mean(), force[here].max(), time_s[here].min()
-    runs = np.sum(~np.isnan(found[0]), axis=0)
-    there = np.flatnonzero(runs)
-    offset, force, time_s = found[:, :, there]
-    low, middle, high = np.nanpercentile(offset, (5, 50, 95), axis=0) if len(there) else np.zeros((3, 0))
-    place, side = places[there], across[there]
-    worst = np.nanpercentile(force, 95, axis=0) if len(there) else np.zeros(0)
-    times = np.nanpercentile(time_s, (5, 50, 95), axis=0).T if len(there) else np.zeros((0, 3))
-    middle, low, high = (place + offset_mm[:, None] * side for offset_mm in (middle, low, high))
-    return RehearsedPath(at[there], middle, low, high, worst, times, runs[there])
+def figures(rows: Sequence[Row]) -> dict[str, Any]:
+    """Share that arrived with its interval, outcomes, states, times, forces."""
+    sums = summarise(rows)
+    times = [row["time_s"] for row in rows if row["reached"]]
+    states = {name: [row["state_shares"][name] for row in rows if row["state_shares"][name] is not None] for name in "ABCD"}
+    low, high = wilson_95(sums["reached_share"], len(rows))
+    return {
+        "runs": len(rows),
+        "arrived": {"share": sums["reached_share"], "low": round(low, 4), "high": round(high, 4)},
+        "outcomes": sums["outcomes"],
+        "states": {name: round(float(np.mean(shares)), 4) for name, shares in states.items() if shares},
+        "time_s": {"median": sums["median_time_s"], "p95": round(float(np.percentile(times, 95)), 2) if times else None},
+        "wall_force_n": {"p95": sums["wall_force_p95_n"], "max": sums["wall_force_max_n"]},
+    }

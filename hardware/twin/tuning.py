@@ -17,7 +17,7 @@ import numpy as np
 from core.config.models import PursuitConfig
 from core.config.rig_file import with_pursuit
 from core.evaluation.trial import Row, summarise
-from hardware.twin.rehearsal import FORCE_MAX_N, FORCE_P95_N, RehearsalPlan, rehearse_once
+from hardware.twin.rehearsal import FORCE_MAX_N, FORCE_P95_N, RehearsalPlan, figures, rehearse_once
 
 Tuned = dict[str, float]
 """Settings of ``policy.pursuit`` by name."""
@@ -84,6 +84,19 @@ def search(plan: RehearsalPlan, seed: int, spread: Spread = map) -> Tuned:
         for number, row in spread(partial(run_candidate, plan), [(number, tried[number], one) for one in seeds for number in kept]):
             rows[number].append(row)
     return tried[min(kept, key=lambda number: (rank(rows[number]), number))]
+
+
+def tuned(plan: RehearsalPlan, seed: int, runs: int, spread: Spread = map) -> dict[str, Any]:
+    """The ``configured`` and the ``found`` settings; where they differ, both compared on `runs` seeds that were not searched."""
+    own, found = candidates(plan.trial.config.policy.pursuit, 1, seed)[0], search(plan, seed, spread)
+    about: dict[str, Any] = {"configured": own, "found": found, "search_runs": SEARCH_RUNS}
+    if found != own:
+        seeds = range(seed + SEARCH_SEEDS, seed + SEARCH_SEEDS + runs)
+        tasks = [(number, settings, one) for one in seeds for number, settings in enumerate((own, found))]
+        rows = sorted(spread(partial(run_candidate, plan), tasks), key=lambda result: int(result[1]["seed"]))
+        before, after = ([row for number, row in rows if number == which] for which in (0, 1))
+        about |= {"before": figures(before), "after": figures(after), "changes": compared(before, after)}
+    return about
 
 
 def compared(before: Sequence[Row], after: Sequence[Row]) -> dict[str, Any]:

@@ -2317,9 +2317,9 @@ Torque off now: the wires spring back at once.</source>
         <translation>未预演：{why}</translation>
     </message>
     <message>
-        <location filename="../../app/operator/rehearsing.py"/>
-        <source>Not rehearsed: the computer is too busy; close other programs, and rehearse again</source>
-        <translation>未预演：计算机太忙；请关闭其他程序后重新预演</translation>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the computer is too busy; close other programs, and rehearse again</source>
+        <translation>计算机太忙；请关闭其他程序后重新预演</translation>
     </message>
     <message>
         <location filename="../../app/operator/rehearsing.py"/>

@@ -14,8 +14,10 @@ from typer.testing import CliRunner
 
 from app.cli import app
 from app.commands.rehearse import _print
+from app.ui.i18n import FIXED
 from core.config.models import Config, load_config
 from core.config.rig_file import as_calibrated, find_rig, make_rig, with_rig, write_rig
+from core.devices import UserError
 from core.evaluation.rehearsal import RehearsalResult
 
 TARGET = "430,400"
@@ -46,7 +48,7 @@ def rehearse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., l
     config.write_text('[twin]\nphantom = "tree"\n')
 
     def call(run: Callable[[float, int], dict[str, Any]], *options: str) -> list[dict[str, Any]]:
-        def over(_workers: int, function: partial[Any], seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+        def over(_workers: int, function: partial[Any], seeds: Sequence[int], _within_s: float) -> Iterator[dict[str, Any]]:
             yield from (run(function.args[0].speed, seed) for seed in seeds)
 
         monkeypatch.setattr("app.commands.rehearse.over_processes", over)
@@ -122,7 +124,7 @@ def test_tuned_settings_are_kept_where_they_are_better_and_it_was_asked_for(
 
 
 def test_a_window_gives_configuration_and_picture_size_and_reads_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    def over(_workers: int, _function: object, seeds: Sequence[int]) -> Iterator[dict[str, Any]]:
+    def over(_workers: int, _function: object, seeds: Sequence[int], _within_s: float) -> Iterator[dict[str, Any]]:
         yield from (row(seed) for seed in seeds)
 
     monkeypatch.setattr("app.commands.rehearse.over_processes", over)
@@ -134,6 +136,10 @@ def test_a_window_gives_configuration_and_picture_size_and_reads_lines(monkeypat
     words = ["rehearse", "--given", "--target", "860,800", "--progress-json", "--runs", "5"]
     result = CliRunner().invoke(app, words, input=given)
     told = [json.loads(line) for line in result.stdout.splitlines()]
-    assert any(line.get("done") == 5 for line in told) and RehearsalResult.model_validate(told[1]["so_far"]).runs == 1
+    assert any(line.get("done") == 5 for line in told) and told[0] == {"speed": 1.0}
+    assert RehearsalResult.model_validate(told[2]["so_far"]).runs == 1
     found = RehearsalResult.model_validate(told[-1])
     assert found.size_px == (1280, 960) and found.target_xy == pytest.approx((860, 800), abs=24)
+    monkeypatch.setattr("app.commands.rehearse.over_processes", lambda *_: (row(0) for _ in ()))
+    result = CliRunner().invoke(app, words, input=given)
+    assert isinstance(result.exception, UserError) and str(result.exception) in FIXED, "a toast of the window"

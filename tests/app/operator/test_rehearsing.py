@@ -133,10 +133,13 @@ def test_it_is_cancelled_at_once(make: MakeController, given: Path, qtbot: QtBot
     assert card.button.text() == "Rehearse  (T)" and window.panels.live._marks.rehearsal is None
     until(qtbot, lambda: not child.is_running)
     assert controller.result is None
-    controller._limit.setInterval(1)
+
+
+def test_slower_speeds_are_named_while_they_are_tried(make: MakeController, given: Path, qtbot: QtBot) -> None:
+    card = card_of(controller := make(said({"speed": 0.7}, {"done": 3, "total": 50}, then=f"exec {WAITS}")))
+    controller._window.set_target(TARGET)
     controller.toggle()
-    until(qtbot, lambda: controller._child is None)
-    assert window.panels.toast.text().startswith("Not rehearsed: the computer is too busy")
+    until(qtbot, lambda: card.text == "At 70 % of the set speeds: 3 of 50")
 
 
 def test_what_prevents_it_is_one_line(make: MakeController, given: Path, qtbot: QtBot) -> None:

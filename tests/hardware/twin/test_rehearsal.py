@@ -15,13 +15,11 @@ from hardware.twin.phantom import Phantom
 from hardware.twin.rehearsal import (
     HEAD_PX,
     Rehearsal,
+    RehearsalPicture,
     RehearsalPlan,
     is_good,
     is_hopeless,
-    rehearsed_path,
-    sharp_turns,
     slowed,
-    weakest_place,
 )
 from hardware.twin.trial import TargetError, TrialPlan, target_near
 from hardware.twin.view import CameraView
@@ -39,6 +37,10 @@ def forked(turn_deg: float, radius_mm: float) -> Phantom:
         for a, b, start, stop in ((0, 1, (0.0, 75.0), fork), (1, 2, fork, end), (1, 3, fork, tip))
     )
     return Phantom("forked", "Forked", VesselGraph(np.array([(0.0, 75.0), fork, end, tip]), edges), 0, VIEW)
+
+
+def picture_of(phantom: Phantom, click_px: tuple[float, float] = (320.0, 240.0)) -> RehearsalPicture:
+    return RehearsalPicture(phantom, VIEW, target_near(phantom, VIEW, click_px), click_px)
 
 
 def test_the_target_lies_in_the_vessel_nearest_to_the_click() -> None:
@@ -59,14 +61,14 @@ def test_the_target_lies_in_the_vessel_nearest_to_the_click() -> None:
 def test_a_branch_is_too_sharp_by_its_turn_and_the_lumen_s_width(turn_deg: float, radius_mm: float, count: int) -> None:
     phantom = forked(turn_deg, radius_mm)
     x, y = VIEW.project(phantom.graph.nodes[3:4])[0] - (0, 10)
-    target = target_near(phantom, VIEW, (x, y))
-    found = sharp_turns(phantom, target, Config())
+    picture = picture_of(phantom, (x, y))
+    found = picture.sharp(Config())
     assert len(found) == count
     if found:
-        assert found[0].turn_deg == pytest.approx(turn_deg, abs=1.0) and found[0].point_mm == pytest.approx((60, 75))
-    assert sharp_turns(phantom, target_near(phantom, VIEW, (320, 240)), Config()) == []  # straight on
+        assert found[0].turn_deg == pytest.approx(turn_deg, abs=1.0) and found[0].xy == pytest.approx((3.2 * 60, 3.2 * 75), abs=0.1)
+    assert picture_of(phantom).sharp(Config()) == []  # straight on
     stiff = behaviour(bend_left_deg_per_mm=Estimate(value=20.0, low=18.0, high=22.0))
-    assert len(sharp_turns(phantom, target, Config(twin=TwinConfig(behaviour=stiff)))) == 1  # a robot that bends less
+    assert len(picture.sharp(Config(twin=TwinConfig(behaviour=stiff)))) == 1  # a robot that bends less
 
 
 def test_a_run_is_the_same_for_its_seed_and_perceives_with_errors(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,13 +95,14 @@ def row(reached: bool, x_mm: list[float], forces_n: list[float]) -> dict[str, An
 
 
 def test_the_weakest_place_is_where_runs_end_or_else_where_the_force_is() -> None:
-    route = np.column_stack([np.linspace(0.0, 140.0, 400), np.full(400, 75.0)])
+    picture = picture_of(forked(50.0, 5.0))
     good = row(True, [20, 45, 95], [0.0, 0.3, 0.1])
-    place = weakest_place([good], route)
-    assert place is not None and (place["along_mm"], place["wall_force_p95_n"], place["ended_here"]) == (45.0, 0.3, 0)
-    place = weakest_place([good, row(False, [20, 62], [0.0, 0.1])], route)
-    assert place is not None and (place["along_mm"], place["ended_here"]) == (65.0, 1)
-    assert weakest_place([], route) is None
+    place = picture.weakest([good])
+    assert place is not None and (place.along_mm, place.wall_force_p95_n, place.ended_here) == (45.0, 0.3, 0)
+    assert place.xy == pytest.approx((3.2 * 45, 3.2 * 75), abs=0.2) and place.turn_deg == 0.0
+    place = picture.weakest([good, row(False, [20, 62], [0.0, 0.1])])
+    assert place is not None and (place.along_mm, place.ended_here) == (65.0, 1)
+    assert picture.weakest([]) is None
 
 
 def test_a_speed_is_good_within_the_limits() -> None:
@@ -109,20 +112,20 @@ def test_a_speed_is_good_within_the_limits() -> None:
 
 
 def test_the_band_of_head_paths_and_the_force_along_the_way() -> None:
-    route = np.column_stack([np.linspace(0.0, 140.0, 400), np.full(400, 75.0)])
     rows = []
     for number in range(21):  # side by side, 0.1 mm apart; all but one turn back at 90 mm; one goes astray
         x = np.arange(30.0, 120.0 if number == 0 else 90.0, 1.0)
         track = {"x_mm": [*x, 60.0], "y_mm": [*np.full(len(x), 74.0 + 0.1 * number), 100.0], "time_s": [*(x / 10.0), 99.0]}
         rows.append({"track": track | {"wall_contact_n": [*np.where(abs(x - 60.0) < 1.0, 0.01 * number, 0.0), 5.0]}})
-    path = rehearsed_path(rows, route)
-    at = int(np.searchsorted(path.along_mm, 60.0))
-    assert path.middle[at] == pytest.approx((60.0, 75.0)) and path.runs[at] == 21
-    assert sorted([path.low[at, 1], path.high[at, 1]]) == pytest.approx([74.1, 75.9])
-    assert path.force_n[at] == pytest.approx(0.19) and path.force_n[at + 2] == 0.0
-    assert path.time_s[at] == pytest.approx([5.9, 5.9, 5.9])
-    assert (path.runs[-1], path.along_mm[-1]) == (1, 120.0) and path.along_mm[0] == 30.0
-    assert len(rehearsed_path([], route).along_mm) == 0
+    picture = picture_of(forked(50.0, 5.0))
+    way = picture.way(rows)
+    at = way.along_mm.index(60.0)
+    assert way.xy[at] == pytest.approx((3.2 * 60.0, 3.2 * 75.0), abs=0.5) and way.runs[at] == 21
+    assert sorted([way.low_xy[at][1], way.high_xy[at][1]]) == pytest.approx([3.2 * 74.1, 3.2 * 75.9], abs=0.1)
+    assert way.wall_force_n[at] == pytest.approx(0.19) and way.wall_force_n[at + 2] == 0.0
+    assert way.time_s[at] == pytest.approx((5.9, 5.9, 5.9), abs=0.11)
+    assert (way.runs[-1], way.along_mm[-1]) == (1, 120.0) and way.along_mm[0] == 30.0
+    assert picture.way([]).along_mm == ()
 
 
 def test_a_speed_is_given_up_when_it_cannot_be_good_any_more() -> None:
