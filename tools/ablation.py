@@ -8,21 +8,23 @@ measures streams of the twin: errors, swaps of head and tail, jumps of the head,
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from app.commands.options import ConfigOption, JsonOption, ModelOption, check_masks
 from app.commands.progress import progress_bar
 from core.config.models import PerceptionConfig, TwinConfig, choose_model, load_config
 from core.devices import UserError
 from core.evaluation.accuracy import WRONG_DEG, WRONG_PX, FrameScore, TrueMasks, score_frame
+from core.evaluation.metrics import Floats, are_too_few, bootstrap_rows, members
 from core.files import name_as_text
 from core.perception.segmentation import Probability, Segmentation, Segmenter
 from core.types import Frame, Image, Mask, Point, Scene
@@ -166,8 +168,8 @@ class StreamFrame:
         """Whether the answer took the tail for the head."""
         if self.head is None or self.tail is None or self.true_head is None or self.true_tail is None:
             return False
-        right = _gap(self.head, self.true_head) + _gap(self.tail, self.true_tail)
-        return _gap(self.head, self.true_tail) + _gap(self.tail, self.true_head) < right
+        right = math.dist(self.head, self.true_head) + math.dist(self.tail, self.true_tail)
+        return math.dist(self.head, self.true_tail) + math.dist(self.tail, self.true_head) < right
 
 
 def stream_frame(scene: Scene, truth: dict[str, Any]) -> StreamFrame:
@@ -200,24 +202,26 @@ def stream_figures(streams: Sequence[Sequence[StreamFrame]]) -> dict[str, float 
     """
     frames = [frame for stream in streams for frame in stream if frame.true_state is not None]
     answered = [frame for frame in frames if frame.state is not None]
-    head_moves = [move for stream in streams for move in _head_moves(stream)]
-    theta_moves = [_turn(b, a) for stream in streams for a, b in _pairs(_theta_errors(stream))]
-    steady = [move for move in head_moves if move <= JUMP_PX]
-    errors = np.array([error for stream in streams for error in _errors(stream)], np.float64).reshape(-1, 2)
-    theta, head = errors.T
-    is_wrong = (theta > WRONG_DEG) | (head > WRONG_PX)
+    errors = [(_theta_errors(stream), _head_errors(stream)) for stream in streams]
+    theta = np.abs(np.concatenate([of_theta for of_theta, _ in errors]))
+    head = np.hypot(*np.concatenate([of_head for _, of_head in errors]).T)
+    known = np.isfinite(theta) & np.isfinite(head)
+    theta, head = theta[known], head[known]
+    theta_moves = np.concatenate([_wrapped(np.diff(of_theta)) for of_theta, _ in errors])
+    # of the head from each answer to the next one, whatever lies between
+    head_moves = np.concatenate([np.hypot(*np.diff(of_head[np.isfinite(of_head[:, 0])], axis=0).T) for _, of_head in errors])
     return {
         "frames": len(frames),
         "answered_share": len(answered) / len(frames) if frames else None,
         "state_agreement": sum(f.state == f.true_state for f in answered) / len(answered) if answered else None,
         "theta_median_deg": float(np.median(theta)) if len(theta) else None,
         "theta_mean_deg": float(theta.mean()) if len(theta) else None,
-        "head_median_px": float(np.median(head)) if len(head) else None,
-        "wrong_share": float(is_wrong.mean()) if len(theta) else None,
+        "head_median_px": float(np.median(head)) if len(theta) else None,
+        "wrong_share": float(((theta > WRONG_DEG) | (head > WRONG_PX)).mean()) if len(theta) else None,
         "swapped_frames": sum(frame.is_swapped for frame in answered),
-        "jumps": len(head_moves) - len(steady),
-        "theta_jitter_deg": _spread(theta_moves, 1.4826),
-        "head_jitter_px": _spread(steady, 1.0 / 1.1774),
+        "jumps": int((head_moves > JUMP_PX).sum()),
+        "theta_jitter_deg": _spread(theta_moves[np.isfinite(theta_moves)], 1.4826),
+        "head_jitter_px": _spread(head_moves[head_moves <= JUMP_PX], 1.0 / 1.1774),
         "state_changes": sum(_changes([f.state for f in stream]) for stream in streams),
         "true_state_changes": sum(_changes([f.true_state for f in stream]) for stream in streams),
     }
@@ -227,56 +231,30 @@ def _pair(values: Sequence[float]) -> Point:
     return float(values[0]), float(values[1])
 
 
-def _gap(a: Point, b: Point) -> float:
-    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
+def _wrapped(degrees: Floats) -> Floats:
+    return (degrees + 180.0) % 360.0 - 180.0
 
 
-def _turn(to: float, since: float) -> float:
-    return (to - since + 180.0) % 360.0 - 180.0
+def _theta_errors(stream: Sequence[StreamFrame]) -> Floats:
+    """Degrees, shape (N,); NaN where there is no answer."""
+    pairs = [(frame.theta_signed_deg, frame.true_theta_signed_deg) for frame in stream]
+    found, true = np.array(pairs, np.float64).reshape(-1, 2).T
+    return _wrapped(found - true)
 
 
-def _spread(changes: Sequence[float], scale: float) -> float | None:
+def _head_errors(stream: Sequence[StreamFrame]) -> Floats:
+    """From the true head to the one that was found, px, shape (N, 2); NaN where there is no answer."""
+    nowhere = (np.nan, np.nan)
+    return np.array([np.subtract(frame.head or nowhere, frame.true_head or nowhere) for frame in stream]).reshape(-1, 2)
+
+
+def _spread(changes: Floats, scale: float) -> float | None:
     """Standard deviation from the median size of changes: `scale` is 1.4826 for a number, 1/1.1774 for the length of a 2-D step."""
-    return scale * float(np.median(np.abs(changes))) if changes else None
-
-
-def _errors(stream: Sequence[StreamFrame]) -> list[tuple[float, float]]:
-    """By how much theta (degrees) and the head (px) of each answer are off."""
-    thetas = _theta_errors(stream)
-    return [
-        (abs(theta), _gap(frame.head, frame.true_head))
-        for theta, frame in zip(thetas, stream, strict=True)
-        if theta is not None and frame.head is not None and frame.true_head is not None
-    ]
-
-
-def _head_moves(stream: Sequence[StreamFrame]) -> list[float]:
-    """How much the head's error changed between each answer and the one before it, in px."""
-    errors = [
-        (frame.head[0] - frame.true_head[0], frame.head[1] - frame.true_head[1])
-        for frame in stream
-        if frame.head is not None and frame.true_head is not None
-    ]
-    return [_gap(a, b) for a, b in zip(errors, errors[1:], strict=False)]
-
-
-def _theta_errors(stream: Sequence[StreamFrame]) -> list[float | None]:
-    return [
-        None
-        if frame.theta_signed_deg is None or frame.true_theta_signed_deg is None
-        else _turn(frame.theta_signed_deg, frame.true_theta_signed_deg)
-        for frame in stream
-    ]
-
-
-def _pairs(values: Sequence[float | None]) -> list[tuple[float, float]]:
-    """Values of frames that follow each other."""
-    return [(a, b) for a, b in zip(values, values[1:], strict=False) if a is not None and b is not None]
+    return scale * float(np.median(np.abs(changes))) if len(changes) else None
 
 
 def _changes(states: Sequence[str | None]) -> int:
-    shown = [state for state in states if state is not None]
-    return sum(a != b for a, b in zip(shown, shown[1:], strict=False))
+    return sum(a != b for a, b in pairwise(state for state in states if state is not None))
 
 
 _FEED_MM_S = 12.0
@@ -351,13 +329,6 @@ def _stream(
         yield frame, world.truth().to_json()
 
 
-RESAMPLES = 1000
-MIN_DEFINED = 0.9
-"""A difference that is undefined in more resamples than the rest of these (a row that hardly answers) has no interval."""
-MIN_GROUPS = 10
-"""Frames of one phantom are alike, so whole phantoms are drawn; with fewer than this many of them there is no interval."""
-
-
 @dataclass(frozen=True, slots=True)
 class AblationColumn:
     """A column of the table: the mean or a quantile of one value per frame."""
@@ -402,92 +373,48 @@ def figures(scores: Sequence[Sequence[FrameScore]], groups: Sequence[Hashable], 
     Parameters
     ----------
     scores : for each variant the scores of the same frames in the same order.
-    groups : for each frame what it belongs to (its phantom); whole groups are drawn, see ``MIN_GROUPS``.
+    groups : for each frame what it belongs to (its phantom): whole groups are drawn, and too few of them make no interval.
     seed : of the bootstrap.
     """
     expected = [index for index, score in enumerate(scores[0]) if score.expected]
-    drawn_from = [groups[index] for index in expected]
-    weights = draw_weights(drawn_from, seed) if are_enough(drawn_from) else np.zeros((1, len(expected)), np.int64)
-    once = np.ones((1, len(expected)), np.int64)
-    columns = [{measure.of: _column([row[i] for i in expected], measure.of) for measure in MEASURES} for row in scores]
+    group = members([groups[index] for index in expected])
     table: list[dict[str, Figure]] = [{} for _ in scores]
     for measure in MEASURES:
-        values = [column[measure.of] for column in columns]
-        plain = [float(estimate(value, once, measure.quantile)[0]) for value in values]
-        drawn = [estimate(value, weights, measure.quantile) for value in values]
-        for index in range(len(scores)):
-            table[index][measure.key] = _figure(plain, drawn, index)
+
+        def differences(*columns: Floats, quantile: float | None = measure.quantile) -> dict[str, Floats]:
+            values = [_estimate(column, quantile) for column in columns]
+            return {str(place): after - before for place, (before, after) in enumerate(pairwise(values), 1)}
+
+        columns = tuple(np.array([_value(row[index], measure.of) for index in expected]) for row in scores)
+        intervals = bootstrap_rows(differences, columns, seed, group)
+        values = [float(_estimate(column, measure.quantile)) for column in columns]
+        for place, value in enumerate(values):
+            difference = value - values[place - 1] if place else math.nan
+            interval = intervals.get(str(place)) if math.isfinite(difference) else None
+            table[place][measure.key] = Figure(_finite(value), _finite(difference), *(interval or ()))
     return table
 
 
-def _figure(plain: list[float], drawn: list[NDArray[np.float64]], index: int) -> Figure:
-    value = _finite(plain[index])
-    if index == 0:
-        return Figure(value)
-    difference = _finite(plain[index] - plain[index - 1])
-    differences = drawn[index] - drawn[index - 1]
-    defined = differences[np.isfinite(differences)]
-    if difference is None or len(defined) < MIN_DEFINED * len(differences):
-        return Figure(value, difference)
-    low, high = np.percentile(defined, (2.5, 97.5))
-    return Figure(value, difference, float(low), float(high))
+def _estimate(values: Floats, quantile: float | None) -> Floats:
+    """Mean or quantile along the last axis, without the frames that say nothing (NaN); NaN where none says anything."""
+    last = np.maximum(np.isfinite(values).sum(-1) - 1, 0)
+    if quantile is None:
+        return np.asarray(np.where(np.isnan(values).all(-1), np.nan, np.nansum(values, -1) / (last + 1)))
+    ordered, position = np.sort(values, -1), quantile * last  # NaN comes last
+    below = position.astype(np.int64)
+    first, second = (np.take_along_axis(ordered, at[..., None], -1)[..., 0] for at in (below, np.minimum(below + 1, last)))
+    return np.asarray(first + (position - below) * (second - first))
 
 
 def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def are_enough(groups: Sequence[Hashable]) -> bool:
-    """Whether there are groups enough for intervals."""
-    return len(set(groups)) >= MIN_GROUPS
-
-
-def draw_weights(groups: Sequence[Hashable], seed: int, resamples: int = RESAMPLES) -> NDArray[np.int64]:
-    """How often each frame is in each bootstrap resample of whole groups, shape (resamples, frames)."""
-    place = {name: index for index, name in enumerate(dict.fromkeys(groups))}
-    member = np.array([place[group] for group in groups], np.int64)
-    count = int(member.max(initial=-1)) + 1
-    if count == 0:
-        return np.zeros((resamples, 0), np.int64)
-    drawn = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=resamples)
-    return np.asarray(drawn[:, member], np.int64)
-
-
-def estimate(values: NDArray[np.float64], weights: NDArray[np.int64], quantile: float | None) -> NDArray[np.float64]:
-    """Mean or quantile of `values` (N,) repeated as often as each row of `weights` (B, N) says; NaN values are left out.
-
-    The quantile is the one of ``numpy.quantile`` on the repeated values. Shape (B,); NaN where a row holds no value.
-    """
-    known = np.isfinite(values)
-    values, weights = values[known], weights[:, known]
-    total = weights.sum(axis=1)
-    result = np.full(len(weights), np.nan)
-    some = total > 0
-    if not some.any():
-        return result
-    if quantile is None:
-        result[some] = (weights[some] @ values) / total[some]
-        return result
-    order = np.argsort(values, kind="stable")
-    values, upto = values[order], np.cumsum(weights[some][:, order], axis=1)
-    position = quantile * (total[some] - 1)
-    below = np.floor(position).astype(np.int64)
-    above = np.minimum(below + 1, total[some] - 1)
-    first, second = (values[(upto <= rank[:, None]).sum(axis=1)] for rank in (below, above))
-    result[some] = first + (position - below) * (second - first)
-    return result
-
-
-def _column(scores: Sequence[FrameScore], of: str) -> NDArray[np.float64]:
-    """One value per frame; NaN where the frame says nothing about it."""
-    return np.array([_value(score, of) for score in scores], np.float64)
+    return value if math.isfinite(value) else None
 
 
 def _value(score: FrameScore, of: str) -> float:
     if of == "answered":
         return float(score.answered)
     if score.theta_error_deg is None or score.head_error_px is None:
-        return np.nan
+        return math.nan
     theta, head = abs(score.theta_error_deg), score.head_error_px
     wrong = theta > WRONG_DEG or head > WRONG_PX
     return float({"theta": theta, "head": head, "agreed": score.state == score.true_state, "wrong": wrong}[of])
@@ -686,7 +613,7 @@ def _measure_set(
         for place, (variant, row) in enumerate(zip(variants, figures(scores, groups, seed), strict=True))
     ]
     expected = [group for group, score in zip(groups, scores[0], strict=True) if score.expected]
-    drawn = f"{len(set(expected))} phantoms{'' if are_enough(expected) else ' (too few for intervals)'}"
+    drawn = f"{len(set(expected))} phantoms{' (too few for intervals)' if are_too_few(members(expected)) else ''}"
     return {"frames": len(samples), "expected": len(expected), "drawn": drawn, "rows": rows}
 
 

@@ -11,21 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.config.models import PerceptionConfig, PoseConfig, QualityConfig, load_config
+from core.config.models import PoseConfig, load_config
 from core.devices import UserError
-from core.evaluation.accuracy import FrameScore, TrueMasks
-from core.perception.pipeline import Pipeline
-from core.perception.vectors import fit_line
-from core.types import Frame, Image, Reason
-from tests.core.drawing import curve, depth
+from core.evaluation.accuracy import FrameScore
+from core.types import Reason
 from tools.ablation import (
     OURS,
     PAPER,
     STEPS,
     StreamFrame,
-    are_enough,
-    draw_weights,
-    estimate,
     figures,
     make_variants,
     markdown,
@@ -71,92 +65,18 @@ def test_a_difference_that_no_step_switches_is_an_error() -> None:
         make_variants(DEFAULTS, DEFAULTS.model_copy(update={"working_size_px": 320}))
 
 
-# ---- switches that the steps need ----
-
-VESSEL = curve((-20.0, 240.0), (300.0, 240.0), (660.0, 240.0))
-
-
-def perceived(robot_depth: np.ndarray, config: PerceptionConfig) -> Reason | None:
-    masks = TrueMasks()
-    masks.show(depth(VESSEL, 22.0) > 0, robot_depth > 0)
-    scene = Pipeline(masks, config).perceive_single(Frame(0, 0.0, grey_bars()))
-    return scene.refusal.reason if scene.refusal is not None else None
-
-
-def grey_bars() -> Image:
-    """A picture that is neither dark nor bright nor blurred."""
-    picture = np.full((480, 640, 3), 60, np.uint8)
-    picture[:, ::2] = 180
-    return picture
-
-
-@pytest.mark.parametrize(
-    ("robot", "expected"),
-    [
-        (curve((-10.0, 240.0), (300.0, 240.0), (660.0, 240.0)), Reason.AMBIGUOUS_PATH),
-        (curve((-10.0, 100.0), (150.0, 100.0), (300.0, 100.0)), Reason.OUTSIDE_VESSEL),
-    ],
-)
-def test_without_the_quality_gate_every_pose_that_can_be_computed_is_given(robot: np.ndarray, expected: Reason) -> None:
-    silent = DEFAULTS.model_copy(update={"quality": QualityConfig(enabled=False)})
-    assert perceived(depth(robot, 4.0), DEFAULTS) is expected
-    assert perceived(depth(robot, 4.0), silent) is None
-    assert perceived(np.full((480, 640), -1.0), silent) is Reason.NO_ROBOT, "there is nothing to answer"
-
-
-def test_linear_regression_takes_errors_in_one_direction_only() -> None:
-    zigzag = np.array([[0.0, 0.0], [4.0, 2.0], [8.0, 0.0], [12.0, 2.0]])
-    # Regression by hand: x - 6 = -6 -2 2 6, y - 1 = -1 1 -1 1, sum xy = 8, sum xx = 80: slope 1/10.
-    along = fit_line(zigzag, "least_squares")
-    upright = fit_line(zigzag[:, ::-1], "least_squares")
-    assert along.direction[1] / along.direction[0] == pytest.approx(0.1)
-    assert upright.direction[0] / upright.direction[1] == pytest.approx(0.1)
-    assert along.start[0] < along.end[0]
-    assert upright.start[1] < upright.end[1]
-
-
-def test_both_fits_find_a_straight_line() -> None:
-    line = np.column_stack([np.arange(20.0), 3.0 * np.arange(20.0)])
-    for fit in ("total_least_squares", "least_squares"):
-        found = fit_line(line, fit)
-        assert found.direction == pytest.approx((1 / np.sqrt(10), 3 / np.sqrt(10)))
-
-
 # ---- figures ----
-
-
-@pytest.mark.parametrize("quantile", [0.5, 0.95, 0.0, 1.0, None])
-def test_estimates_are_those_of_the_repeated_values(quantile: float | None) -> None:
-    rng = np.random.default_rng(3)
-    values, weights = rng.normal(size=15), rng.integers(0, 4, (20, 15))
-    found = estimate(values, weights, quantile)
-    for row, value in zip(weights, found, strict=True):
-        repeated = np.repeat(values, row)
-        assert value == pytest.approx(repeated.mean() if quantile is None else np.quantile(repeated, quantile))
-
-
-def test_whole_phantoms_are_drawn_where_there_are_enough() -> None:
-    groups = [number // 2 for number in range(20)]
-    weights = draw_weights(groups, seed=1, resamples=50)
-    assert are_enough(groups)
-    assert weights.shape == (50, 20)
-    np.testing.assert_array_equal(weights[:, ::2], weights[:, 1::2])
-    assert (weights.sum(axis=1) == 20).all()
-    np.testing.assert_array_equal(weights, draw_weights(groups, seed=1, resamples=50))
-    assert (weights != draw_weights(groups, seed=2, resamples=50)).any()
 
 
 def test_of_too_few_phantoms_no_difference_has_an_interval() -> None:
     """Drawn one by one, twenty frames of two phantoms would make it too narrow."""
     rng = np.random.default_rng(4)
     rows = [[score(float(theta), stem=str(k)) for k, theta in enumerate(rng.normal(shift, 1.0, 20))] for shift in (3.0, 6.0)]
-    assert not are_enough([0] * 10 + [1] * 10)
     few = figures(rows, [k // 10 for k in range(20)])[1]["theta_mean_deg"]
     enough = figures(rows, [k // 2 for k in range(20)])[1]["theta_mean_deg"]
     assert few.difference == enough.difference
     assert (few.low, few.high, few.is_clear) == (None, None, False)
     assert enough.is_clear
-    assert draw_weights([], seed=1, resamples=5).shape == (5, 0)
 
 
 def score(theta: float | None, head: float = 1.0, state: str = "C", stem: str = "a") -> FrameScore:

@@ -35,6 +35,17 @@ def test_total_least_squares_does_not_prefer_an_axis() -> None:
     assert abs(np.degrees(np.arctan2(vector.direction[0], vector.direction[1]))) < 1.0
 
 
+def test_linear_regression_takes_errors_in_one_direction_only() -> None:
+    zigzag = np.array([[0.0, 0.0], [4.0, 2.0], [8.0, 0.0], [12.0, 2.0]])
+    # Regression by hand: x - 6 = -6 -2 2 6, y - 1 = -1 1 -1 1, sum xy = 8, sum xx = 80: slope 1/10.
+    along = fit_line(zigzag, "least_squares")
+    upright = fit_line(zigzag[:, ::-1], "least_squares")
+    assert along.direction[1] / along.direction[0] == pytest.approx(0.1)
+    assert upright.direction[0] / upright.direction[1] == pytest.approx(0.1)
+    assert along.start[0] < along.end[0]
+    assert upright.start[1] < upright.end[1]
+
+
 def test_dense_points_weigh_no_more_than_sparse_ones() -> None:
     bent = np.array([[0.0, 0.0], [20.0, 0.0], [40.0, 10.0]])
     dense_start = np.concatenate([np.column_stack([np.linspace(0, 20, 500), np.zeros(500)]), bent[2:]])
