@@ -25,7 +25,7 @@ from core.control.kept_zero import ZeroRequest
 from core.devices import DeviceError, Robot
 from core.types import Command, RobotStatus
 from hardware.processes import PARENT_CHECK_S
-from hardware.servos.bus_ipc import BusClient, BusOrder, BusPhase, BusStatus, Heartbeat, start_bus
+from hardware.servos.bus_ipc import BusClient, BusPhase, BusStatus, start_bus
 from hardware.servos.discovery import find_servos
 from hardware.servos.dynamixel_port import BusProcessLost, NoAnswer, NotReady, PortError, PortTaken, TorqueStillOn
 from hardware.servos.registers import ServoState
@@ -306,19 +306,6 @@ def test_stop_while_every_way_in_is_full(servos: SoftServoBus, armed: ServoRobot
     _settle_mm(servos)
 
 
-def test_stop_switches_the_torque_off_when_that_is_the_policy(servos: SoftServoBus) -> None:
-    robot = _robot(servos, torque_off_on_stop=True)
-    robot.connect()
-    try:
-        robot.zero()
-        robot.arm()
-        robot.stop()
-        _seen(robot, lambda status: status.phase is BusPhase.STOPPED)
-        assert _torques(servos) == [0] * 7
-    finally:
-        robot.close()
-
-
 @pytest.mark.slow  # what hangs is waited for, and then for its end
 def test_a_bus_process_that_hangs_keeps_no_torque_on(armed: ServoRobot, servos: SoftServoBus) -> None:
     """Asked and asked again it could not answer, and the port was its own: only opening the rig anew got out of it."""
@@ -434,35 +421,6 @@ def test_silence_holds_then_disarms_then_quiet_then_the_servos_own_watchdog(serv
         robot.close()
 
 
-def test_a_heartbeat_without_orders_holds_and_stays_armed(servos: SoftServoBus, armed: ServoRobot) -> None:
-    _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
-    status = _seen(armed, lambda s: s.rejection is not None and s.rejection.reason is RejectReason.STALE_COMMAND)
-    assert status.armed
-    at_mm = _settle_mm(servos)
-    for _ in range(40):
-        armed.beat(None)
-        time.sleep(0.02)
-    assert servos.positions_mm()[4] == at_mm
-    assert _seen(armed, lambda s: True).armed
-
-
-# --- bad orders ------------------------------------------------------------------------------------------------------------------
-
-
-def test_an_order_that_is_not_finite_is_rejected_in_the_bus_process_too(servos: SoftServoBus, armed: ServoRobot) -> None:
-    _drive(armed, until=lambda status: servos.positions_mm()[4] > 0.5)
-    end_s = time.monotonic() + PATIENCE_S
-    status = armed.bus_status()
-    while status is not None and not status.rejections.get(RejectReason.NON_FINITE) and time.monotonic() < end_s:
-        now_s = time.monotonic()
-        armed._client.put_heartbeat(Heartbeat(now_s, Source.OPERATOR))
-        armed._client.put_order(BusOrder(Command(bend=math.nan, advance_mm_s=math.inf), Source.OPERATOR, now_s))
-        time.sleep(0.02)
-        status = armed.bus_status()
-    assert status.rejections[RejectReason.NON_FINITE] > 0
-    assert status.armed
-
-
 # --- faults of bus and servos ----------------------------------------------------------------------------------------------------
 
 
@@ -559,25 +517,6 @@ def test_after_a_strain_the_tendons_are_let_go_slowly(servos: SoftServoBus, arme
     assert _positions(status)[1] == pytest.approx(-1.7, abs=0.1), "a slack tendon is not tightened"
     assert servos.positions_mm()[4] == pytest.approx(fed_mm, abs=0.1), "the robot is not pulled out"
     assert _torques(servos) == [1] * 7
-
-
-def test_fault_24_a_servo_that_overheats_is_let_go_slowly(servos: SoftServoBus, armed: ServoRobot) -> None:
-    """It held the wires, got hotter, and shut itself down with a snap."""
-    _bend(armed)
-    servos.modify_servo(1, lambda servo: servo.heat(71.0))
-    _seen(armed, lambda status: status.releasing)
-    with pytest.raises(NotReady, match="the tension is being let off"):
-        armed.arm()
-    seen_mm = [servos.positions_mm()[0]]
-    while armed.bus_status().releasing:
-        armed.beat(Source.OPERATOR)
-        seen_mm.append(servos.positions_mm()[0])
-        time.sleep(0.01)
-    _settle_mm(servos)
-    assert max(before - after for before, after in zip(seen_mm, seen_mm[1:], strict=False)) < 0.5, "no snap"
-    assert servos.positions_mm()[:2] == pytest.approx((0.0, -1.7), abs=0.1)
-    assert _torques(servos) == [1] * 7
-    assert _latched(Cause.HOT)(armed.bus_status())
 
 
 @pytest.mark.parametrize("startup", [0, 3])
@@ -800,26 +739,6 @@ def test_servos_of_a_dead_application_hold_are_watched_and_then_relaxed_and_swit
         assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
         _wait_for(lambda: not _lives(bus_pid))
         assert not _lives(bus_pid)
-
-
-def test_an_application_that_is_silent_for_so_long_finds_the_servos_switched_off(servos: SoftServoBus) -> None:
-    robot = _robot(servos, unattended_s=2.5, **WATCHED)
-    robot.connect()
-    try:
-        robot.zero()
-        robot.arm()
-        _bend(robot)
-        _wait_for(lambda: _torques(servos) == [0] * 7)
-        assert servos.positions_mm()[0] == pytest.approx(0.0, abs=0.06)
-        status = _drive(robot, 0.2)
-        assert status.phase is BusPhase.DISARMED
-        assert status.latched.cause is Cause.HEARTBEAT_LOST
-        robot.acknowledge()
-        robot.arm()
-        assert _torques(servos) == [1] * 7
-    finally:
-        robot.torque_off()
-        robot.close()
 
 
 def test_a_closed_robot_that_holds_is_watched_and_the_next_one_takes_over(servos: SoftServoBus) -> None:
