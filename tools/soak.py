@@ -52,11 +52,8 @@ from hardware.twin.world import TwinCamera, TwinWorld
 from tools.run import run_tool
 from tools.wire_monitor import MonitoredBus, WireMonitor
 
-_log = logging.getLogger(__name__)
-
 _START_MM = 60.0
 _STEP_S = 0.1
-_FRAMES_KEPT = 20
 
 
 @dataclass(slots=True)

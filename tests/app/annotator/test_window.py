@@ -384,18 +384,6 @@ def test_undo_and_redo_reach_over_a_restart(make: MakeRater) -> None:
     assert again.message == "Nothing to undo"
 
 
-def test_points_are_dragged_put_in_and_taken_out(rater: Rater) -> None:
-    rater.click((200.0, 180.0), (320.0, 180.0))
-    rater.press(Key.Key_Return, Key.Key_1)
-    rater.canvas.close_line()
-    rater.drag((320.0, 180.0), (330.0, 200.0))
-    assert rater.drawn.robot[1] == pytest.approx((330.0, 200.0), abs=1.0)
-    rater.drag((265.0, 190.0), (265.0, 160.0))
-    assert rater.drawn.robot[1] == pytest.approx((265.0, 160.0), abs=1.0)
-    rater.click((265.0, 160.0), button=Qt.MouseButton.RightButton)
-    assert len(rater.drawn.robot) == 2
-
-
 def _both_lines(rater: Rater) -> None:
     rater.click(*ROBOT)
     rater.press(Key.Key_Return)
@@ -572,19 +560,6 @@ def test_what_the_algorithm_or_another_image_does_not_give_is_said(rater: Rater)
     assert rater.message.startswith("The algorithm gives no pose: image black: 99 % of it")
     rater.press(Key.Key_V)
     assert rater.message == "No other image of this folder and size has a robot mask"
-
-
-def test_brush_and_outline(rater: Rater) -> None:
-    rater.press(Key.Key_4)
-    rater.click((100.0, 100.0), (300.0, 100.0), (300.0, 300.0))
-    rater.press(Key.Key_Return)
-    assert len(rater.drawn.masks) == 1
-    rater.press(Key.Key_T)
-    rater.drag((500.0, 400.0), (520.0, 400.0))
-    assert len(rater.drawn.masks) == 2
-    before = sum(len(mask.points) for mask in rater.drawn.masks)
-    rater.press(Key.Key_S)
-    assert sum(len(mask.points) for mask in rater.drawn.masks) < before
 
 
 VESSEL_Y, VESSEL_RADIUS = 240, 20

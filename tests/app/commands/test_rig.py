@@ -170,14 +170,6 @@ def test_boards_that_cannot_be_printed(tmp_path: Path) -> None:
     assert not (tmp_path / "b.pdf").exists()
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's full device")
-@pytest.mark.parametrize("ending", [".pdf", ".png"])
-def test_a_full_disk_is_one_line(tmp_path: Path, ending: str) -> None:
-    (tmp_path / f"b{ending}").symlink_to("/dev/full")
-    with pytest.raises(BoardPrintError, match=r"cannot be written \(No space left on device\)"):
-        _run("board", "--out", str(tmp_path / f"b{ending}"))
-
-
 def test_a_calibration_without_servos_finds_the_scale() -> None:
     said = _run("calibrate", "bench 1", "--auto", "--steps", "board", "--pictures", "2")
     assert "scale: 0.322" in said

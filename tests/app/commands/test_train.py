@@ -245,12 +245,6 @@ def test_an_empty_name_is_no_model(command: tuple[object, ...], tmp_path: Path) 
     assert "--model is empty" in done.stderr
 
 
-def test_an_unknown_look_is_named(tmp_path: Path) -> None:
-    done = run("synth", "--out", tmp_path / "x", "--count", 1, "--family", "velvet")
-    assert done.returncode == 2
-    assert "unknown look family 'velvet'" in done.stderr
-
-
 @pytest.mark.slow
 def test_speed_is_the_contracts_json_object() -> None:
     done = run_apart("benchmark", "--json", "--frames", 8)  # the window that it times is started as it was itself

@@ -17,7 +17,7 @@ from pytestqt.qtbot import QtBot
 from app.annotator.sources import image_files
 from app.operator import recording
 from app.operator.record_bar import RecordBar
-from app.operator.recording import AfterSession, Declined, RecoveryController, loss_words
+from app.operator.recording import AfterSession, Declined, RecoveryController
 from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.ui.description_form import DescriptionDialog
@@ -40,7 +40,6 @@ from core.session.manifest import (
 )
 from core.session.reader import SessionReader
 from core.session.recovery import CutSession
-from core.session.writer import RecordStatus
 from core.types import Tick
 from tests.app.annotated import measure
 from tests.app.conftest import MakeWindow
@@ -255,17 +254,6 @@ def test_a_double_click_is_one_click(qtbot: QtBot) -> None:
     assert asked == [True], "the second would end what the first has begun"
     qtbot.mouseClick(bar, Qt.MouseButton.LeftButton)
     assert asked == [True, True]
-
-
-def test_the_tool_tip_of_the_bar_is_as_new_as_what_it_tells(qtbot: QtBot) -> None:
-    """Between two sessions the bar's own words stay the same, and the disk fills up."""
-    bar = RecordBar()
-    qtbot.addWidget(bar)
-    bar.show_status(RecordStatus(disk_free=40_000_000_000))
-    assert "40.0 GB free" in bar.toolTip()
-    bar.show_status(RecordStatus(disk_free=1_200_000_000, warning="disk nearly full: 1200 MB left"))
-    assert "1.2 GB free" in bar.toolTip()
-    assert "disk nearly full: 1200 MB left" in bar.toolTip()
 
 
 LONG_MS = 120_000
@@ -616,8 +604,3 @@ def test_a_damaged_list_of_declined_ones_declines_nothing(text: str, tmp_path: P
     declined.add("session_a")
     declined.add("session_b")
     assert declined.names() == {"session_a", "session_b"}
-
-
-def test_a_loss_in_words() -> None:
-    assert loss_words({"seconds": 0.2, "rows": 1, "pictures": 6}) == "0.2 s are lost (rows: 1, pictures: 6)"
-    assert loss_words({"seconds": 0.0, "rows": 0, "pictures": 0}) == "nothing of it is lost"

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.operator import services as tour_module
-from app.operator.services import mark_seen, tour_at_start, was_seen
+from app.operator.services import tour_at_start, was_seen
 from app.operator.window import OperatorWindow
 from app.ui.theme import MIN_WINDOW
 from app.widgets.mode_bar import StopButton
@@ -173,10 +173,3 @@ def test_once_at_the_first_start_on_a_screen_and_whenever_it_is_asked_for(
     running.tour.end()
     next(action for action in running.actions() if action.text() == "&Tour").trigger()
     assert running.tour.is_running
-
-
-def test_a_folder_that_cannot_be_written_disturbs_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
-    mark_seen()
-    assert not was_seen()

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton
 from pytestqt.qtbot import QtBot
 
 from app.annotator.sources import default_store, session_rows
@@ -393,14 +392,6 @@ def test_notes_that_the_disk_does_not_take_are_not_lost(
     until(qtbot, lambda: {"a long careful remark", "another"} <= {event.text for event in window.session.events})
 
 
-def test_rows_that_went_from_a_closed_session_are_told(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
-    folder = make_session(tmp_path)
-    lines = (folder / "frames.jsonl").read_bytes().splitlines(keepends=True)
-    (folder / "frames.jsonl").write_bytes(b"".join(lines[:-5]))
-    window = open_player(folder)
-    until(qtbot, lambda: f"the last 5 of {COUNT} rows are lost" in window.panels.problems.toPlainText())
-
-
 def test_a_session_that_was_cut_says_so(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     folder = make_session(tmp_path)
     write_manifest(folder, read_manifest(folder).model_copy(update={"closed": False}))
@@ -479,17 +470,6 @@ def test_a_snapshot_tells_that_it_is_played_back(player: PlayerWindow, tmp_path:
     (values,) = (tmp_path / "kept").glob("*.json")
     told = json.loads(values.read_text())
     assert (told["rig"], told["frame"], told["model"]) == ("SIM PLAYBACK", 0, "default")
-
-
-def test_overlays_help_and_full_screen_by_key(player: PlayerWindow) -> None:
-    press(player, Key.Key_0)
-    assert not any(chip.isChecked() for chip in player.panels.overlay_bar.findChildren(QAbstractButton))
-    press(player, Key.Key_1)
-    assert sum(chip.isChecked() for chip in player.panels.overlay_bar.findChildren(QAbstractButton)) == 1
-    press(player, Key.Key_F1)
-    assert player.panels.help.isVisible()
-    press(player, Key.Key_Escape)
-    assert not player.panels.help.isVisible()
 
 
 def test_damage_is_listed_and_the_rest_is_played(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:

@@ -7,9 +7,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from app.settings.dialog import ProfileRow, SettingsDialog
+from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
-from app.settings.fields import WANTED, NumberEdit, SettingField
+from app.settings.fields import NumberEdit, SettingField
 from core.config.files import Profiles
 from core.config.models import RESOURCES, Config, load_config
 from core.config.schema import schema, settings_by_key
@@ -70,20 +70,6 @@ def test_a_field_shows_unit_default_range_and_meaning(dialog: SettingsDialog) ->
         assert words in texts
     assert shown.editor.accessibleName() == "Allowed distance, px"
     assert shown.toolTip() == D_ALLOW
-
-
-@pytest.mark.parametrize("where", ["setting", "profile"])
-def test_a_choice_by_keyboard_keeps_the_focus_where_it_was(dialog: SettingsDialog, qtbot: QtBot, where: str) -> None:
-    combo = field(dialog, "rig.robot").editor if where == "setting" else dialog.findChild(ProfileRow).combo
-    combo.setFocus()
-    before = combo.currentText()
-    QTest.keyClick(combo, Key.Key_Return)
-    qtbot.waitUntil(combo.view().isVisible)
-    QTest.keyClick(combo.view(), Key.Key_Down)
-    QTest.keyClick(combo.view(), Key.Key_Return)
-    qtbot.waitUntil(lambda: not combo.view().isVisible())
-    assert combo.currentText() != before
-    assert dialog.focusWidget() is combo, "Tab goes on from here"
 
 
 def test_typing_is_checked_at_once_and_marked(dialog: SettingsDialog) -> None:
@@ -329,14 +315,6 @@ def test_a_folder_is_chosen_on_the_disk(dialog: SettingsDialog, tmp_path: Path) 
     assert seen[-1].record.folder == str(tmp_path)
     editor = dialog.page.fields["record.folder"].editor
     assert editor.text() == str(tmp_path)
-
-
-def test_everything_that_is_a_path_can_be_browsed_for(dialog: SettingsDialog) -> None:
-    assert set(WANTED) <= set(settings_by_key())
-    for key in WANTED:
-        assert field(dialog, key).browse_button is not None
-    source = field(dialog, "rig.source").browse_button
-    assert [action.text() for action in source.menu().actions()] == ["&File...", "F&older..."]
 
 
 def test_a_shipped_model_goes_by_its_name(dialog: SettingsDialog) -> None:

@@ -20,25 +20,18 @@ from app.teaching.folder import TeachingStep
 from app.teaching.model import free_name, teaching_folder
 from app.training.model import TrainingPhase
 from app.ui.texts import OperatorStep
-from core import geometry
 from core.bench.bench import read_bench
-from core.config.models import PerceptionConfig
 from core.control.alerts import Alert, alert_of
 from core.control.drive_view import DriveNews, DriveView
 from core.control.modes import Hindrance
 from core.learning.model_writer import save_model
-from core.perception.inference import open_segmenter
 from core.perception.model_file import own_models
-from core.perception.segmentation import OrientationAverage, Probability
+from core.perception.segmentation import Probability
 from core.perception.unet import DualUNet, UNetShape
 from core.types import Image
-from hardware.twin.phantoms import make_phantom
-from hardware.twin.rendering.appearance import named_appearance
-from hardware.twin.rendering.renderer import Renderer
-from hardware.twin.truth import way_from_port
 from tests.app.teaching.bench_hand import LONG_MS, BenchHand, PictureFeed
-from tests.app.teaching.test_folder import drive, large, opened, segment
-from tests.core.learning.toy_bench import toy_picture, toy_robot, toy_vessel
+from tests.app.teaching.test_folder import drive, opened, segment
+from tests.core.learning.toy_bench import toy_picture, toy_robot
 
 OpenHand = Callable[..., BenchHand]
 TEACHES = """
@@ -223,18 +216,6 @@ def test_three_places_make_an_empty_picture(open_hand: OpenHand) -> None:
     assert "not known (dark)" in page.found.text() or "Good" in page.found.text()
 
 
-def test_what_looks_like_a_robot_in_the_empty_picture_is_shown(qtbot: QtBot, tmp_path: Path) -> None:
-    def sees_one(_image: Image) -> tuple[Probability, Probability]:
-        return large(toy_vessel()).astype(np.float32), large(toy_robot(0, 0.6)).astype(np.float32)
-
-    hand = BenchHand(qtbot, tmp_path / "teaching", PictureFeed([toy_picture(seed=number) for number in range(9)]), sees_one)
-    hand.open()
-    hand.click(hand.window.empty_page.take)
-    assert "sees a robot near" in hand.window.empty_page.found.text()
-    assert hand.window.next_button.isEnabled()
-    hand.end()
-
-
 def test_a_vessel_that_the_network_does_not_see_is_painted(qtbot: QtBot, tmp_path: Path) -> None:
     def sees_none(_image: Image) -> tuple[Probability, Probability]:
         return np.zeros((480, 640), np.float32), np.zeros((480, 640), np.float32)
@@ -399,15 +380,6 @@ def test_a_training_is_stopped_and_goes_on_while_the_window_is_closed(
     assert hand.model.training.line.startswith("Stopped")
 
 
-def test_enter_presses_the_focused_button(open_hand: OpenHand) -> None:
-    hand = open_hand()
-    hand.window.empty_page.take.setFocus()
-    QTest.keyClick(hand.window, Qt.Key.Key_Return)
-    hand.wait()
-    assert hand.model.view.empty is not None
-    assert hand.model.view.step is TeachingStep.EMPTY
-
-
 def test_names_of_folder_and_model() -> None:
     assert teaching_folder("my rig/2").name == "my_rig_2"
     assert free_name("Bench ü 2").startswith("Bench_2")
@@ -419,51 +391,6 @@ def test_a_line_of_another_version_is_no_result() -> None:
 
 
 # ---- input events
-
-
-def twin_frames(look: str) -> tuple[list[Image], list[Image]]:
-    """Empty pictures of the twin's tree with five ends, and the robot on its way into each, bent to both sides at three depths."""
-    phantom = make_phantom("tree")
-    renderer = Renderer(phantom, named_appearance(look, 7), (640, 480), seed=3)
-    frames = []
-    for target in phantom.targets:
-        route = way_from_port(phantom, target)
-        route = np.vstack([geometry.extrapolate(route[::-1], 40.0, 3.0)[:0:-1], route])  # it comes from outside
-        length = float(geometry.arc_length(route)[-1])
-        for depth in np.arange(0.2, 0.98, 8.0 / length):
-            line = geometry.cut(route, 0.0, depth * length)
-            bends = (-3.0, 0.0, 3.0) if 0.5 < depth < 0.6 else (0.0,)
-            for bend in bends:
-                left = np.clip(1.0 - (geometry.arc_length(line)[-1] - geometry.arc_length(line)) / 15.0, 0.0, 1.0)[:, None]
-                frames.append(renderer.render(line + bend * left**2 * geometry.normals(line), noise_seed=len(frames)).image)
-    return [renderer.render(None, noise_seed=1000 + number).image for number in range(9)], frames
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("look", ["tank", "glow"])
-def test_a_tree_with_five_ends_takes_few_input_events(
-    look: str, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The network proposes the vessel, the robot is moved by hand, and nothing has to be corrected."""
-    stands_for_teach(monkeypatch, TEACHES)
-    empty, frames = twin_frames(look)
-    network = OrientationAverage(open_segmenter(PerceptionConfig().segmentation))
-    hand = BenchHand(qtbot, tmp_path / "teaching", PictureFeed(empty), network)
-    hand.open()
-    window = hand.window
-    to_the_robot(hand)
-    for frame in frames:
-        hand.show(frame)
-    assert hand.model.view.missing == (), window.move_page.lacks.text()
-    hand.click(window.next_button)
-    hand.click(window.next_button)
-    hand.click(window.train_page.start)
-    qtbot.waitUntil(lambda: hand.model.training.phase is TrainingPhase.DONE, timeout=LONG_MS)
-    hand.wait()
-    hand.click(window.next_button)
-    assert hand.used
-    assert hand.events == 7  # of 40
-    hand.end()
 
 
 TEACHES_LITTLE = """

@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
     QAbstractSpinBox,
-    QApplication,
     QComboBox,
     QDialog,
     QLineEdit,
@@ -33,8 +32,6 @@ from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
 from app.training.dialog import TrainingDialog
 from app.training.model import TrainingPhase, TrainingState
-from app.ui import theme
-from app.widgets.messages import Offer, OfferButton, OfferStrip
 from core.config.files import Profiles
 from core.config.models import Config, load_config
 from core.control.drive_view import DriveView
@@ -240,17 +237,6 @@ def test_closing_while_it_trains_is_called_what_it_is(qtbot: QtBot) -> None:
         assert shown.hide_button.text() == "&Hide, go on training"
 
 
-def test_fields_of_a_dialog_follow_the_theme(qapp: QApplication, qtbot: QtBot) -> None:
-    with training(qtbot) as shown:
-        before = shown.styleSheet()
-        try:
-            theme.apply_theme(qapp, theme.Theme.LIGHT)
-            assert shown.styleSheet() != before
-        finally:
-            theme.apply_theme(qapp, theme.Theme.DARK)
-        assert shown.styleSheet() == before
-
-
 # ---- before driving
 
 
@@ -272,15 +258,3 @@ def test_without_servos_there_is_nothing_to_arm(make_checks: MakeChecks) -> None
 
 
 # ---- offers
-
-
-def test_while_work_goes_on_to_end_it_is_not_what_is_meant(qtbot: QtBot) -> None:
-    window = QWidget()
-    qtbot.addWidget(window)
-    strip = OfferStrip(window)
-    answers = (OfferButton("Do it", lambda: None),)
-    strip.offer(Offer("one", "Something can be done", answers=answers))
-    main = strip.answers["Do it"].styleSheet()
-    strip.withdraw("one")
-    strip.offer(Offer("two", "It is being done", answers=answers, share=0.5))
-    assert strip.answers["Do it"].styleSheet() != main

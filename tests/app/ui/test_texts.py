@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from app.ui.texts import (
-    QUANTITY,
     REASON_TEXT,
     SPEED_WORD,
     STATE_MEANING,
@@ -78,14 +77,6 @@ def test_refusal_says_what_to_do_and_what_was_measured() -> None:
 )
 def test_advice_headline(speed: Speed, steer: float, expected: str) -> None:
     assert advice_headline(Advice(speed, 1.0, steer, "")) == expected
-
-
-@pytest.mark.parametrize("name", QUANTITY)
-def test_every_one_is_whole_sentences_that_fit_a_screen(name: str) -> None:
-    quantity = QUANTITY[name]
-    assert quantity.meaning.endswith((".", ")"))
-    assert quantity.meaning[0].isupper()
-    assert all(len(line) <= 110 for line in tip(name).splitlines())
 
 
 def test_a_tip_names_quantity_and_unit() -> None:

@@ -41,11 +41,6 @@ def dark_again(qapp: QApplication) -> Iterator[None]:
     theme.apply_theme(qapp)
 
 
-def hue_deg(name: str) -> float:
-    red, green, blue = (part / 255 for part in theme.rgb(name))
-    return float(np.degrees(np.arctan2(np.sqrt(3) * (green - blue), 2 * red - green - blue)) % 360)
-
-
 def test_everything_that_is_written_can_be_read() -> None:
     for ground in SURFACES:
         for role in (role for role in ROLES if role not in NOT_WRITTEN):
@@ -56,12 +51,6 @@ def test_everything_that_is_written_can_be_read() -> None:
         assert theme.contrast(LIGHT.INK, getattr(LIGHT, role)) >= 4.5, role
     for state in PoseState:
         assert theme.contrast(theme.INK, theme.STATE_COLOUR[state]) >= 4.5, state
-
-
-def test_a_colour_keeps_its_hue() -> None:
-    for role in ("ORANGE", "SKY", "GREEN", "YELLOW", "VERMILLION", "PURPLE", "THETA", "D_HEAD", "D_TAIL"):
-        apart = abs(hue_deg(getattr(DARK, role)) - hue_deg(getattr(LIGHT, role)))
-        assert min(apart, 360 - apart) < 20, role
 
 
 def test_curves_that_lie_in_one_chart_differ_for_a_deuteranope_in_the_light() -> None:

@@ -144,13 +144,3 @@ def test_log_rows_follow_whatever_the_pace(panel: CommandPanel, clock: Clock) ->
     assert [log.item(0, column).text() for column in range(4)] == ["12:00:00", "right", "999.00 → 0.80 mm, speed", ""]
     assert log.item(MAX_ENTRIES - 1, 2).text() == "500.00 → 0.80 mm, speed"
     assert [log.item(row, 2).text() for row in range(log.rowCount())] == [entry.text for entry in log.log.entries]
-
-
-def test_repeats_renew_their_row(panel: CommandPanel, clock: Clock) -> None:
-    for cycle in range(1, 30):
-        clock.now_s += 0.1
-        panel.show_view(DriveView(0.0), bus(cycle=cycle, time_s=0.1 * cycle, clamps=(clamp(), clamp("up", limit=Limit.MARGIN))))
-    clock.now_s += 1.0
-    panel.show_view(DriveView(0.0), None)
-    log = panel.log
-    assert [log.item(row, 3).text() for row in range(log.rowCount())] == ["×29", "×29"]

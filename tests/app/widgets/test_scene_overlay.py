@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QAbstractButton
 
-from app.widgets.scene_overlay import Layer, OverlayBar, foot, scene_shapes
+from app.widgets.scene_overlay import Layer, OverlayBar, scene_shapes
 from core.types import Pose, PoseState, RobotPath, Scene, Vector
 from tests.app.widgets.conftest import Own
 
@@ -17,13 +17,6 @@ POSE = Pose(40.9, 40.9, 30.0, 4.0, False, PoseState.C, 0.9)
 
 def scene(scale: float = 1.0, **parts: object) -> Scene:
     return Scene(0, 0.0, (640, 480), scale, **parts)
-
-
-def test_foot_is_the_nearest_point_of_the_line() -> None:
-    assert foot(VESSEL, (30.0, 40.0)) == pytest.approx((30.0, 10.0))
-    assert foot(VESSEL, (-5.0, 3.0)) == pytest.approx((-5.0, 10.0))
-    slanted = Vector((0.0, 0.0), (5.0, 5.0), (10.0, 10.0))
-    assert foot(slanted, (10.0, 0.0)) == pytest.approx((5.0, 5.0))
 
 
 def test_measures_end_at_their_feet() -> None:
@@ -107,7 +100,3 @@ def test_chips_go_in_two_rows_where_one_would_cut_their_names(own: Own, width: i
         assert not any(chip.geometry().intersects(other.geometry()) for other in chips if other is not chip)
     in_order = sorted(chips, key=lambda chip: (chip.y(), chip.x()))
     assert [chip.text() for chip in in_order] == [layer.value.label for layer in Layer][: 10 + is_rehearsed]
-
-
-def test_layers_have_keys_of_their_own() -> None:
-    assert [layer.value.key for layer in Layer] == [*"123456789", "G", "B"]

@@ -313,12 +313,6 @@ def test_a_damaged_profile_is_told_and_does_not_stand_in_the_way(tmp_path: Path)
     assert [one.name.startswith("old.toml.bad-") for one in tmp_path.iterdir()] == [True]
 
 
-def test_a_disk_that_does_not_take_a_profile_is_one_line(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(ProfileError, match="cannot be written"):
-        Profiles(tmp_path / "file").save("mine", BRIGHT)
-
-
 def test_the_windows_begin_with_the_users_own_settings_or_a_named_file(tmp_path: Path) -> None:
     assert settings_of_windows().path == own_settings_path()
     assert own_settings_path().name == "settings.toml"

@@ -271,14 +271,6 @@ def test_the_insertion_port_leaves_the_older_calibration_where_it_is() -> None:
     assert read_rig(path.with_name("bench 1.older.toml")).calibration == KNOWN
 
 
-def test_a_disk_that_does_not_take_it_is_one_line(tmp_path: Path) -> None:
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    with pytest.raises(RigFileError, match="cannot be saved") as told:
-        write_rig(make_rig(load_config(), "bench 1", None), blocked / "bench 1.toml")
-    assert "\n" not in str(told.value)
-
-
 @pytest.mark.parametrize("name", ["", "  ", "../up", "a/b", ".hidden", "twin", "Webcam", "x" * 61, "a.older"])
 def test_names_that_are_none(name: str) -> None:
     with pytest.raises(ValueError, match=r"name|called"):

@@ -355,12 +355,6 @@ def test_a_session_with_nothing_left_says_so_and_leaves_no_half_copy(session: Pa
     assert [path.name for path in session.parent.iterdir()] == [session.name]
 
 
-def test_a_copy_that_cannot_be_written_is_one_line(session: Path, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(SessionError, match=r"make room or choose another folder"):
-        recover(session, tmp_path / "file")
-
-
 def test_an_empty_session_is_not_offered(tmp_path: Path) -> None:
     files = SessionFiles(tmp_path, ABOUT, QUICK, first_s=0.0, now_s=0.0)
     files.close("never began", 0)

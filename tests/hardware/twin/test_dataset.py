@@ -97,12 +97,6 @@ def test_another_plan_or_a_smaller_count_does_not_overwrite_a_set(small_set: Syn
         write_set(SynthPlan(small_set.out, count, seed, size=(320, 240)))
 
 
-def test_an_unwritable_folder_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("x")
-    with pytest.raises(SynthError, match="cannot be written"):
-        write_set(SynthPlan(tmp_path / "file" / "set", 1, 0))
-
-
 def test_the_benchs_own_look_is_the_trials_one() -> None:
     frame = next(dataset.episode_frames(SynthPlan(Path("unused"), 1, 8, size=(320, 240), families=("bench",)), 0))
     phantom = make_phantom("random:8")
