@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import sys
@@ -213,7 +214,10 @@ def make_application(look: WindowConfig | None = None) -> QApplication:
     # Qt paints large areas in a thread pool and waits for it; while perception keeps the cores busy, that wait is longer than the
     # painting (measured on two cores: 105 instead of 70 ms from capture to screen).
     os.environ.setdefault("QT_NO_GUI_THREADPOOL", "1")
-    application = QApplication.instance() or QApplication([sys.argv[0]])
+    application = QApplication.instance()
+    if application is None:
+        application = QApplication([sys.argv[0]])
+        _collect_garbage_here(application)
     assert isinstance(application, QApplication)
     application.setApplicationName("LumenPilot")
     application.setDesktopFileName("lumenpilot")  # the desktop entry that `make install` writes
@@ -221,6 +225,27 @@ def make_application(look: WindowConfig | None = None) -> QApplication:
     use_language(application, look.language if look is not None else ENGLISH)
     theme.apply_theme(application, look.theme if look is not None else theme.Theme.DARK)
     return application
+
+
+_COLLECT_MS = 500
+
+
+def _collect_garbage_here(application: QObject) -> None:
+    """Have garbage collected by a timer of the window's thread alone.
+
+    Python collects in the thread that happens to allocate: one that reads a child's output would destroy a window that went out of
+    use, and with it what the window's thread is just emitting a signal of.
+    """
+
+    def collect() -> None:
+        due = [k for k, (count, limit) in enumerate(zip(gc.get_count(), gc.get_threshold(), strict=True)) if count > limit]
+        if due:
+            gc.collect(due[-1])
+
+    gc.disable()
+    timer = QTimer(application, interval=_COLLECT_MS)
+    timer.timeout.connect(collect)
+    timer.start()
 
 
 def close_all(application: QApplication, *, may_ask: bool = False) -> None:

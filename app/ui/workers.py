@@ -67,7 +67,8 @@ class QueuedCallback(Generic[Receiver]):
     """Calls from any thread to one object of the window's thread, which makes this.
 
     Threads must not emit signals of a window's objects: of an object that is just being destroyed the signal lies in freed memory,
-    and ``QObject.destroyed`` comes too late to prevent it. The receiver is held weakly, so that no thread ever destroys it.
+    and ``QObject.destroyed`` comes too late to prevent it. The receiver is held weakly, so that no thread ever destroys it; nor
+    does a collection of garbage (``make_application``).
     """
 
     def __init__(self, receiver: Receiver) -> None:

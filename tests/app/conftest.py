@@ -39,10 +39,15 @@ def bench() -> FakeBench:
 
 @pytest.fixture(autouse=True)
 def no_leaks(request: pytest.FixtureRequest, qapp: QApplication, imported: set[str]) -> Iterator[None]:
-    """Every window that a test makes is gone after it. Without ``qtbot`` it is looked for first: collecting takes its time."""
+    """Every window that a test makes is gone after it. Without ``qtbot`` it is looked for first: collecting takes its time.
+
+    As in the program, no other thread collects: it would destroy windows that went out of use.
+    """
     _leave_out(imported)
     before = set(QApplication.topLevelWidgets())
+    gc.disable()
     yield
+    gc.enable()
     may_be_clean = "qtbot" not in request.fixturenames
     for _ in range(2):  # what Qt lets go of may hold more
         if may_be_clean and set(QApplication.topLevelWidgets()) <= before:

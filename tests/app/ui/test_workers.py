@@ -215,6 +215,38 @@ def test_threads_that_go_on_sending_while_the_program_ends_do_not_hurt_it() -> N
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
+GARBAGE = """
+import threading, time
+from PySide6.QtCore import QObject, Qt
+from app.ui.window_base import make_application
+
+application, where = make_application(), []
+
+class Unused(QObject):
+    def __init__(self):
+        super().__init__()
+        self.itself, self.child = self, QObject(self)
+        self.child.destroyed.connect(lambda: where.append(threading.current_thread().name), Qt.ConnectionType.DirectConnection)
+
+Unused()
+thread = threading.Thread(target=lambda: [{"a": number} for number in range(200_000)])
+thread.start()
+thread.join()
+assert where == []
+while not where:
+    kept = [{"a": number} for number in range(2000)]
+    application.processEvents()
+    time.sleep(0.01)
+print(where)
+"""
+
+
+def test_a_window_that_went_out_of_use_is_destroyed_in_its_own_thread() -> None:
+    """Whichever thread allocates: a signal that is just emitted would be that of freed memory."""
+    done = subprocess.run([sys.executable, "-c", GARBAGE], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "['MainThread']\n"), done.stderr
+
+
 def python(code: str) -> list[str]:
     return [sys.executable, "-c", code]
 
