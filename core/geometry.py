@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
+from contourpy import contour_generator
 from numpy.typing import NDArray
 
 from core.perception import compiled
@@ -76,6 +78,38 @@ def median(values: NDArray[np.float64]) -> float:
     ordered: list[float] = sorted(values.tolist())
     middle = len(ordered) // 2
     return ordered[middle] if len(ordered) % 2 else 0.5 * (ordered[middle - 1] + ordered[middle])
+
+
+def outlines(values: NDArray[np.float64], level: float) -> list[Points]:
+    """The closed lines (N, 2) around what is above `level` in a map (H, W), whose border is not; the last point is the first again.
+
+    What is above lies on the right as seen on screen, and lines begin at their lowest place. Two places that meet at a corner are
+    connected where the mean of the four is above.
+    """
+    lines = []
+    for found in cast("list[Points]", contour_generator(z=values, line_type="Separate").lines(level)):
+        line = found[np.append(True, np.any(np.diff(found, axis=0) != 0.0, axis=1))]
+        across, down = np.floor((line[:-1] + line[1:]) / 2).T
+        last = int(np.lexsort((across, down))[-1])
+        lines.append(np.vstack([line[last + 1 :], line[1 : last + 2]]))
+    return lines
+
+
+def thinned(points: Points, tolerance: float) -> Points:
+    """A polyline's points without those that are nearer than `tolerance` to the rest (Douglas and Peucker); both ends are kept."""
+    kept, pieces = np.zeros(len(points), np.bool_), [(0, len(points) - 1)]
+    kept[[0, -1]] = True
+    while pieces:
+        first, last = pieces.pop()
+        start, along = points[first], points[last] - points[first]
+        away = points[first + 1 : last] - start
+        share = np.clip(away @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+        distance = np.hypot(*(away - share[:, None] * along).T)
+        if len(distance) and distance.max() > tolerance:
+            middle = first + 1 + int(distance.argmax())
+            kept[middle] = True
+            pieces += [(middle, last), (first, middle)]
+    return points[kept]
 
 
 def normals(points: Points) -> Points:

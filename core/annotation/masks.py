@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from core import geometry
 from core.annotation.model import Line, MaskPolygon, MaskTarget
 from core.types import Mask, Points
 
@@ -203,8 +204,6 @@ def area_polygon(mask: Mask) -> NDArray[np.float64] | None:
 
 def area_rings(mask: Mask) -> list[NDArray[np.float64]]:
     """The polygons (N, 2) around the components and holes of a mask (H, W): inside is what an odd number of them encloses."""
-    from skimage.measure import approximate_polygon, find_contours  # loads statistics, which takes a second
-
-    outlines = find_contours(np.pad(mask, 1).astype(np.float64), 0.5, fully_connected="high")
-    # From the padded picture's pixel centres (row, column) to corners (x, y); the last point is the first one again.
-    return [np.asarray(approximate_polygon(outline, _TOLERANCE_PX)[:-1, ::-1] - 0.5) for outline in outlines]
+    # From the padded picture's pixel centres to corners; at half the height, neighbours by a corner would not be connected.
+    outlines = geometry.outlines(np.pad(mask, 1).astype(np.float64), 0.5 - 1e-9)
+    return [geometry.thinned(outline, _TOLERANCE_PX)[:-1] - 0.5 for outline in outlines]

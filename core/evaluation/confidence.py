@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.linear_model import LogisticRegression
-from sklearn.metrics import roc_auc_score
+from scipy.stats import rankdata
 
 from core.config.models import PerceptionConfig
 from core.devices import UserError
@@ -58,15 +57,28 @@ def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: d
     x = np.array(evidence, np.float64)
     mean, scale = x.mean(axis=0), np.maximum(x.std(axis=0), 1e-3)
     standard = np.clip((x - mean) / scale, -4.0, 4.0)
-    regression = LogisticRegression(C=0.3, max_iter=1000).fit(standard, np.array(right))
+    weights = _logistic(standard, np.array(right, np.float64))
     return ConfidenceCalibration(
         features=ConfidenceFeatures.names()[: x.shape[1]],
         mean=tuple(mean.tolist()),
         scale=tuple(scale.tolist()),
-        weights=tuple(regression.coef_[0].tolist()),
-        offset=float(regression.intercept_[0]),
+        weights=tuple(weights[:-1].tolist()),
+        offset=float(weights[-1]),
         fitted_on=fitted_on | {"answers": len(right), "right": int(sum(right))},
     )
+
+
+def _logistic(x: NDArray[np.float64], right: NDArray[np.float64], penalty: float = 1 / 0.3) -> NDArray[np.float64]:
+    """Weights of a logistic regression with a quadratic `penalty`, and its offset, which has none: (F + 1,), by Newton's steps."""
+    x = np.column_stack([x, np.ones(len(x))])
+    ridge, weights = np.diag([penalty] * (x.shape[1] - 1) + [0.0]), np.zeros(x.shape[1])
+    for _ in range(100):
+        found = 1 / (1 + np.exp(-x @ weights))
+        step = np.linalg.solve((x.T * (found * (1 - found))) @ x + ridge, x.T @ (right - found) - ridge @ weights)
+        weights += step
+        if np.abs(step).max() < 1e-9:
+            break
+    return weights
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +112,8 @@ def expected_calibration_error(bins: Sequence[ConfidenceBin]) -> float | None:
 
 def auroc(confidence: NDArray[np.float64], right: NDArray[np.bool_]) -> float | None:
     """Probability that a right answer is more confident than a wrong one; None when there are not both kinds."""
-    return float(roc_auc_score(right, confidence)) if right.any() and not right.all() else None
+    good, bad = int(right.sum()), int((~right).sum())
+    return (float(rankdata(confidence)[right].sum()) - good * (good + 1) / 2) / (good * bad) if good and bad else None
 
 
 _EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 1.0)

@@ -296,25 +296,21 @@ _OVERALL = ("accuracy", "kappa", "fowlkes_mallows_pairs", "fowlkes_mallows_macro
 
 def kappa(true: Sequence[str], found: Sequence[str]) -> float | None:
     """Cohen's kappa of two labellings; None when both know one label only, where chance alone agrees."""
-    from sklearn.metrics import cohen_kappa_score  # takes a second to import
+    labels = sorted({*true, *found})
+    return _defined(table_statistics(_table(_places(true, found, labels), len(labels))[None])["kappa"][0]) if labels else None
 
-    return float(cohen_kappa_score(list(true), list(found))) if len({*true, *found}) > 1 else None
+
+def _places(true: Sequence[str], found: Sequence[str], labels: Sequence[str]) -> NDArray[np.int64]:
+    """Row and column of each image's pair in the confusion table, shape (2, n)."""
+    return np.array([[labels.index(label) for label in side] for side in (true, found)], np.int64)
 
 
-def fowlkes_mallows_pairs(true: Sequence[str], found: Sequence[str]) -> float | None:
-    """The pair-counting index: how alike two labellings group pairs of images, whatever the labels are called.
-
-    None when one of the labellings puts no two images together.
-    """
-    if any(len(set(labels)) == len(labels) for labels in (true, found)):
-        return None
-    from sklearn.metrics import fowlkes_mallows_score
-
-    return float(fowlkes_mallows_score(list(true), list(found)))
+def _table(rows_columns: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+    return np.bincount(rows_columns[0] * size + rows_columns[1], minlength=size * size).reshape(size, size)
 
 
 def table_statistics(tables: NDArray[np.int64]) -> dict[str, Floats]:
-    """Statistics of many confusion tables at once, for the bootstrap (scikit-learn does one at a time, from labels).
+    """Statistics of many confusion tables at once, for the bootstrap.
 
     Returns name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages; one that occurs
     without a hit counts as 0.
@@ -373,21 +369,15 @@ def state_metrics(manual: Sequence[str], algorithm: Sequence[str], seed: int = 0
         empty: dict[str, Any] = {"n": 0, "labels": [], "confusion": []}
         ci95 = dict.fromkeys((*_OVERALL, "macro_f1", "weighted_f1"))
         return empty | dict.fromkeys(_OVERALL) | {"per_class": {}} | averages | {"ci95": ci95}
-    from sklearn.metrics import precision_recall_fscore_support
-
-    rows_columns = np.array([(labels.index(m), labels.index(a)) for m, a in zip(manual, algorithm, strict=True)]).T
-    confusion = np.zeros((len(labels), len(labels)), np.int64)
-    np.add.at(confusion, tuple(rows_columns), 1)
-    # Precision, recall and F1 (rows) of each class, NaN where undefined.
-    classes = np.array(precision_recall_fscore_support(list(manual), list(algorithm), labels=labels, zero_division=np.nan)[:3])
+    rows_columns = _places(manual, algorithm, labels)
+    confusion = _table(rows_columns, len(labels))
+    given, told, hits = confusion.sum(1), confusion.sum(0), np.diagonal(confusion)
+    with np.errstate(invalid="ignore"):
+        classes = np.array([hits / told, hits / given, 2 * hits / (given + told)])  # precision, recall, F1; NaN where undefined
     rows = [{name: _defined(value) for name, value in zip(_AVERAGED, column, strict=True)} for column in classes.T]
     per_class_fm = np.sqrt(classes[0] * classes[1])
-    point: dict[str, Any] = {
-        "accuracy": float(np.trace(confusion) / n),
-        "kappa": kappa(manual, algorithm),
-        "fowlkes_mallows_pairs": fowlkes_mallows_pairs(manual, algorithm),
-        "fowlkes_mallows_macro": float(np.nan_to_num(per_class_fm).mean()),
-    }
+    statistics = table_statistics(confusion[None])
+    point: dict[str, Any] = {name: _defined(statistics[name][0]) for name in _OVERALL}
     averages = {"macro": _averages(classes, np.ones(len(labels))), "weighted": _averages(classes, confusion.sum(1))}
     known = point | {f"{kind}_f1": averages[kind]["f1"] for kind in _KINDS}
     intervals: dict[str, list[float] | None] = {}

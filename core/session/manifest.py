@@ -40,7 +40,7 @@ MANIFEST, DESCRIPTION, FRAMES, EVENTS = "manifest.json", "description.json", "fr
 PREFIX, RECOVERED = "session_", "_recovered"
 FORMAT = 1
 _MAX_BYTES = 8_000_000
-_PACKAGES = ("av", "mujoco-core", "numba", "numpy", "opencv-python-headless", "openvino", "scikit-image", "scipy", "torch")
+_PACKAGES = ("av", "mujoco-core", "numba", "numpy", "opencv-python-headless", "openvino", "scipy", "torch")
 
 Kind = Literal["SIM", "LIVE", "PLAYBACK", "UNKNOWN"]
 """The banner's word; UNKNOWN only in a copy that was recovered without its manifest."""

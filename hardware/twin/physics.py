@@ -20,8 +20,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from skimage.measure import approximate_polygon, find_contours
 
+from core import geometry
 from core.config.calibration import BehaviourConfig, Estimate
 from core.control.joints import unit_vector
 from core.types import Command, Point, Points, RobotStatus, VesselGraph
@@ -83,7 +83,7 @@ def lumen_outline(graph: VesselGraph) -> list[Points]:
         i = slice(int((cy - reach - low[1]) / _GRID_MM), int((cy + reach - low[1]) / _GRID_MM) + 2)
         j = slice(int((cx - reach - low[0]) / _GRID_MM), int((cx + reach - low[0]) / _GRID_MM) + 2)
         np.maximum(depth[i, j], radius - np.hypot(y[i, None] - cy, x[None, j] - cx), out=depth[i, j])
-    return [low + _GRID_MM * contour[:, ::-1] for contour in find_contours(depth, 0.0)]
+    return [low + _GRID_MM * outline for outline in geometry.outlines(depth, 0.0)]
 
 
 def wall_boxes(phantom: Phantom, outlines: list[Points]) -> tuple[list[Wall], Port]:
@@ -91,13 +91,13 @@ def wall_boxes(phantom: Phantom, outlines: list[Points]) -> tuple[list[Wall], Po
     port, discs = port_of(phantom), lumen_discs(phantom.graph)
     walls = []
     for outline in outlines:
-        corners = approximate_polygon(outline, _TOLERANCE_MM)
+        corners = geometry.thinned(outline, _TOLERANCE_MM)
         for start, end in itertools.pairwise(corners):
             length = float(np.linalg.norm(end - start))
             if length < 1e-6:
                 continue
             along = (end - start) / length
-            # The lumen lies on the left of all outlines as seen on screen (x right, y down), islands too.
+            # The lumen lies on the right of all outlines as seen on screen (x right, y down), islands too.
             outward = np.array([along[1], -along[0]])
             count = int(np.ceil(length / _MAX_PIECE_MM))
             for piece in range(count):

@@ -100,3 +100,26 @@ def test_no_line_and_lines_of_no_length(lines: list[Points]) -> None:
     few = Bundle.of(lines)
     even = few.resample(2.0).smooth(4.0)
     assert [line.tolist() for line in even.split(even.points)] == [[[3.0, 4.0]]] * len(lines)
+
+
+def test_outlines_go_around_what_is_above_with_it_on_their_right_and_begin_at_the_lowest_place() -> None:
+    values = np.zeros((7, 7))
+    values[1:6, 1:6], values[3, 3] = 1.0, 0.0
+    outer, hole = geometry.outlines(values, 0.5)
+    assert np.array_equal(outer[0], outer[-1])
+    assert outer[:, 1].max() == outer[0, 1] == 5.5
+    area = [np.sum(line[:-1, 0] * line[1:, 1] - line[1:, 0] * line[:-1, 1]) / 2 for line in (outer, hole)]
+    assert area == pytest.approx([24.5, -0.5]), "corners cut off"
+    values = np.zeros((4, 4))
+    values[1, 1] = values[2, 2] = 1.0
+    assert len(geometry.outlines(values, 0.5 - 1e-9)) == 1, "neighbours by a corner"
+
+
+def test_a_thinned_line_keeps_its_corners_and_comes_near_every_point() -> None:
+    line = np.array([(0.0, 0.0), (1.0, 0.05), (2.0, 0.0), (2.0, 1.0), (2.0, 2.0)])
+    assert geometry.thinned(line, 0.1).tolist() == [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]
+    around = np.column_stack([np.cos(angles := np.linspace(0.0, 2 * np.pi, 200)), np.sin(angles)])
+    few = geometry.thinned(around, 0.02)
+    assert len(few) < 30
+    assert max(geometry.nearest(few, (x, y))[0] for x, y in around.tolist()) <= 0.02
+    assert np.array_equal(geometry.thinned(line[:1], 0.1), line[:1])

@@ -165,7 +165,7 @@ def test_intervals_are_seeded_and_hold_the_value() -> None:
     assert high - low == pytest.approx(2 * 1.96 * found["sd_deg"] / np.sqrt(200), rel=0.1)
 
 
-# states: the paper's 44 label pairs, scikit-learn as the second opinion, and what is undefined
+# states: the paper's 44 label pairs, and what is undefined
 
 
 def label_pairs(confusion: object, labels: tuple[str, ...] = PAPER_LABELS) -> tuple[list[str], list[str]]:
