@@ -105,7 +105,7 @@ def who_drives(view: DriveView | None, why_not: Undriven = Undriven.NO_ROBOT) ->
         return tr("the program drives")
     if view.permitted is Source.OPERATOR:
         return tr("you steer")
-    return tr("nothing moves") if view.servos_on or view.latched is not None else tr("servos follow nobody")
+    return tr("nothing moves") if view.servos_on or view.latched is not None else tr("servos not in use")
 
 
 def next_step(view: DriveView) -> NextStep:
@@ -126,7 +126,7 @@ def next_step(view: DriveView) -> NextStep:
             # The servos' process has named what is not as configured, and what to do depends on it.
             said = next((fault.detail for fault in view.active if fault.cause is Cause.SERVOS_WRONG), "")
             return replace(step, rest=said) if said and faults[0] is Cause.SERVOS_WRONG else step
-        return NextStep(OperatorStep.SERVOS_ON, True, tr("The servos follow nobody, but may still pull"), rest)
+        return NextStep(OperatorStep.SERVOS_ON, True, tr("The servos are not in use, but may still pull"), rest)
     if view.mode is Mode.ARMED:
         return _hand_over(view)
     if view.against_arming:
@@ -212,13 +212,14 @@ _STRAIGHT_DEG = 0.5
 """Less steering is shown as straight."""
 
 
-def override_line(advice: Advice | None, state: PoseState | None) -> str:
-    """That the way ahead decides and not the state table, in one line for badge and advice; "" where both agree."""
+def override_line(advice: Advice | None, state: PoseState | None, *, with_rule: bool) -> str:
+    """That the route decides and not the state table (`with_rule`: and what that says), in one line; "" where both agree."""
     if advice is None or state is None:
         return ""
     speed, steers, rule = _TABLE[state]
     agrees = advice.speed is speed and advice.advance_mm_s > 0.0 and (abs(advice.steer_deg) >= _STRAIGHT_DEG) is steers
-    return "" if agrees else tr("the way decides, not state {state} ({rule})", state=state.value, rule=tr(rule))
+    line = "" if agrees else tr("the route decides, not state {state}", state=state.value)
+    return f"{line} ({tr(rule)})" if line and with_rule else line
 
 
 @dataclass(frozen=True, slots=True)

@@ -165,8 +165,8 @@ _CHEVRONS = {Speed.STOP: 0, Speed.SLOWEST: 1, Speed.SLOW: 2, Speed.MODERATE: 3, 
 class AdviceLine(PaintedWidget):
     """An arrow turned by the steering angle, the speed as word and as one to four chevrons, the degrees and the reason.
 
-    Arrow and chevrons point up to advance, and down to back off, as the keys do; Stop is a square. Where the way decides, not the
-    state, it says so, as the badge does. Without advice it is blank and says why. Where the pose is unsure it says so.
+    Arrow and chevrons point up to advance, and down to back off, as the keys do; Stop is a square. Where the route decides, not
+    the state, it says so, as the badge does. Without advice it is blank and says why. Where the pose is unsure it says so.
     """
 
     def __init__(self) -> None:
@@ -203,7 +203,7 @@ class AdviceLine(PaintedWidget):
         self.update()
 
     def _why(self, advice: Advice) -> str:
-        why = "; ".join(part for part in (tr_text(advice.why), override_line(advice, self._state)) if part)
+        why = "; ".join(part for part in (tr_text(advice.why), override_line(advice, self._state, with_rule=False)) if part)
         return tr("the pose is unsure; {why}", why=why) if self._is_unsure else why
 
     def paint(self, painter: QPainter) -> None:

@@ -62,7 +62,8 @@ class StateBadge(PaintedWidget):
         if pose is not None:
 
             def why() -> str:
-                return "; ".join(line for line in (why_line(pose, self._limits), override_line(advice, pose.state)) if line)
+                lines = why_line(pose, self._limits), override_line(advice, pose.state, with_rule=True)
+                return "; ".join(line for line in lines if line)
 
             self._set(pose.state, tr(STATE_TITLE[pose.state]), why, renew_text, pose.confidence)
         elif refusal is not None:

@@ -85,9 +85,7 @@ class PursuitConfig(ConfigSection):
     pixels_per_mm: float = Field(3.0, gt=0.1, le=50.0, description="of the view, roughly; a calibrated rig has its own scale")
     look_ahead_px: float = Field(10.0, ge=4.0, le=200.0, description="distance of the look-ahead point from a resting head")
     look_ahead_s: float = Field(0.15, ge=0.0, le=5.0, description="so much way at the present speed is added to it")
-    rounding_px: float = Field(
-        8.0, ge=0.0, le=100.0, description="after each miss of a branch its corner is rounded over so much more"
-    )
+    rounding_px: float = Field(8.0, ge=0.0, le=100.0, description="added to the rounding of a branch's corner after each miss")
     heading_px: float = Field(16.0, ge=4.0, le=100.0, description="end of the robot whose direction is the head's")
     follow_arc: float = Field(0.9, ge=0.0, le=1.0, description="0 = point at the look-ahead point, 1 = lie along the route")
     gain: float = Field(1.0, gt=0.0, le=5.0, description="degrees of steering per degree of error")
@@ -269,8 +267,8 @@ class PoseConfig(ConfigSection):
 
     d_allow_px: float = Field(6.0, gt=0.0, le=200.0, description="distance of head and tail that is still on the centerline")
     theta_allow_deg: float = Field(10.0, gt=0.0, le=180.0, description="angle that is still along the centerline")
-    hysteresis_px: float = Field(1.0, ge=0.0, le=50.0, description="so much farther before a state is left again")
-    hysteresis_deg: float = Field(1.5, ge=0.0, le=45.0, description="so much more angle before state A is left again")
+    hysteresis_px: float = Field(1.0, ge=0.0, le=50.0, description="state A is left only this far beyond its limit")
+    hysteresis_deg: float = Field(1.5, ge=0.0, le=45.0, description="state A is left only this far beyond its limit")
     dwell_s: float = Field(0.1, ge=0.0, le=5.0, description="a new state must have been seen for so long to be shown")
 
     @model_validator(mode="before")
@@ -394,7 +392,7 @@ class TwinConfig(ConfigSection):
 class RigConfig(ConfigSection):
     """Which camera and robot are used."""
 
-    name: str = Field("twin", min_length=1, description="as it stands in sessions and messages")
+    name: str = Field("twin", min_length=1, description="what sessions and messages call this rig")
     camera: CameraName = Field("twin", description="where pictures come from")
     robot: Literal["twin", "servos", "none"] = Field("twin", description="what moves; servos = real ones, see section Servos")
     source: str | None = Field(None, description="path of the video, folder, or RealSense recording (.bag)")

@@ -92,8 +92,8 @@ class Effect(StrEnum):
     """When a changed setting begins to act."""
 
     NOW = "acts at once"
-    RIG = "acts at the next start of the rig"
-    PROGRAM = "acts at the next start of the program"
+    RIG = "from the next start of the rig"
+    PROGRAM = "from the next start of the program"
 
 
 @dataclass(frozen=True, slots=True)

@@ -80,7 +80,7 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     Hindrance.ALREADY_ARMED: ("Armed", "hand over to a destination; disarm first for anything else"),
     Hindrance.CAMERA_SETTLING: ("Waiting for steady pictures (1 s)", "the camera must be well for a second"),
     Hindrance.PERCEPTION_SETTLING: ("Waiting for a steady pose (1 s)", "keep the robot in view: it must be seen well for a second"),
-    Hindrance.SERVOS_UNCHECKED: ("The servos follow nobody", "switch them on; that checks them, too"),
+    Hindrance.SERVOS_UNCHECKED: ("The servos are not in use", "switch them on; that checks them, too"),
     Hindrance.SERVOS_BUSY: ("The servos are busy", "ask again when that has ended"),
     Hindrance.NOT_YET_ARMED: ("Not armed", "arm first"),
     Hindrance.ALREADY_AUTONOMOUS: ("Already handed over", "touch the controls to take back"),

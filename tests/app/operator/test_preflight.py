@@ -104,7 +104,7 @@ def test_what_is_not_configured_is_not_counted_as_good(qtbot: QtBot) -> None:
 @pytest.mark.parametrize(
     ("against", "says_"),
     [
-        ((Hindrance.SERVOS_UNCHECKED,), "The servos follow nobody"),
+        ((Hindrance.SERVOS_UNCHECKED,), "The servos are not in use"),
         ((Hindrance.PERCEPTION_SETTLING,), "Waiting for a steady pose (1 s)"),
         ((Cause.HEAD_LOST, Hindrance.SERVOS_UNCHECKED), "The robot's head is out of sight"),
         ((Hindrance.ALREADY_ARMED,), "Armed"),

@@ -53,7 +53,7 @@ def asked(bar: ModeBar) -> list[str]:
     ("view", "mode", "who"),
     [
         (None, "ADVISORY", "pictures only"),
-        (OFF, "ADVISORY", "servos follow nobody"),
+        (OFF, "ADVISORY", "servos not in use"),
         (READY, "ADVISORY", "you steer"),
         (DriveView(0.0, latched=Fault(Cause.HOT)), "ADVISORY", "nothing moves"),
         (ARMED, "ARMED", "you steer"),
@@ -108,7 +108,8 @@ def test_modes_differ_without_colour_and_without_words(own: Own) -> None:
             OFF,
             OperatorStep.SERVOS_ON,
             True,
-            "The servos follow nobody, but may still pull. Press F3: they are checked with the torque off, then tighten the wires.",
+            "The servos are not in use, but may still pull. Press F3: they are checked with the torque off, then tighten the "
+            "wires.",
         ),
         (DriveView(0.0, busy="checking the servos"), OperatorStep.SERVOS_ON, False, "Checking the servos. This takes a moment."),
         (READY, OperatorStep.ARM, True, "You steer. Press F6 to arm; then you can hand over to the program."),
