@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from hardware.servos.servo_robot import ServoRobot
     from hardware.simulated_clock import SimulatedClock
     from hardware.twin.process import PrestartedProcesses
-    from hardware.twin.world import TwinWorld
 
 
 class RigKind(StrEnum):
@@ -40,15 +39,14 @@ class RigKind(StrEnum):
 class Rig:
     """An open rig.
 
-    ``robot``: None when pictures are only looked at; ``world`` exists when the twin is in this process, and ``clock`` when it is in
-    one of its own: frames, servos and pilot have its time.
+    ``robot``: None when pictures are only looked at; ``clock`` exists when it is a twin in a process of its own: frames, servos and
+    pilot have its time.
     """
 
     name: str
     kind: RigKind
     camera: Camera
     robot: GuardedRobot | None
-    world: TwinWorld | None = None
     clock: SimulatedClock | None = None
 
     def close(self) -> None:
@@ -127,10 +125,8 @@ def _open_live(config: Config, zero: ZeroConfig | None) -> Rig:
     rig = config.rig
     if rig.robot == "twin":
         raise DeviceError(f'rig {rig.name}: a real camera does not see the twin\'s robot: set rig.robot to "servos" or "none"')
-    if rig.robot == "servos" and (config.servos.port is None or config.servos.driver == "direct"):
-        raise DeviceError(
-            f'rig {rig.name}: set servos.port (ls /dev/serial/by-id) and leave servos.driver out, or rig.robot = "none"'
-        )
+    if rig.robot == "servos" and config.servos.port is None:
+        raise DeviceError(f'rig {rig.name}: set servos.port (ls /dev/serial/by-id), or rig.robot = "none"')
     camera = real_camera(config)
     with ExitStack() as undo:
         camera.open()
@@ -168,8 +164,7 @@ def real_camera(config: Config) -> Camera:
 
 def _has_own_process(config: Config) -> bool:
     """Whether this is a twin with servos, in a process of its own."""
-    is_driven_twin = kind_of(config.rig) is RigKind.SIM and config.rig.robot == "twin"
-    return is_driven_twin and config.servos.driver == "dynamixel" and config.servos.port is None
+    return kind_of(config.rig) is RigKind.SIM and config.rig.robot == "twin" and config.servos.port is None
 
 
 def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
@@ -177,11 +172,11 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         raise DeviceError(
             f'rig {config.rig.name}: the twin has servos of its own: set rig.robot = "twin", or rig.camera to a real one'
         )
-    if config.rig.robot == "twin" and config.servos.driver == "dynamixel" and config.servos.port is not None:
+    if config.rig.robot == "twin" and config.servos.port is not None:
         raise DeviceError(f"rig {config.rig.name} has servos of its own: leave servos.port ({config.servos.port}) out")
-    if _has_own_process(config):
+    if config.rig.robot == "twin":
         return _open_remote_twin(config, ahead)
-    from hardware.twin.world import DirectRobot, TwinCamera, TwinWorld
+    from hardware.twin.world import TwinCamera, TwinWorld
 
     try:
         world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety)
@@ -189,17 +184,8 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         raise DeviceError(str(error)) from None
     world.insert(START_INSERTION_MM)
     camera = TwinCamera(world)
-    robot: GuardedRobot | None = None
-    if config.rig.robot == "twin":
-        robot = DirectRobot(world.robot, config.safety, config.servos)
-        robot.connect()
-    try:
-        camera.open()
-    except DeviceError:
-        if robot is not None:
-            robot.close()
-        raise
-    return Rig(config.rig.name, RigKind.SIM, camera, robot, world)
+    camera.open()
+    return Rig(config.rig.name, RigKind.SIM, camera, None)
 
 
 def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
@@ -212,7 +198,7 @@ def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
         undo.callback(loading.end)
         twin = RemoteTwin(config, START_INSERTION_MM, loading.twin)
         undo.callback(twin.close)
-        servos = config.servos.model_copy(update={"port": twin.port})
+        servos = config.servos.model_copy(update={"port": twin.port, "driver": "dynamixel"})
         name, safety = "bench twin with servos", config.safety
         robot = ServoRobot(servos, safety, name=name, truth=twin.status, process=loading.bus, clock=twin.clock)
         undo.callback(robot.close)

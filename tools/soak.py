@@ -129,7 +129,7 @@ class SoakRig:
             self.robot.zero()
             self.bus.set_zero()
             camera = SoakCamera(world, self.injected)
-            rig = Rig("soak", RigKind.SIM, camera, self.robot, world)
+            rig = Rig("soak", RigKind.SIM, camera, self.robot)
             perceive, model = maker._perception(config.perception)
             camera.open()
             undo.callback(camera.close)

@@ -107,7 +107,7 @@ class EngineMaker:
         with ExitStack() as undo, ThreadPoolExecutor(1, "network", lower_priority) as beside:
             loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
             ahead, self._ahead = self._ahead, None
-            rig = open_rig(config, ahead)
+            rig = self._open(config, ahead)
             undo.callback(rig.close)
             perceive, model = loading.result()
             network = perceive if isinstance(perceive, Pipeline) else None
@@ -127,6 +127,9 @@ class EngineMaker:
         ahead, self._ahead = self._ahead, None
         if ahead is not None:
             ahead.end()
+
+    def _open(self, config: Config, ahead: PrestartedProcesses | None) -> Rig:
+        return open_rig(config, ahead)
 
     def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
         try:

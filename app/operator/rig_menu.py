@@ -23,7 +23,6 @@ from app.ui.texts import rig_line
 from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.models import Config
 from core.config.rig_file import ListedRig, RigFileError, calibration_of, find_rig, list_rigs, set_port, with_rig
-from core.config.safety import OF_SERVOS
 from core.control.modes import ARMED_MODES, Mode
 from core.devices import UserError
 from core.types import Frame, Point, Scene
@@ -282,7 +281,7 @@ class RigMenuController(QObject):
         why = self.hindrance()
         if kind_of(config.rig) is RigKind.PLAYBACK:
             why = tr("a recording is played: start with a camera or the twin")
-        elif (not config.servos.is_default or config.servos.driver not in OF_SERVOS) and config.rig.robot != "none":
+        elif (not config.servos.is_default or config.servos.driver != "dynamixel") and config.rig.robot != "none":
             why = tr("the wizard knows the default robot only: write the ids and signs of these joints into the rig file")
         if why:
             self._refuse(why)

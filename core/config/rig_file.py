@@ -33,7 +33,7 @@ from core.config.models import (
     SegmentationConfig,
     TwinConfig,
 )
-from core.config.safety import OF_SERVOS, AtClose, ServosConfig
+from core.config.safety import AtClose, ServosConfig
 from core.config.section import ConfigSection, first_problem
 from core.devices import UserError, disk_errors
 from core.files import write_atomic
@@ -87,8 +87,8 @@ class RigFile(ConfigSection):
             raise ValueError("robot servos needs a real camera and servos.port")
         if self.calibration is not None and (misfit := self.calibration.misfit(self.servos)):
             raise ValueError(f"{misfit}: calibrate again")
-        if self.kind == "twin" and self.servos.driver not in OF_SERVOS:
-            raise ValueError("servos.driver: the twin has DYNAMIXEL servos of its own: leave it out, or set it to direct")
+        if self.kind == "twin" and self.servos.driver != "dynamixel":
+            raise ValueError("servos.driver: the twin has DYNAMIXEL servos of its own: leave it out")
         if self.robot == "servos" and self.servos.too_loose:
             raise ValueError(f"servos: {self.servos.too_loose}")
         return self

@@ -17,7 +17,7 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, StringConstraints, model_serializer, model_validator
 
 from core.config.section import ConfigSection
 from core.config.servo_models import SERVO_MODELS, ForceLimit, ServoModel, force_limit, unsupported
@@ -281,19 +281,18 @@ AtClose = Literal["ask", "hold", "relax", "torque off"]
 
 
 _DRIVE_METHODS = ("open", "read", "write", "hold", "stop", "close", "interruptible", "pause")
-DRIVES = PluginKind("drives", ("dynamixel", "direct", "stepper board"), _DRIVE_METHODS)
+DRIVES = PluginKind("drives", ("dynamixel", "stepper board"), _DRIVE_METHODS)
 """What drives the joints; a plugin's entry point is called with port and speed (``hardware/servos/drive.py``)."""
-DriveName = Annotated[str, DRIVES]
-OF_SERVOS = ("dynamixel", "direct")
-"""Drives with DYNAMIXEL servos, or like them."""
-LIMITS_FORCE = frozenset(OF_SERVOS)
+DriveName = Annotated[str, DRIVES, BeforeValidator(lambda name: "dynamixel" if name == "direct" else name)]
+"""Files of earlier versions may have "direct", a twin without servos."""
+LIMITS_FORCE = frozenset({"dynamixel"})
 """Drives that keep each joint's ``max_force_n`` themselves; with another one the program never drives a LIVE rig."""
 
 
 class ServosConfig(ConfigSection):
     """The bus and the robot's joints."""
 
-    driver: DriveName = Field("dynamixel", description="what is on the port; direct: the twin without servos, a lighter load")
+    driver: DriveName = Field("dynamixel", description="what is on the port")
     port: str | None = Field(None, min_length=1, description="serial device; empty: the twin's own pseudo-terminal")
     baud: int = Field(1_000_000, ge=9600, le=4_500_000, description="speed of the bus")
     model: int = Field(1020, ge=0, le=65535, description="model number of the servos (1020: XM430-W350); a joint may have another")

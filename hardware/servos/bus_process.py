@@ -30,7 +30,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from core.config.calibration import ZeroConfig
-from core.config.safety import DRIVES, OF_SERVOS, JointName, SafetyConfig, ServosConfig
+from core.config.safety import DRIVES, JointName, SafetyConfig, ServosConfig
 from core.control.faults import Cause, Fault, Reaction
 from core.control.kept_zero import ZeroBasis, ZeroRequest, request_problem, unknown_joint
 from core.devices import UserError
@@ -72,7 +72,7 @@ Bus = ServoBus | DriveBus
 
 def make_bus(servos: ServosConfig, backups: Path | None, now_s: Callable[[], float] = wall_clock_s) -> Bus:
     """The bus of the configured drive. Raises NotReady, PluginError."""
-    if servos.driver in OF_SERVOS:
+    if servos.driver == "dynamixel":
         return ServoBus(servos, backups=backups, now_s=now_s)
     if servos.port is None:
         raise NotReady("no servo port is configured: set servos.port")

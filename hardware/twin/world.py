@@ -1,7 +1,7 @@
 """The bench twin: a world of phantom, physics, look and camera view, with its camera and robot.
 
-The world is stepped by the caller (lock-step) or follows the wall clock. It applies the current command of its ``TwinRobot``;
-``DirectRobot`` puts the pilot's rules before that robot, without servos in between.
+The world is stepped by the caller (lock-step) or follows the wall clock. It applies the current command of its ``TwinRobot``,
+unless servos drive it.
 """
 
 from __future__ import annotations
@@ -17,11 +17,6 @@ import numpy as np
 
 from core.config.models import PerceptionConfig, TwinConfig
 from core.config.safety import SafetyConfig, ServosConfig
-from core.control.bus_monitor import BusReport
-from core.control.gate import Rejection, RejectReason, Source
-from core.control.joints import Retracted
-from core.control.kept_zero import ZeroRequest
-from core.control.robot import SentMotion
 from core.devices import DeviceError, Latest
 from core.perception.centerline import plan_route
 from core.types import Command, Frame, Point, Points, RobotStatus
@@ -302,127 +297,3 @@ class TwinCamera:
 
     def close(self) -> None:
         self._world.stop()
-
-
-class DirectRobot:
-    """Executes commands of the source that the newest ``beat`` permits, while it is fresh. All methods are thread-safe."""
-
-    def __init__(self, robot: TwinRobot, safety: SafetyConfig, servos: ServosConfig | None = None) -> None:
-        self._robot, self._safety = robot, safety
-        count = len((servos or ServosConfig()).joints)
-        self._healthy = BusReport(
-            misses=(0,) * count,
-            hardware_errors=(0,) * count,
-            temperatures_c=(25.0,) * count,
-            voltages_v=(12.0,) * count,
-            tracking_mm=(0.0,) * count,
-        )
-        self._lock = threading.Lock()
-        self._permitted: Source | None = None
-        self._beat_s = -1.0
-        self._armed = False
-        self._cycle = 0
-        self._sent: SentMotion | None = None
-        self._waiting: SentMotion | None = None
-
-    @property
-    def name(self) -> str:
-        return self._robot.name
-
-    @property
-    def failure(self) -> str | None:
-        return None
-
-    def connect(self) -> None:
-        self._robot.connect()
-
-    def beat(self, permitted: Source | None) -> None:
-        """The source that may drive, for 100 ms. A command that came just before its permission is executed now."""
-        with self._lock:
-            self._permitted, self._beat_s = permitted, time.monotonic()
-            waiting, self._waiting = self._waiting, None
-            if waiting is not None and self._beat_s - waiting.time_s <= self._safety.command_max_age_s:
-                self._execute(waiting)
-
-    def send(
-        self,
-        command: Command,
-        *,
-        source: Source = Source.OPERATOR,
-        captured_s: float | None = None,
-        retracts: Retracted = Retracted.NONE,
-    ) -> Command:
-        """Make the command the current one if its source may drive; otherwise hold."""
-        with self._lock:
-            return self._execute(SentMotion(0, time.monotonic(), command, source, captured_s))
-
-    def hold(self) -> None:
-        with self._lock:
-            self._waiting = None
-            self._hold(None)
-
-    def stop(self) -> None:
-        with self._lock:
-            self._armed, self._waiting = False, None
-            self._robot.hold()
-
-    def arm(self) -> None:
-        with self._lock:
-            self._armed = True
-
-    def disarm(self) -> None:
-        self.stop()
-
-    def acknowledge(self) -> None:
-        """No fault latches."""
-
-    def zero(self, request: ZeroRequest | None = None) -> None:
-        """No servos."""
-
-    def reboot(self, servo_id: int) -> None:
-        """No servos."""
-
-    def relax(self, is_overtaken: Callable[[], bool] = lambda: False) -> None:
-        self.stop()
-
-    def torque_off(self) -> None:
-        self.stop()
-
-    def report(self) -> BusReport | None:
-        with self._lock:
-            return replace(self._healthy, armed=self._armed)
-
-    def sent_motion(self) -> SentMotion | None:
-        with self._lock:
-            return self._sent if self._armed else None
-
-    def kept_back(self) -> Rejection | None:
-        """There is no gate that rejects motions."""
-        return None
-
-    def status(self) -> RobotStatus:
-        return self._robot.status()
-
-    def close(self) -> None:
-        self._robot.close()
-
-    def _execute(self, order: SentMotion) -> Command:
-        """Execute a command if its source may drive; else hold, and keep it for a permission that follows at once."""
-        self._waiting = None
-        is_stale = time.monotonic() - self._beat_s > self._safety.command_max_age_s
-        if not self._armed or is_stale or self._permitted is not order.source:
-            is_armed = self._armed and not is_stale and self._permitted is not None
-            self._hold(RejectReason.WRONG_SOURCE if is_armed else RejectReason.NOT_ARMED)
-            self._waiting = order
-            return Command()
-        sent = self._robot.send(order.motion)
-        self._record(replace(order, motion=sent))
-        return sent
-
-    def _hold(self, rejection: RejectReason | None) -> None:
-        self._robot.hold()
-        self._record(SentMotion(0, time.monotonic(), self._robot.current_command, rejection=rejection))
-
-    def _record(self, sent: SentMotion) -> None:
-        self._cycle += 1
-        self._sent = SentMotion(self._cycle, sent.time_s, sent.motion, sent.source, sent.captured_s, sent.rejection)

@@ -169,7 +169,7 @@ def test_a_recording_is_played_back(bag: Path) -> None:
 
 @pytest.mark.usefixtures("own_folder")
 def test_a_rig_is_opened_with_its_lens() -> None:
-    base = load_config(overrides={"servos": {"driver": "direct"}, "twin": {"lens_distortion": -0.12}})
+    base = load_config(overrides={"rig": {"robot": "none"}, "twin": {"lens_distortion": -0.12}})
     known = CalibrationConfig(made_utc=datetime.now(UTC), lens=LENS)
     path = write_rig(make_rig(base, "bent", known))
     rig = open_rig(with_rig(base, make_rig(base, "bent", known), path))

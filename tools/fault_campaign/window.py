@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -18,9 +19,12 @@ from core.control.engine import Perceive
 from core.control.gate import Source
 from core.control.health import ModelReport
 from core.control.modes import Mode
-from core.types import Frame, Point, Scene
-from hardware.rig import RigKind
+from core.types import Command, Frame, Point, Scene
+from hardware.rig import START_INSERTION_MM, Rig, RigKind
+from hardware.twin.actuation import JointsToTwin
+from hardware.twin.world import TwinCamera, TwinWorld
 from tools.fault_campaign.bench import TARGET
+from tools.lockstep import LockStepServos
 
 _PATIENCE_S = 60.0
 
@@ -38,16 +42,64 @@ class BreakingPerception:
         return self._perceive(frame, target)
 
 
-def make_test_window(folder: Path) -> tuple[OperatorWindow, list[BreakingPerception]]:
-    """The window, shown and started, with the real opener; and the perceptions that it opens, newest last.
+class _ThreadedServos(LockStepServos):
+    """For the threads of a window, and the world's, which turns the cycles."""
 
-    The twin is a light one: no servo line, 12 pictures a second, one thread. Sessions go to `folder`.
+    def __init__(self, config: Config) -> None:
+        super().__init__(config.servos, config.safety, time.monotonic)
+        self._lock = threading.RLock()
+
+    def cycle(self) -> None:
+        with self._lock:
+            super().cycle()
+
+    def arm(self) -> None:
+        with self._lock:
+            super().arm()
+
+    def disarm(self) -> None:
+        with self._lock:
+            super().disarm()
+
+    def stop(self) -> None:
+        with self._lock:
+            super().stop()
+
+    def torque_off(self) -> None:
+        with self._lock:
+            super().torque_off()
+
+
+def _open_in_real_time(config: Config) -> Rig:
+    """The twin in this process, with ideal servos behind the real guard and gate."""
+    world, servos = TwinWorld(config.twin, perception=config.perception), _ThreadedServos(config)
+    world.insert(START_INSERTION_MM)
+    joints = JointsToTwin(config.servos, servos.positions_mm())
+
+    def drive(duration_s: float) -> Command:
+        servos.cycle()
+        return joints.command(servos.positions_mm(), duration_s)
+
+    world.drive = drive
+    camera = TwinCamera(world)
+    camera.open()
+    return Rig("twin", RigKind.SIM, camera, servos)
+
+
+def make_test_window(folder: Path) -> tuple[OperatorWindow, list[BreakingPerception]]:
+    """The window, shown and started; and the perceptions that it opens, newest last.
+
+    The twin runs by the wall's clock, which does not wait for a window that hangs. It is a light one: 12 pictures a second, one
+    thread. Sessions go to `folder`.
     """
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     make_application()
     made: list[BreakingPerception] = []
 
     class Maker(EngineMaker):
+        def _open(self, config: Config, ahead: object) -> Rig:
+            return _open_in_real_time(config)
+
         def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
             perceive, report = super()._perception(config)
             made.append(BreakingPerception(perceive))
@@ -56,7 +108,6 @@ def make_test_window(folder: Path) -> tuple[OperatorWindow, list[BreakingPercept
     config = Config.model_validate(
         {
             "twin": {"live_frames_per_second": 12.0},
-            "servos": {"driver": "direct"},
             "perception": {"segmentation": {"threads": 1, "mirrored": "never"}},
             "record": {"folder": str(folder), "ring_s": 0.0},
         }

@@ -223,3 +223,7 @@ def test_nor_may_they_be_tightened_below_what_it_takes_to_repeat_a_thing(changes
 def test_thresholds_that_contradict_each_other(changes: dict[str, float], words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         load_config(overrides={"safety": changes})
+
+
+def test_a_file_that_asks_for_a_twin_without_servos_gets_one_with_servos() -> None:
+    assert load_config(overrides={"servos": {"driver": "direct"}}).servos.driver == "dynamixel"

@@ -125,9 +125,8 @@ def test_what_was_started_ahead_of_a_twin_that_cannot_be_is_ended() -> None:
         open_rig(Config.model_validate({"twin": {"phantom": "no such phantom"}}), ahead)
 
 
-@pytest.mark.parametrize("changed", [{"rig": {"robot": "none"}}, {"servos": {"driver": "direct"}}])
-def test_only_a_twin_with_servos_of_its_own_is_started_ahead(changed: dict[str, Any]) -> None:
-    assert start_ahead(load_config(overrides=changed)) is None
+def test_a_twin_without_a_robot_is_not_started_ahead() -> None:
+    assert start_ahead(load_config(overrides={"rig": {"robot": "none"}})) is None
 
 
 @pytest.mark.usefixtures("no_process_stays_behind")
