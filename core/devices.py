@@ -1,4 +1,4 @@
-"""Interfaces of camera and robot, their errors, and a one-slot hand-over between threads. Drivers live in ``hardware``."""
+"""The interface of a camera, the errors of devices, and a one-slot hand-over between threads. Drivers live in ``hardware``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 from core.messages import message
 
 if TYPE_CHECKING:
-    from core.types import Command, Frame, RobotStatus
+    from core.types import Frame
 
 
 class UserError(Exception):
@@ -65,18 +65,6 @@ class EndOfStream(DeviceError):
 
 class DamagedStream(EndOfStream):
     """A recorded source ends too early, because its rest cannot be read."""
-
-
-class Robot(Protocol):
-    """Takes commands and returns what was really sent after its own limits."""
-
-    @property
-    def name(self) -> str: ...
-    def connect(self) -> None: ...
-    def send(self, command: Command) -> Command: ...
-    def status(self) -> RobotStatus: ...
-    def hold(self) -> None: ...
-    def close(self) -> None: ...
 
 
 T = TypeVar("T")

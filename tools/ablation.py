@@ -318,10 +318,9 @@ def _stream(
     routes = (RouteFollower(world.phantom, node, wander=_WANDER, seed=seed) for node in world.phantom.targets)
     follower = max(routes, key=lambda route: route.length_mm)
     world.insert(_START_MM)
-    world.robot.connect()
     period_s = 1.0 / world.config.frames_per_second
     for _ in range(frames):
-        world.robot.send(follower.command(world.physics.robot_points_mm(), _FEED_MM_S, period_s))
+        world.send(follower.command(world.physics.robot_points_mm(), _FEED_MM_S, period_s))
         world.advance(period_s)
         frame = world.frame()
         picture = world.picture(world.physics.robot_points_mm(), world.physics.delivery_mm)

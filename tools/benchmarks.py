@@ -566,10 +566,9 @@ def _clip(seed: int, count: int) -> tuple[list[Image], list[Any]]:
     world = TwinWorld(TwinConfig(), phantom=phantom, appearance=named_appearance(None, seed), seed=seed)
     follower = RouteFollower(phantom, phantom.targets[0])
     world.insert(45.0, target=phantom.targets[0])
-    world.robot.connect()
     images, truths = [], []
     for _ in range(count):
-        world.robot.send(follower.command(world.physics.robot_points_mm(), 4.0, 1 / FRAMES_PER_SECOND))
+        world.send(follower.command(world.physics.robot_points_mm(), 4.0, 1 / FRAMES_PER_SECOND))
         world.advance(1 / FRAMES_PER_SECOND)
         images.append(world.frame().image)
         truths.append(world.truth())

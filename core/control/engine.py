@@ -11,7 +11,8 @@ from typing import Protocol
 from core.control.faults import Cause, Fault
 from core.control.frame_reports import is_picture
 from core.control.pilot import Pilot, PilotLoop
-from core.devices import Camera, CameraLost, DeviceError, EndOfStream, Robot
+from core.control.robot import GuardedRobot
+from core.devices import Camera, CameraLost, DeviceError, EndOfStream
 from core.messages import message
 from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene, Tick
 
@@ -43,7 +44,7 @@ class Engine:
         policy: Callable[[Scene], Advice | None],
         on_close: Callable[[], None],
         pilot: Pilot | None = None,
-        robot: Robot | None = None,
+        robot: GuardedRobot | None = None,
         *,
         turns_pilot: bool = True,
     ) -> None:

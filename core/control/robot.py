@@ -11,8 +11,7 @@ from core.control.bus_monitor import BusReport
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.joints import Retracted
 from core.control.kept_zero import ZeroRequest
-from core.devices import Robot
-from core.types import Command
+from core.types import Command, RobotStatus
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +42,7 @@ class BenchClock(Protocol):
     def speed(self) -> float: ...
 
 
-class GuardedRobot(Robot, Protocol):
+class GuardedRobot(Protocol):
     """All methods may be called from any thread. ``stop`` never waits and never fails.
 
     ``connect``, ``arm``, ``disarm``, ``acknowledge``, ``zero``, ``reboot``, ``relax`` and ``torque_off`` may take seconds and raise
@@ -54,7 +53,13 @@ class GuardedRobot(Robot, Protocol):
     """
 
     @property
+    def name(self) -> str: ...
+    @property
     def failure(self) -> str | None: ...
+    def connect(self) -> None: ...
+    def status(self) -> RobotStatus: ...
+    def hold(self) -> None: ...
+    def close(self) -> None: ...
     def beat(self, permitted: Source | None) -> None: ...
     def send(
         self,

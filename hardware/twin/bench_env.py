@@ -102,9 +102,8 @@ class BenchEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         world = self._world = TwinWorld(config.twin, phantom=phantom, appearance=look, seed=own_seed, servos=config.servos)
         target = choose_target(phantom, world.view, own_seed)
         world.insert(start_mm(phantom, target), target=target.node)
-        world.robot.connect()
         joints = DirectJoints(config.servos, config.safety)
-        world.drive = lambda duration_s: joints.command(world.robot.current_command, duration_s)
+        world.drive = lambda duration_s: joints.command(world.command, duration_s)
         self._route, self._target = target.route, target
         self._along = geometry.arc_length(target.route)
         self._at_mm = geometry.nearest(target.route, world.physics.head_mm, self._along)[1]
@@ -115,7 +114,7 @@ class BenchEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Drive for ``STEP_S``. Raises RuntimeError before the first reset, and ValueError for numbers that are not finite."""
         world = self._opened()
         bend, pitch, feed = np.clip(np.asarray(action, np.float64), -1.0, 1.0).tolist()
-        self._command = world.robot.send(Command(bend, pitch, feed * MAX_ADVANCE_MM_S))
+        self._command = world.send(Command(bend, pitch, feed * MAX_ADVANCE_MM_S))
         before_mm = self._at_mm
         world.advance(STEP_S)
         self._at_mm = self._progress()

@@ -190,7 +190,6 @@ class Trial:
         """Run until the target is reached or the trial has failed."""
         world = self._world
         world.insert(self._start_mm, target=self.target.node)
-        world.robot.connect()
         start_s = world.physics.time_s
         outcome = ""
         while not outcome:
@@ -212,13 +211,13 @@ class Trial:
         """Process one frame; returns the outcome, "" while the trial goes on."""
         frame = self._read()
         scene = self._perceive(frame)
-        status = self._world.robot.status()
+        status = self._world.physics.status()
         advice = self._policy(scene, status if self._plan.wall_force else replace(status, wall_contact_n=None))
         if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
             advice = None  # autonomy has to hold
         self._watch_direction(scene)
         self._delayed.append(self._command(advice, frame.captured_s))
-        self._world.robot.send(self._delayed.popleft())
+        self._world.send(self._delayed.popleft())
         time_s, contact_n = frame.captured_s - start_s, status.wall_contact_n or 0.0
         self._log.count(scene.pose, scene.refusal.reason.value if scene.refusal else "", contact_n)
         if len(self._log.forces_n) % _MEASURE_EVERY == 1:

@@ -1,7 +1,6 @@
-"""The bench twin: a world of phantom, physics, look and camera view, with its camera and robot.
+"""The bench twin: a world of phantom, physics, look and camera view, with its camera.
 
-The world is stepped by the caller (lock-step) or follows the wall clock. It applies the current command of its ``TwinRobot``,
-unless servos drive it.
+The world is stepped by the caller (lock-step) or follows the wall clock. It applies the newest command, unless servos drive it.
 """
 
 from __future__ import annotations
@@ -17,9 +16,10 @@ import numpy as np
 
 from core.config.models import PerceptionConfig, TwinConfig
 from core.config.safety import SafetyConfig, ServosConfig
+from core.control.joints import limited
 from core.devices import DeviceError, Latest
 from core.perception.centerline import plan_route
-from core.types import Command, Frame, Point, Points, RobotStatus
+from core.types import Command, Frame, Point, Points
 from hardware.simulated_clock import STEP_S, WorldClock
 from hardware.twin.actuation import DirectJoints
 from hardware.twin.phantom import Phantom
@@ -34,90 +34,15 @@ MAX_DELIVERY_MM_S = 10.0
 MAX_ROTATION_DEG_S = 90.0
 
 
-class TwinRobot:
-    """Clamps commands to the robot's limits and holds the last one. All methods may be called from any thread."""
-
-    name = "bench twin"
-
-    def __init__(self, physics: TwinPhysics) -> None:
-        self._physics = physics
-        self._lock = threading.Lock()
-        self._command = Command()
-        self._connected = False
-        self._sent_s = time.monotonic()
-
-    @property
-    def current_command(self) -> Command:
-        """The command that the world applies now."""
-        with self._lock:
-            return self._command
-
-    def connect(self) -> None:
-        with self._lock:
-            self._command = Command()
-            self._connected = True
-
-    def send(self, command: Command) -> Command:
-        """Make `command`, clamped to the limits, the current one; returns the clamped command.
-
-        Raises
-        ------
-        ValueError
-            When a number is not finite; the current command stays.
-        DeviceError
-            When the robot is not connected.
-        """
-        values = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s, command.rotation_deg_s)
-        if not all(math.isfinite(value) for value in values):
-            raise ValueError(f"command is not finite: {command}")
-        sent = Command(
-            bend=_clamp(command.bend, 1.0),
-            pitch=_clamp(command.pitch, 1.0),
-            advance_mm_s=_clamp(command.advance_mm_s, MAX_ADVANCE_MM_S),
-            delivery_mm_s=_clamp(command.delivery_mm_s, MAX_DELIVERY_MM_S),
-            rotation_deg_s=_clamp(command.rotation_deg_s, MAX_ROTATION_DEG_S),
-        )
-        with self._lock:
-            if not self._connected:
-                raise DeviceError("the bench twin's robot is not connected: call connect() first")
-            self._command = sent
-            self._sent_s = time.monotonic()
-        return sent
-
-    def command_age_s(self) -> float:
-        """Time since the last command; the real-time world holds a robot that gets no commands any more."""
-        with self._lock:
-            return time.monotonic() - self._sent_s
-
-    def hold(self) -> None:
-        """Stop all motion and keep the bend."""
-        with self._lock:
-            self._command = replace(self._command, advance_mm_s=0.0, delivery_mm_s=0.0)
-
-    def status(self) -> RobotStatus:
-        return self._physics.status()
-
-    def close(self) -> None:
-        """Hold; further commands are refused."""
-        self.hold()
-        with self._lock:
-            self._connected = False
-
-
-def _clamp(value: float, limit: float) -> float:
-    return max(-limit, min(limit, value))
-
-
 _log = logging.getLogger(__name__)
 
 _CONTROL_S = 0.02  # period of the command, in simulated time
-_COMMAND_EXPIRES_S = 0.3
 _REST_S = 0.3
 """After an insertion the robot comes to rest."""
 
 
 class TwinWorld:
-    """Steps the physics under the robot's current command and renders frames.
+    """Steps the physics under the newest command and renders frames.
 
     Lock-step: call ``advance`` and ``frame``; the same seeds and commands give the same bits. Real time: ``start`` runs both in a
     thread by a ``WorldClock``, so on a busy machine the world becomes slower and does not jump. Frames have the time of `clock`;
@@ -151,7 +76,7 @@ class TwinWorld:
             specimen = replace(specimen, shaft_ei=known.shaft_to_head.value * specimen.tip_ei)
         tendons_deg = [joint.angle_deg or 0.0 for joint in servos.tendons]
         self.physics = TwinPhysics(self.phantom, seed, drive, tendons_deg, specimen)
-        self.robot = TwinRobot(self.physics)
+        self.command = Command()
         self._renderer = Renderer(self.phantom, self.appearance, size, seed)
         self.appearance = self._renderer.appearance
         self._frame_index = 0
@@ -161,18 +86,33 @@ class TwinWorld:
         self.frames: Latest[Frame] = Latest()
         self.failure: str | None = None
         self.drive: Callable[[float], Command] | None = None
-        """Gives the command for the coming seconds in place of the robot, when the servos move it."""
+        """Gives the command for the coming seconds in place of ``command``, when servos move the robot."""
         self._joints = None if servos.is_default else DirectJoints(servos, safety or SafetyConfig())
         if self._joints is not None:
-            self.drive = lambda duration_s: self._of_joints(self.robot.current_command, duration_s)
+            self.drive = lambda duration_s: self._of_joints(self.command, duration_s)
+
+    def send(self, command: Command) -> Command:
+        """Apply a command from now on, clamped to the robot's limits; returns it clamped.
+
+        Raises
+        ------
+        ValueError
+            When a number is not finite; the command before stays.
+        """
+        values = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s, command.rotation_deg_s)
+        if not all(math.isfinite(value) for value in values):
+            raise ValueError(f"command is not finite: {command}")
+        limits = (1.0, 1.0, MAX_ADVANCE_MM_S, MAX_DELIVERY_MM_S, MAX_ROTATION_DEG_S)
+        self.command = Command(*map(limited, values, limits))
+        return self.command
 
     def advance(self, duration_s: float) -> None:
-        """Step the physics by simulated seconds under the robot's current command."""
+        """Step the physics by simulated seconds under the newest command."""
         with self._lock:
             left = duration_s
             while left > 1e-9:
                 step = min(_CONTROL_S, left)
-                self.physics.step(self.robot.current_command if self.drive is None else self.drive(step), step)
+                self.physics.step(self.command if self.drive is None else self.drive(step), step)
                 left -= step
 
     def _of_joints(self, command: Command, duration_s: float) -> Command:
@@ -262,9 +202,6 @@ class TwinWorld:
         clock.begin()
         next_frame_s = clock.world_s
         while not self._stop.is_set():
-            if self.robot.command_age_s() > _COMMAND_EXPIRES_S:
-                # The program repeats its command unless it hangs.
-                self.robot.hold()
             if (wait_s := clock.wait_s()) > 0.0:
                 self._stop.wait(wait_s)
                 continue

@@ -41,20 +41,19 @@ def make(folder: Path) -> None:
     )
     x, y = world.view.project(follower.route)[-_BACK].tolist()
     world.insert(_START_MM)
-    world.robot.connect()
     writer = SessionWriter(settings, about_rig(config, "SIM", "twin"), folder=folder.parent)
     writer.start()
     truth = []
     period_s = 1.0 / world.config.frames_per_second
     for turn in range(COUNT * EVERY):
-        world.robot.send(follower.command(world.physics.robot_points_mm(), _FEED_MM_S, period_s))
+        world.send(follower.command(world.physics.robot_points_mm(), _FEED_MM_S, period_s))
         world.advance(period_s)
         if turn % EVERY == 0:
             frame = world.frame()
             if turn == 0:
                 writer.add_event(event_of_target((x, y), frame.captured_s))
             truth.append(world.truth().to_json())
-            assert writer.put(Tick(frame, unseen(frame), None, None, world.robot.status(), 0, 3.0))
+            assert writer.put(Tick(frame, unseen(frame), None, None, world.physics.status(), 0, 3.0))
     writer.stop("all recorded")
     assert writer.close()
     saved = writer.status().saved

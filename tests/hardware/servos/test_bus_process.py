@@ -22,7 +22,8 @@ from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import RejectReason, Source
 from core.control.kept_zero import ZeroRequest
-from core.devices import DeviceError, Robot
+from core.control.robot import GuardedRobot
+from core.devices import DeviceError
 from core.types import Command, RobotStatus
 from hardware.processes import PARENT_CHECK_S
 from hardware.servos.bus_ipc import BusClient, BusPhase, BusStatus, start_bus
@@ -132,7 +133,7 @@ def _settle_mm(servos: SoftServoBus, most_s: float = 2.0) -> float:
 
 
 def test_it_is_a_robot_that_moves_only_when_armed(servos: SoftServoBus, robot: ServoRobot) -> None:
-    as_protocol: Robot = robot
+    as_protocol: GuardedRobot = robot
     assert as_protocol.send(FORWARD) == Command()
     assert robot.bus_status().firmware == (servos.servo(1).table["firmware"],) * 7
     _drive(robot, 0.2)

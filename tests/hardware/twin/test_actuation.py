@@ -66,14 +66,13 @@ def test_the_head_goes_where_it_is_steered_on_the_screen(path: object) -> None:
     servos = next(read_rig(one).servos for one in RIGS if one == path)
     world = TwinWorld(TwinConfig(phantom="s_curve", image_width_px=160, image_height_px=120), servos=servos)
     world.insert(30.0)
-    world.robot.connect()
 
     def heading_deg() -> float:
         before, end = world.physics.robot_points_mm()[-2:]
         return float(np.degrees(np.arctan2(end[1] - before[1], end[0] - before[0])))
 
     def turned_deg(bend: float) -> float:
-        world.robot.send(Command(bend=bend))
+        world.send(Command(bend=bend))
         world.advance(2.2)
         return heading_deg() - start_deg
 

@@ -1,18 +1,15 @@
-"""The bench twin as a whole, in lock-step (bit-equal) and in real time, with its camera and robot."""
+"""The bench twin as a whole, in lock-step (bit-equal) and in real time, with its camera."""
 
 import math
-import threading
 import time
 
 import numpy as np
 import pytest
 
 from core.config.models import TwinConfig
-from core.devices import DeviceError, Robot
+from core.devices import DeviceError
 from core.types import Command
-from hardware.twin.phantoms import make_phantom
-from hardware.twin.physics import TwinPhysics
-from hardware.twin.world import MAX_ADVANCE_MM_S, MAX_DELIVERY_MM_S, TwinCamera, TwinRobot, TwinWorld
+from hardware.twin.world import MAX_ADVANCE_MM_S, MAX_DELIVERY_MM_S, TwinCamera, TwinWorld
 
 
 def _world(**changes: object) -> TwinWorld:
@@ -24,8 +21,7 @@ def test_lock_step_is_bit_equal_for_the_same_seed_and_commands() -> None:
     for _ in range(2):
         world = _world(appearance_seed=3)
         camera = TwinCamera(world, lock_step=True)
-        world.robot.connect()
-        world.robot.send(Command(bend=0.3, advance_mm_s=10.0))
+        world.send(Command(bend=0.3, advance_mm_s=10.0))
         runs.append([camera.read(0.0) for _ in range(4)])
     for first, second in zip(*runs, strict=True):
         np.testing.assert_array_equal(first.image, second.image)
@@ -78,19 +74,6 @@ def test_a_broken_world_is_a_lost_camera(monkeypatch: pytest.MonkeyPatch) -> Non
     camera.close()
 
 
-def test_a_robot_without_new_commands_is_held() -> None:
-    world = _world()
-    world.robot.connect()
-    world.robot.send(Command(bend=0.4, advance_mm_s=10.0))
-    world.start()
-    try:
-        while world.robot.command_age_s() < 1.0:
-            time.sleep(0.05)
-    finally:
-        world.stop()
-    assert world.robot.current_command == Command(bend=0.4)
-
-
 def test_the_seen_tip_is_the_physical_one() -> None:
     world = _world()
     world.insert(60.0)
@@ -111,19 +94,6 @@ def test_a_target_gives_the_truth_a_route() -> None:
         assert world.truth((float(end[0]), float(end[1]))).pose is not None
 
 
-@pytest.fixture(scope="module")
-def physics() -> TwinPhysics:
-    return TwinPhysics(make_phantom("y_branch"))
-
-
-@pytest.fixture
-def robot(physics: TwinPhysics) -> TwinRobot:
-    physics.reset()
-    robot = TwinRobot(physics)
-    robot.connect()
-    return robot
-
-
 @pytest.mark.parametrize(
     ("asked", "sent"),
     [
@@ -135,45 +105,15 @@ def robot(physics: TwinPhysics) -> TwinRobot:
         (Command(delivery_mm_s=99.0), Command(delivery_mm_s=MAX_DELIVERY_MM_S)),
     ],
 )
-def test_commands_are_clamped(robot: TwinRobot, asked: Command, sent: Command) -> None:
-    as_protocol: Robot = robot
-    assert as_protocol.status().insertion_mm == 0.0
-    assert robot.send(asked) == sent
-    assert robot.current_command == sent
+def test_commands_are_clamped(asked: Command, sent: Command) -> None:
+    world = _world()
+    assert world.send(asked) == world.command == sent
 
 
-def test_a_command_that_is_not_finite_is_refused(robot: TwinRobot) -> None:
-    before = robot.send(Command(bend=0.1))
+def test_a_command_that_is_not_finite_is_refused() -> None:
+    world = _world()
+    before = world.send(Command(bend=0.1))
     for key, bad in (("bend", math.nan), ("pitch", math.inf), ("advance_mm_s", -math.inf), ("delivery_mm_s", math.nan)):
         with pytest.raises(ValueError, match="not finite"):
-            robot.send(Command(**{key: bad}))
-    assert robot.current_command == before
-
-
-def test_a_closed_robot_holds_with_its_bend_and_refuses_until_connected_again(robot: TwinRobot) -> None:
-    robot.send(Command(bend=0.4, pitch=0.1, advance_mm_s=5.0, delivery_mm_s=2.0))
-    robot.close()
-    robot.close()
-    assert robot.current_command == Command(bend=0.4, pitch=0.1)
-    with pytest.raises(DeviceError, match="connect"):
-        robot.send(Command(advance_mm_s=1.0))
-    robot.connect()
-    assert robot.current_command == Command()
-
-
-def test_status_and_commands_come_from_other_threads_while_it_steps(robot: TwinRobot, physics: TwinPhysics) -> None:
-    done, seen = threading.Event(), []
-
-    def operate() -> None:
-        while not done.is_set():
-            robot.send(Command(bend=0.2, advance_mm_s=20.0))
-            seen.append(robot.status())
-
-    operator = threading.Thread(target=operate)
-    operator.start()
-    for _ in range(25):
-        physics.step(robot.current_command, 0.02)
-    done.set()
-    operator.join()
-    assert physics.insertion_mm == pytest.approx(10.0, abs=1.5)
-    assert all(later.time_s >= earlier.time_s for earlier, later in zip(seen, seen[1:], strict=False))
+            world.send(Command(**{key: bad}))
+    assert world.command == before
