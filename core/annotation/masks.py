@@ -29,9 +29,7 @@ _BRUSH_SIDE_PX = 2048
 """The brush paints in no finer raster than this on the longer side: at 8k a stroke would take half a second."""
 
 
-def polygons_of(
-    mask: Mask, target: MaskTarget, tolerance_px: float = TOLERANCE_PX, offset: tuple[int, int] = (0, 0)
-) -> tuple[MaskPolygon, ...]:
+def polygons_of(mask: Mask, target: MaskTarget, tolerance_px: float = TOLERANCE_PX) -> tuple[MaskPolygon, ...]:
     """The outlines of a mask (H, W), the largest first and each followed by its holes: what lies in a hole comes after that.
 
     Parameters
@@ -39,9 +37,8 @@ def polygons_of(
     mask : binary mask.
     target : what it covers.
     tolerance_px : how far an outline may be off; 0 keeps the mask, but for pieces of one or two pixels.
-    offset : added to all points, (x, y).
     """
-    contours, hierarchy = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE, offset=offset)
+    contours, hierarchy = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     parents: list[int] = np.asarray(hierarchy).reshape(-1, 4)[:, 3].tolist() if len(contours) else []
     outlines = [_outline(contour, target, tolerance_px, parent >= 0) for contour, parent in zip(contours, parents, strict=True)]
     holes: dict[int, list[MaskPolygon]] = {}

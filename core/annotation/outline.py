@@ -7,13 +7,10 @@ Dice .87 and .96 for the whole vessel, because it follows reflections and the ou
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import cv2
 import numpy as np
 
-from core.annotation.masks import TOLERANCE_PX, fill, paint, polygons_of
+from core.annotation.masks import TOLERANCE_PX, fill, polygons_of
 from core.annotation.model import Annotation, History, MaskPolygon, MaskTarget
 from core.annotation.tube import drawn_tube, snapped_tube
 from core.types import Image, Mask, Point, Points
@@ -113,8 +110,6 @@ def _cut(image: Image, mask: Mask, point: Point, radius_px: float, *, erase: boo
 class VesselOutline:
     """The vessel's mask while it is drawn. It begins with a proposal, or empty; every gesture can be undone.
 
-    Gestures may run in another thread than ``mask`` is read, one at a time.
-
     Parameters
     ----------
     image : RGB (H, W, 3), best one of the empty bench.
@@ -161,21 +156,3 @@ class VesselOutline:
 
     def redo(self) -> None:
         self._history.redo()
-
-    def add_tube(self, stroke: Points, radius_px: float | np.ndarray) -> None:
-        """A drag along the middle, (N, 2), with one radius or one per point."""
-        self._change("tube", lambda masks: with_tube(masks, MaskTarget.VESSEL, self.image, stroke, radius_px))
-
-    def click_region(self, point: Point, radius_px: float, *, erase: bool = False) -> None:
-        """The region around a click is vessel, or with `erase` is not."""
-        action = "erase region" if erase else "add region"
-        self._change(action, lambda masks: with_region(masks, MaskTarget.VESSEL, self.image, point, radius_px, erase=erase))
-
-    def brush(self, stroke: Points, radius_px: float, *, erase: bool = False) -> None:
-        """A stroke (N, 2) of the brush."""
-        action = "erase vessel mask" if erase else "paint vessel mask"
-        self._change(action, lambda masks: paint(masks, MaskTarget.VESSEL, stroke, radius_px, self.size, erase=erase))
-
-    def _change(self, action: str, change: Callable[[Polygons], Polygons]) -> None:
-        now = self._history.current
-        self._history.edit(action, replace(now, masks=change(now.masks)))
