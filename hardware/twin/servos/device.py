@@ -13,7 +13,6 @@ from core.config.servo_models import SERVO_MODELS, ServoModel
 from hardware.twin.servos.protocol import (
     ALERT,
     CURRENT_POSITION,
-    EEPROM,
     POSITION,
     POSITION_MODES,
     RAM_START,
@@ -234,8 +233,6 @@ _WATCHDOG_S = _RIPPLE_S = 0.02
 REBOOT_S = 0.3
 _TORQUE_AT_START, _RAM_RESTORE = 1, 2
 """Bits of Startup Configuration(60)."""
-_STORE, _RESTORE = b"\x01CTRL", b"\x02CTRL"
-"""Parameters of the instruction Control Table Backup."""
 _OUTPUT_LIMITS = (("goal_pwm", "pwm_limit"), ("goal_current", "current_limit"))
 _GAINS = ("velocity_i_gain", "velocity_p_gain", "position_d_gain", "position_i_gain", "position_p_gain", "feedforward_2nd",
           "feedforward_1st")  # fmt: skip
@@ -347,7 +344,6 @@ class SoftServo:
         for goal, limit in _OUTPUT_LIMITS:
             table[goal] = table[limit]
         startup = table["startup"] if table["firmware"] >= table.startup_since else 0
-        table["backup_ready"] = int(self._backup is not None)
         if startup & _RAM_RESTORE and self._backup is not None:
             for name in table.backed_up:
                 table[name] = self._backup[name]
@@ -365,9 +361,8 @@ class SoftServo:
         self.restart(for_s)
 
     def backup(self) -> None:
-        """Store the backup: the EEPROM, gains, profile and indirect addresses (instruction Control Table Backup)."""
-        self._backup = {name: self.table[name] for name in (*EEPROM, *self.table.backed_up)}
-        self.table["backup_ready"] = 1
+        """Store gains, profile and indirect addresses, as another program may have done (instruction Control Table Backup)."""
+        self._backup = {name: self.table[name] for name in self.table.backed_up}
 
     def _forget_turns(self) -> None:
         """Count from within one turn from now on."""
@@ -386,25 +381,7 @@ class SoftServo:
             reply = self._reply(ErrorCode.NONE)
             self.restart()
             return reply
-        if instruction == Instruction.BACKUP:
-            return self._store(address.to_bytes(2, "little") + data)
         return self._reply(ErrorCode.INSTRUCTION)
-
-    def _store(self, parameters: bytes) -> StatusReply:
-        """Store or restore the backup, which needs the torque off; a restored EEPROM restarts the servo."""
-        if self.table["firmware"] < self.table.startup_since:
-            return self._reply(ErrorCode.INSTRUCTION)
-        restored = self._backup if parameters == _RESTORE else None
-        if self.table["torque"] or (parameters != _STORE and restored is None):
-            return self._reply(ErrorCode.RESULT_FAIL)
-        reply = self._reply(ErrorCode.NONE)
-        if restored is None:
-            self.backup()
-        else:
-            for name in EEPROM:
-                self.table[name] = restored[name]
-            self.restart()
-        return reply
 
     def obey(self, address: int, data: bytes) -> None:
         """A write to its Secondary ID(12): the RAM obeys, and there is no answer."""

@@ -24,7 +24,6 @@ class Instruction(IntEnum):
     READ = 0x02
     WRITE = 0x03
     REBOOT = 0x08
-    BACKUP = 0x20
     SYNC_READ = 0x82
     SYNC_WRITE = 0x83
 
@@ -242,14 +241,12 @@ _REGISTERS = (
     Register("position_trajectory", 140, 4, 0),
     Register("voltage", 144, 2, 120),
     Register("temperature", 146, 1, 25),
-    Register("backup_ready", 147, 1, 0, since=STARTUP_SINCE),
     *(
         Register(f"indirect_address_{n + 1}", INDIRECT_ADDRESS + 2 * n, 2, INDIRECT_DATA + n, 64, SIZE - 1)
         for n in range(INDIRECT_COUNT)
     ),
 )
 BY_NAME = {register.name: register for register in _REGISTERS}
-EEPROM = tuple(register.name for register in _REGISTERS if register.eeprom)
 _BACKED_UP = (
     "velocity_i_gain", "velocity_p_gain", "position_d_gain", "position_i_gain", "position_p_gain", "feedforward_2nd",
     "feedforward_1st", "profile_acceleration", "profile_velocity",

@@ -14,9 +14,8 @@ from hardware.twin.servos.bus import SoftServoBus
 from hardware.twin.servos.device import GEAR_FRICTION_MNM, STALL_MA, ElasticWire, MotorGoal, ServoMotor, SoftServo
 
 CONFIG = ServosConfig()
-ACCESS, RANGE, LIMIT, RESULT = 7, 4, 6, 1
-WRITE, REBOOT, BACKUP = 3, 8, 0x20
-STORE = int.from_bytes(b"\x01C", "little"), b"TRL"
+ACCESS, RANGE, LIMIT = 7, 4, 6
+WRITE, REBOOT = 3, 8
 TICKS_PER_MM = 4096 / 40.0
 RADIUS_MM = 40.0 / 6.2832
 
@@ -229,7 +228,7 @@ def _mapped(servo: SoftServo) -> SoftServo:
 def test_a_restart_brings_back_what_the_startup_configuration_says(startup: int) -> None:
     servo = _mapped(SoftServo(1, 1020, 100))
     assert _write(servo, 60, startup, 1) == 0
-    assert servo.answer(BACKUP, STORE[0], data=STORE[1]).error == 0
+    servo.backup()
     assert _write(servo, 250, 7, 1) == 0  # an indirect datum: in no backup
     _write(servo, 65, 1, 1)
     servo.turn(2 * 4096)
@@ -257,19 +256,6 @@ def test_the_small_size_restores_its_20_addresses_and_no_datum() -> None:
     assert servo.answer(2, 168, 4).data == addresses
     assert servo.answer(2, 208, 2).data == b"\0" + (100).to_bytes(1, "little")
     assert _write(servo, 210, 5, 2) == 0, "two data, not the 22nd address"
-
-
-def test_a_backup_needs_the_torque_off_and_restores_the_eeprom() -> None:
-    servo = SoftServo(1, 1020, 100)
-    _write(servo, 63, 4, 1)
-    assert servo.answer(BACKUP, STORE[0], data=STORE[1]).error == 0
-    assert servo.table["backup_ready"] == 1
-    _write(servo, 63, 0, 1)
-    _write(servo, 64, 1, 1)
-    assert servo.answer(BACKUP, STORE[0], data=STORE[1]).error == RESULT
-    _write(servo, 64, 0, 1)
-    assert servo.answer(BACKUP, int.from_bytes(b"\x02C", "little"), data=b"TRL").error == 0
-    assert (servo.table["shutdown"], servo.is_booting) == (4, True)
 
 
 @pytest.mark.parametrize(("firmware", "register", "error"), [(37, 98, ACCESS), (38, 98, 0), (44, 60, ACCESS), (45, 60, 0)])
