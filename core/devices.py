@@ -25,12 +25,16 @@ class UserError(Exception):
 
 
 @contextmanager
-def disk_errors(kind: type[UserError], path: Path | str, what: str, then: str = "") -> Iterator[None]:
-    """Tell an OSError within as an error of `kind`: what is the matter with `path`, and what to do."""
+def disk_errors(kind: type[UserError], path: Path | str, what: str, then: str = "", *, missing: str = "") -> Iterator[None]:
+    """Tell an OSError within as an error of `kind`: what is the matter with `path`, and what to do.
+
+    `missing` is said of a file that is not there, where that is worth other words.
+    """
     try:
         yield
     except OSError as error:
-        raise kind(f"{path}: {what} ({error.strerror}){then}") from None
+        is_missing = missing and isinstance(error, FileNotFoundError)
+        raise kind(f"{path}: {missing}" if is_missing else f"{path}: {what} ({error.strerror}){then}") from None
 
 
 class DeviceError(UserError):

@@ -18,7 +18,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator, model_v
 from core.config.calibration import BehaviourConfig
 from core.config.safety import SafetyConfig, ServosConfig
 from core.config.section import ConfigSection, plain_message
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.plugins import PluginKind
 
 
@@ -447,11 +447,8 @@ class Config(ConfigSection):
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: no such configuration file") from None
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+        with disk_errors(ConfigError, path, "cannot be read", missing="no such configuration file"):
+            return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: not a text file in UTF-8") from None
     except ValueError as error:  # not TOMLDecodeError alone: a number of 5000 digits is another ValueError

@@ -174,12 +174,8 @@ def has_rig(name: str) -> bool:
 
 def read_rig(path: Path) -> RigFile:
     """Read and check a rig file; raises RigFileError. The file is never changed."""
-    try:
+    with disk_errors(RigFileError, path, "cannot be read", missing="no such rig file; main.py rig list names those that there are"):
         data = path.read_bytes()
-    except FileNotFoundError:
-        raise RigFileError(f"{path}: no such rig file; main.py rig list names those that there are") from None
-    except OSError as error:
-        raise RigFileError(f"{path}: cannot be read ({error.strerror})") from None
     if len(data) > _MAX_BYTES:
         raise RigFileError(f"{path}: too large for a rig file")
     try:

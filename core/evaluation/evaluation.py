@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from core.devices import UserError
+from core.devices import UserError, disk_errors
 from core.evaluation.metrics import (
     RANGE_DEG,
     SHARE_EDGES_PERCENT,
@@ -117,14 +117,10 @@ def read_measurements(path: Path) -> list[Measurement]:
 
     Raises EvaluationError: with file, line and column in one line. An image that is there twice is refused: it would count twice.
     """
-    try:
+    with disk_errors(EvaluationError, path, "cannot be read", missing="no such file"):
         data = path.read_bytes()
-        # UTF-16 is what spreadsheets call Unicode text.
+    try:  # UTF-16 is what spreadsheets call Unicode text
         text = data.decode("utf-16" if data[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig")
-    except FileNotFoundError:
-        raise EvaluationError(f"{path}: no such file") from None
-    except OSError as error:
-        raise EvaluationError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise EvaluationError(f"{path}: not a text file in UTF-8; save the table as CSV (UTF-8)") from None
     lines = [line for line in text.splitlines() if line.strip()]

@@ -325,13 +325,8 @@ _Read = TypeVar("_Read", bound=BaseModel)
 
 def _read(path: Path, kind: type[_Read]) -> _Read:
     """A JSON file of a session. Raises SessionError: not there, damaged, or of a newer version."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise SessionError(f"{path}: missing") from None
-    except OSError as error:
-        raise SessionError(f"{path}: cannot be read ({error.strerror})") from None
+    with disk_errors(SessionError, path, "cannot be read", missing="missing"), path.open("rb") as file:
+        data = file.read(_MAX_BYTES + 1)
     if len(data) > _MAX_BYTES:
         raise SessionError(f"{path}: too large")
     try:

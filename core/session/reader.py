@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.control.modes import Mode
+from core.devices import disk_errors
 from core.messages import message
 from core.session.codec import Count, InvalidRecord, JsonLayout, Moment, RecordedRow, read_json, row_from_json
 from core.session.files import FileLine, check_seal, is_sealed, lines_of, read_line
@@ -507,14 +508,10 @@ class SessionReader:
 
 def check_is_session(folder: Path) -> None:
     """Raises SessionError when there is nothing of a session in it."""
-    try:
+    with disk_errors(SessionError, folder, "cannot be read", missing="no such session"):
+        if folder.is_file():
+            raise SessionError(f"{folder}: a session is a folder, not a file")
         names = {path.name for path in folder.iterdir()}
-    except FileNotFoundError:
-        raise SessionError(f"{folder}: no such session") from None
-    except NotADirectoryError:
-        raise SessionError(f"{folder}: a session is a folder, not a file") from None
-    except OSError as error:
-        raise SessionError(f"{folder}: cannot be read ({error.strerror})") from None
     if FRAMES not in names and not any(name.startswith("video_") and name.endswith(".mkv") for name in names):
         raise SessionError(f"{folder}: not a session: neither {FRAMES} nor a video in it")
 

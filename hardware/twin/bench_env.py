@@ -22,6 +22,7 @@ from hardware.twin.actuation import DirectJoints
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.rendering.appearance import named_appearance
 from hardware.twin.trial import FIRST_SEED, REACHED_MM, choose_target, start_mm
+from hardware.twin.truth import heading
 from hardware.twin.world import TwinWorld
 
 STEP_S = 0.1
@@ -151,7 +152,7 @@ class BenchEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _state(self) -> NDArray[np.float32]:
         world, info = self._opened(), self._info()
         points = world.physics.robot_points_mm()
-        head, forward = points[-1], _heading(points)
+        head, forward = points[-1], heading(points)
         right = np.array([-forward[1], forward[0]])
         ahead = geometry.point_at(self._route, self._along, np.minimum(self._at_mm + np.array(AHEAD_MM), self._along[-1])) - head
         radius_mm = self._radius_mm(ahead[0] + head)
@@ -183,11 +184,3 @@ class BenchEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         at = tuple(round((value + 0.5) * factor - 0.5) for value, factor in zip(self._target.click_px, scale, strict=True))
         cv2.circle(small, at, _TARGET_PX, _TARGET_COLOUR, -1, cv2.LINE_AA)
         return np.asarray(small, np.uint8)
-
-
-def _heading(points: Points, over_mm: float = 3.0) -> NDArray[np.float64]:
-    """Unit direction of the robot's head."""
-    away = np.hypot(*(points - points[-1]).T)
-    behind = points[np.flatnonzero(away >= over_mm)[-1]] if np.any(away >= over_mm) else points[0]
-    step = points[-1] - behind
-    return np.asarray(step / max(float(np.hypot(*step)), 1e-9))

@@ -262,10 +262,10 @@ class RouteFollower:
         nearest = places[np.argmin(np.sum((self.route[places] - head) ** 2, axis=1))]
         self._progress_mm = float(self._along[nearest])
         goal = self.point_at(self._progress_mm + self._lookahead_mm)
-        heading = _heading(robot_points_mm)
+        ahead = heading(robot_points_mm)
         wanted = goal - head
-        right = np.array([-heading[1], heading[0]])
-        error = float(np.arctan2(wanted @ right, wanted @ heading))
+        right = np.array([-ahead[1], ahead[0]])
+        error = float(np.arctan2(wanted @ right, wanted @ ahead))
         # Ornstein-Uhlenbeck drift with a memory of 0.6 s.
         keep = float(np.exp(-dt_s / 0.6))
         self._drift = keep * self._drift + float(np.sqrt(1 - keep**2)) * float(self._rng.normal())
@@ -301,7 +301,7 @@ def _arc_length(points: Points) -> NDArray[np.float64]:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
-def _heading(points: Points, over_mm: float = 3.0) -> np.ndarray:
+def heading(points: Points, over_mm: float = 3.0) -> NDArray[np.float64]:
     """Unit direction of the robot's head."""
     distance = np.linalg.norm(points - points[-1], axis=1)
     behind = points[np.flatnonzero(distance >= over_mm)[-1]] if np.any(distance >= over_mm) else points[0]
