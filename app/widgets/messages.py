@@ -9,16 +9,15 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from math import ceil
 
-from PySide6.QtCore import QRectF, Qt, QTimer, Signal, Slot
-from PySide6.QtGui import QColor, QFontMetricsF, QMouseEvent, QPainter, QResizeEvent
-from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, QTimer, Signal, Slot
+from PySide6.QtGui import QMouseEvent, QResizeEvent
+from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QPushButton, QSizePolicy, QWidget
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.widgets.basics import OnResize, column, line, text_button
-from app.widgets.painting import CENTER, PaintedWidget, draw_box, draw_text, draw_track
+from app.widgets.painting import CENTER
 
 _SHOWN_MS = 6000
 _BREAK_AFTER = re.compile(r"[/_-]")  # where a long name of a file may be broken
@@ -76,12 +75,18 @@ class NoticeKind(Enum):
     FAULT = "FAULT"
 
 
-_WIDEST_PX, _EDGE_PX, _TITLE_PX, _DETAIL_PX, _FOOT_PX, _BUTTON_PX = 560, 20, 54, 62, 16, 46
+_WIDEST_PX, _EDGE_PX = 560, 20
 _SIZES_PX = (14, 13, 12, 11)  # of the detail's font
-_WRAPPED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+_NOTICE_STYLE = """
+Notice {{ background: @PANEL; border: 2px solid @{}; border-radius: 10px; }}
+QLabel {{ color: @TEXT_DIM; }}
+QLabel#title {{ color: @TEXT; }}
+QProgressBar {{ background: @RAISED; border: none; border-radius: 3px; }}
+QProgressBar::chunk {{ background: @{}; border-radius: 3px; }}
+"""
 
 
-class Notice(PaintedWidget):
+class Notice(QFrame):
     """A card in the middle of its parent: starting, no new picture, recording over, fault. It is as high as its text needs.
 
     PROGRESS has a moving bar; a fault or an ended recording has a button to start again (``restart``).
@@ -90,81 +95,50 @@ class Notice(PaintedWidget):
     restart = Signal()
 
     def __init__(self, parent: QWidget) -> None:
-        super().__init__(hint=(520, 170), parent=parent)
+        super().__init__(parent)
         self._parent = parent
-        self._kind = NoticeKind.PROGRESS
-        self._title = self._detail = ""
-        self._phase = 0.0
-        self._timer = QTimer(self, interval=50)
-        self._timer.timeout.connect(self._move_bar)
+        self._title, self._detail = QLabel(alignment=CENTER, objectName="title"), QLabel(wordWrap=True, alignment=CENTER)
+        self._bar = QProgressBar(textVisible=False, maximum=0)
+        self._bar.setFixedHeight(6)
         self._button = text_button(tr("Start again  (F5)"), self.restart.emit)
-        rows = QVBoxLayout(self)
-        rows.setContentsMargins(24, 24, 24, 20)
-        rows.addStretch(1)
-        rows.addWidget(self._button, 0, Qt.AlignmentFlag.AlignHCenter)
+        rows = column(self._title, (self._detail, 1), self._bar, spacing=8, margins=(_EDGE_PX, 16, _EDGE_PX, 20))
+        rows.addWidget(self._button, 0, CENTER)
+        self.setLayout(rows)
         OnResize(parent, self, self._place)
         self.hide()
 
     @property
     def text(self) -> str:
-        return f"{self._title}. {self._detail}" if self._detail else self._title
+        return ". ".join(label.text() for label in (self._title, self._detail) if label.text())
 
     def show_notice(self, kind: NoticeKind, title: str, detail: str = "", *, restartable: bool = False) -> None:
-        self._kind, self._title, self._detail = kind, tr_text(title), tr_text(detail)
+        self._title.setText(tr_text(title))
+        self._detail.setText(tr_text(detail))
+        self._detail.setVisible(bool(detail))
+        self._bar.setVisible(kind is NoticeKind.PROGRESS)
         self._button.setVisible(restartable)
+        theme.set_sheet(self, _NOTICE_STYLE.format(kind.value, kind.value))
         self.setAccessibleName(self.text)
         self.setToolTip(self.text)
-        if kind is NoticeKind.PROGRESS:
-            self._timer.start()
-        else:
-            self._timer.stop()
         self._place()
         self.show()
         self.raise_()
-        self.update()
 
     def clear(self) -> None:
-        self._timer.stop()
         self.hide()
 
     def _place(self) -> None:
-        room = self._parent.rect()
+        """In the largest font of the detail with which all of it has room."""
+        room, rows = self._parent.rect(), self.layout()
+        assert rows is not None
         width = min(_WIDEST_PX, room.width() - 2 * _EDGE_PX)
-        self.resize(width, self.height())
-        needed = max(_DETAIL_PX, self._detail_height(_SIZES_PX[0]))
-        height = self._around + min(needed, max(_DETAIL_PX, room.height() - _EDGE_PX - self._around))
+        self._title.setFont(theme.fitted(theme.bold(22), self._title.text(), width - 2 * _EDGE_PX, 11))
+        for size_px in _SIZES_PX:
+            self._detail.setFont(theme.font(size_px))
+            rows.invalidate()
+            if (height := rows.totalHeightForWidth(width)) <= room.height() - _EDGE_PX:
+                break
         self.setGeometry((room.width() - width) // 2, (room.height() - height) // 2, width, height)
-
-    @property
-    def _around(self) -> int:
-        """The height without the detail."""
-        return _TITLE_PX + _FOOT_PX + (_BUTTON_PX if self._button.isVisibleTo(self) else 0)
-
-    def _detail_height(self, size_px: int) -> int:
-        room = QRectF(0, 0, self.width() - 2 - 2 * _EDGE_PX, 0)
-        return ceil(QFontMetricsF(theme.font(size_px)).boundingRect(room, _WRAPPED, self._detail).height())
-
-    @Slot()
-    def _move_bar(self) -> None:
-        self._phase = (self._phase + 0.02) % 1.0
-        self.update()
-
-    def paint(self, painter: QPainter) -> None:
-        frame, colour = QRectF(self.rect()).adjusted(1, 1, -1, -1), theme.of(self._kind.value)
-        draw_box(painter, frame, 10, theme.colour(theme.PANEL, 0.96), colour, 2)
-        title = QRectF(20, 16, frame.width() - 40, 32)
-        draw_text(painter, title, self._title, theme.bold(22), theme.TEXT, CENTER, smallest_px=11)
-        room = QRectF(_EDGE_PX, _TITLE_PX, frame.width() - 2 * _EDGE_PX, self.height() - self._around)
-        size_px = next((size for size in _SIZES_PX if self._detail_height(size) <= room.height()), _SIZES_PX[-1])
-        painter.setPen(QColor(theme.TEXT_DIM))
-        painter.setFont(theme.font(size_px))
-        painter.drawText(room, _WRAPPED, self._detail)
-        if self._kind is NoticeKind.PROGRESS:
-            track = QRectF(60, frame.bottom() - 26, frame.width() - 120, 6)
-            draw_track(painter, track)
-            width = track.width() * 0.28
-            left = track.left() - width + (track.width() + width) * self._phase
-            draw_box(painter, QRectF(left, track.top(), width, track.height()).intersected(track), 3, colour)
 
 
 _OFFER_WIDEST_PX = 900

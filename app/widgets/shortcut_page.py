@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from html import escape
 
-from PySide6.QtCore import QPoint, QRect, QRectF, Qt
-from PySide6.QtGui import QMouseEvent, QPainter
-from PySide6.QtWidgets import QMainWindow, QWidget
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtGui import QColor, QMouseEvent
+from PySide6.QtWidgets import QFrame, QLabel, QMainWindow, QWidget
 
 from app.ui import theme
 from app.ui.actions import KeyTable, key_names, menu_tables, shown
 from app.ui.i18n import mark, tr
 from app.ui.texts import DEADMAN_KEY
-from app.widgets.basics import OnResize
+from app.widgets.basics import OnResize, column, line
 from app.widgets.jog_panel import KEYS
-from app.widgets.painting import PaintedWidget, draw_box, draw_text, text_width
 
-_MOST_WIDTH, _EDGE, _GUTTER = 1280, 28, 22
-_COLUMNS = (3, 4)  # in as few as fit
-_TITLE, _HEAD, _ROW, _BETWEEN = 58.0, 29.0, 26.0, 10.0
-_LEAST_ROW = 16.0
-_CLEAR_PX = 4
-_KEYS_SHARE = 0.46  # of a column's width, at most
+_MOST_WIDTH, _MARGIN_PX, _CLEAR_PX = 1280, 12, 4
+_COLUMNS = 4
+_SIZES = ((13, 5), (13, 3), (13, 1), (12, 1), (11, 0))
+"""Of the text and of the space above and below it, px; the first with which all fits."""
+_STYLE = f"""
+QFrame#keys {{ background: @PANEL; border: 1px solid @LINE; border-radius: 12px; }}
+KeyPage {{ background: {theme.colour(theme.ON_PICTURE.INK, 0.78).name(QColor.NameFormat.HexArgb)}; }}
+"""
 
 Column = tuple[KeyTable, ...]
 
 
-class KeyPage(PaintedWidget):
+class KeyPage(QFrame):
     """Covers its parent; a click closes it. Its tables are made each time that it opens.
 
     Parameters
@@ -37,29 +38,34 @@ class KeyPage(PaintedWidget):
     """
 
     def __init__(self, parent: QWidget, first: Column = (), last: Column = (), above: QWidget | None = None) -> None:
-        super().__init__(tr("Keys"), parent=parent)
+        super().__init__(parent, accessibleName=tr("Keys"))
         self._parent = parent
         self._first, self._last = first, last
         self._above = above
-        self._tables: Column = ()
+        self.tables: Column = ()
+        """Shown since the last opening."""
+        title, hint, self._text = QLabel(tr("Keys")), QLabel(tr("F1 or Esc closes this page")), QLabel()
+        title.setFont(theme.bold(22))
+        hint.setObjectName("card_note")
+        self._card = QFrame(objectName="keys")
+        self._card.setLayout(column(line((title, 1), hint), (self._text, 1), margins=(28, 16, 28, 14)))
+        self._text.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.setLayout(column(self._card, margins=(_MARGIN_PX,) * 4))
+        self.layout().setAlignment(self._card, Qt.AlignmentFlag.AlignVCenter)
+        theme.set_sheet(self, _STYLE)
         self.hide()
         for watched in (parent, above):
             if watched is not None:
                 OnResize(watched, self, self._place, moves=True)
 
-    @property
-    def tables(self) -> Column:
-        """The tables shown since the last opening."""
-        return self._tables
-
     def toggle(self) -> None:
         window = self._parent.window()
         if not self.isVisible() and isinstance(window, QMainWindow):
-            self._tables = (*map(shown, self._first), *menu_tables(window), *map(shown, self._last))
-            rows = (row for _, table in self._tables for row in table)
+            self.tables = (*map(shown, self._first), *menu_tables(window), *map(shown, self._last))
+            rows = (row for _, table in self.tables for row in table)
             self.setAccessibleDescription("; ".join(f"{key}: {text}" for key, text in rows))
-        self._place()
         self.setVisible(not self.isVisible())
+        self._place()
         self.raise_()
 
     def _place(self) -> None:
@@ -67,86 +73,53 @@ class KeyPage(PaintedWidget):
         if self._above is not None:
             room.setBottom(self._above.mapTo(self._parent, QPoint(0, 0)).y() - _CLEAR_PX)
         self.setGeometry(room)
+        self._card.setMaximumWidth(_MOST_WIDTH)
+        self.follow_theme()
+
+    def follow_theme(self) -> None:
+        """The text again, in the scheme's colours, as large as fits."""
+        if self.isHidden():
+            return
+        width, height = min(self.width() - 2 * _MARGIN_PX, _MOST_WIDTH), self.height() - 2 * _MARGIN_PX
+        for size_px, space_px in _SIZES:
+            self._text.setText(_page(self.tables, size_px, space_px))
+            needed = self._card.sizeHint()
+            if needed.width() <= width and needed.height() <= height:
+                break
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.hide()
 
-    def paint(self, painter: QPainter) -> None:
-        painter.fillRect(self.rect(), theme.colour(theme.ON_PICTURE.INK, 0.78))
-        columns, scale = _lay_out(self._tables, self.height() - 24 - _TITLE - _EDGE / 2)
-        page = QRectF(0, 0, min(_MOST_WIDTH, self.width() - 24), _TITLE + _tallest(columns) * scale + _EDGE / 2)
-        page.moveCenter(QRectF(self.rect()).center())
-        draw_box(painter, page, 12, theme.PANEL, theme.LINE)
-        left, right, top = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight, Qt.AlignmentFlag.AlignTop
-        draw_text(painter, page.adjusted(_EDGE, 18, 0, 0), tr("Keys"), theme.bold(22), theme.TEXT, left | top)
-        hint = page.adjusted(0, 24, -_EDGE, 0)
-        draw_text(painter, hint, tr("F1 or Esc closes this page"), theme.font(12), theme.TEXT_FAINT, right | top)
-        x = page.left() + _EDGE
-        for column, width in zip(columns, _widths(columns, page.width() - 2 * _EDGE), strict=True):
-            _paint_column(painter, QRectF(x, page.top() + _TITLE, width, 0), column, scale)
-            x += width + _GUTTER
+
+def _page(tables: Column, size_px: int, space_px: int) -> str:
+    """All tables in columns, as HTML."""
+    columns = "<td width=22></td>".join(
+        f"<td><table cellspacing=0>{''.join(_rows(*table) for table in part)}</table></td>" for part in _in_columns(tables)
+    )
+    cells = f"td {{ font-size: {size_px}px; padding: {space_px}px 14px {space_px}px 0; white-space: pre; }}"
+    heads = f"td.head {{ color: {theme.SKY}; font-weight: 600; font-size: {size_px + 1}px; padding-top: {3 * space_px}px; }}"
+    looks = f"td.key {{ color: {theme.TEXT}; font-weight: 600; }} td.text {{ color: {theme.TEXT_DIM}; }}"
+    return f"<style>{cells} {heads} {looks}</style><table width=100% cellspacing=0 cellpadding=0><tr>{columns}</tr></table>"
 
 
-def _height(tables: Sequence[KeyTable]) -> float:
-    return sum(_HEAD + _ROW * len(rows) + _BETWEEN for _, rows in tables)
+def _rows(title: str, rows: tuple[tuple[str, str], ...]) -> str:
+    body = (f"<tr><td class=key>{escape(keys)}</td><td class=text>{escape(what)}</td></tr>" for keys, what in rows)
+    return f"<tr><td class=head colspan=2>{escape(title)}</td></tr>{''.join(body)}"
 
 
-def _tallest(columns: Sequence[Column]) -> float:
-    return max(map(_height, columns), default=0.0)
-
-
-def _lay_out(tables: Column, room: float) -> tuple[tuple[Column, ...], float]:
-    """The columns, and the scale of their rows: when nothing fits, the rows move together."""
-    columns: tuple[Column, ...] = ()
-    for count in _COLUMNS:
-        columns = _in_columns(tables, count)
-        if _tallest(columns) <= room:
-            return columns, 1.0
-    return columns, max(_LEAST_ROW / _ROW, room / max(1.0, _tallest(columns)))
-
-
-def _in_columns(tables: Column, count: int) -> tuple[Column, ...]:
-    """The tables in their order, none of them cut, in `count` columns at most; the tallest is as low as can be."""
-    limits = sorted({_height(tables[first:last]) for first in range(len(tables)) for last in range(first + 1, len(tables) + 1)})
-    for limit in limits:
-        columns: list[Column] = [()]
+def _in_columns(tables: Column) -> list[Column]:
+    """The tables in their order, none of them cut, in ``_COLUMNS`` columns at most; the tallest is as low as can be."""
+    most_rows = max((len(rows) + 1 for _, rows in tables), default=1)
+    while True:
+        columns, height = [()], 0
         for table in tables:
-            if columns[-1] and _height((*columns[-1], table)) > limit:
-                columns.append(())
-            columns[-1] += (table,)
-        if len(columns) <= count and _tallest(columns) <= limit:
-            return tuple(columns)
-    return (tables,)
-
-
-def _widths(columns: Sequence[Column], room: float) -> list[float]:
-    """The width of each column's longest row; the difference to `room` is shared."""
-    texts = [max(text_width(theme.font(13), text) for _, rows in column for _, text in rows) for column in columns]
-    needed = [_keys_width(column) + text + 2.0 for column, text in zip(columns, texts, strict=True)]
-    spare = room - _GUTTER * (len(columns) - 1) - sum(needed)
-    if spare < 0.0:
-        return [width * (1.0 + spare / sum(needed)) for width in needed]
-    return [width + spare / len(columns) for width in needed]
-
-
-def _keys_width(column: Column) -> float:
-    return max(text_width(theme.semi_bold(13), key) for _, rows in column for key, _ in rows) + 14.0
-
-
-def _paint_column(painter: QPainter, place: QRectF, tables: Column, scale: float) -> None:
-    keys_px = min(_keys_width(tables), _KEYS_SHARE * place.width())
-    line = QRectF(place)
-    for title, rows in tables:
-        line.setHeight(_HEAD * scale - 3)
-        draw_text(painter, line, title, theme.semi_bold(14), theme.SKY)
-        line.moveTop(line.top() + _HEAD * scale)
-        line.setHeight(_ROW * scale)
-        for key, text in rows:
-            draw_text(painter, line, key, theme.fitted(theme.semi_bold(13), key, int(keys_px - 6)), theme.TEXT)
-            room = line.adjusted(keys_px, 0, 0, 0)
-            draw_text(painter, room, text, theme.font(13), theme.TEXT_DIM, smallest_px=11, elided=True)
-            line.moveTop(line.top() + _ROW * scale)
-        line.moveTop(line.top() + _BETWEEN * scale)
+            rows = len(table[1]) + 1
+            if height + rows > most_rows:
+                columns, height = [*columns, ()], 0
+            columns[-1], height = (*columns[-1], table), height + rows
+        if len(columns) <= _COLUMNS:
+            return columns
+        most_rows += 1
 
 
 _HELD = (mark("Hold to move, release to stop"), tuple((key_names(keys), motion.value) for motion, keys in KEYS.items()))

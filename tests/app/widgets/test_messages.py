@@ -38,4 +38,4 @@ def test_a_notice_has_room_for_all_that_it_says(own: Own, size: tuple[int, int],
     notice.show_notice(NoticeKind.FAULT, "The rig stopped", why.removesuffix("again") + "twice", restartable=restartable)
     assert notice.grab().toImage() != shown, "its last word is seen"
     notice.show_notice(NoticeKind.FAULT, "The rig stopped", "camera lost", restartable=restartable)
-    assert notice.height() == (178 if restartable else 132)
+    assert notice.height() < shown.height()
