@@ -18,7 +18,7 @@ from app.ui.texts import Undriven
 from app.ui.workers import Pace
 from app.widgets.alerts import AlertStrip
 from app.widgets.basics import Card, card_note, column, holder, line, row
-from app.widgets.command_panel import CommandPanel
+from app.widgets.command_panel import CommandPanel, GateEvents
 from app.widgets.event_log import EventLog, LogKind
 from app.widgets.jog_panel import JogPanel, advised_motions
 from app.widgets.messages import Notice, NoticeKind, OfferStrip, Toast
@@ -73,6 +73,7 @@ class OperatorPanels(ScenePanels):
         self.mode_bar = ModeBar()
         self.servos = ServoTable()
         self.commands = CommandPanel()
+        self._gate = GateEvents()
         self.events = EventLog()
         self._needle_pace = Pace(_NEEDLE_EVERY_S)
         self._blanked = ""
@@ -137,6 +138,8 @@ class OperatorPanels(ScenePanels):
             self.jog.show_status(status_by_servos(bus, self._servo_config))
         self.servos.show_status(bus, self._servo_config, now_s)
         self.commands.show_view(view, bus)
+        for event in self._gate.since_last(bus) if bus is not None else ():
+            self.events.add(LogKind.GATE, event.text, event.key, event.times)
 
     def show_alerts(self, alerts: tuple[Alert, ...]) -> None:
         """Show new alerts over the picture."""

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF
-from PySide6.QtGui import QColor, QPainter
-from PySide6.QtWidgets import QHeaderView, QTableWidget, QTableWidgetItem, QWidget
+from PySide6.QtGui import QPainter
+from PySide6.QtWidgets import QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
-from app.ui.texts import SPEED_WORD, side, tip
+from app.ui.texts import SPEED_WORD, joint_title, side, tip
 from app.ui.workers import Pace
-from app.widgets.basics import ScrollKeys, card_note, column
-from app.widgets.painting import LEFT, NONE, RIGHT, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
+from app.widgets.basics import card_note, column
+from app.widgets.painting import NONE, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
 from app.widgets.servo_table import TONE_ROLE, Cell, Tone
 from core.control.drive_view import DriveView
 from core.control.gate import RejectReason, Source
@@ -115,27 +115,7 @@ def _share(value: float, positive: str, negative: str) -> str:
     return f"{abs(value):.2f} {positive if value > 0.0 else negative}"
 
 
-MAX_ENTRIES = 500
-_LOOK_BACK = 30  # entries in which a repetition is looked for
-_BURST_S = 1.0  # the same event again within so long raises a count
 _IDLE = frozenset({RejectReason.NO_COMMAND, RejectReason.NOT_ARMED})  # nothing was asked for, so nothing was refused
-
-
-@dataclass(frozen=True, slots=True)
-class LogEntry:
-    """One burst: ``text`` is its newest event's, ``clock`` the time of day of its first; ``joint`` is empty for rejections."""
-
-    clock: str
-    joint: str
-    text: str
-    count: int
-    last_s: float
-    key: Hashable
-    serial: int
-
-    @property
-    def is_rejection(self) -> bool:
-        return not self.joint
 
 
 def rejected_commands(status: BusStatus) -> int:
@@ -143,49 +123,46 @@ def rejected_commands(status: BusStatus) -> int:
     return sum(count for reason, count in status.rejections.items() if reason not in _IDLE)
 
 
-class ClampLog:
-    """What the gate limited and rejected, newest first, repeats counted; fed with every status that the window receives.
+@dataclass(frozen=True, slots=True)
+class GateEvent:
+    """Something that the gate limited or rejected: what it is a repetition of, in words, and how often."""
+
+    key: Hashable
+    text: str
+    times: int = 1
+
+
+class GateEvents:
+    """What the gate has limited and rejected, from every status that the window receives.
 
     Those are fewer than the cycles of the bus, so clamps are samples; ``BusStatus.clamp_count`` counts all of them. Rejections
     are taken from the status' own counts, and none is missed.
     """
 
     def __init__(self) -> None:
-        self.entries: list[LogEntry] = []
         self._cycle: int | None = None
         self._rejections: dict[RejectReason, int] = {}
-        self._serial = 0
 
-    def add_status(self, status: BusStatus, clock: str) -> None:
-        """Log the events of a status; `clock` is the time of day as text."""
+    def since_last(self, status: BusStatus) -> list[GateEvent]:
         if self._cycle is None or status.cycle < self._cycle:  # the first of a bus process: what it counted before is no news
             self._rejections = dict(status.rejections)
         elif status.cycle == self._cycle:
-            return
-        self._cycle = status.cycle
+            return []
+        self._cycle, found = status.cycle, []
         for clamp in status.clamps:
             change = f"{number(clamp.asked_mm, 2)} \N{RIGHTWARDS ARROW} {number(clamp.allowed_mm, 2)} mm"
-            text = f"{change}, {tr_text(clamp.limit.value)}"
-            self._add((clamp.joint, clamp.limit), clamp.joint, text, 1, status.time_s, clock)
+            text = f"{joint_title(clamp.joint)}: {change}, {tr_text(clamp.limit.value)}"
+            found.append(GateEvent((clamp.joint, clamp.limit), text))
         for joint in status.at_end:
-            self._add((joint, "end"), joint, tr("stopped at the end of its envelope"), 1, status.time_s, clock)
+            found.append(GateEvent((joint, "end"), f"{joint_title(joint)}: {tr('stopped at the end of its envelope')}"))
         for reason, count in status.rejections.items():
             more = count - self._rejections.get(reason, 0)
             if more > 0 and reason not in _IDLE:
                 known = status.rejection is not None and status.rejection.reason is reason and status.rejection.detail
-                self._add(reason, "", f"{reason.value}: {known}" if known else reason.value, more, status.time_s, clock)
+                why = tr_text(f"{reason.value}: {known}" if known else reason.value)
+                found.append(GateEvent(reason, f"{tr('rejected')}: {why}", more))
         self._rejections = dict(status.rejections)
-
-    def _add(self, key: Hashable, joint: str, text: str, count: int, now_s: float, clock: str) -> None:
-        for row, entry in enumerate(self.entries[:_LOOK_BACK]):
-            if entry.key == key and 0.0 <= now_s - entry.last_s <= _BURST_S:
-                # a newer rejection without a detail keeps the earlier one's
-                kept = entry.text if entry.is_rejection and ":" not in text else text
-                self.entries[row] = replace(entry, text=kept, count=entry.count + count, last_s=now_s)
-                return
-        self._serial += 1
-        self.entries.insert(0, LogEntry(clock, joint.replace("_", " "), text, count, now_s, key, self._serial))
-        del self.entries[MAX_ENTRIES:]
+        return found
 
 
 LATENCY_LIMIT_MS = 100.0
@@ -277,124 +254,42 @@ def _paint_row(painter: QPainter, box: QRectF, row: ProvenanceRow, width: float,
 
 
 _SHOW_EVERY_S = 0.2
-_ROW = 17  # height, px
-_WIDTHS = {mark("When"): 66, mark("Joint"): 68, mark("What the gate did"): 0, "\N{MULTIPLICATION SIGN}": 46}
-_LOG_STYLE = """
-QTableView { background: @PANEL; border: 1px solid @PANEL; font-size: 12px; }
-QTableView:focus { border: 1px solid @SKY; }
-"""
 
 
 class CommandPanel(QWidget):
-    """Advised, asked, commanded and sent in one table; below it what the gate limited and rejected, newest first.
+    """Advised, asked, commanded and sent in one table; below it how often the gate limited and rejected.
 
-    ``show_view`` may be called at any rate: every status is counted, texts are renewed five times a second at most.
-
-    Parameters
-    ----------
-    clock : monotonic.
-    time_of_day : for the log, as text.
+    ``show_view`` may be called at any rate: texts are renewed five times a second at most.
     """
 
-    def __init__(
-        self,
-        clock: Callable[[], float] = time.monotonic,
-        time_of_day: Callable[[], str] = lambda: time.strftime("%H:%M:%S"),
-    ) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
-        self._time_of_day = time_of_day
         self._pace = Pace(_SHOW_EVERY_S, clock)
         self._provenance = Provenance()
         self._known = False
         self._table = ProvenanceTable()
         self._heading = card_note(_heading(None))
         self._heading.setFixedHeight(16)
-        self.log = ClampTable()
-        self.setLayout(column((self._table, 3), self._heading, (self.log, 2), spacing=3))
+        self._heading.setToolTip(tr("What it did stands in the page Log"))
+        self.setLayout(column((self._table, 1), self._heading, spacing=3))
         self.setAccessibleName(tr("Commands"))
 
     @property
     def text(self) -> str:
-        """The provenance table and the log's heading as lines."""
+        """The provenance table and the line on the gate, as lines."""
         return f"{self._table.text}\n{self._heading.text()}"
 
     def show_view(self, view: DriveView | None, status: BusStatus | None) -> None:
         """The newest state of driving and of the bus; None without a robot, or without a bus."""
-        if status is not None:
-            self.log.log.add_status(status, self._time_of_day())
         known = view is not None
         if not self._pace.due() and known is self._known:
             return
         self._known = known
         latency_ms = 1000.0 * view.latency_s if view is not None and view.latency_s is not None else None
         self._table.show_rows(self._provenance.rows(view), latency_ms, view.follow_share if view is not None else None)
-        self.log.update_rows()
         heading = _heading(status)
         if heading != self._heading.text():
             self._heading.setText(heading)
-
-
-class ClampTable(QTableWidget):
-    """What the gate limited and rejected, newest first."""
-
-    def __init__(self) -> None:
-        super().__init__(0, len(_WIDTHS))
-        ScrollKeys(self, _ROW)
-        self.log = ClampLog()
-        self._shown: list[LogEntry] = []
-        theme.set_sheet(self, _LOG_STYLE)
-        self.setShowGrid(False)
-        self.setWordWrap(False)
-        rows = self.verticalHeader()
-        rows.hide()
-        rows.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        rows.setMinimumSectionSize(_ROW)
-        rows.setDefaultSectionSize(_ROW)
-        header = self.horizontalHeader()
-        header.hide()
-        header.setMinimumSectionSize(20)
-        self.setHorizontalHeaderLabels([tr(name) for name in _WIDTHS])
-        for place, width in enumerate(_WIDTHS.values()):
-            header.setSectionResizeMode(place, QHeaderView.ResizeMode.Fixed if width else QHeaderView.ResizeMode.Stretch)
-            if width:
-                self.setColumnWidth(place, width)
-        self.setMinimumHeight(3 * _ROW)
-        self.setAccessibleName(tr("What the gate limited and rejected"))
-
-    def update_rows(self) -> None:
-        """Show what has changed in the log since the last time."""
-        entries, newest = self.log.entries, self._shown[0].serial if self._shown else 0
-        added = sum(entry.serial > newest for entry in entries)
-        for _ in range(added):
-            self.insertRow(0)
-        self.setRowCount(len(entries))
-        for row, entry in enumerate(entries):
-            if row < added or self._shown[row - added] is not entry:
-                self._show_entry(row, entry)
-        self._shown = list(entries)
-
-    def follow_theme(self) -> None:
-        for row, entry in enumerate(self._shown):
-            self._show_entry(row, entry)
-
-    def _show_entry(self, row: int, entry: LogEntry) -> None:
-        what = tr("rejected") if entry.is_rejection else tr_text(entry.joint)
-        count = f"\N{MULTIPLICATION SIGN}{entry.count}" if entry.count > 1 else ""
-        plain, strong = theme.font(12), theme.semi_bold(12)
-        name, text, faint = (theme.FAULT,) * 3 if entry.is_rejection else (theme.TEXT, theme.TEXT_DIM, theme.TEXT_FAINT)
-        cells = (
-            (entry.clock, plain, theme.TEXT_FAINT, LEFT),
-            (what, strong, name, LEFT),
-            (entry.text, plain, text, LEFT),
-            (count, plain, faint, RIGHT),
-        )
-        for place, (shown, font, colour, align) in enumerate(cells):
-            item = QTableWidgetItem(shown)
-            item.setFont(font)
-            item.setForeground(QColor(colour))
-            item.setTextAlignment(align)
-            item.setToolTip(" ".join(part for part in (entry.clock, what, entry.text, count) if part))
-            self.setItem(row, place, item)
 
 
 def _heading(status: BusStatus | None) -> str:

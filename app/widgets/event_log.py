@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from enum import Enum
@@ -73,7 +73,8 @@ class EventLog(QWidget):
     def __init__(self, now: Callable[[], datetime] = datetime.now) -> None:
         super().__init__()
         self._now = now
-        self._newest: LoggedEvent | None = None
+        self._recent: dict[Hashable, tuple[LoggedEvent, QListWidgetItem]] = {}
+        """What a repetition would be one of; the oldest first."""
         self._view = _EventList()
         self._view.customContextMenuRequested.connect(self._open_menu)
         self._filter = QuietCombo(tr("Kind of events shown"))
@@ -91,15 +92,23 @@ class EventLog(QWidget):
         items = (self._view.item(row) for row in range(self._view.count()))
         return [item.text() for item in items if not item.isHidden()]
 
-    def add(self, kind: LogKind, text: str) -> None:
-        """Something happened now; a repetition of the newest event within two seconds raises its count instead."""
-        event, newest = LoggedEvent(self._now(), kind, tr_text(" ".join(text.split()))), self._newest
-        if newest is not None and (newest.kind, newest.text) == (kind, event.text) and abs(event.at - newest.at) <= SAME_WITHIN:
-            self._newest = replace(event, times=newest.times + 1)
-            self._view.replace_newest(self._newest)
+    def add(self, kind: LogKind, text: str, key: Hashable = None, times: int = 1) -> None:
+        """Something happened now, `times` times; a repetition within two seconds raises its count instead.
+
+        It is a repetition of what has the same `key`, without one the same text.
+        """
+        event = LoggedEvent(self._now(), kind, tr_text(" ".join(text.split())), times)
+        same = kind, key if key is not None else event.text
+        known = self._recent.pop(same, None)
+        while self._recent and event.at - next(iter(self._recent.values()))[0].at > SAME_WITHIN:
+            del self._recent[next(iter(self._recent))]
+        if known is not None and abs(event.at - known[0].at) <= SAME_WITHIN:
+            item = known[1]
+            event = replace(event, times=known[0].times + times)
+            _show_event(item, event)
         else:
-            self._newest = event
-            self._view.add(event)
+            item = self._view.add(event)
+        self._recent[same] = event, item
 
     def show_kind(self, kind: LogKind | None) -> None:
         """Show one kind only; None shows everything."""
@@ -136,22 +145,17 @@ class _EventList(QListWidget):
         self.setMinimumHeight(2 * _ROW_HEIGHT)
         self.setAccessibleName(tr("Events, newest first"))
 
-    def add(self, event: LoggedEvent) -> None:
+    def add(self, event: LoggedEvent) -> QListWidgetItem:
         """Put `event` in front; above ``MOST_ROWS`` the oldest one is removed."""
         item, bar = QListWidgetItem(), self.verticalScrollBar()
         self.insertItem(0, item)
-        self.replace_newest(event)
+        _show_event(item, event)
         item.setHidden(self._kind not in (None, event.kind))
         self.takeItem(MOST_ROWS)
         if bar.value() > 0 and not item.isHidden():
             self.executeDelayedItemsLayout()
             bar.setValue(bar.value() + _ROW_HEIGHT)
-
-    def replace_newest(self, event: LoggedEvent) -> None:
-        item = self.item(0)
-        item.setText(event.line)
-        item.setToolTip(event.text)
-        item.setData(Qt.ItemDataRole.UserRole, event)
+        return item
 
     def show_kind(self, kind: LogKind | None) -> None:
         self._kind = kind
@@ -159,6 +163,12 @@ class _EventList(QListWidget):
             item = self.item(row)
             item.setHidden(kind not in (None, item.data(Qt.ItemDataRole.UserRole).kind))
         self.scrollToTop()
+
+
+def _show_event(item: QListWidgetItem, event: LoggedEvent) -> None:
+    item.setText(event.line)
+    item.setToolTip(event.text)
+    item.setData(Qt.ItemDataRole.UserRole, event)
 
 
 class _EventPainter(QStyledItemDelegate):

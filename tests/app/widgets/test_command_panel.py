@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.widgets.command_panel import MAX_ENTRIES, ClampLog, CommandPanel
+from app.widgets.command_panel import CommandPanel, GateEvents
 from core.control.drive_view import DriveView
 from core.control.gate import Clamp, Rejection, RejectReason, Source
 from core.control.joints import Limit
@@ -20,10 +20,6 @@ def clamp(joint: str = "right", asked_mm: float = 1.2, allowed_mm: float = 0.8, 
     return Clamp(joint, asked_mm, allowed_mm, limit)
 
 
-def told(log: ClampLog) -> list[tuple[str, str, int]]:
-    return [(entry.joint or "rejected", entry.text, entry.count) for entry in log.entries]
-
-
 STALE, TOO_FAR = RejectReason.STALE_POSE, RejectReason.OVER_RATE
 SEEN = Rejection(STALE, "182 ms (at most 150 ms)")
 
@@ -34,15 +30,18 @@ SEEN = Rejection(STALE, "182 ms (at most 150 ms)")
         (
             [{"clamps": (clamp(),)}, {"clamps": (clamp("delivery_1", -3.0, -2.9, Limit.STEP),)}],
             [
-                ("delivery 1", f"{MINUS}3.00 → {MINUS}2.90 mm, step from the measured position", 1),
-                ("right", "1.20 → 0.80 mm, speed", 1),
+                ("right: 1.20 → 0.80 mm, speed", 1),
+                (f"delivery 1: {MINUS}3.00 → {MINUS}2.90 mm, step from the measured position", 1),
             ],
         ),
-        ([{"cycle": 7, "clamps": (clamp(),)}] * 3, [("right", "1.20 → 0.80 mm, speed", 1)]),
+        ([{"cycle": 7, "clamps": (clamp(),)}] * 3, [("right: 1.20 → 0.80 mm, speed", 1)]),
         ([{"rejections": {STALE: 4}}], []),
         (
             [{"rejections": {STALE: 4}}, {"rejection": SEEN, "rejections": {STALE: 5}}, {"rejections": {STALE: 8}}],
-            [("rejected", "pose behind the command too old: 182 ms (at most 150 ms)", 4)],
+            [
+                ("rejected: pose behind the command too old: 182 ms (at most 150 ms)", 1),
+                ("rejected: pose behind the command too old", 3),
+            ],
         ),
         ([{}, {"rejections": {RejectReason.NO_COMMAND: 30, RejectReason.NOT_ARMED: 2}}], []),
         (
@@ -51,26 +50,17 @@ SEEN = Rejection(STALE, "182 ms (at most 150 ms)")
                 {"cycle": 3, "rejections": {TOO_FAR: 1}},
                 {"cycle": 4, "rejections": {TOO_FAR: 2}},
             ],
-            [("rejected", "goal too far away", 1)],
+            [("rejected: goal too far away", 1)],
         ),
-        ([{"at_end": ("advance",)}], [("advance", "stopped at the end of its envelope", 1)]),
+        ([{"at_end": ("advance",)}], [("advance: stopped at the end of its envelope", 1)]),
     ],
-    ids=["newest first", "a cycle once", "counted before", "between cycles", "rest", "new bus process", "end of envelope"],
+    ids=["in their order", "a cycle once", "counted before", "between cycles", "rest", "new bus process", "end of envelope"],
 )
-def test_log_of_the_gate(statuses: list[dict[str, object]], entries: list[tuple[str, str, int]]) -> None:
-    log = ClampLog()
+def test_what_the_gate_limited_and_rejected(statuses: list[dict[str, object]], entries: list[tuple[str, int]]) -> None:
+    gate, found = GateEvents(), []
     for cycle, changes in enumerate(statuses, start=1):
-        log.add_status(bus(**{"cycle": cycle, **changes}), "12:00:00")
-    assert told(log) == entries
-
-
-def test_log_counts_repeats_of_the_same_limit_until_a_second_has_passed() -> None:
-    log = ClampLog()
-    for cycle in range(1, 6):
-        log.add_status(bus(cycle=cycle, time_s=0.02 * cycle, clamps=(clamp(asked_mm=cycle), clamp("left"))), "12:00:00")
-    assert told(log) == [("left", "1.20 → 0.80 mm, speed", 5), ("right", "5.00 → 0.80 mm, speed", 5)]
-    log.add_status(bus(cycle=6, time_s=2.0, clamps=(clamp(),)), "12:00:02")
-    assert told(log)[0] == ("right", "1.20 → 0.80 mm, speed", 1)
+        found += gate.since_last(bus(**{"cycle": cycle, **changes}))
+    assert [(event.text, event.times) for event in found] == entries
 
 
 ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
@@ -78,7 +68,7 @@ ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
 
 @pytest.fixture
 def panel(own: Own, clock: Clock) -> CommandPanel:
-    return own(CommandPanel(clock, lambda: "12:00:00"), 446, 205, show=True)
+    return own(CommandPanel(clock), 446, 205, show=True)
 
 
 def lines(panel: CommandPanel) -> list[str]:
@@ -129,18 +119,3 @@ def test_nothing_and_its_reason(panel: CommandPanel, clock: Clock) -> None:
     assert lines(panel)[5:] == ["following the advice –", "Gate: no servo bus"]
     panel.show_view(None, None)
     assert lines(panel)[:4] == ["Advised: –", "You asked: –", "Program: –", "Sent: –"]
-
-
-def test_log_rows_follow_whatever_the_pace(panel: CommandPanel, clock: Clock) -> None:
-    view = DriveView(0.0)
-    for cycle in range(1, 2 * MAX_ENTRIES):
-        clock.now_s += 0.03
-        status = bus(cycle=cycle, time_s=2.0 * cycle, clamps=(clamp(asked_mm=cycle),), clamp_count=cycle)
-        panel.show_view(view, status)
-    clock.now_s += 1.0
-    panel.show_view(view, status)
-    log = panel.log
-    assert log.rowCount() == MAX_ENTRIES
-    assert [log.item(0, column).text() for column in range(4)] == ["12:00:00", "right", "999.00 → 0.80 mm, speed", ""]
-    assert log.item(MAX_ENTRIES - 1, 2).text() == "500.00 → 0.80 mm, speed"
-    assert [log.item(row, 2).text() for row in range(log.rowCount())] == [entry.text for entry in log.log.entries]

@@ -57,6 +57,14 @@ def test_a_repetition_within_two_seconds_is_counted(log: EventLog, wall: WallClo
     assert log.lines[0].endswith("×2"), "also after the list was read"
 
 
+def test_what_alternates_is_counted_by_its_key(log: EventLog, wall: WallClock) -> None:
+    for k in range(3):
+        log.add(LogKind.GATE, f"right: {k} mm", "right")
+        log.add(LogKind.GATE, f"left: {k} mm", "left", times=2)
+        wall.wait(1.0)
+    assert [line[20:] for line in log.lines] == ["left: 2 mm ×6", "right: 2 mm ×3"]
+
+
 @pytest.mark.parametrize("visible", [True, False])
 def test_log_keeps_the_newest_two_thousand(log: EventLog, visible: bool) -> None:
     log.setVisible(visible)
