@@ -12,14 +12,13 @@ from enum import Enum, IntEnum
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, Qt, Signal, Slot
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt, Signal, Slot
 from PySide6.QtGui import QColor, QHideEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
     QLabel,
     QMenu,
-    QPushButton,
     QStackedLayout,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -415,7 +414,6 @@ class ServoView(QTableWidget):
         header.setMinimumSectionSize(20)
         header.setFixedHeight(_HEADER)
         header.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setAccessibleName(tr("Servos"))
         self.show_rows(rows)
 
@@ -558,7 +556,7 @@ _SHOW_EVERY_S = 0.2
 class ServoTable(QWidget):
     """Renewed five times a second at most, and there only the cells that changed.
 
-    The table takes no keyboard focus, as the arrow keys belong to the robot; all that it offers is in the buttons' menus as well.
+    The table takes no keyboard focus, as the arrow keys belong to the robot.
     Each request is confirmed in the widget itself, then emitted as a signal.
 
     Attributes
@@ -591,13 +589,15 @@ class ServoTable(QWidget):
         self.zeros: ZeroDialog | None = None
         """While it is open."""
         self.table = ServoView(servo_rows(None, self._servos, self._safety))
-        self.table.customContextMenuRequested.connect(self._open_context_menu)
         self._balance = TendonBalance()
         self._bus = QLabel()
         self._bus.setFixedHeight(16)
         self.question = QuestionStrip()  # where a request is confirmed
         self.question.closed.connect(self._on_answered)
-        self._restart_button = text_button(tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), self._open_restart_menu)
+        self._restart_button = text_button(tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), lambda: None)
+        self._restarts = QMenu(self)
+        self._restarts.aboutToShow.connect(self._fill_restarts)
+        self._restart_button.setMenu(self._restarts)
         self._zero_button = text_button(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self.open_zeros)
         self._off_button = text_button(tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off)
         self._asked_by: QWidget = self._zero_button
@@ -635,20 +635,6 @@ class ServoTable(QWidget):
         """Where warnings begin, for another rig."""
         self._safety = safety
 
-    def menu_for(self, joint: JointConfig | None) -> QMenu:
-        """What can be done with one servo (None: with all)."""
-        menu = self._make_menu()
-        free = self._reachable and not self._armed
-        if joint is not None:
-            restart = menu.addAction(
-                tr("Restart servo {id} ({joint})", id=joint.id, joint=joint_title(joint.name)), partial(self._ask_restart, joint)
-            )
-            restart.setEnabled(free)
-            menu.addSeparator()
-        menu.addAction(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self.open_zeros).setEnabled(free)
-        menu.addAction(tr("Switch all torque off"), self._ask_torque_off).setEnabled(self._reachable)
-        return menu
-
     def _show(self, status: BusStatus | None, silence_s: float | None) -> None:
         believed = self._status = status if silence_s is None else None
         if self.zeros is not None:
@@ -681,15 +667,10 @@ class ServoTable(QWidget):
         )
         self.question.cancel()  # it was asked under other circumstances
 
-    def _open_context_menu(self, at: QPoint) -> None:
-        place = self.table.indexAt(at).row()
-        self.menu_for(self._servos.joints[place] if place >= 0 else None).popup(self.table.viewport().mapToGlobal(at))
-
-    def _open_restart_menu(self) -> None:
-        menu = self._make_menu()
+    def _fill_restarts(self) -> None:
+        self._restarts.clear()
         for joint in self._servos.joints:
-            menu.addAction(f"{joint.id}  {joint_title(joint.name)}", partial(self._ask_restart, joint))
-        _popup_above(menu, self._restart_button)
+            self._restarts.addAction(f"{joint.id}  {joint_title(joint.name)}", partial(self._ask_restart, joint))
 
     @property
     def lacks_zeros(self) -> bool:
@@ -718,11 +699,6 @@ class ServoTable(QWidget):
             self.zeros.deleteLater()
             self.zeros = None
 
-    def _make_menu(self) -> QMenu:
-        menu = QMenu(self)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        return menu
-
     def _ask_restart(self, joint: JointConfig) -> None:
         question = tr("Restart servo {id} ({joint})? It must be zeroed again.", id=joint.id, joint=joint_title(joint.name))
         self._ask(self._restart_button, question, tr("Restart"), partial(self.reboot_asked.emit, joint.id))
@@ -746,7 +722,3 @@ class ServoTable(QWidget):
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
         self.question.cancel()
-
-
-def _popup_above(menu: QMenu, button: QPushButton) -> None:
-    menu.popup(button.mapToGlobal(QPoint(0, -menu.sizeHint().height())))
