@@ -7,7 +7,6 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -49,7 +48,7 @@ if TYPE_CHECKING:
 EXPORTS = ("dataset", "csv", "angles", *(one.name for one in FORMATS.values() if one.write is not None))
 _DISAGREEMENT_DEG = 30.0
 """A disagreement of so much takes all certainty from an image, half as much half of it."""
-_KEPT = (("loupe", "L"), ("masks", "K"))
+_KEPT = {"loupe": "L", "masks": "K"}
 """Switches of the window that keep their state, and their keys."""
 
 
@@ -439,7 +438,8 @@ def _rater_window(
     """One rater's window until it is closed; the exit code, and who annotates next."""
     from app.annotator.model import AnnotationModel
     from app.annotator.window import AnnotatorWindow
-    from app.ui.layout_state import LayoutState, Parts, Switch, toggling
+    from app.ui.actions import action_of
+    from app.ui.layout_state import LayoutState
     from app.ui.opening import note_recent
     from app.ui.window_base import run_until_closed
 
@@ -451,9 +451,8 @@ def _rater_window(
     print_warnings(store.problems)
     who = tr("study {name}, rater {rater}, blind", name=name, rater=rater) if name else tr("rater {rater}", rater=rater)
     window = AnnotatorWindow(model, who, paths)
-    bar = window.panels.bar
-    switches = {name: Switch(partial(bar.is_on, key), toggling(partial(bar.toggle, key))) for name, key in _KEPT}
-    LayoutState(window, "annotator", Parts({"main": window.panels.columns}, {}, switches))
+    switches = {name: action_of(window, key) for name, key in _KEPT.items()}
+    LayoutState(window, "annotator", window.panels.columns, switches=switches)
     if len(paths) == 1 and not name:  # opened again, a study would not be blind
         note_recent(paths[0])
     return run_until_closed(application, window, window.show_message), window.next_rater

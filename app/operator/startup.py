@@ -137,12 +137,11 @@ def _open_outputs(config: Config, *, is_asked: bool) -> dict[OutputKind, LiveOut
 
 
 def _keep_layout(window: OperatorWindow) -> None:
-    from app.ui.layout_state import LayoutState, Parts, Switch, overlay_switches, toggling
+    from app.ui.layout_state import LayoutState
+    from app.widgets.scene_panels import overlay_actions
 
-    panels = window.panels
-    performance = Switch(lambda: panels.shows_performance, toggling(panels.toggle_performance))
-    switches = {**overlay_switches(panels.overlay_bar), "performance": performance}
-    LayoutState(window, "operator", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
+    switches = {**overlay_actions(window), "performance": window.performance_entry}
+    LayoutState(window, "operator", window.panels.columns, window.panels.pages, switches)
 
 
 def _leave_after_first_frame(window: OperatorWindow) -> None:

@@ -3,37 +3,19 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Mapping
 
 from PySide6.QtCore import QByteArray, QEvent, QObject, QSettings
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMainWindow, QTabWidget
 
 from app.ui import theme
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.i18n import tr
 from app.widgets.basics import Columns
-from app.widgets.scene_overlay import Layer, OverlayBar
 
 _NAME = "LumenPilot"
-
-
-@dataclass(frozen=True, slots=True)
-class Switch:
-    """Something that is on or off."""
-
-    is_on: Callable[[], bool]
-    turn: Callable[[bool], object]
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """What is kept of a window, by names that stay the same from version to version."""
-
-    columns: Mapping[str, Columns] = field(default_factory=dict)
-    pages: Mapping[str, QTabWidget] = field(default_factory=dict)
-    switches: Mapping[str, Switch] = field(default_factory=dict)
+_COLUMNS, _PAGE = "columns/main", "page/right"
 
 
 def layout_settings() -> QSettings:
@@ -48,12 +30,20 @@ class LayoutState(QObject):
     ----------
     window : as it is by default; not shown yet.
     name : of the kind of window.
-    parts : what to keep beside its size and place.
+    switches : checkable actions, by names that stay the same from version to version.
     """
 
-    def __init__(self, window: QMainWindow, name: str, parts: Parts) -> None:
+    def __init__(
+        self,
+        window: QMainWindow,
+        name: str,
+        columns: Columns,
+        pages: QTabWidget | None = None,
+        switches: Mapping[str, QAction] | None = None,
+    ) -> None:
         super().__init__(window)
-        self._window, self._name, self._parts = window, name, parts
+        self._window, self._name = window, name
+        self._columns, self._pages, self._switches = columns, pages, switches or {}
         self._default = self._values()
         add_menu(window, tr("&View"), [MenuEntry(tr("&Reset layout"), self.reset)])
         self._restore()
@@ -99,44 +89,30 @@ class LayoutState(QObject):
         settings.endGroup()
 
     def _values(self) -> dict[str, object]:
-        parts = self._parts
+        pages = self._pages
         return {
-            **{f"columns/{name}": columns.share for name, columns in parts.columns.items()},
-            **{f"page/{name}": _page_name(pages, pages.currentIndex()) for name, pages in parts.pages.items()},
-            **{f"switch/{name}": switch.is_on() for name, switch in parts.switches.items()},
+            _COLUMNS: self._columns.share,
+            **({_PAGE: _page_name(pages, pages.currentIndex())} if pages is not None else {}),
+            **{f"switch/{name}": action.isChecked() for name, action in self._switches.items()},
         }
 
     def _arrange(self, values: Mapping[str, object]) -> None:
         """Apply the values that are known and valid."""
-        parts = self._parts
-        for name, columns in parts.columns.items():
-            with contextlib.suppress(ValueError):  # an INI file holds texts
-                share = float(str(values.get(f"columns/{name}")))
-                if 0.0 < share < 1.0:
-                    columns.set_share(share)
-        for name, pages in parts.pages.items():
+        with contextlib.suppress(ValueError):  # an INI file holds texts
+            share = float(str(values.get(_COLUMNS)))
+            if 0.0 < share < 1.0:
+                self._columns.set_share(share)
+        if (pages := self._pages) is not None:
             names = [_page_name(pages, place) for place in range(pages.count())]
-            wanted = values.get(f"page/{name}")
-            if wanted in names:
+            if (wanted := values.get(_PAGE)) in names:
                 pages.setCurrentIndex(names.index(str(wanted)))
-        for name, switch in parts.switches.items():
+        for name, action in self._switches.items():
             on = {"true": True, "false": False}.get(str(values.get(f"switch/{name}")).lower())
-            if on is not None and on is not switch.is_on():
-                switch.turn(on)
+            if on is not None and on is not action.isChecked():
+                action.trigger()
 
 
 def _page_name(pages: QTabWidget, place: int) -> str:
     """A page's own name: its title may count something."""
     page = pages.widget(place)
     return (page.accessibleName() if page is not None else "") or pages.tabText(place)
-
-
-def overlay_switches(bar: OverlayBar, without: tuple[Layer, ...] = ()) -> dict[str, Switch]:
-    """The switches of the overlays, without those that are not the user's choice."""
-    layers = [layer for layer in Layer if layer not in without]
-    return {layer.name.lower(): Switch(partial(bar.is_on, layer), toggling(partial(bar.toggle, layer))) for layer in layers}
-
-
-def toggling(toggle: Callable[[], object]) -> Callable[[bool], object]:
-    """A switch's ``turn`` that toggles: it is only called for another state."""
-    return lambda _on: toggle()

@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction, QColor, QPainter, QPen
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui import theme
-from app.ui.actions import MenuEntry, turn_page
+from app.ui.actions import MenuEntry, action_of, turn_page
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import REASON_TEXT, advice_headline, override_line, tip
 from app.ui.window_base import WindowFrame
@@ -157,6 +157,11 @@ def add_scene_view_menu(window: WindowFrame, panels: ScenePanels, more: Sequence
     of_layer = dict(zip(Layer, actions, strict=False))
     bar.toggled.connect(lambda layer, on: of_layer[layer].setChecked(on))
     return actions
+
+
+def overlay_actions(window: WindowFrame) -> dict[str, QAction]:
+    """The entries of the overlays in the View menu, by names for files."""
+    return {layer.name.lower(): action_of(window, layer.value.key) for layer in Layer}
 
 
 _CHEVRONS = {Speed.STOP: 0, Speed.SLOWEST: 1, Speed.SLOW: 2, Speed.MODERATE: 3, Speed.FAST: 4}

@@ -6,14 +6,16 @@ from collections.abc import Iterator
 
 import pytest
 from PySide6.QtCore import QByteArray
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QLabel, QMainWindow, QTabWidget
 from pytestqt.qtbot import QtBot
 
 from app.operator.window import OperatorWindow
 from app.ui.actions import action_of, plain
-from app.ui.layout_state import LayoutState, Parts, Switch, layout_settings, overlay_switches
+from app.ui.layout_state import LayoutState, layout_settings
 from app.widgets.basics import Columns
-from app.widgets.scene_overlay import Layer, OverlayBar
+from app.widgets.scene_overlay import Layer
+from app.widgets.scene_panels import overlay_actions
 from tests.app.conftest import MakeWindow
 
 
@@ -39,10 +41,8 @@ class Arranged:
             page.setAccessibleName("Problems of it" if name == "Problems" else "")
             self.pages.addTab(page, name)
         self.pages.setParent(self.window)
-        self.bar = OverlayBar()
-        self.bar.setParent(self.window)
-        parts = Parts({"main": self.columns}, {"right": self.pages}, overlay_switches(self.bar))
-        self.keeper = LayoutState(self.window, "test", parts)
+        self.switches = {name: QAction(self.window, checkable=True, checked=True) for name in ("ghost", "masks")}
+        self.keeper = LayoutState(self.window, "test", self.columns, self.pages, self.switches)
         qtbot.addWidget(self.window)
         self.window.show()
 
@@ -57,20 +57,21 @@ def test_the_next_window_is_as_the_last_one_was(first: Arranged, qtbot: QtBot) -
     first.columns.set_share(0.45)
     first.pages.setCurrentIndex(2)
     first.pages.setTabText(2, "Problems 3")
-    first.bar.toggle(Layer.GHOST)
+    first.switches["ghost"].trigger()
     first.window.close()
     second = Arranged(qtbot)
     assert second.window.size().toTuple() == (640, 420)
     assert second.columns.share == pytest.approx(0.45, abs=0.01)
     assert second.pages.currentIndex() == 2, "by its name, not by its title"
-    assert not second.bar.is_on(Layer.GHOST)
-    assert second.bar.is_on(Layer.MASKS)
+    assert not second.switches["ghost"].isChecked()
+    assert second.switches["masks"].isChecked()
 
 
 def test_reset_puts_all_back_now_and_at_the_next_start(first: Arranged, qtbot: QtBot) -> None:
     first.columns.set_share(0.45)
     first.pages.setCurrentIndex(1)
-    first.bar.set_all(False)
+    for switch in first.switches.values():
+        switch.trigger()
     first.window.close()
     second = Arranged(qtbot)
     menus = {plain(action.text()): action.menu() for action in second.window.menuBar().actions()}
@@ -78,10 +79,10 @@ def test_reset_puts_all_back_now_and_at_the_next_start(first: Arranged, qtbot: Q
     second.keeper.reset()
     assert second.columns.share == pytest.approx(0.6)
     assert second.pages.currentIndex() == 0
-    assert all(second.bar.is_on(layer) for layer in Layer)
+    assert all(switch.isChecked() for switch in second.switches.values())
     third = Arranged(qtbot)
     assert third.columns.share == pytest.approx(0.6)
-    assert all(third.bar.is_on(layer) for layer in Layer)
+    assert all(switch.isChecked() for switch in third.switches.values())
 
 
 @pytest.mark.parametrize(
@@ -103,7 +104,7 @@ def test_broken_values_are_ignored(qtbot: QtBot, key: str, value: object) -> Non
     assert made.window.size().toTuple() == (800, 400)
     assert made.columns.share == pytest.approx(0.6)
     assert made.pages.currentIndex() == 0
-    assert made.bar.is_on(Layer.GHOST)
+    assert made.switches["ghost"].isChecked()
 
 
 def test_a_broken_file_is_ignored(qtbot: QtBot, first: Arranged) -> None:
@@ -137,8 +138,7 @@ def test_columns_keep_their_shares_when_the_window_grows(qtbot: QtBot) -> None:
 def test_overlays_of_the_operator_window_are_kept(make_window: MakeWindow) -> None:
     def arranged() -> OperatorWindow:
         window = make_window()
-        switches = overlay_switches(window.panels.overlay_bar)
-        LayoutState(window, "operator", Parts({"main": window.panels.columns}, {"right": window.panels.pages}, switches))
+        LayoutState(window, "operator", window.panels.columns, window.panels.pages, overlay_actions(window))
         return window
 
     window = arranged()
@@ -150,14 +150,3 @@ def test_overlays_of_the_operator_window_are_kept(make_window: MakeWindow) -> No
     assert not again.panels.overlay_bar.is_on(Layer.LOUPE)
     assert not action_of(again, Layer.LOUPE.value.key).isChecked()
     assert again.panels.pages.tabText(again.panels.pages.currentIndex()) == name
-
-
-def test_a_switch_is_turned_only_when_it_is_not_so_already(qtbot: QtBot) -> None:
-    turned: list[bool] = []
-    settings = layout_settings()
-    settings.setValue("one/switch/a", True)
-    settings.sync()
-    window = QMainWindow()
-    qtbot.addWidget(window)
-    LayoutState(window, "one", Parts(switches={"a": Switch(lambda: True, turned.append)}))
-    assert turned == []
