@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QLabel,
     QListView,
+    QProgressBar,
     QSizePolicy,
     QStyle,
     QStyledItemDelegate,
@@ -306,6 +307,10 @@ QScrollBar::handle:vertical { background: @LINE; border-radius: 4px; min-height:
 QScrollBar::add-line:vertical, QScrollBar::sub-line:vertical { height: 0; }
 QScrollBar::add-page:vertical, QScrollBar::sub-page:vertical { background: transparent; }
 """
+_BAR_STYLE = """
+QProgressBar { background: @LINE; border: none; border-radius: 3px; }
+QProgressBar::chunk { background: @ALLOWED; border-radius: 3px; }
+"""
 _Index = QModelIndex | QPersistentModelIndex
 
 
@@ -470,13 +475,23 @@ class QueueList(QWidget):
         name_list(self._filter, tr("Which images are listed"))
         self._filter.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._filter.currentIndexChanged.connect(lambda _index: self._show_rows())
-        self._progress = _ProgressBar()
-        self.show_progress = self._progress.show_progress
-        self.setLayout(column(self._progress, self._filter, (self._view, 1), spacing=6))
+        self._progress, self._bar = QLabel(), QProgressBar(textVisible=False)
+        self._progress.setFont(theme.semi_bold(14))
+        self._bar.setFixedHeight(6)
+        self._bar.setAccessibleName(tr("Progress"))
+        theme.set_sheet(self._bar, _BAR_STYLE)
+        self.setLayout(column(self._progress, self._bar, self._filter, (self._view, 1), spacing=6))
 
     @property
     def progress_text(self) -> str:
-        return self._progress.text
+        return self._progress.text()
+
+    def show_progress(self, finished: int, count: int) -> None:
+        left = count - finished
+        done = tr("{finished} of {count} done", finished=finished, count=count)
+        self._progress.setText(done + tr(", {left} left", left=left) if left else done)
+        self._bar.setRange(0, max(count, 1))
+        self._bar.setValue(finished)
 
     def _show_rows(self) -> None:
         chosen = self._filter.currentData()
@@ -492,29 +507,6 @@ class QueueList(QWidget):
 
     def focus_list(self) -> None:
         self._view.setFocus()
-
-
-class _ProgressBar(PaintedWidget):
-    def __init__(self) -> None:
-        super().__init__(tr("Progress"), height=34)
-        self._finished, self._count = 0, 0
-
-    @property
-    def text(self) -> str:
-        left = self._count - self._finished
-        done = tr("{finished} of {count} done", finished=self._finished, count=self._count)
-        return done + tr(", {left} left", left=left) if left else done
-
-    def show_progress(self, finished: int, count: int) -> None:
-        self._finished, self._count = finished, count
-        self.setAccessibleDescription(self.text)
-        self.update()
-
-    def paint(self, painter: QPainter) -> None:
-        draw_text(painter, QRectF(0, 0, self.width(), 20), self.text, theme.semi_bold(14), theme.TEXT)
-        for share, colour in ((1.0, theme.LINE), (self._finished / max(self._count, 1), theme.ALLOWED)):
-            if share > 0:
-                draw_box(painter, QRectF(0, 25, self.width() * share, 6), 3, colour)
 
 
 _HEIGHT = 232

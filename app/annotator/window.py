@@ -677,7 +677,6 @@ class AnnotatorWindow(WindowFrame):
             self.others.open_path(path, "--rater", self.model.items[0].key.rater)
 
     def _let_go(self) -> None:
-        self.others.leave()
         self.files.close()
         if self._training is not None:
             self._training.end()

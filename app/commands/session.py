@@ -184,11 +184,14 @@ def export(
         list[Path], typer.Option(help="x.mp4, .csv, .mcap, .ros2.mcap, .lerobot, or what a plugin writes; may be repeated")
     ],
     plain: Annotated[bool, typer.Option("--plain", help="MP4 without overlays")] = False,
+    rows: Annotated[str | None, typer.Option(metavar="FIRST-LAST", help="MP4 of these rows alone")] = None,
     as_json: JsonOption = False,
     progress_json: ProgressOption = False,
 ) -> None:
     """A session as video, table, MCAP for Foxglove and PlotJuggler or for ROS 2 (.ros2.mcap), or episode of a LeRobotDataset."""
     names = {str(path): exporter_name(path) for path in out}
+    if rows is not None and (set(names.values()) != {"mp4"} or plain):
+        raise UserError("--rows is for an MP4 with overlays")
     if not plain and "mp4" in names.values():
         check_qt("export it with --plain")
     if progress_json:
@@ -198,9 +201,10 @@ def export(
     with SessionReader(session) as reader:
         reader.wait()
         with progress_bar() as bar:
+            first, last = _places(reader, rows) if rows is not None else (0, len(reader))
             for path in out:
-                on_row = partial(bar.advance, bar.add_task(path.name, total=len(reader)))
-                written[str(path)] = _export(reader, path, plain, on_row)
+                on_row = partial(bar.advance, bar.add_task(path.name, total=last - first))
+                written[str(path)] = _export(reader, path, plain, on_row, (first, last))
         lost = losses(reader, reader.events)  # reading the events adds to the problems
         problems = [*reader.problems, *lost]
         if _is_cut(reader):
@@ -218,7 +222,7 @@ def export(
         sys.stdout.write(f"{name}: {count} {items_of(names[name])}\n")
 
 
-def _export(reader: SessionReader, out: Path, plain: bool, on_row: Callable[[], None]) -> int:
+def _export(reader: SessionReader, out: Path, plain: bool, on_row: Callable[[], None], places: tuple[int, int]) -> int:
     if plain or exporter_name(out) != "mp4":
         return export_session(reader, out, on_row)
     from app.widgets.overlay_image import draw_overlay
@@ -230,7 +234,19 @@ def _export(reader: SessionReader, out: Path, plain: bool, on_row: Callable[[], 
     def draw(tick: Tick) -> Image:
         return draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=stamp)
 
-    return export_mp4(reader, out, draw, on_row=on_row)
+    return export_mp4(reader, out, draw, first=places[0], last=places[1], on_row=on_row)
+
+
+def _places(reader: SessionReader, rows: str) -> tuple[int, int]:
+    """Of the rows from FIRST to LAST, which is included; raises UserError where there are none."""
+    first, _, last = rows.partition("-")
+    if not (first.isdecimal() and last.isdecimal()):
+        raise UserError(f"--rows {rows}: must be the first and the last row, such as 12-40")
+    known = reader.timeline().row
+    low, high = int(np.searchsorted(known, int(first))), int(np.searchsorted(known, int(last), side="right"))
+    if low >= high:
+        raise UserError(f"--rows {rows}: the session has none of them")
+    return low, high
 
 
 def play(
@@ -253,14 +269,16 @@ def play(
         application = make_application(own_config().window)
 
         from app.player.window import PlayerWindow
-        from app.ui.layout_state import LayoutState, Parts, overlay_switches
+        from app.ui.layout_state import LayoutState
         from app.ui.opening import note_recent
-        from app.widgets.scene_overlay import Layer
+        from app.widgets.scene_panels import overlay_actions
 
         window = PlayerWindow(reader, config, against)
         panels = window.panels
-        switches = overlay_switches(panels.overlay_bar, without=(Layer.LOUPE,) if against is not None else ())
-        LayoutState(window, "player", Parts({"main": panels.columns}, {"right": panels.pages}, switches))
+        switches = overlay_actions(window)
+        if against is not None:
+            del switches["loupe"]  # two pictures leave no room for it
+        LayoutState(window, "player", panels.columns, panels.pages, switches)
         note_recent(session)
         code = run_until_closed(application, window, window.show_message)
     sys.exit(code)
@@ -283,10 +301,10 @@ def library(
 
     from app.library.model import LibraryModel
     from app.library.window import LibraryWindow
-    from app.ui.layout_state import LayoutState, Parts
+    from app.ui.layout_state import LayoutState
 
     window = LibraryWindow(LibraryModel((folder or sessions_folder(own.record.folder)).absolute()))
-    LayoutState(window, "library", Parts({"main": window.panels.columns}))
+    LayoutState(window, "library", window.panels.columns)
     sys.exit(run_until_closed(application, window, window.show_message))
 
 

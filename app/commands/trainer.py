@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
@@ -58,30 +58,13 @@ _OPACITY = 0.45
 """Of the colours over found masks in these pictures."""
 
 
-class TrainingTask(Protocol):
-    """A network to be trained, the crops that it is trained on, and how it is saved."""
-
-    network: DualUNet
-    measures_held_out: bool
-
-    def crop_size(self, crop: tuple[int, int]) -> tuple[int, int]:
-        """Height and width of the crops where `crop` is asked for."""
-        ...
-
-    def crops(self, plan: TrainingPlan, bar: Progress, interrupt: Interrupt) -> Any:
-        """The data set of crops; None when interrupted."""
-        ...
-
-    def save(self, network: DualUNet, out: Path, training: dict[str, Any], figures: dict[str, Any], *, whole: bool) -> None:
-        """Write the model; without its eight-bit copy unless `whole`."""
-        ...
-
-
 class FrameTraining:
     """The network of whole pictures: from nothing, or from the model `init`, whose tip refinement is kept.
 
     `scenes`: files of ``core.learning.scenes``, from which crops are painted. `examples`: frames from which its eight-bit copy
     learns; None: ``_EXAMPLES``.
+
+    As each ``TrainingTask`` it gives its crops (None when interrupted), and saves itself, with its eight-bit copy if `whole`.
     """
 
     measures_held_out = True
@@ -184,6 +167,9 @@ class TipTraining:
                 with suppress(DatasetError):
                     examples.append(np.ascontiguousarray(self._crops[index][0].numpy().transpose(1, 2, 0)))
         save_with_second_look(self._base, network, out, training=training, figures=figures, examples=examples)
+
+
+TrainingTask = FrameTraining | TipTraining
 
 
 def default_shape(*, deep: bool = True) -> UNetShape:

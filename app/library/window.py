@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, QTimer, QUrl, Slot
-from PySide6.QtGui import QColor, QDesktopServices, QPainter, QPixmap
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, QTimer, Slot
+from PySide6.QtGui import QColor, QPainter, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
@@ -29,11 +28,10 @@ from app.ui import theme
 from app.ui.actions import MenuEntry, add_help_menu, add_menu
 from app.ui.description_form import DescriptionForm
 from app.ui.i18n import mark, tr, tr_text
-from app.ui.opening import OtherWindows
+from app.ui.opening import OfferedCommand, ask_path, open_file
 from app.ui.window_base import WindowFrame
-from app.ui.workers import ChildProcess, command_of
 from app.widgets.basics import Card, Columns, column, holder, line, name_list, set_window_margins, side, text_button
-from app.widgets.messages import Offer, OfferButton, OfferStrip, Toast
+from app.widgets.messages import OfferStrip, Toast
 from app.widgets.painting import CENTER, RIGHT, draw_box, draw_fitted, draw_text, text_width
 from app.widgets.shortcut_page import KeyPage
 from core.session.exporters import PLUGINS as EXPORTERS
@@ -46,10 +44,6 @@ _SIDE_PX = 400, 520
 _SHARE = 0.66
 _AGAIN_MS = 3000
 """While a session is being recorded, the folder is looked through so often."""
-_ANNOTATED = "48"
-"""Pictures for the annotator, evenly over a session, as the operator window takes."""
-_CANCELLED = 130, -15
-"""Exit codes of a command that was asked to end."""
 _KIND_ROLES = ("SIM", "LIVE", "PLAYBACK")
 _MOUSE = (mark("Mouse"), ((mark("Double click"), mark("play the session")),))
 
@@ -259,9 +253,7 @@ class LibraryWindow(WindowFrame):
         self.sessions = LibraryFilter(model)
         self.sessions.setParent(self)
         self._chosen: Path | None = None
-        self._children: list[ChildProcess] = []
-        self._others = OtherWindows(self)
-        self._others.said.connect(self.show_message)
+        self.others.said.connect(self.show_message)
         self._again = QTimer(self, singleShot=True, interval=_AGAIN_MS)
         self._again.timeout.connect(model.scan)
         self.panels = LibraryPanels(self.sessions)
@@ -383,10 +375,12 @@ class LibraryWindow(WindowFrame):
     # ---- what is done
 
     def choose_folder(self) -> None:
-        folder = QFileDialog.getExistingDirectory(self, tr("A folder with sessions"), str(self._model.folder))
-        if folder:
-            self._model.open_folder(Path(folder))
-            self._show_title()
+        mode = QFileDialog.FileMode.Directory
+        ask_path(self, tr("A folder with sessions"), self._model.folder, self._open_folder, mode)
+
+    def _open_folder(self, folder: Path) -> None:
+        self._model.open_folder(folder)
+        self._show_title()
 
     def reload(self) -> None:
         self._model.scan()
@@ -405,14 +399,13 @@ class LibraryWindow(WindowFrame):
     @Slot()
     def play(self) -> None:
         if (summary := self.summary) is not None:
-            self._others.open(tr("Opening the player: {name}", name=summary.folder.name), "play", str(summary.folder))
+            self.others.play(summary.folder)
 
     @Slot()
     def annotate(self) -> None:
         """Pictures evenly over it, in the annotator."""
         if (summary := self.summary) is not None:
-            words = tr("Opening the annotator: {name}", name=summary.folder.name)
-            self._others.open(words, "annotate", str(summary.folder), "--frames", _ANNOTATED, "--order", "even")
+            self.others.annotate(summary.folder)
 
     def recover(self) -> None:
         """A whole copy beside a session that was cut."""
@@ -423,48 +416,30 @@ class LibraryWindow(WindowFrame):
 
     def export(self, ending: str) -> None:
         """Ask for a file, and write it beside the window."""
-        summary = self.summary
-        if summary is None:
-            return
-        name = summary.folder.name
-        start = str(summary.folder.parent / f"{name}.{ending}")
-        keep = QFileDialog.Option.DontConfirmOverwrite  # what is there is never overwritten
-        chosen, _ = QFileDialog.getSaveFileName(self, tr("Export {name}", name=name), start, f"*.{ending}", options=keep)
-        if chosen:
-            out = chosen if chosen.lower().endswith(f".{ending.lower()}") else f"{chosen}.{ending}"
-            words = tr("Exporting {name}", name=Path(out).name), tr("Exported: {path}", path=out)
-            self._run(*words, "session", "export", str(summary.folder), "--out", out)
+        if (summary := self.summary) is not None:
+            folder, mode = summary.folder, QFileDialog.FileMode.AnyFile
+            export = partial(self._export, folder, ending)
+            dialog = ask_path(self, tr("Export {name}", name=folder.name), folder.parent, export, mode, [f"*.{ending}"])
+            dialog.selectFile(f"{folder.name}.{ending}")
+
+    def _export(self, session: Path, ending: str, chosen: Path) -> None:
+        out = chosen if chosen.name.lower().endswith(f".{ending.lower()}") else chosen.with_name(f"{chosen.name}.{ending}")
+        words = tr("Exporting {name}", name=out.name), tr("Exported: {path}", path=out)
+        self._run(*words, "session", "export", str(session), "--out", str(out))
 
     def show_folder(self) -> None:
         """With the desktop's file manager."""
         if (summary := self.summary) is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(summary.folder)))
+            open_file(summary.folder)
 
     def _run(self, words: str, done: str, *arguments: str) -> None:
         """Run a command that shows how far it is; `words` say what it does, `done` that it has ended well."""
-        child = ChildProcess(command_of(*arguments, "--progress-json"), self)
-        child.ended.connect(partial(self._on_ended, child, done))
-        child.told.connect(partial(self._show_share, child, words))
-        self._children.append(child)
-        self.show_message(words)
-        child.start()
+        command = OfferedCommand(self, self.panels.offers, words, *arguments, "--progress-json")
+        command.ended.connect(partial(self._on_ended, done))
+        command.start()
 
-    def _show_share(self, child: ChildProcess, words: str, record: dict[str, Any]) -> None:
-        if record.get("done") is not None:
-            share = min(1.0, record["done"] / record["total"]) if record.get("total") else -1.0
-            cancel = OfferButton(tr("Cancel"), child.ask_to_end, tr("Nothing is left of it"))
-            self.panels.offers.offer(Offer(str(id(child)), words, "", (cancel,), share=share, dismissed=child.ask_to_end))
-
-    def _on_ended(self, child: ChildProcess, done: str, code: int, last: str) -> None:
-        self._children.remove(child)
-        self.panels.offers.withdraw(str(id(child)))
-        child.deleteLater()
-        if code == 0:
-            self.show_message(done)
-        elif code in _CANCELLED:
-            self.show_message(tr("Cancelled"))
-        else:
-            self.show_message(tr_text(last) or tr("Ended with exit code {code}", code=code), is_fault=True)
+    def _on_ended(self, done: str, told: object, line: str, is_fault: bool) -> None:
+        self.show_message(tr_text(line) if told is None else done, is_fault)
         self._model.scan()  # there may be a recovered copy
 
     # ---- the window
@@ -494,9 +469,8 @@ class LibraryWindow(WindowFrame):
 
     def _let_go(self) -> None:
         self._again.stop()
-        self._others.leave()  # people work in these windows
-        for child in self._children:
-            child.leave()  # it ends by itself
+        for command in self.findChildren(OfferedCommand):
+            command.leave()  # it ends by itself
 
     def _finish(self) -> Sequence[str]:
         return () if self._model.stop() else ["the disk did not answer in time; leaving without it"]

@@ -7,7 +7,7 @@ directly.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QKeyEvent
@@ -29,7 +29,6 @@ from app.widgets.basics import SCROLL_KEYS
 from app.widgets.event_log import LogKind
 from app.widgets.jog_panel import KEYS, Motion
 from core.config.models import Config
-from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.kept_zero import ZeroRequest
 from core.control.modes import ARMED_MODES, Act
@@ -39,6 +38,9 @@ from core.types import Point
 from hardware.inputs.gamepad import Gamepad, GamepadError, GamepadState
 from hardware.inputs.pedal import Pedal, PedalError, PedalReport
 from hardware.servos.bus_ipc import BusStatus
+
+if TYPE_CHECKING:
+    from app.operator.panels import OperatorPanels
 
 _WINDOW_LOST = (QEvent.Type.WindowDeactivate, QEvent.Type.WindowBlocked)
 """Blocked by a dialog, a window gets no release any more, even where the desktop leaves it the focus."""
@@ -292,14 +294,6 @@ _ACT_OF = {
 }
 
 
-class DrivePanels(Protocol):
-    """What shows driving."""
-
-    def show_drive(self, view: DriveView | None, bus: BusStatus | None, why_not: Undriven = Undriven.NO_ROBOT) -> None: ...
-    def show_alerts(self, alerts: tuple[Alert, ...]) -> None: ...
-    def log(self, kind: LogKind, text: str) -> None: ...
-
-
 class DriveController(QObject):
     """Passes the operator's controls to the pilot of the running rig, and the pilot's view and alerts to panels and recorder.
 
@@ -314,7 +308,7 @@ class DriveController(QObject):
 
     reported = Signal(object)
 
-    def __init__(self, window: QWidget, rig: RigSession, panels: DrivePanels, recorder: Recorder) -> None:
+    def __init__(self, window: QWidget, rig: RigSession, panels: OperatorPanels, recorder: Recorder) -> None:
         super().__init__(window)
         self._rig, self._panels, self._recorder = rig, panels, recorder
         self.jog = JogKeys(window, lambda: self.can_move)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPoint, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QDialog, QFrame, QGridLayout, QLabel, QPushButton, QScrollArea, QWidget
 
 from app.operator.preflight import Preflight, PreflightFinding, PreflightModel
@@ -11,42 +11,20 @@ from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import OperatorStep
 from app.widgets.basics import card_note, column, line, takes_enter
-from app.widgets.painting import PaintedWidget, Sign, draw_text, paint_sign, polygon, set_colours
 from hardware.preflight.preflight import Level
 
 _SIZE = QSize(780, 560)
 _LEAST_PX, _ABOVE_PX = 300, 8
 _TITLE_PX = 40  # about what the desktop's title bar takes
 _UPDATE_MS = 1000
-_TICK = polygon([(4.0, 12.0), (9.0, 17.0), (18.0, 6.0)])
-_DASH = polygon([(5.0, 11.0), (17.0, 11.0)])
-_LOOK: dict[Level, tuple[Sign | None, str, str]] = {
-    Level.GOOD: (None, "ALLOWED", mark("good")),
-    Level.UNUSED: (None, "TEXT_FAINT", mark("not used")),
-    Level.WARNING: (Sign.WARNING, "ORANGE", mark("notice")),
-    Level.BAD: (Sign.BARRED, "FAULT", mark("NOT READY")),
+_LOOK: dict[Level, tuple[str, str, str]] = {
+    Level.GOOD: ("\N{CHECK MARK}", "ALLOWED", mark("good")),
+    Level.UNUSED: ("\N{EN DASH}", "TEXT_FAINT", mark("not used")),
+    Level.WARNING: ("\N{WARNING SIGN}", "ORANGE", mark("notice")),
+    Level.BAD: ("\N{MULTIPLICATION X}", "FAULT", mark("NOT READY")),
 }
-"""Sign, colour and word; the good ones have a tick, those that are not used a dash."""
-
-
-class _Badge(PaintedWidget):
-    """Sign and word of a level, as some operators see no difference in colour."""
-
-    def __init__(self, level: Level) -> None:
-        super().__init__(tr(_LOOK[level][2]))
-        self._level = level
-        self.setFixedSize(112, 22)
-
-    def paint(self, painter: QPainter) -> None:
-        sign, role, word = _LOOK[self._level]
-        colour = QColor(theme.of(role))
-        if sign is None:
-            pen = QPen(colour, 2.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
-            set_colours(painter, None, pen)
-            painter.drawPolyline(_DASH if self._level is Level.UNUSED else _TICK)
-        else:
-            paint_sign(painter, QRectF(2, 2, 18, 18), sign, colour)
-        draw_text(painter, QRectF(28, 0, 84, 20), tr(word), theme.semi_bold(13), colour)
+"""Sign, colour and word: some operators see no difference in colour."""
+_BADGE_PX = 112
 
 
 class PreflightList(QDialog):
@@ -163,7 +141,11 @@ class PreflightList(QDialog):
             detail.setWordWrap(True)
             detail.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)  # a command is made to be copied
             top = Qt.AlignmentFlag.AlignTop
-            self._rows.addWidget(_Badge(finding.level), place, 0, top)
+            sign, role, word = _LOOK[finding.level]
+            badge = QLabel(f'<span style="font-size: 18px;">{sign}</span>&nbsp;&nbsp;{tr(word)}')
+            badge.setFixedWidth(_BADGE_PX)
+            theme.set_sheet(badge, f"color: @{role}; font-size: 13px; font-weight: 600;")
+            self._rows.addWidget(badge, place, 0, top)
             self._rows.addWidget(name, place, 1, top)
             self._rows.addWidget(detail, place, 2, top)
         self._rows.setRowStretch(len(self._shown), 1)

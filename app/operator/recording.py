@@ -1,6 +1,6 @@
 """Sessions in the operator window: recorded beside the engine's thread, annotated, evaluated and played in processes of their own.
 
-Sessions that were cut (kill, power, full disk) are searched when the window starts, offered one by one, and recovered into copies.
+Sessions that were cut (kill, power, full disk) are searched when the window starts, offered, and recovered into copies.
 """
 
 from __future__ import annotations
@@ -11,17 +11,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject, QTimer, QUrl, Signal, Slot
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, QTimer, Signal, Slot
 from PySide6.QtWidgets import QWidget
 
-from app.annotator.sources import REFUSED
 from app.ui.description_form import DescriptionDialog
 from app.ui.i18n import mark, tr, tr_text
-from app.ui.opening import OtherWindows
-from app.ui.workers import NOT_STARTED, ChildProcess, Worker, command_of
+from app.ui.opening import FRAMES, OfferedCommand, Offers, OtherWindows, open_file
+from app.ui.workers import Worker
 from app.widgets.messages import Offer, OfferButton
 from core.annotation.store import DEFAULT_NAME
 from core.config.models import Config
@@ -47,7 +45,7 @@ from core.session.manifest import (
     remembered_description,
     write_description,
 )
-from core.session.recovery import CutSession, find_cut_sessions
+from core.session.recovery import find_cut_sessions
 from core.session.writer import STOPPED, RecordStatus, SessionWriter, faults_between
 from core.types import Point, Tick
 from hardware.rig import RigKind
@@ -327,39 +325,12 @@ class DescriptionController(QObject):
         self._files.wait(_END_WITHIN_MS)
 
 
-_KEY = "recovery"
+_KEY, _OFFER = "recovery", "session"
 _END_WITHIN_MS = 3000
 
 
-class Offers(Protocol):
-    """Where offers are shown."""
-
-    def offer(self, offer: Offer) -> None: ...
-    def withdraw(self, key: str) -> None: ...
-
-
-class Declined:
-    """The sessions that are not offered again, by their folders' names; a small file in the program's state folder."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def names(self) -> set[str]:
-        """A file that cannot be read declines nothing."""
-        try:
-            names = json.loads(self._path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
-            return set()
-        return {name for name in names if isinstance(name, str)} if isinstance(names, list) else set()
-
-    def add(self, name: str) -> None:
-        """Raises OSError."""
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(self._path, json.dumps(sorted(self.names() | {name})).encode())
-
-
 class RecoveryController(QObject):
-    """Searches, measures, offers and recovers cut sessions beside the window. The damaged original is never changed.
+    """Searches cut sessions beside the window, offers them, and has whole copies made of them. The damaged originals stay.
 
     ``said`` carries a line and whether it is a fault; ``recovered`` the folder of a copy and what it lacks, in words.
 
@@ -367,151 +338,94 @@ class RecoveryController(QObject):
     ----------
     folder : where recordings go.
     offers : where to ask.
-    declined : what is not asked again.
+    declined : file with the names of the sessions that are not offered again.
     """
 
     said = Signal(str, bool)
     recovered = Signal(object, str)
 
-    def __init__(self, folder: Path, offers: Offers, declined: Declined, parent: QObject | None = None) -> None:
+    def __init__(self, folder: Path, offers: Offers, declined: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._folder, self._offers, self._declined = folder, offers, declined
-        self._waiting: list[CutSession] = []
-        self._found = 0
-        self._child: ChildProcess | None = None
-        self._says_none = False
+        self._running: OfferedCommand | None = None
         self._is_closed = False
         self._work = Worker("looking for cut sessions", self)
         self._work.done.connect(self._on_found)
-        self._work.failed.connect(self._on_search_failed)
+        self._work.failed.connect(
+            lambda _again, line: self.said.emit(tr("Cut sessions could not be looked for: {line}", line=line), True)
+        )
 
     def search(self, *, again: bool = False) -> None:
         """Search cut sessions; `again`: also those that were declined, and a line if there was nothing."""
-        if self._child is not None or self._waiting or self._is_closed:
-            return
-        self._says_none = again
         folder, declined = self._folder, self._declined
 
-        def find() -> list[CutSession]:
-            not_wanted = set() if again else declined.names()
-            return [cut for cut in find_cut_sessions(folder) if cut.folder.name not in not_wanted]
+        def find() -> list[Path]:
+            not_wanted = set() if again else declined_names(declined)
+            return [cut.folder for cut in find_cut_sessions(folder) if cut.folder.name not in not_wanted]
 
-        self._work.submit("search", find, once=True)
+        if self._running is None:
+            self._work.submit(again, find, once=True)
 
     def close(self) -> None:
         """Search no more; a running recovery ends by itself, and leaves a whole copy or none."""
         self._is_closed = True
-        if self._child is not None:
-            self._child.leave()
-            self._child.ask_to_end()
+        if self._running is not None:
+            self._running.leave(end=True)
         self._work.stop(finish=False)
         self._work.wait(_END_WITHIN_MS)
 
-    def _on_found(self, _key: object, found: list[CutSession]) -> None:
+    def _on_found(self, again: bool, found: list[Path]) -> None:
         if self._is_closed:  # what was found meanwhile was already on its way
             return
-        self._waiting, self._found = list(found), len(found)
-        if not found and self._says_none:
-            self.said.emit(tr("No cut session in {folder}", folder=self._folder), False)
-        self._measure_next()
-
-    def _on_search_failed(self, _key: object, line: str) -> None:
-        self.said.emit(tr("Cut sessions could not be looked for: {line}", line=line), True)
-
-    # ---- one after the other
-
-    def _measure_next(self) -> None:
-        """How much would be lost is measured before the operator is asked."""
-        if self._waiting:
-            self._run("--only-look", self._waiting[0].folder, lambda _record: None, self._on_measured, self._measure_next)
-
-    def _on_measured(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
-        lost = told.get("lost")
-        never = OfferButton(tr("Never"), lambda: self._decline(session), tr("Do not ask again for this one"))
-        if code != 0 or not isinstance(lost, dict):
-            text = tr("A recording was cut, and it cannot be recovered")
-            self._ask(text, line or session.name, (never,), is_fault=True)
+        if not found:
+            if again:
+                self.said.emit(tr("No cut session in {folder}", folder=self._folder), False)
             return
-        number = self._found - len(self._waiting) + 1
-        place = tr(" ({place} of {count})", place=number, count=self._found) if self._found > 1 else ""
-        kept = tr("{count} pictures are whole", count=told.get("pictures", 0))
-        recover = tr("Make a whole copy beside {session}", session=session)
-        self._ask(
-            tr("A recording was cut{place}: {loss}", place=place, loss=loss_words(lost)),
-            tr("{name}; {kept}. The damaged original stays as it is.", name=session.name, kept=kept),
-            (OfferButton(tr("Recover"), lambda: self._recover(session), recover), self._not_now(), never),
+        text = tr("A recording was cut") if len(found) == 1 else tr("{count} recordings were cut", count=len(found))
+        names = ", ".join(session.name for session in found)
+        answers = (
+            OfferButton(tr("Recover"), partial(self._recover, found), tr("Make a whole copy beside each")),
+            OfferButton(tr("Not now"), lambda: None, tr("Ask again at the next start")),
+            OfferButton(tr("Never"), partial(self._decline, found), tr("Do not ask again for these")),
         )
+        self._offers.offer(Offer(_KEY, text, tr("{name}. The damaged original stays as it is.", name=names), answers))
 
-    def _ask(self, text: str, detail: str, answers: tuple[OfferButton, ...], *, is_fault: bool = False) -> None:
-        self._offers.offer(Offer(_KEY, text, detail, answers, is_fault=is_fault, dismissed=self._next))
-
-    def _not_now(self) -> OfferButton:
-        return OfferButton(tr("Not now"), self._next, tr("Ask again at the next start"))
-
-    def _next(self) -> None:
-        self._waiting.pop(0)
-        self._measure_next()
-
-    def _decline(self, session: Path) -> None:
+    def _decline(self, sessions: list[Path]) -> None:
+        names = declined_names(self._declined) | {session.name for session in sessions}
         try:
-            self._declined.add(session.name)
+            self._declined.parent.mkdir(parents=True, exist_ok=True)
+            write_atomic(self._declined, json.dumps(sorted(names)).encode())
         except OSError as error:
             self.said.emit(tr("That you do not want to be asked could not be kept ({why})", why=error.strerror), True)
-        self._next()
 
-    def _recover(self, session: Path) -> None:
-        def show_share(record: dict[str, Any]) -> None:
-            done, total = record.get("done"), record.get("total")
-            share = min(1.0, done / total) if done is not None and total else -1.0
-            self._offers.offer(Offer(_KEY, tr("Recovering a copy"), session.name, share=share))
+    def _recover(self, sessions: list[Path]) -> None:
+        """One after the other."""
+        session, *others = sessions
+        words = tr("Recovering a copy: {name}", name=session.name)
+        command = OfferedCommand(self, self._offers, words, "session", "recover", str(session), "--progress-json", "--json")
+        command.ended.connect(partial(self._on_recovered, others))
+        self._running = command
+        command.start()
 
-        show_share({})
-        self._run("--progress-json", session, show_share, self._on_recovered, lambda: self._recover(session))
-
-    def _on_recovered(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
-        self._offers.withdraw(_KEY)
-        if code == 0 and "session" in told:
+    def _on_recovered(self, others: list[Path], told: dict[str, Any] | None, line: str, _is_fault: bool) -> None:
+        self._running = None
+        if told is not None:
             words = loss_words(told["lost"])
             self.said.emit(tr("Recovered: {session}; {words}", session=told["session"], words=words), False)
             self.recovered.emit(Path(told["session"]), tr("Recovered; {words}", words=words))
         else:
-            self.said.emit(tr("Not recovered: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
-        self._next()
+            self.said.emit(tr("Not recovered: {why}", why=tr_text(line)), True)
+        if others:
+            self._recover(others)
 
-    def _run(
-        self,
-        option: str,
-        session: Path,
-        on_progress: Callable[[dict[str, Any]], None],
-        on_result: Callable[[Path, dict[str, Any], int, str], None],
-        again: Callable[[], None],
-    ) -> None:
-        told: dict[str, Any] = {}
 
-        def on_told(record: dict[str, Any]) -> None:
-            if "done" in record:
-                on_progress(record)
-            else:
-                told.update(record)
-
-        def on_ended(code: int, line: str) -> None:
-            self._child = None
-            if code != NOT_STARTED and code >= 0:
-                on_result(session, told, code, line)
-                return
-            # It never began, or a signal ended it: the session may well be recovered at another time.
-            if code == NOT_STARTED:
-                text = tr("A recording was cut; the program that recovers it could not be started")
-            else:
-                text = tr("A recording was cut; the program that recovers it was ended from outside")
-            why = f": {tr_text(line)}" if line else ""
-            retry = OfferButton(tr("Try again"), again, tr("Once there is memory and room on the disk, for instance"))
-            self._ask(text, f"{session.name}{why}", (retry, self._not_now()), is_fault=True)
-
-        self._child = ChildProcess(command_of("session", "recover", str(session), option, "--json"), self)
-        self._child.told.connect(on_told)
-        self._child.ended.connect(on_ended)
-        self._child.start()
+def declined_names(path: Path) -> set[str]:
+    """The sessions that are not offered again, by their folders' names; a file that cannot be read declines nothing."""
+    try:
+        names = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return set()
+    return {name for name in names if isinstance(name, str)} if isinstance(names, list) else set()
 
 
 def loss_words(lost: dict[str, Any]) -> str:
@@ -519,17 +433,6 @@ def loss_words(lost: dict[str, Any]) -> str:
         return tr("nothing of it is lost")
     seconds, rows, pictures = lost["seconds"], lost["rows"], lost["pictures"]
     return tr("{seconds:.1f} s are lost (rows: {rows}, pictures: {pictures})", seconds=seconds, rows=rows, pictures=pictures)
-
-
-FRAMES = 48
-"""Pictures of a session that are offered for annotation, evenly over its time: as many as in the paper."""
-REPORT = "report.html"
-_OFFER, _WORK = "session", "evaluation"
-
-
-def open_file(path: Path) -> bool:
-    """Show a file with whatever the desktop shows such files with."""
-    return QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
 
 
 class AfterSession(QObject):
@@ -540,31 +443,35 @@ class AfterSession(QObject):
     Parameters
     ----------
     offers : where to ask and to show how it goes.
+    windows : opens the annotator and the player.
     show_file : opens the report; False when it cannot.
     """
 
     said = Signal(str, bool)
     describe_asked = Signal(object)
 
-    def __init__(self, offers: Offers, show_file: Callable[[Path], bool] = open_file, parent: QObject | None = None) -> None:
+    def __init__(
+        self,
+        offers: Offers,
+        windows: OtherWindows,
+        show_file: Callable[[Path], bool] = open_file,
+        parent: QObject | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._offers, self._show_file = offers, show_file
+        self._offers, self._windows, self._show_file = offers, windows, show_file
         self.session: Path | None = None
         """The newest one, until there is another."""
-        self._evaluation: ChildProcess | None = None
-        self._windows = OtherWindows(self)
-        self._windows.said.connect(self.said)
+        self._evaluation: OfferedCommand | None = None
 
     def offer(self, session: Path, text: str = mark("Session saved"), *, asks_who: bool = False) -> None:
         """A session has ended, or was recovered; `text` says which. `asks_who`: it is not known who recorded it."""
         self.session = session
         report = tr("The algorithm against angles measured by hand, as a report")
-        measure = tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES)
         describe = OfferButton(tr("Describe"), partial(self.describe_asked.emit, session), tr("Operator, task, condition, tags"))
         answers: tuple[OfferButton, ...] = (
-            OfferButton(tr("Annotate"), partial(self.annotate, session), measure),
+            self._annotate_button(session),
             OfferButton(tr("Evaluate"), partial(self.evaluate, session), report),
-            OfferButton(tr("Play"), partial(self.play, session), tr("The player, with everything as it was understood")),
+            OfferButton(tr("Play"), partial(self._windows.play, session), tr("The player, with everything as it was understood")),
         )
         detail = tr("{name}, in {parent}", name=session.name, parent=session.parent)
         answers = (describe, *answers) if asks_who else (*answers, describe)
@@ -575,29 +482,8 @@ class AfterSession(QObject):
         self._offers.withdraw(_OFFER)
 
     def close(self) -> None:
-        """Windows that people work in stay open; an evaluation ends."""
-        self._windows.leave()
         if self._evaluation is not None:
-            self._evaluation.leave()
-            self._evaluation.kill()
-
-    # ---- the steps
-
-    def annotate(self, session: Path) -> None:
-        """The annotation tool on pictures evenly over the session."""
-        options = ("--frames", str(FRAMES), "--order", "even")
-        self._windows.open(tr("Opening the annotator: {name}", name=session.name), "annotate", str(session), *options)
-
-    def annotate_refused(self, session: Path) -> None:
-        """The annotation tool on pictures without a pose."""
-        self._windows.open(tr("Opening the annotator: {name}", name=session.name), "annotate", str(session), "--rows", REFUSED)
-
-    def play(self, session: Path) -> None:
-        self._windows.open(tr("Opening the player: {name}", name=session.name), "play", str(session))
-
-    def open_library(self, folder: Path) -> None:
-        """All sessions of a folder."""
-        self._windows.open(tr("Opening the library"), "library", str(folder))
+            self._evaluation.leave(end=True)
 
     def evaluate(self, session: Path) -> None:
         """The report; without anything measured by hand yet, the annotation tool, for that comes first."""
@@ -607,56 +493,30 @@ class AfterSession(QObject):
         if not (session / DEFAULT_NAME).is_file():
             self._needs_annotations(session, tr("Nothing is measured by hand yet"))
             return
-        out = session / "evaluation"
-        told: dict[str, Any] = {}
-        child = ChildProcess(command_of("evaluate", str(session), "--out", str(out), "--progress-json"), self)
-        child.told.connect(lambda record: self._on_told(session, record, told))
-        child.ended.connect(lambda code, line: self._on_evaluated(session, told, code, line))
-        self._evaluation = child
-        self._show_share(session, -1.0, tr("loading the network"))
-        child.start()
+        out, words = session / "evaluation", tr("Evaluating {name}", name=session.name)
+        command = OfferedCommand(self, self._offers, words, "evaluate", str(session), "--out", str(out), "--progress-json")
+        command.ended.connect(partial(self._on_evaluated, session, out / "report.html"))
+        self._evaluation = command
+        command.start()
 
-    def _on_told(self, session: Path, record: dict[str, Any], told: dict[str, Any]) -> None:
-        if "done" not in record:
-            told.update(record)
-            return
-        done, total, what = record["done"], record["total"], tr_text(record["what"])
-        left = tr(", {left:.0f} s left", left=record["left_s"]) if record.get("left_s") else ""
-        detail = tr("{done:.0f} of {total:.0f} {what}{left}", done=done, total=total or 0, what=what, left=left)
-        self._show_share(session, done / total if total else -1.0, detail)
-
-    def _show_share(self, session: Path, share: float, detail: str) -> None:
-        cancel = OfferButton(tr("Cancel"), self._cancel, tr("Stop; a report of before stays"))
-        text = tr("Evaluating {name}", name=session.name)
-        self._offers.offer(Offer(_WORK, text, detail, (cancel,), share=share, dismissed=self._cancel))
-
-    def _cancel(self) -> None:
-        child, self._evaluation = self._evaluation, None
-        if child is not None:
-            child.leave()
-            child.kill()
-            self.said.emit(tr("Evaluation cancelled"), False)
-
-    def _on_evaluated(self, session: Path, told: dict[str, Any], code: int, line: str) -> None:
+    def _on_evaluated(self, session: Path, report: Path, told: dict[str, Any] | None, line: str, is_fault: bool) -> None:
         self._evaluation = None
-        self._offers.withdraw(_WORK)
-        if code == 0:
-            report = session / "evaluation" / REPORT
-            answered, measured = told.get("answered", 0), told.get("measured", 0)
-            judged = tr("{answered} of {measured} pictures answered", answered=answered, measured=measured)
+        if told is not None:
+            judged = tr("{answered} of {measured} pictures answered", answered=told["answered"], measured=told["measured"])
             if self._show_file(report):
                 self.said.emit(tr("Evaluated: {judged}. Report opened: {report}", judged=judged, report=report), False)
             else:
                 self.said.emit(tr("Evaluated: {judged}. The report is: {report}", judged=judged, report=report), False)
         elif "no finished annotation" in line:
-            self._needs_annotations(
-                session, tr("No picture is measured to the end yet: both lines and a state, can't tell, or no robot")
-            )
+            why = tr("No picture is measured to the end yet: both lines and a state, can't tell, or no robot")
+            self._needs_annotations(session, why)
         else:
-            self.said.emit(tr("Not evaluated: {why}", why=tr_text(line) or tr("exit code {code}", code=code)), True)
+            self.said.emit(tr("Not evaluated: {why}", why=tr_text(line)) if is_fault else line, is_fault)
 
     def _needs_annotations(self, session: Path, why: str) -> None:
-        pictures = tr("{frames} pictures, evenly over the session", frames=FRAMES)
-        measure = OfferButton(tr("Annotate"), partial(self.annotate, session), pictures)
         detail = tr("The annotator takes {frames} pictures, evenly over the session. Then evaluate again.", frames=FRAMES)
-        self._offers.offer(Offer(_OFFER, why, detail, (measure,)))
+        self._offers.offer(Offer(_OFFER, why, detail, (self._annotate_button(session),)))
+
+    def _annotate_button(self, session: Path) -> OfferButton:
+        meaning = tr("Measure by hand: {frames} pictures, evenly over the session", frames=FRAMES)
+        return OfferButton(tr("Annotate"), partial(self._windows.annotate, session), meaning)

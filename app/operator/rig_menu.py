@@ -19,6 +19,7 @@ from app.rig_wizard.model import MakeSight, OpenBench, RigWizardModel
 from app.rig_wizard.wizard import RigWizard
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.opening import ask_path
 from app.ui.texts import rig_line
 from core.config.calibration import CalibrationConfig, PortConfig
 from core.config.models import Config
@@ -178,11 +179,7 @@ class RigMenuController(QObject):
 
     def ask_source(self, mode: QFileDialog.FileMode) -> None:
         """Ask for a picture, video or folder of pictures to look at instead of the rig's camera."""
-        dialog = QFileDialog(self._window, tr("Look at pictures instead of the camera's"), fileMode=mode)
-        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        dialog.fileSelected.connect(lambda path: self.choose_source(Path(path)))
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.show()  # not open(): the STOP button must stay within reach
+        ask_path(self._window, tr("Look at pictures instead of the camera's"), Path(), self.choose_source, mode)
 
     @Slot(object)
     def choose_source(self, path: Path) -> None:

@@ -11,13 +11,13 @@ from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QMessageBox
 
-from app.annotator.sources import default_store
+from app.annotator.sources import REFUSED, default_store
 from app.operator.awake import AwakeInhibitor, must_stay_awake
 from app.operator.engine_thread import EnginePhase
 from app.operator.models import ModelMenu
 from app.operator.preflight import PreflightModel
 from app.operator.preflight_list import PreflightList
-from app.operator.recording import AfterSession, Declined, DescriptionController, RecoveryController, open_file
+from app.operator.recording import AfterSession, DescriptionController, RecoveryController
 from app.operator.rig_engine import leaving_a_core
 from app.operator.rig_session import StopOutcome
 from app.operator.window import OperatorWindow
@@ -26,6 +26,7 @@ from app.training.model import collect_from_file
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
 from app.ui.i18n import mark, tr
+from app.ui.opening import ask_path, open_file
 from app.ui.texts import OperatorStep
 from app.widgets.messages import Offer, OfferButton
 from core.annotation.store import DEFAULT_NAME
@@ -73,10 +74,10 @@ class WindowServices(QObject):
         self._window, self._state = window, state
         offers = window.panels.offers
         self._offers = offers
-        self.after = AfterSession(offers, parent=self)
+        self.after = AfterSession(offers, window.others, parent=self)
         self.descriptions = DescriptionController(window, window.recorder)
         self.recovery = RecoveryController(
-            sessions_folder(window.rig.config.record.folder), offers, Declined(state / "not_to_recover.json"), self
+            sessions_folder(window.rig.config.record.folder), offers, state / "not_to_recover.json", self
         )
         self.preflight = PreflightModel(lambda: window.rig.config, lambda: window.controls.view, self)
         self.awake = AwakeInhibitor(self)
@@ -107,7 +108,7 @@ class WindowServices(QObject):
 
     def _wire(self) -> None:
         window = self._window
-        for part in (self.after, self.descriptions, self.recovery, self.models):
+        for part in (window.others, self.after, self.descriptions, self.recovery, self.models):
             part.said.connect(window.say)
         self.after.describe_asked.connect(self.descriptions.ask)
         self.recovery.recovered.connect(self.after.offer)
@@ -122,15 +123,16 @@ class WindowServices(QObject):
 
     def _add_menus(self) -> None:
         window = self._window
+        annotate = window.others.annotate
         session = [
             MenuEntry(tr("Session &library"), self._open_library, ("Ctrl+L",)),
             MenuEntry(tr("Describe the &next recordings..."), self.descriptions.ask_for_next),
             MenuEntry(tr("&Describe the newest session..."), partial(self._with_newest, self.descriptions.ask)),
             None,
-            MenuEntry(tr("&Annotate the newest session"), partial(self._with_newest, self.after.annotate)),
-            MenuEntry(tr("Annotate its &refused frames"), partial(self._with_newest, self.after.annotate_refused)),
+            MenuEntry(tr("&Annotate the newest session"), partial(self._with_newest, annotate)),
+            MenuEntry(tr("Annotate its &refused frames"), partial(self._with_newest, partial(annotate, rows=REFUSED))),
             MenuEntry(tr("&Evaluate the newest session"), partial(self._with_newest, self.after.evaluate)),
-            MenuEntry(tr("&Play the newest session"), partial(self._with_newest, self.after.play)),
+            MenuEntry(tr("&Play the newest session"), partial(self._with_newest, window.others.play)),
             MenuEntry(tr("&Open another session..."), self._choose_session),
             None,
             MenuEntry(tr("Look for &cut sessions"), partial(self.recovery.search, again=True)),
@@ -180,15 +182,12 @@ class WindowServices(QObject):
             step(session)
 
     def _open_library(self) -> None:
-        self.after.open_library(sessions_folder(self._window.rig.config.record.folder))
+        self._window.others.open_library(sessions_folder(self._window.rig.config.record.folder))
 
     def _choose_session(self) -> None:
         folder = sessions_folder(self._window.rig.config.record.folder)
-        dialog = QFileDialog(self._window, tr("A recorded session"), str(folder), fileMode=QFileDialog.FileMode.Directory)
-        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        dialog.fileSelected.connect(lambda path: self.after.offer(Path(path), tr("Session")))
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.show()  # not open(): the STOP button must stay within reach
+        offer = partial(self.after.offer, text=tr("Session"))
+        ask_path(self._window, tr("A recorded session"), folder, offer, QFileDialog.FileMode.Directory)
 
     # ---- before driving
 
@@ -239,14 +238,10 @@ class WindowServices(QObject):
         folder = sessions_folder(self._window.rig.config.record.folder)
         store = default_store([session]) if session is not None else folder / DEFAULT_NAME
         start = next(place for place in store.parents if place.is_dir())
-        dialog = QFileDialog(self._window, tr("Annotations to train on"), str(start), tr("Annotations (*.sqlite)"))
-        dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+        filters = [tr("Annotations (*.sqlite)")]
+        dialog = ask_path(self._window, tr("Annotations to train on"), start, self.open_training, filters=filters)
         if store.is_file():
             dialog.selectFile(str(store))
-        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        dialog.fileSelected.connect(lambda path: self.open_training(Path(path)))
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.show()
 
     def open_training(self, store: Path) -> None:
         """The dialog for an annotation file."""

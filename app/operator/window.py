@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, QTimer, QUrl, Signal, Slot
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QComboBox, QLineEdit
 
 from app.operator.engine_thread import EnginePhase
@@ -22,6 +21,7 @@ from app.operator.tour import operator_stops
 from app.operator.twin_menu import TwinMenuController
 from app.ui.actions import MenuEntry, add_help_menu, add_menu, plain
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.opening import open_file
 from app.ui.snapshot import Origin, SnapshotWriter, pictures_folder
 from app.ui.texts import OperatorStep, Undriven
 from app.ui.window_base import WindowFrame
@@ -166,8 +166,8 @@ class OperatorWindow(WindowFrame):
         )
         performance = MenuEntry(tr("Performance fi&gures"), self.panels.toggle_performance, checked=False)
         actions = add_scene_view_menu(self, self.panels, [performance])
-        action = next(one for one in actions if plain(one.text()) == plain(performance.text))
-        self.panels.performance_shown.connect(action.setChecked)
+        self.performance_entry = next(one for one in actions if plain(one.text()) == plain(performance.text))
+        self.panels.performance_shown.connect(self.performance_entry.setChecked)
         add_menu(
             self,
             tr("&Robot"),
@@ -397,7 +397,7 @@ class OperatorWindow(WindowFrame):
     def open_pictures(self) -> None:
         """Where snapshots go."""
         folder = self._snapshots.folder
-        if not folder.is_dir() or not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+        if not folder.is_dir() or not open_file(folder):
             self.panels.toast.show_message(tr("Snapshots go to {folder}", folder=folder))
 
     @Slot()

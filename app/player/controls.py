@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from functools import partial
 
 from PySide6.QtCore import (
     QAbstractListModel,
@@ -18,15 +17,15 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPen, QValidator
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QValidator
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QComboBox,
     QLabel,
     QLineEdit,
     QListView,
-    QProgressBar,
     QPushButton,
+    QSizePolicy,
     QSlider,
     QSpinBox,
     QStyle,
@@ -40,7 +39,7 @@ from app.player.timeline import paint_mark
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.widgets.basics import column, line, name_list
-from app.widgets.painting import CENTER, RIGHT, PaintedWidget, draw_box, draw_text
+from app.widgets.painting import RIGHT, draw_text
 from core.session.manifest import Description, Event, EventKind, Manifest
 
 _TYPED = re.compile(r"(?:(?:(\d+):)?(\d+):)?(\d+(?:[.,]\d*)?|[.,]\d+)(?: *(ms|s))?")
@@ -89,28 +88,24 @@ QSlider::groove:horizontal { height: 6px; background: @RAISED; border-radius: 3p
 QSlider::sub-page:horizontal { background: @PLAYBACK; border-radius: 3px; }
 QSlider::handle:horizontal { background: @TEXT; width: 14px; margin: -5px 0; border-radius: 7px; }
 QSlider::handle:horizontal:focus { background: @SKY; }
-QProgressBar { background: @RAISED; border: 1px solid @LINE; border-radius: 5px; text-align: center;
-    color: @TEXT; font-size: 12px; }
-QProgressBar::chunk { background: @LINE; border-radius: 4px; }
 """
 
 
 class PlayerBar(QWidget):
-    """Slider, time, buttons and choosers. Times are milliseconds from the first row."""
+    """Slider, time, buttons and choosers. Times are milliseconds from the first row. A button presses an entry of the menus.
 
-    play_requested = Signal()
-    step_requested = Signal(int)
-    jump_requested = Signal(int)
+    Parameters
+    ----------
+    press : gets the key of the entry.
+    """
+
     sought_ms = Signal(int)
     speed_chosen = Signal(float)
     jump_kind_chosen = Signal(object)
-    clip_requested = Signal()
-    cancel_requested = Signal()
-    note_requested = Signal()
-    snapshot_requested = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, press: Callable[[str], object]) -> None:
         super().__init__()
+        self._press = press
         theme.set_sheet(self, _STYLE)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName(tr("Position in milliseconds"))
@@ -127,7 +122,7 @@ class PlayerBar(QWidget):
         for label in (self.length, self.frame):
             theme.set_sheet(label, "color: @TEXT_DIM;")
         self.frame.setObjectName("card_note")
-        self.play = self._button(_PLAY, tr("Play or pause  (Space)"), self.play_requested.emit, tr("Play"))
+        self.play = self._button(_PLAY, tr("Play or pause  (Space)"), "Space", tr("Play"))
         self.play.setObjectName("play")
         self.play.setFixedWidth(56)
         self.kind = QComboBox()
@@ -143,20 +138,14 @@ class PlayerBar(QWidget):
         self.speed.setToolTip(tr("Speed  ([ slower, ] faster)"))
         self.speed.setFixedWidth(78)
         clip_tip = tr("Save the selection as a video, without one the session  (E)")
-        self.clip = self._button(tr("Clip"), clip_tip, self.clip_requested.emit)
-        self.note = self._button(tr("Note"), tr("Add a note at this time  (M)"), self.note_requested.emit)
-        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (Ctrl+S)"), self.snapshot_requested.emit)
-        self.progress = QProgressBar()
-        self.progress.setFixedHeight(24)
-        self.progress.setAccessibleName(tr("Clip being written"))
-        cancel_tip = tr("Stop writing the clip  (Esc)")
-        self.cancel = self._button(tr("Cancel"), cancel_tip, self.cancel_requested.emit, tr("Cancel the clip"))
+        self.clip = self._button(tr("Clip"), clip_tip, "E")
+        self.note = self._button(tr("Note"), tr("Add a note at this time  (M)"), "M")
+        self.snapshot = self._button(tr("Snapshot"), tr("Save this picture  (Ctrl+S)"), "Ctrl+S")
         self._lay_out()
         self.slider.valueChanged.connect(self.sought_ms)
         self.position.valueChanged.connect(self.sought_ms)
         self.speed.activated.connect(lambda _index: self.speed_chosen.emit(self.speed.currentData()))
         self.kind.activated.connect(lambda _index: self.jump_kind_chosen.emit(self.kind.currentData()))
-        self.show_progress(None)
         self.show_length(0, 0)
 
     def show_length(self, duration_ms: int, rows: int) -> None:
@@ -197,32 +186,23 @@ class PlayerBar(QWidget):
         """How long the clip will be."""
         self.clip.setText(tr("Clip") if length_s is None else tr("Clip {seconds:.1f} s", seconds=length_s))
 
-    def show_progress(self, share: float | None) -> None:
-        """Of the clip that is being written; None: none is."""
-        for widget in (self.progress, self.cancel):
-            widget.setVisible(share is not None)
-        self.clip.setVisible(share is None)
-        if share is not None:
-            self.progress.setValue(round(100 * share))
-
-    def _button(self, text: str, tip: str, slot: Callable[[], object], name: str = "") -> QPushButton:
+    def _button(self, text: str, tip: str, key: str, name: str = "") -> QPushButton:
         button = QPushButton(text)
         button.setToolTip(tip)
         button.setAccessibleName(name or tip.partition("  (")[0])
         button.setFixedWidth(max(_BUTTON, QFontMetrics(theme.font(14)).horizontalAdvance(text) + 18))
-        button.clicked.connect(lambda _checked=False: slot())
+        button.clicked.connect(lambda _checked=False: self._press(key))
         return button
 
     def _lay_out(self) -> None:
         row = line(spacing=5)
-        step, jump = self.step_requested.emit, self.jump_requested.emit
-        before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), partial(step, -1))
-        after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), partial(step, 1))
+        before = self._button("\N{LEFTWARDS ARROW}", tr("One frame back  (\N{LEFTWARDS ARROW})"), "Left")
+        after = self._button("\N{RIGHTWARDS ARROW}", tr("One frame on  (\N{RIGHTWARDS ARROW})"), "Right")
         previous = self._button(
-            "\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}", tr("To the previous one of the kind beside  (P)"), partial(jump, -1)
+            "\N{LEFT-POINTING DOUBLE ANGLE QUOTATION MARK}", tr("To the previous one of the kind beside  (P)"), "P"
         )
         following = self._button(
-            "\N{RIGHT-POINTING DOUBLE ANGLE QUOTATION MARK}", tr("To the next one of the kind beside  (N)"), partial(jump, 1)
+            "\N{RIGHT-POINTING DOUBLE ANGLE QUOTATION MARK}", tr("To the next one of the kind beside  (N)"), "N"
         )
         for group in ((before, self.play, after), (previous, self.kind, following)):
             for widget in group:
@@ -230,7 +210,7 @@ class PlayerBar(QWidget):
             row.addSpacing(6)
         row.addWidget(self.speed)
         row.addStretch(1)
-        for right in (self.progress, self.cancel, self.clip, self.note, self.snapshot):
+        for right in (self.clip, self.note, self.snapshot):
             row.addWidget(right)
         top = line((self.slider, 1), self.position, self.length, self.frame, spacing=8)
         self.setLayout(column(top, row, spacing=5))
@@ -344,18 +324,24 @@ class _EventDelegate(QStyledItemDelegate):
 
 _KNOWN = ("SIM", "LIVE", "PLAYBACK")
 _HEIGHT = 34
+_PLATE_STYLE = "color: @{0}; border: 2px dashed @{0}; border-radius: 6px; padding: 0 10px; font-size: 14px; font-weight: 700;"
 
 
-class RecordedPlate(PaintedWidget):
+class RecordedPlate(QWidget):
     """What was recorded, SIM or LIVE, on which rig, when: an outlined word, not filled as the banner of a live rig."""
 
     def __init__(self, manifest: Manifest | None, name: str, description: Description) -> None:
-        super().__init__(hint=(420, _HEIGHT), height=_HEIGHT)
-        self._description, self._is_written = description, False
-        self._kind = manifest.kind if manifest is not None else "UNKNOWN"
+        super().__init__()
         self._manifest, self._name = manifest, name
-        self._note = ""
-        self.show_written(False)
+        self._description, self._is_written = description, False
+        kind = manifest.kind if manifest is not None else "UNKNOWN"
+        self._word, self._note = QLabel(tr("recorded {kind}", kind=tr_text(kind))), QLabel()
+        theme.set_sheet(self._word, _PLATE_STYLE.format(kind if kind in _KNOWN else "FAULT"))
+        theme.set_sheet(self._note, "color: @TEXT_DIM; font-size: 14px;")
+        self._note.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.setLayout(line(self._word, (self._note, 1), spacing=12, margins=(1, 3, 0, 3)))
+        self.setFixedHeight(_HEIGHT)
+        self._show()
 
     def show_written(self, is_written: bool) -> None:
         """Whether it is still being recorded: then it is not cut off."""
@@ -369,27 +355,16 @@ class RecordedPlate(PaintedWidget):
 
     def _show(self) -> None:
         about, note = self._description, _note(self._manifest, self._name, is_written=self._is_written)
-        self._note = "  \N{MIDDLE DOT}  ".join(part for part in (note, about.line) if part)
+        self._note.setText("  \N{MIDDLE DOT}  ".join(part for part in (note, about.line) if part))
         program = self._manifest.program if self._manifest is not None else ""
         made = tr("recorded with LumenPilot {program}", program=program) if program else ""
         tags = " ".join(f"#{tag}" for tag in about.tags)
         self.setAccessibleName(self.text)
         self.setToolTip("\n".join(part for part in (self.text, tags, about.notes, made) if part))
-        self.update()
 
     @property
     def text(self) -> str:
-        return tr("recorded {kind}, {note}", kind=tr_text(self._kind), note=self._note)
-
-    def paint(self, painter: QPainter) -> None:
-        colour = theme.of(self._kind if self._kind in _KNOWN else "FAULT")
-        word, word_font = tr("recorded {kind}", kind=tr_text(self._kind)), theme.bold(14)
-        plate = QRectF(1, 3, QFontMetrics(word_font).horizontalAdvance(word) + 24, _HEIGHT - 6)
-        draw_box(painter, plate, 6, None, QPen(QColor(colour), 2, Qt.PenStyle.DashLine))
-        draw_text(painter, plate, word, word_font, colour, CENTER)
-        left = plate.right() + 12
-        room = QRectF(left, 0, max(0.0, self.width() - left), self.height())
-        draw_text(painter, room, self._note, theme.font(theme.Size.BODY), theme.TEXT_DIM, elided=True)
+        return f"{self._word.text()}, {self._note.text()}"
 
 
 def _note(manifest: Manifest | None, name: str, *, is_written: bool) -> str:

@@ -1,9 +1,8 @@
-"""The session that is played: its rows, events and problems, which become known while it is read; notes, snapshots and clips."""
+"""The session that is played: its rows, events and problems, which become known while it is read; notes and snapshots."""
 
 from __future__ import annotations
 
 import logging
-import threading
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,28 +15,19 @@ from app.player.course import Course, course_of
 from app.player.replayed import Replayed
 from app.ui.i18n import tr, tr_text
 from app.ui.snapshot import Origin, SnapshotWriter
-from app.ui.workers import QueuedCallback, Worker
-from app.widgets.overlay_image import draw_overlay
-from core.devices import UserError
+from app.ui.workers import Worker
 from core.files import name_of
-from core.session.export import export_mp4
 from core.session.files import add_event, is_being_written
 from core.session.manifest import Description, Event, SessionError, write_description
 from core.session.reader import SessionReader, losses
-from core.types import Image, Tick
+from core.types import Tick
 
 _POLL_MS = 200
 _GROWN = 1.2
 """While the session is read, the course is renewed when it has grown by this factor: each renewal costs more the longer it is."""
-_CLIP_REPORTS = 100
-_CLIP_POLL_S = 0.05
 _STOP_WITHIN_MS = 10_000
 
 _log = logging.getLogger(__name__)
-
-
-class _ClipCancelled(UserError):
-    """Raised in the clip's thread."""
 
 
 class PlayedSession(QObject):
@@ -46,13 +36,12 @@ class PlayedSession(QObject):
     ``changed``: course or events; ``polled``: the reader was asked; ``emptied``: why there is nothing to play;
     ``problems_found``: all problems; ``is_written``: whether the session is still being recorded; ``compared``: the results of a
     replay have been read; ``described``: what the session is about, once that is kept; ``note_refused``: a note that could not be
-    written; ``clip_progressed``: the share of the clip that is written, None when none is; ``clip_saved``: its path and a line;
-    ``message``: a line for people and whether it is a fault.
+    written; ``message``: a line for people and whether it is a fault.
 
     Parameters
     ----------
     reader : not closed here.
-    folder : of snapshots and clips.
+    folder : of snapshots.
     """
 
     changed = Signal()
@@ -63,8 +52,6 @@ class PlayedSession(QObject):
     compared = Signal()
     described = Signal(object)
     note_refused = Signal(object)
-    clip_progressed = Signal(object)
-    clip_saved = Signal(object, str)
     message = Signal(str, bool)
 
     def __init__(self, reader: SessionReader, folder: Path, parent: QObject | None = None) -> None:
@@ -85,10 +72,9 @@ class PlayedSession(QObject):
         self._losses: list[str] | None = None
         self._problems: list[str] | None = None
         self._is_empty = False
-        self._clip_cancelled: threading.Event | None = None
         self._poll_timer = QTimer(self, interval=_POLL_MS)
         self._poll_timer.timeout.connect(self._poll)
-        self._files, self._clips = Worker("player work", self), Worker("clip", self)
+        self._files = Worker("player work", self)
         self._measured = Worker("angles by hand", self, behind=True)
         self._measured.done.connect(self._on_done)
         self._measured.failed.connect(
@@ -96,8 +82,6 @@ class PlayedSession(QObject):
         )
         self._files.done.connect(self._on_done)
         self._files.failed.connect(self._on_failed)
-        self._clips.done.connect(self._on_clip_ended)
-        self._clips.failed.connect(lambda _clip, why: self._on_clip_ended(_clip, (tr("Clip not saved: {why}", why=why), True)))
         self._snapshots = SnapshotWriter(folder, self)
         self._snapshots.saved.connect(lambda line: self.message.emit(line, False))
         self._snapshots.failed.connect(lambda line: self.message.emit(line, True))
@@ -198,69 +182,11 @@ class PlayedSession(QObject):
         """The picture plain, with overlays, and its values."""
         self._snapshots.write(tick, Origin(f"{self._kind} PLAYBACK", None, self._model_name))
 
-    @property
-    def has_clip(self) -> bool:
-        return self._clip_cancelled is not None
-
-    def write_clip(self, places: tuple[int, int], times_s: tuple[float, float]) -> None:
-        """A video of the rows from the first to the last of `places` (included), named by their times."""
-        if self.has_clip:
-            self.message.emit(tr("A clip is being written already; Esc cancels it"), False)
-            return
-        cancelled = self._clip_cancelled = threading.Event()
-        session, stamp = self._reader.folder, f"{self._kind} PLAYBACK"
-        out, report, (first, last) = _free_path(self._folder, session, times_s), QueuedCallback(self), places
-        count, written = last + 1 - first, 0
-
-        def check() -> None:
-            if cancelled.is_set():
-                raise _ClipCancelled("cancelled")
-
-        def draw(tick: Tick) -> Image:
-            return draw_overlay(tick.frame.image, tick.scene, tick.advice, stamp=stamp)
-
-        def on_row() -> None:
-            nonlocal written
-            check()
-            written += 1
-            share = written / count
-            if written % max(1, count // _CLIP_REPORTS) == 0 or written == count:
-                report.send(lambda it: it.clip_progressed.emit(share) if it.has_clip else None)
-
-        def write() -> tuple[str, bool]:
-            try:
-                with SessionReader(session) as reader:  # of its own, so that playing goes on beside it
-                    while not reader.wait(_CLIP_POLL_S):
-                        check()
-                    pictures = export_mp4(reader, out, draw, first=first, last=last + 1, on_row=on_row)
-            except _ClipCancelled:
-                return tr("Clip cancelled; nothing was kept"), False
-            note = tr(", {count} pictures are lost", count=count - pictures) if pictures < count else ""
-            return tr("Clip saved: {file} ({count} pictures{note})", file=out, count=pictures, note=note), False
-
-        self.clip_progressed.emit(0.0)
-        self._clips.submit(out, write)
-
-    def cancel_clip(self) -> None:
-        """Stop soon; nothing is left of the file."""
-        if self._clip_cancelled is not None:
-            self._clip_cancelled.set()
-
-    def _on_clip_ended(self, clip: object, outcome: tuple[str, bool]) -> None:
-        self._clip_cancelled = None
-        self.clip_progressed.emit(None)
-        if isinstance(clip, Path) and clip.is_file():
-            self.clip_saved.emit(clip, outcome[0])
-        else:
-            self.message.emit(*outcome)
-
     def shut_down(self) -> bool:
-        """Finish notes and snapshots, cancel the clip; False when the disk does not answer."""
-        self.cancel_clip()
+        """Finish notes and snapshots; False when the disk does not answer."""
         self._measured.stop(finish=False)
-        for worker in (self._files, self._clips):
-            worker.stop(finish=True)
-        return self._snapshots.finish() & self._files.wait(_STOP_WITHIN_MS) & self._clips.wait(_STOP_WITHIN_MS)
+        self._files.stop(finish=True)
+        return self._snapshots.finish() & self._files.wait(_STOP_WITHIN_MS)
 
 
 def angles_by_hand(session: Path) -> NDArray[np.float64] | None:
@@ -289,13 +215,3 @@ def _add_note(folder: Path, event: Event) -> Event:
 def _describe(folder: Path, description: Description) -> Description:
     write_description(folder, description)
     return description
-
-
-def _free_path(folder: Path, session: Path, times_s: tuple[float, float]) -> Path:
-    """A file name that tells what is in the clip, and that does not exist yet."""
-    name = f"{name_of(session)}_{round(times_s[0] * 1000)}-{round(times_s[1] * 1000)}ms"
-    path, k = folder / f"{name}.mp4", 1
-    while path.exists():
-        k += 1
-        path = folder / f"{name}_{k}.mp4"
-    return path

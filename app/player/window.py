@@ -7,15 +7,17 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Slot
+from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
 
-from app.operator.recording import AfterSession, open_file
+from app.operator.recording import AfterSession
 from app.player.controls import NoteField, PlayerBar, RecordedPlate, SessionEvents
 from app.player.course import Course, JumpKind, PlayClock, chosen_at, neighbour, places_of, target_at, value_lines
 from app.player.decoder import Decoded, FrameDecoder
@@ -23,13 +25,14 @@ from app.player.replayed import compared_line
 from app.player.session_model import PlayedSession
 from app.player.timeline import TimelineView
 from app.ui import theme
-from app.ui.actions import MenuEntry, add_help_menu, add_menu
+from app.ui.actions import MenuEntry, action_of, add_help_menu, add_menu
 from app.ui.description_form import DescriptionDialog
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.opening import FRAMES, OfferedCommand, ask_path, open_file
 from app.ui.snapshot import pictures_folder
 from app.ui.theme import ON_PICTURE
 from app.ui.window_base import WindowFrame
-from app.widgets.basics import Card, card_note, column, holder, line
+from app.widgets.basics import Card, OnResize, card_note, column, holder, line
 from app.widgets.command_panel import Provenance, ProvenanceTable
 from app.widgets.live_view import HeadLoupe, LiveView
 from app.widgets.messages import Notice, NoticeKind, Offer, OfferButton, OfferStrip, Toast
@@ -40,6 +43,7 @@ from app.widgets.sim_banner import SimBanner
 from core.config.models import Config
 from core.config.rig_file import scaled
 from core.evaluation.rehearsal import RehearsalResult, rehearsal_of
+from core.files import name_of
 from core.session.codec import RecordedRow
 from core.session.exporters import PLUGINS
 from core.session.manifest import Description, Event, EventKind
@@ -146,7 +150,7 @@ _BANNER_WIDTH, _GAP = 330, 8
 class PlayerPanels(ScenePanels):
     """Makes the widgets, lays them out, and shows one recorded row on all of them."""
 
-    def __init__(self, config: Config, reader: SessionReader, *, with_other: bool = False) -> None:
+    def __init__(self, config: Config, reader: SessionReader, press: Callable[[str], object], *, with_other: bool = False) -> None:
         manifest = reader.manifest
         known = manifest.known if manifest is not None else None
         pixels_per_mm = scaled(config, known).policy.pursuit.pixels_per_mm
@@ -169,7 +173,7 @@ class PlayerPanels(ScenePanels):
         self.values = _text_page(tr("Recorded values"))
         self.problems = _text_page(tr("Problems of the session"))
         self.timeline = TimelineView()
-        self.bar = PlayerBar()
+        self.bar = PlayerBar(press)
         self.note = NoteField(tr("Note at this time; Enter keeps it, Esc does not"), "SKY")
         self.note.hide()
         self._mode_note = card_note(tr("mode when it was recorded"))
@@ -314,22 +318,14 @@ class _CornerLabel(QLabel):
 
     def __init__(self, text: str, parent: QWidget) -> None:
         super().__init__(text, parent)
-        self._parent = parent
         theme.set_sheet(self, "background: @PLAYBACK; color: @INK; font-weight: 700; font-size: 12px; padding: 2px 8px;")
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.adjustSize()
-        parent.installEventFilter(self)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize:
-            self.move(2, self._parent.height() - self.height() - 2)
-        return False
+        OnResize(parent, self, lambda: self.move(2, parent.height() - self.height() - 2))
 
 
-_MOST_ANNOTATED = 48
-"""Frames that are annotated at once, as the annotator takes of a whole session."""
-_CLIP = "clip"
-"""Key of the offer after a clip was saved."""
+_EXPORTED = "exported"
+"""Key of the offer after a file was written."""
 _TURN_MS = 15
 _STOP_WITHIN_MS = 10_000
 
@@ -362,11 +358,12 @@ class PlayerWindow(WindowFrame):
         self._refused_notes: deque[Event] = deque()
         self._description = reader.description
         self._decoder = FrameDecoder(reader, self)
-        self.session = PlayedSession(reader, pictures_folder(config.window.pictures_folder), self)
+        self._pictures = pictures_folder(config.window.pictures_folder)
+        self.session = PlayedSession(reader, self._pictures, self)
         self._turn = QTimer(self, interval=_TURN_MS, timerType=Qt.TimerType.PreciseTimer)
-        self.panels = PlayerPanels(config, reader, with_other=against is not None)
+        self.panels = PlayerPanels(config, reader, lambda key: action_of(self, key).trigger(), with_other=against is not None)
         self.setCentralWidget(self.panels)
-        self.after = AfterSession(self.panels.offers, parent=self)
+        self.after = AfterSession(self.panels.offers, self.others, parent=self)
         add_player_menus(self)
         self._connect()
         self.setWindowTitle(tr("LumenPilot \N{EM DASH} PLAYBACK of {name}", name=reader.folder.name))
@@ -386,7 +383,6 @@ class PlayerWindow(WindowFrame):
         self._decoder.decoded.connect(self._on_decoded)
         self._decoder.failed.connect(lambda line: panels.show_nothing(tr("Playing ended"), line, NoticeKind.FAULT))
         session.message.connect(self.show_message)
-        session.clip_saved.connect(self._on_clip_saved)
         self.after.said.connect(self.show_message)
         self.others.said.connect(self.show_message)
         session.changed.connect(self._show_course)
@@ -397,21 +393,13 @@ class PlayerWindow(WindowFrame):
         session.compared.connect(self._on_compared)
         session.described.connect(self._on_described)
         session.note_refused.connect(self._on_note_refused)
-        session.clip_progressed.connect(bar.show_progress)
         panels.timeline.sought.connect(self.seek)
         panels.timeline.selected.connect(lambda first, last: self.select((first, last)))
         panels.events.chosen.connect(self._go_to_event)
         panels.note.returnPressed.connect(self._save_note)
-        bar.play_requested.connect(self.toggle_play)
-        bar.step_requested.connect(self.step)
-        bar.jump_requested.connect(self.jump)
         bar.sought_ms.connect(lambda ms: self.seek(ms / 1000.0))
         bar.speed_chosen.connect(self.set_speed)
         bar.jump_kind_chosen.connect(self.set_jump_kind)
-        bar.clip_requested.connect(self.export_clip)
-        bar.cancel_requested.connect(session.cancel_clip)
-        bar.note_requested.connect(self.begin_note)
-        bar.snapshot_requested.connect(self.save_snapshot)
         bar.show_speed(1.0)
         bar.show_kind(self.jump_kind)
         if self._against is not None:
@@ -587,15 +575,15 @@ class PlayerWindow(WindowFrame):
 
     @Slot()
     def export_clip(self) -> None:
-        """The selection as a video with overlays, into the pictures' folder; playing goes on."""
+        """The selection, or the whole session, as a video with overlays in the pictures' folder; playing goes on."""
         if not len(self.course):
             self.show_message(tr("No clip: there are no frames"), is_fault=True)
             return
-        if self.selection is None and not self.session.is_whole:
-            self.show_message(tr("No clip yet: the session is still being read, and would be cut short"), is_fault=True)
-            return
         first_s, last_s = self.selection or (0.0, self.course.duration_s)
-        self.session.write_clip((self.course.place_at(first_s), self.course.place_at(last_s)), (first_s, last_s))
+        first, last = (self.course.rows[self.course.place_at(time_s)] for time_s in (first_s, last_s))
+        name = f"{name_of(self._reader.folder)}_{round(first_s * 1000)}-{round(last_s * 1000)}ms"
+        paths = (self._pictures / f"{name}{'' if k == 1 else f'_{k}'}.mp4" for k in count(1))
+        self._export(next(path for path in paths if not path.exists()), *(["--rows", f"{first}-{last}"] if self.selection else []))
 
     @Slot()
     def save_snapshot(self) -> None:
@@ -606,32 +594,33 @@ class PlayerWindow(WindowFrame):
         else:
             self.session.save_snapshot(tick)
 
-    def _on_clip_saved(self, path: Path, text: str) -> None:
-        folder = OfferButton(tr("Open its folder"), partial(open_file, path.parent), str(path.parent))
-        play = OfferButton(tr("Open the clip"), partial(open_file, path))
-        self.panels.offers.offer(Offer(_CLIP, text, "", (folder, play)))
-
     def ask_open(self) -> None:
         """Another session, or a folder of pictures, in a window of its own."""
-        self._ask(tr("A session, or a folder of pictures"), QFileDialog.FileMode.Directory, self.open_path)
+        folder = self._reader.folder.parent
+        ask_path(self, tr("A session, or a folder of pictures"), folder, self.open_path, QFileDialog.FileMode.Directory)
 
     def ask_export(self) -> None:
         """The whole session in another form, by the ending of the file's name."""
-        endings = " ".join(f"*.{ending}" for ending in PLUGINS.names)
-        self._ask(tr("Export the session as"), QFileDialog.FileMode.AnyFile, self._export, endings)
+        folder, endings = self._reader.folder, " ".join(f"*.{ending}" for ending in PLUGINS.names)
+        mode = QFileDialog.FileMode.AnyFile
+        dialog = ask_path(self, tr("Export the session as"), folder.parent, self._export, mode, [endings])
+        dialog.selectFile(f"{folder.name}.mp4")
 
-    def _ask(self, title: str, mode: QFileDialog.FileMode, then: Callable[[Path], None], endings: str = "") -> None:
-        dialog = QFileDialog(self, title, str(self._reader.folder.parent), fileMode=mode)
-        if endings:
-            dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-            dialog.setNameFilter(endings)
-            dialog.selectFile(f"{self._reader.folder.name}.mp4")
-        dialog.fileSelected.connect(lambda path: then(Path(path)))
-        dialog.finished.connect(dialog.deleteLater)
-        dialog.open()
+    def _export(self, out: Path, *options: str) -> None:
+        words, session = tr("Exporting {name}", name=out.name), str(self._reader.folder)
+        arguments = ("session", "export", session, "--out", str(out), *options, "--progress-json", "--json")
+        command = OfferedCommand(self, self.panels.offers, words, *arguments)
+        command.ended.connect(partial(self._on_exported, out))
+        command.start()
 
-    def _export(self, out: Path) -> None:
-        self.others.open(tr("Exporting {name}", name=out.name), "session", "export", str(self._reader.folder), "--out", str(out))
+    def _on_exported(self, out: Path, told: dict[str, Any] | None, line: str, is_fault: bool) -> None:
+        if told is None:
+            self.show_message(tr_text(line), is_fault)
+            return
+        folder = OfferButton(tr("Open its folder"), partial(open_file, out.parent), str(out.parent))
+        play = OfferButton(tr("Open it"), partial(open_file, out))
+        text = tr("Exported: {path}", path=out)
+        self.panels.offers.offer(Offer(_EXPORTED, text, "\n".join(map(tr_text, told["problems"])), (folder, play)))
 
     # ---- annotation, in a window of its own
 
@@ -650,7 +639,7 @@ class PlayerWindow(WindowFrame):
         self._annotate(self._selected(differs) if differs is not None else np.zeros(0, np.int64), tr("No difference here"))
 
     def annotate_session(self) -> None:
-        self.after.annotate(self._reader.folder)
+        self.others.annotate(self._reader.folder)
 
     def evaluate(self) -> None:
         """The algorithm against what was annotated, as a report; without that the annotator is offered."""
@@ -667,17 +656,15 @@ class PlayerWindow(WindowFrame):
         if not len(places):
             self.show_message(why_none)
             return
-        if len(places) > _MOST_ANNOTATED:
-            places = places[np.unique(np.round(np.linspace(0, len(places) - 1, _MOST_ANNOTATED)).astype(int))]
-        rows = ",".join(str(row) for row in self.course.rows[places].tolist())
-        words = tr("Opening the annotator: {count} frames", count=len(places))
-        self.others.open(words, "annotate", str(self._reader.folder), "--rows", rows)
+        if len(places) > FRAMES:
+            places = places[np.unique(np.round(np.linspace(0, len(places) - 1, FRAMES)).astype(int))]
+        self.others.annotate(self._reader.folder, ",".join(str(row) for row in self.course.rows[places].tolist()))
 
     # ---- what it is about
 
     def open_library(self) -> None:
         """All sessions of its folder."""
-        self.others.open(tr("Opening the library"), "library", str(self._reader.folder.absolute().parent))
+        self.others.open_library(self._reader.folder.absolute().parent)
 
     def describe(self) -> None:
         """Ask what the session is about."""
@@ -751,8 +738,6 @@ class PlayerWindow(WindowFrame):
         elif self.focusWidget() is not panels.live:
             panels.bar.discard_typed_time()
             panels.live.setFocus()
-        elif self.session.has_clip:
-            self.session.cancel_clip()
         elif self.selection is not None:
             self.select(None)
         else:
@@ -772,14 +757,15 @@ class PlayerWindow(WindowFrame):
         return super()._may_close()
 
     def _let_go(self) -> None:
-        self.others.leave()  # people work in these windows
         self.after.close()
+        for command in self.findChildren(OfferedCommand):
+            command.leave(end=True)
         self._turn.stop()
         self.session.stop_polling()
         self.panels.notice.clear()
 
     def _finish(self) -> Sequence[str]:
-        """End the threads; notes and snapshots are finished, a clip is cancelled."""
+        """End the threads; notes and snapshots are finished."""
         self._decoder.stop()
         has_saved = self.session.shut_down()
         if not (self._decoder.wait(_STOP_WITHIN_MS) and has_saved):

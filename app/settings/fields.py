@@ -27,6 +27,7 @@ from app.operator.stop_keys import NUMBERS_ONLY
 from app.settings.draft import as_text
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
+from app.ui.opening import ask_path
 from app.widgets.basics import QuietCombo
 from core.config.models import RESOURCES
 from core.config.rig_file import rigs_folder
@@ -70,7 +71,6 @@ class BrowseButton(QPushButton):
     def __init__(self, key: str, title: str) -> None:
         super().__init__(tr("Browse..."))
         self._key, self._wanted = key, WANTED[key]
-        self.dialog: QFileDialog | None = None
         self.entry = ""
         """The text of the field: the dialog begins there."""
         self.setAccessibleName(tr("Browse for {title}", title=title))
@@ -84,30 +84,12 @@ class BrowseButton(QPushButton):
             self.clicked.connect(lambda _on=False: self.browse(folders=self._wanted.folders))
 
     def browse(self, *, folders: bool) -> None:
-        if self.dialog is not None:
-            self.dialog.raise_()
-            return
-        dialog = QFileDialog(self.window(), tr(self._wanted.title), str(self._start()))
-        dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
-        if folders:
-            dialog.setFileMode(QFileDialog.FileMode.Directory)
-            dialog.setOption(QFileDialog.Option.ShowDirsOnly)
-        else:
-            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-            dialog.setNameFilters(self._wanted.filter.split(";;"))
-        dialog.fileSelected.connect(self._on_selected)
-        dialog.finished.connect(self._on_finished)
-        self.dialog = dialog
-        dialog.show()  # not open(): nothing may block STOP
+        mode = QFileDialog.FileMode.Directory if folders else QFileDialog.FileMode.ExistingFile
+        filters = [] if folders else self._wanted.filter.split(";;")
+        ask_path(self.window(), tr(self._wanted.title), self._start(), self._on_chosen, mode, filters)
 
-    def _on_selected(self, path: str) -> None:
-        chosen = Path(path)
-        self.chosen.emit(chosen.name if chosen.parent == _MODELS else path)  # a shipped model goes by its name
-
-    def _on_finished(self) -> None:
-        dialog, self.dialog = self.dialog, None
-        if dialog is not None:
-            dialog.deleteLater()
+    def _on_chosen(self, path: Path) -> None:
+        self.chosen.emit(path.name if path.parent == _MODELS else str(path))  # a shipped model goes by its name
 
     def _start(self) -> Path:
         """The nearest folder that is there."""

@@ -1,18 +1,30 @@
-"""Windows that this one opens, each a process of its own: a session in the player, everything else in the annotator."""
+"""What a window opens and starts beside itself: other windows, commands, files; and the dialog that asks for a path.
+
+Windows and commands are processes of their own: a session opens in the player, everything else in the annotator.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any, Protocol
 
-from PySide6.QtCore import QMimeData, QObject, Signal
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtCore import QMimeData, QObject, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
 from app.ui.i18n import tr, tr_text
 from app.ui.layout_state import layout_settings
-from app.ui.workers import ChildProcess, command_of
+from app.ui.workers import NOT_STARTED, ChildProcess, command_of
+from app.widgets.messages import Offer, OfferButton
 from core.session.manifest import MANIFEST
+
+FRAMES = 48
+"""Pictures of a session that are annotated, evenly over its time: as many as in the paper."""
+_CANCELLED = 130, -signal.SIGTERM
+"""Exit codes of a command that was asked to end."""
 
 
 class OtherWindows(QObject):
@@ -39,9 +51,22 @@ class OtherWindows(QObject):
         """The player for a session, or a file in one; the annotator, with these `options`, for everything else."""
         session = next((at for at in (path, path.parent) if (at / MANIFEST).is_file()), None)
         if session is not None:
-            self.open(tr("Opening the player: {name}", name=session.name), "play", str(session))
+            self.play(session)
         else:
             self.open(tr("Opening the annotator: {name}", name=path.name), "annotate", str(path), *options)
+
+    def play(self, session: Path) -> None:
+        """The player, with everything as it was understood."""
+        self.open(tr("Opening the player: {name}", name=session.name), "play", str(session))
+
+    def annotate(self, session: Path, rows: str = "") -> None:
+        """The annotator on pictures evenly over a session, or on those of `rows`, as ``annotate --rows`` takes them."""
+        options = ("--rows", rows) if rows else ("--frames", str(FRAMES), "--order", "even")
+        self.open(tr("Opening the annotator: {name}", name=session.name), "annotate", str(session), *options)
+
+    def open_library(self, folder: Path) -> None:
+        """All sessions of a folder."""
+        self.open(tr("Opening the library"), "library", str(folder))
 
     def leave(self) -> None:
         """This window closes; nothing more is said of the others."""
@@ -53,6 +78,95 @@ class OtherWindows(QObject):
         child.deleteLater()
         if code != 0:
             self.said.emit(tr_text(line) or tr("That window ended with exit code {code}", code=code), True)
+
+
+class Offers(Protocol):
+    """Where offers are shown."""
+
+    def offer(self, offer: Offer) -> None: ...
+    def withdraw(self, key: str) -> None: ...
+
+
+class OfferedCommand(QObject):
+    """A command that runs beside the window; an offer shows how far it is, with a button that asks it to end.
+
+    ``ended`` carries what the command told at its end (None: it failed or was cancelled), a line that says why it told nothing, and
+    whether that is a fault.
+    """
+
+    ended = Signal(object, str, bool)
+
+    def __init__(self, parent: QObject, offers: Offers, words: str, *arguments: str) -> None:
+        super().__init__(parent)
+        self._offers, self._words, self._key = offers, words, f"command {id(self)}"
+        self._told: dict[str, Any] = {}
+        self._child = ChildProcess(command_of(*arguments), self)
+        self._child.told.connect(self._on_told)
+        self._child.ended.connect(self._on_ended)
+        self._show(-1.0, "")
+
+    def start(self) -> None:
+        self._child.start()
+
+    def cancel(self, why: str) -> None:
+        """It is not started, and `why`."""
+        self._on_ended(NOT_STARTED, why)
+
+    def leave(self, *, end: bool = False) -> None:
+        """The window closes: nothing more is said of it; with `end` it is asked to end, too."""
+        self._child.leave()
+        if end:
+            self._child.ask_to_end()
+
+    def _on_told(self, record: dict[str, Any]) -> None:
+        if record.get("done") is None:
+            self._told.update(record)
+            return
+        done, total, what = record["done"], record["total"], tr_text(record["what"])
+        left = tr(", {left:.0f} s left", left=record["left_s"]) if record.get("left_s") else ""
+        detail = tr("{done:.0f} of {total:.0f} {what}{left}", done=done, total=total or 0, what=what, left=left)
+        self._show(min(1.0, done / total) if total else -1.0, detail)
+
+    def _show(self, share: float, detail: str) -> None:
+        cancel, end = OfferButton(tr("Cancel"), self._child.ask_to_end, tr("Stop it")), self._child.ask_to_end
+        self._offers.offer(Offer(self._key, self._words, detail, (cancel,), share=share, dismissed=end))
+
+    def _on_ended(self, code: int, line: str) -> None:
+        self._offers.withdraw(self._key)
+        if code in _CANCELLED:
+            self.ended.emit(None, tr("Cancelled"), False)
+        elif code:
+            self.ended.emit(None, line or tr("Ended with exit code {code}", code=code), True)
+        else:
+            self.ended.emit(self._told, "", False)
+        self.deleteLater()
+
+
+def open_file(path: Path) -> bool:
+    """Show a file or folder with whatever the desktop shows such with; False when it cannot."""
+    return QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))
+
+
+def ask_path(
+    parent: QWidget,
+    title: str,
+    folder: Path,
+    then: Callable[[Path], object],
+    mode: QFileDialog.FileMode = QFileDialog.FileMode.ExistingFile,
+    filters: Sequence[str] = (),
+) -> QFileDialog:
+    """Ask for a file or folder; `then` gets each one that is chosen. The dialog blocks nothing: STOP stays within reach."""
+    dialog = QFileDialog(parent, title, str(folder), fileMode=mode)
+    dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+    if filters:
+        dialog.setNameFilters(filters)
+    if mode is QFileDialog.FileMode.AnyFile:
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)  # the commands that write never overwrite
+    dialog.filesSelected.connect(lambda chosen: [then(Path(path)) for path in chosen])
+    dialog.finished.connect(dialog.deleteLater)
+    dialog.show()
+    return dialog
 
 
 def dropped_paths(data: QMimeData) -> list[Path]:

@@ -406,9 +406,6 @@ QUANTITY = {
             "instead."
         ),
     ),
-    "reason": Quantity(
-        mark("No pose"), "", mark("The program sees that it cannot tell, and names why: better no answer than a wrong one.")
-    ),
     # ---- the vessel and the way
     "clearance": Quantity(
         mark("Room"),
@@ -420,14 +417,6 @@ QUANTITY = {
     ),
     "force": Quantity(
         mark("Wall force"), "N", mark("Sum of the contact forces of the robot on the vessel's wall. Known on the bench twin only.")
-    ),
-    "target": Quantity(
-        mark("Destination"),
-        mark("px to go"),
-        mark(
-            "Where you want to go: a click in the picture sets it, a right click or Esc clears it. "
-            "The vessel's direction follows the way there, and the program drives to it."
-        ),
     ),
     "phantom": Quantity(
         mark("Phantom"), "", mark("The vessel phantom that the bench twin shows; another one starts the twin again.")
@@ -472,9 +461,6 @@ QUANTITY = {
         ),
     ),
     "insertion": Quantity(mark("in"), "mm", mark("How far the robot is in, by the feed's servo.")),
-    "mode": Quantity(
-        mark("Mode"), "", mark("Who drives: ADVISORY and ARMED you, AUTONOMOUS the program, HOLD and STOPPED nobody.")
-    ),
     "deadman": Quantity(
         mark("Deadman"),
         "",
@@ -519,11 +505,6 @@ QUANTITY = {
             "The whole session: states as a band, theta, gaps, and marks of alerts, steps, destinations and notes. Click or drag "
             "goes there, the wheel zooms, Shift and drag selects."
         ),
-    ),
-    "values": Quantity(
-        mark("Recorded values"),
-        "",
-        mark("What no dial shows: frame, latency by stage, confidence, crossed, tendons, servo bus, faults."),
     ),
     "lines_used": Quantity(
         mark("lines used"),

@@ -172,6 +172,7 @@ class WindowFrame(QMainWindow):
         if self._is_shut:
             return
         self._is_shut = True
+        self.others.leave()  # people work in these windows
         self._let_go()
         self._heartbeat.stop()
         # A repaint that is still queued would find a window without a surface.

@@ -289,7 +289,7 @@ def test_exports_and_reports_are_made_by_other_processes_from_a_copy(
         copy, out = (arguments[arguments.index(name) + 1] for name in ("--store", "--out"))
         return [sys.executable, "-c", f"{count}open(sys.argv[2], 'w').write(str(n))", copy, out]
 
-    monkeypatch.setattr("app.annotator.files.command_of", command)
+    monkeypatch.setattr("app.ui.opening.command_of", command)
     rater.press(Key.Key_X)
     rater.window.files.export("coco", tmp_path / "masks")
     rater.qtbot.waitUntil(lambda: "Written" in rater.message, timeout=30_000)

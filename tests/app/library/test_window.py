@@ -10,13 +10,14 @@ from typing import ClassVar
 import pytest
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.library import model as library_model
-from app.library import window as library_window
 from app.library.model import SUMMARY, LibraryModel, SortOrder
 from app.library.window import LibraryWindow
 from app.ui import opening
+from app.ui.opening import OfferedCommand
 from core.session import manifest as manifests
 from core.session.library import SummaryCache
 from core.session.manifest import MANIFEST, Description, read_description, read_manifest, write_description
@@ -189,11 +190,9 @@ class _Child(QObject):
 def test_sessions_are_played_annotated_and_exported_from_here(
     open_library: Open, folder: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    for module in (library_window, opening):
-        monkeypatch.setattr(module, "ChildProcess", _Child)
+    monkeypatch.setattr(opening, "ChildProcess", _Child)
     monkeypatch.setattr(_Child, "started", started := [])
     out = str(tmp_path / "a")
-    monkeypatch.setattr(library_window.QFileDialog, "getSaveFileName", lambda *_, **__: (out, ""))
     window = open_library(folder)
     all_read(window, qtbot)
     window.panels.search.setText("ben")
@@ -202,13 +201,17 @@ def test_sessions_are_played_annotated_and_exported_from_here(
     QTest.keyClick(window.panels.list, Qt.Key.Key_P)
     QTest.keyClick(window.panels.list, Qt.Key.Key_A)
     window.panels.export.menu().actions()[1].trigger()
+    (dialog,) = window.findChildren(QFileDialog)
+    dialog.filesSelected.emit([out])
+    dialog.close()
     assert started == [
         ("play", session),
         ("annotate", session, "--frames", "48", "--order", "even"),
         ("session", "export", session, "--out", f"{out}.csv", "--progress-json"),
     ]
-    window._children[0].told.emit({"done": 1, "total": 4, "what": "x.csv"})
+    child = window.findChild(OfferedCommand)._child
+    child.told.emit({"done": 1, "total": 4, "what": "x.csv"})
     assert "Exporting" in window.panels.offers.text
-    window._children[0].ended.emit(2, "the disk is full; make room")
+    child.ended.emit(2, "the disk is full; make room")
     assert window.panels.toast.text() == "the disk is full; make room"
     assert window.panels.offers.text == ""

@@ -15,12 +15,12 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.annotator.sources import image_files
-from app.operator import recording
 from app.operator.record_bar import RecordBar
-from app.operator.recording import AfterSession, Declined, RecoveryController
+from app.operator.recording import AfterSession, RecoveryController, declined_names
 from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.ui.description_form import DescriptionDialog
+from app.ui.opening import OtherWindows
 from app.widgets.messages import OfferStrip
 from core.annotation.store import DEFAULT_NAME
 from core.config.models import Config
@@ -39,7 +39,6 @@ from core.session.manifest import (
     remembered_description,
 )
 from core.session.reader import SessionReader
-from core.session.recovery import CutSession
 from core.types import Tick
 from tests.app.annotated import measure
 from tests.app.conftest import MakeWindow
@@ -284,8 +283,10 @@ def after(strip: OfferStrip, shown: list[Path], said: list[str]) -> Iterator[Aft
         shown.append(path)
         return True
 
-    after = AfterSession(strip, show)
-    after.said.connect(lambda line, _: said.append(line))
+    windows = OtherWindows()
+    after = AfterSession(strip, windows, show)
+    for part in (after, windows):
+        part.said.connect(lambda line, _: said.append(line))
     yield after
     after.close()
 
@@ -344,15 +345,13 @@ def test_an_evaluation_can_be_cancelled(
     session = session_in(tmp_path)
     measure(session / DEFAULT_NAME, image_files([session], 48)[:1], [5.0])
     after.evaluate(session)
-    child = after._evaluation
     strip.answers["Cancel"].click()
-    qtbot.waitUntil(lambda: not child.is_running, timeout=LONG_MS)
-    assert said == ["Evaluation cancelled"]
+    qtbot.waitUntil(lambda: said == ["Cancelled"], timeout=LONG_MS)
     assert shown == []
 
 
 def test_a_window_that_fails_says_why(after: AfterSession, said: list[str], qtbot: QtBot, tmp_path: Path) -> None:
-    after.play(tmp_path / "no_session")
+    after._windows.play(tmp_path / "no_session")
     qtbot.waitUntil(lambda: len(said) == 2, timeout=LONG_MS)
     assert "no_session" in said[1]
 
@@ -443,34 +442,38 @@ def content(session: Path) -> dict[str, str]:
 
 @pytest.fixture
 def desk(strip: OfferStrip, tmp_path: Path) -> Iterator[RecoveryController]:
-    desk = RecoveryController(tmp_path / "sessions", strip, Declined(tmp_path / "state" / "declined.json"))
+    desk = RecoveryController(tmp_path / "sessions", strip, tmp_path / "state" / "declined.json")
     yield desk
     desk.close()
 
 
-def test_a_cut_session_is_offered_with_its_loss_and_recovered_into_a_copy(
+def test_cut_sessions_are_offered_and_recovered_into_copies(
     desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path
 ) -> None:
     session = cut(tmp_path / "sessions")
+    time.sleep(1.1)  # sessions are named by the second
+    damaged = cut(tmp_path / "sessions")
+    for path in (damaged / "frames.jsonl", *damaged.glob("video_*")):
+        path.write_bytes(b"\0" * 500)
     before = content(session)
     said: list[str] = []
     copies: list[Path] = []
     desk.said.connect(lambda line, _: said.append(line))
     desk.recovered.connect(lambda copy, _words: copies.append(copy))
     desk.search()
-    qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
-    # 12 frames 0.1 s apart, one row gone: its picture is there, but nobody knows what it showed
-    assert "0.1 s are lost (rows: 1, pictures: 0)" in strip.text
-    assert session.name in strip.text
+    qtbot.waitUntil(lambda: "2 recordings were cut" in strip.text, timeout=LONG_MS)
+    assert session.name in strip.text and damaged.name in strip.text
     strip.answers["Recover"].click()
-    qtbot.waitUntil(lambda: bool(copies), timeout=LONG_MS)
+    qtbot.waitUntil(lambda: len(said) == 2, timeout=LONG_MS)
     assert copies == [session.with_name(session.name + "_recovered")]
     with SessionReader(copies[0]) as reader:
         assert reader.wait(10.0)
         assert len(reader) == 11
         assert reader.is_closed
     assert content(session) == before
-    assert "0.1 s are lost" in said[-1]
+    # 12 frames 0.1 s apart, one row gone: its picture is there, but nobody knows what it showed
+    assert "0.1 s are lost (rows: 1, pictures: 0)" in said[0]
+    assert "nothing left to recover" in said[1]
     assert not strip.isVisible()
 
 
@@ -479,9 +482,13 @@ def test_a_session_that_is_not_wanted_is_not_offered_again(
 ) -> None:
     session = cut(tmp_path / "sessions")
     desk.search()
+    qtbot.waitUntil(lambda: "A recording was cut" in strip.text, timeout=LONG_MS)
+    strip.answers["Not now"].click()
+    assert not declined_names(tmp_path / "state" / "declined.json")
+    desk.search()
     qtbot.waitUntil(lambda: "Never" in strip.answers, timeout=LONG_MS)
     strip.answers["Never"].click()
-    assert Declined(tmp_path / "state" / "declined.json").names() == {session.name}
+    assert declined_names(tmp_path / "state" / "declined.json") == {session.name}
     desk.search()
     qtbot.waitUntil(lambda: desk._work.pending == 0)
     qtbot.wait(50)
@@ -490,93 +497,24 @@ def test_a_session_that_is_not_wanted_is_not_offered_again(
     qtbot.waitUntil(lambda: strip.isVisible() and "Recover" in strip.answers, timeout=LONG_MS)
 
 
-def test_what_is_found_after_closing_starts_nothing(
-    desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path
-) -> None:
-    cut(tmp_path / "sessions")
-    desk.search()
+def test_what_is_found_after_closing_starts_nothing(desk: RecoveryController, strip: OfferStrip, tmp_path: Path) -> None:
     desk.close()
-    desk._on_found("look", [CutSession(tmp_path, "cut", 1)])
-    assert desk._child is None
+    desk._on_found(False, [tmp_path])
     assert not strip.isVisible()
 
 
-def test_not_now_goes_on_to_the_next_one_and_asks_again_at_the_next_start(
-    desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path
+def test_a_process_that_cannot_be_started_is_said(
+    desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = cut(tmp_path / "sessions")
-    time.sleep(1.1)  # sessions are named by the second
-    second = cut(tmp_path / "sessions")
+    cut(tmp_path / "sessions")
+    said: list[str] = []
+    desk.said.connect(lambda line, _: said.append(line))
+    monkeypatch.setattr("app.ui.opening.command_of", lambda *_: ["/nowhere/python"])
     desk.search()
-    qtbot.waitUntil(lambda: "(1 of 2)" in strip.text, timeout=LONG_MS)
-    assert first.name in strip.text
-    strip.answers["Not now"].click()
-    qtbot.waitUntil(lambda: "(2 of 2)" in strip.text, timeout=LONG_MS)
-    assert second.name in strip.text
-    strip.answers["\N{MULTIPLICATION SIGN}"].click()
-    assert not Declined(tmp_path / "state" / "declined.json").names()
-    desk.search()
-    qtbot.waitUntil(lambda: "(1 of 2)" in strip.text, timeout=LONG_MS)
-
-
-def test_what_cannot_be_recovered_is_said_and_can_be_declined(
-    desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path
-) -> None:
-    session = cut(tmp_path / "sessions")
-    (session / "frames.jsonl").write_bytes(b"\0" * 500)
-    for video in session.glob("video_*"):
-        video.write_bytes(b"\0" * 500)
-    desk.search()
-    qtbot.waitUntil(lambda: "cannot be recovered" in strip.text, timeout=LONG_MS)
-    assert "nothing left to recover" in strip.text
-    strip.answers["Never"].click()
-    assert Declined(tmp_path / "state" / "declined.json").names() == {session.name}
-
-
-_NOWHERE, _KILLED = ["/nowhere/python"], ["/bin/sh", "-c", "kill -9 $$"]
-
-
-@pytest.mark.parametrize(
-    ("what", "command", "told"),
-    [
-        ("looking", _NOWHERE, "could not be started"),
-        ("recovering", _KILLED, "was ended from outside"),
-    ],
-)
-def test_a_process_that_says_nothing_is_no_word_against_the_session_and_can_be_tried_again(
-    desk: RecoveryController,
-    strip: OfferStrip,
-    qtbot: QtBot,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    what: str,
-    command: list[str],
-    told: str,
-) -> None:
-    session = cut(tmp_path / "sessions")
-    copies: list[Path] = []
-    desk.recovered.connect(lambda copy, _words: copies.append(copy))
-    if what == "recovering":
-        desk.search()
-        qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
-    with monkeypatch.context() as broken:
-        broken.setattr(recording, "command_of", lambda *_: command)
-        if what == "recovering":
-            strip.answers["Recover"].click()
-        else:
-            desk.search()
-        qtbot.waitUntil(lambda: "Try again" in strip.answers, timeout=LONG_MS)
-        assert told in strip.text
-        assert session.name in strip.text
-        assert "cannot be recovered" not in strip.text
-        assert "Never" not in strip.answers  # nobody knows anything against it
-        strip.answers["Try again"].click()
-        qtbot.waitUntil(lambda: desk._child is None and "Try again" in strip.answers, timeout=LONG_MS)
-    strip.answers["Try again"].click()
-    if what == "looking":
-        qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
-        strip.answers["Recover"].click()
-    qtbot.waitUntil(lambda: bool(copies), timeout=LONG_MS)
+    qtbot.waitUntil(lambda: "Recover" in strip.answers, timeout=LONG_MS)
+    strip.answers["Recover"].click()
+    qtbot.waitUntil(lambda: bool(said), timeout=LONG_MS)
+    assert said[0].startswith("Not recovered: cannot be started")
     assert not strip.isVisible()
 
 
@@ -599,8 +537,4 @@ def test_a_folder_that_is_not_there_and_whole_sessions_offer_nothing(
 def test_a_damaged_list_of_declined_ones_declines_nothing(text: str, tmp_path: Path) -> None:
     path = tmp_path / "declined.json"
     path.write_text(text)
-    declined = Declined(path)
-    assert declined.names() == set()
-    declined.add("session_a")
-    declined.add("session_b")
-    assert declined.names() == {"session_a", "session_b"}
+    assert declined_names(path) == set()

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.settings.dialog import SettingsDialog
@@ -308,10 +309,10 @@ def test_a_folder_is_chosen_on_the_disk(dialog: SettingsDialog, tmp_path: Path) 
     seen = drafts(dialog)
     chooser = field(dialog, "record.folder").browse_button
     chooser.click()
-    assert not chooser.dialog.isModal(), "STOP must stay in reach"
-    chooser.dialog.setDirectory(str(tmp_path))
-    chooser.dialog.fileSelected.emit(str(tmp_path))
-    chooser.dialog.reject()
+    (chosen,) = dialog.findChildren(QFileDialog)
+    assert not chosen.isModal(), "STOP must stay in reach"
+    chosen.filesSelected.emit([str(tmp_path)])
+    chosen.reject()
     assert seen[-1].record.folder == str(tmp_path)
     editor = dialog.page.fields["record.folder"].editor
     assert editor.text() == str(tmp_path)
@@ -320,5 +321,5 @@ def test_a_folder_is_chosen_on_the_disk(dialog: SettingsDialog, tmp_path: Path) 
 def test_a_shipped_model_goes_by_its_name(dialog: SettingsDialog) -> None:
     seen = drafts(dialog)
     chooser = field(dialog, "perception.segmentation.model").browse_button
-    chooser._on_selected(str(RESOURCES / "models" / "other"))
+    chooser._on_chosen(RESOURCES / "models" / "other")
     assert seen[-1].perception.segmentation.model == "other"
