@@ -18,7 +18,7 @@ from app.widgets.messages import Offer, OfferButton
 from core.perception.model_file import MODELS, ModelError, ModelInfo, models_in, own_models, read_model_info
 
 if TYPE_CHECKING:  # the training dialog needs this file where there is no robot: not on Linux
-    from app.operator.recording import Offers
+    from app.ui.opening import Offers
 
 
 @dataclass(frozen=True, slots=True)

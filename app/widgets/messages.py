@@ -97,7 +97,8 @@ class Notice(QFrame):
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
         self._parent = parent
-        self._title, self._detail = QLabel(alignment=CENTER, objectName="title"), QLabel(wordWrap=True, alignment=CENTER)
+        self._title, self._detail = QLabel(alignment=CENTER), QLabel(wordWrap=True, alignment=CENTER)
+        self._title.setObjectName("title")
         self._bar = QProgressBar(textVisible=False, maximum=0)
         self._bar.setFixedHeight(6)
         self._button = text_button(tr("Start again  (F5)"), self.restart.emit)

@@ -38,7 +38,8 @@ class KeyPage(QFrame):
     """
 
     def __init__(self, parent: QWidget, first: Column = (), last: Column = (), above: QWidget | None = None) -> None:
-        super().__init__(parent, accessibleName=tr("Keys"))
+        super().__init__(parent)
+        self.setAccessibleName(tr("Keys"))
         self._parent = parent
         self._first, self._last = first, last
         self._above = above
@@ -47,11 +48,13 @@ class KeyPage(QFrame):
         title, hint, self._text = QLabel(tr("Keys")), QLabel(tr("F1 or Esc closes this page")), QLabel()
         title.setFont(theme.bold(22))
         hint.setObjectName("card_note")
-        self._card = QFrame(objectName="keys")
+        self._card = QFrame()
+        self._card.setObjectName("keys")
         self._card.setLayout(column(line((title, 1), hint), (self._text, 1), margins=(28, 16, 28, 14)))
         self._text.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.setLayout(column(self._card, margins=(_MARGIN_PX,) * 4))
-        self.layout().setAlignment(self._card, Qt.AlignmentFlag.AlignVCenter)
+        rows = column(self._card, margins=(_MARGIN_PX,) * 4)
+        rows.setAlignment(self._card, Qt.AlignmentFlag.AlignVCenter)
+        self.setLayout(rows)
         theme.set_sheet(self, _STYLE)
         self.hide()
         for watched in (parent, above):
@@ -111,7 +114,8 @@ def _in_columns(tables: Column) -> list[Column]:
     """The tables in their order, none of them cut, in ``_COLUMNS`` columns at most; the tallest is as low as can be."""
     most_rows = max((len(rows) + 1 for _, rows in tables), default=1)
     while True:
-        columns, height = [()], 0
+        columns: list[Column] = [()]
+        height = 0
         for table in tables:
             rows = len(table[1]) + 1
             if height + rows > most_rows:
