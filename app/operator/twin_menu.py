@@ -71,6 +71,11 @@ class TwinMenuController(QObject):
             group.addAction(action)
         menu = next(one for one in self._actions[0].associatedObjects() if isinstance(one, QMenu))
         menu.aboutToShow.connect(self.update_entries)
+        rare = QMenu(tr("Rarer loo&ks"), menu)  # on a small screen one menu would be higher than it
+        for look in RARE_TITLES:
+            menu.removeAction(self._looks[look])
+            rare.addAction(self._looks[look])
+        menu.addMenu(rare)
         self._picker.chosen.connect(self._choose_phantom)
         self.update_entries()
 

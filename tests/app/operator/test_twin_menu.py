@@ -48,7 +48,8 @@ def _entries(window: OperatorWindow) -> dict[str, QAction]:
     """As they are when the menu opens."""
     menu = next(action.menu() for action in window.menuBar().actions() if plain(action.text()) == "Twin")
     menu.aboutToShow.emit()
-    return {plain(action.text()): action for action in menu.actions() if not action.isSeparator()}
+    rare = next(action.menu() for action in menu.actions() if action.menu() is not None)
+    return {plain(action.text()): action for action in (*menu.actions(), *rare.actions()) if action.text() and not action.menu()}
 
 
 def _marked(window: OperatorWindow) -> list[str]:
