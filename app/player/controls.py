@@ -171,7 +171,7 @@ class PlayerBar(QWidget):
         self.position.lineEdit().setText(self.position.textFromValue(self.position.value()))
 
     def show_playing(self, on: bool) -> None:
-        self.play.setText("\N{DOUBLE VERTICAL LINE}" if on else _PLAY)
+        self.play.setText("||" if on else _PLAY)
         self.play.setAccessibleName(tr("Pause") if on else tr("Play"))
 
     def show_speed(self, speed: float) -> None:
