@@ -2,16 +2,19 @@
 
 A mutant of these modules differs from the code in one place: a comparison, an operator, a condition, a number, a returned
 value. Its unit tests run against it, then the long ones (state machines, pilot). A mutant that passes them all survives: a test is
-missing, or ``EXPLAINED`` says why the change has no effect. Exit code 1: a survivor is unexplained; 2: the tests fail without any
-mutant. Works on copies in a temporary folder; a quarter of an hour on two cores. ``python -m tools.mutation NAME ...`` does only
-these modules.
+missing, or ``EXPLAINED`` says why the change has no effect; those run the unit tests alone. Exit code 1: a survivor is unexplained;
+2: the tests fail without any mutant. Works on copies in a temporary folder, in forks of a process that has pytest loaded.
+``python -m tools.mutation NAME ...`` does only these modules.
 """
 
 from __future__ import annotations
 
 import ast
+import compileall
 import copy
+import multiprocessing
 import os
+import py_compile
 import subprocess
 import sys
 import tempfile
@@ -44,6 +47,8 @@ TESTS = {  # module -> the tests that should find its mutants
 LONG_TESTS = ("test_safety_machine.py", "test_pilot.py", "test_pilot_machine.py")
 JOBS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 TIMEOUT_S = 300.0
+LOADED = ["__main__", "pytest", "hypothesis.stateful", "pytestqt.plugin", "PySide6.QtTest", "pydantic", "cv2"]
+"""Loaded once for all mutants: what tests and code import that no mutant changes."""
 
 # fmt: off
 MISTRUST = "without a trusted measurement there is an objection already; it stands there for the type checker"
@@ -98,6 +103,10 @@ class Mutant:
     line: str
     change: str
     source: str
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        return self.module, self.line, self.change
 
 
 def path_of(module: str) -> Path:
@@ -193,8 +202,9 @@ def fate_of(mutant: Mutant, tree: Path) -> Fate:
     """Run the tests in `tree`, a copy of the project, with the mutant in it."""
     path = path_of(mutant.module)
     (tree / path).write_text(mutant.source, encoding="utf-8")
+    short, long = tests_of(mutant.module)
     try:
-        fates = (run_tests(tree, tests) for tests in tests_of(mutant.module) if tests)
+        fates = (run_tests(tree, tests) for tests in (short, [] if mutant.key in EXPLAINED else long) if tests)
         return next((fate for fate in fates if fate is not Fate.SURVIVES), Fate.SURVIVES)
     finally:
         (tree / path).write_bytes((ROOT / path).read_bytes())
@@ -202,12 +212,27 @@ def fate_of(mutant: Mutant, tree: Path) -> Fate:
 
 def run_tests(tree: Path, tests: list[str]) -> Fate:
     """SURVIVES: they all pass."""
-    command = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    try:
-        code = subprocess.run(command, cwd=tree, capture_output=True, timeout=TIMEOUT_S, check=False).returncode
-    except subprocess.TimeoutExpired:
+    process = multiprocessing.get_context("forkserver").Process(target=_pytest, args=(tree, tests))
+    process.start()
+    process.join(TIMEOUT_S)
+    if process.exitcode is None:
+        process.kill()
+        process.join()
         return Fate.HANGS
-    return Fate.SURVIVES if code == 0 else Fate.FOUND if code > 0 else Fate.HANGS
+    return Fate.SURVIVES if process.exitcode == 0 else Fate.FOUND if process.exitcode > 0 else Fate.HANGS
+
+
+def _pytest(tree: Path, tests: list[str]) -> None:
+    """Run pytest on tests of a copy, silently; its exit code is this process's."""
+    import pytest
+
+    os.chdir(tree)
+    sys.path[:] = [str(tree), *(place for place in sys.path if place and Path(place) != ROOT)]
+    sys.dont_write_bytecode = True
+    silent = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silent, 1)
+    os.dup2(silent, 2)
+    sys.exit(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning", *tests]))
 
 
 def broken_tests(modules: list[str], tree: Path) -> list[str]:
@@ -226,6 +251,8 @@ def copy_project(folder: Path) -> Path:
             target = folder / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes((ROOT / name).read_bytes())
+    # by their content, since mutants of the same second and length follow each other
+    compileall.compile_dir(folder, quiet=2, invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH)
     return folder
 
 
@@ -235,6 +262,7 @@ def main(modules: list[str]) -> int:
         sys.stderr.write(f"unknown: {', '.join(sorted(unknown))}; known are {', '.join(TESTS)}\n")
         return 2
     modules = modules or list(TESTS)
+    multiprocessing.get_context("forkserver").set_forkserver_preload(LOADED)
     todo = [mutant for module in modules for mutant in mutants(module, (ROOT / path_of(module)).read_text(encoding="utf-8"))]
     with tempfile.TemporaryDirectory() as folder, Progress() as bar, ThreadPoolExecutor(JOBS) as pool:
         copies = [copy_project(Path(folder) / str(job)) for job in range(JOBS)]
@@ -249,7 +277,10 @@ def main(modules: list[str]) -> int:
         def judge(mutant: Mutant) -> Fate:
             tree = trees.get()
             try:
-                return fate_of(mutant, tree)
+                fate = fate_of(mutant, tree)
+                if fate is Fate.SURVIVES and mutant.key not in EXPLAINED:
+                    bar.console.print(f"{path_of(mutant.module)}:{mutant.number}: {mutant.change}: {mutant.line}", markup=False)
+                return fate
             finally:
                 trees.put(tree)
                 bar.advance(task)
@@ -265,7 +296,7 @@ def report(fates: list[tuple[Mutant, Fate]]) -> int:
     for mutant, fate in fates:
         if fate is Fate.FOUND:
             continue
-        why = EXPLAINED.get((mutant.module, mutant.line, mutant.change)) if fate is Fate.SURVIVES else "the tests stood still"
+        why = EXPLAINED.get(mutant.key) if fate is Fate.SURVIVES else "the tests stood still"
         unexplained += why is None
         place = f"{path_of(mutant.module)}:{mutant.number}"
         sys.stdout.write(f"{place}: {mutant.change}\n    {mutant.line}\n    {why or 'NOT EXPLAINED'}\n")
