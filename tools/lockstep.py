@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
+from core.config.safety import SafetyConfig, ServosConfig
 from core.control.bus_monitor import BusReport
 from core.control.faults import Cause, Fault
 from core.control.gate import Rejection, Source
@@ -30,7 +30,7 @@ class LockStepServos:
     def __init__(self, servos: ServosConfig, safety: SafetyConfig, clock: Callable[[], float]) -> None:
         self._servos, self._clock = servos, clock
         self._guard = BusGuard(servos, safety, clock())
-        self._at_mm: tuple[float, ...] = (0.0,) * len(JOINT_NAMES)
+        self._at_mm: tuple[float, ...] = (0.0,) * len(servos.joints)
         self._order: BusOrder | None = None
         self._beat: Heartbeat | None = None
         self._torque = self._torque_off_done = False
@@ -111,8 +111,8 @@ class LockStepServos:
         self._guard.acknowledge()
 
     def zero(self, request: ZeroRequest | None = None) -> None:
-        positions_mm = request.positions_mm if request is not None else dict.fromkeys(JOINT_NAMES, 0.0)
-        self._at_mm = tuple(positions_mm.get(name, at) for name, at in zip(JOINT_NAMES, self._at_mm, strict=True))
+        positions_mm = request.positions_mm if request is not None else dict.fromkeys(self._servos.names, 0.0)
+        self._at_mm = tuple(positions_mm.get(name, at) for name, at in zip(self._servos.names, self._at_mm, strict=True))
 
     def reboot(self, servo_id: int) -> None:
         """Nothing to do."""

@@ -110,7 +110,8 @@ def calibrate_rig(
     drums: Annotated[
         str | None,
         typer.Option(
-            help="diameters in mm, measured: of the tendons' drums, the feed's wheel, the delivery's; of a screw: its lead over pi",
+            help="diameters in mm, measured: of the tendons' drums, the feed's wheel, the delivery's if there is one; "
+            "of a screw: its lead over pi",
             metavar="TENDONS,FEED,DELIVERY",
         ),
     ] = None,
@@ -314,10 +315,11 @@ def _drums(text: str | None) -> DrumsConfig | None:
     if text is None:
         return None
     try:
-        tendons_mm, advance_mm, delivery_mm = map(float, text.split(","))
+        tendons_mm, advance_mm, *delivery = map(float, text.split(","))
+        (delivery_mm,) = delivery or [advance_mm]
         return DrumsConfig(tendons_mm=tendons_mm, advance_mm=advance_mm, delivery_mm=delivery_mm)
     except ValueError:  # pydantic's, too
-        raise UserError(f"--drums {text}: three diameters in mm of 0.3 to 150: tendons, feed, delivery") from None
+        raise UserError(f"--drums {text}: diameters in mm of 0.3 to 150: tendons, feed, delivery if there is one") from None
 
 
 def _report(line: str) -> None:

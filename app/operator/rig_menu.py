@@ -278,8 +278,8 @@ class RigMenuController(QObject):
         why = self.hindrance()
         if kind_of(config.rig) is RigKind.PLAYBACK:
             why = tr("a recording is played: start with a camera or the twin")
-        elif (not config.servos.is_default or config.servos.driver != "dynamixel") and config.rig.robot != "none":
-            why = tr("the wizard knows the default robot only: write the ids and signs of these joints into the rig file")
+        elif config.servos.driver != "dynamixel" and config.rig.robot != "none":
+            why = tr("the wizard knows DYNAMIXEL servos only: write the ids and signs of the joints into the rig file")
         if why:
             self._refuse(why)
             return

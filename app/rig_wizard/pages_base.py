@@ -309,15 +309,22 @@ def table(headings: Sequence[str], first_column: Sequence[str], name: str, *, fi
     header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
     header.setStretchLastSection(True)
-    for row, text in enumerate(first_column):
-        set_cell(made, row, 0, text)
     if row_px:
         made.verticalHeader().setDefaultSectionSize(row_px)
     if fitted:
-        rows = made.rowCount() * made.verticalHeader().defaultSectionSize()
-        made.setFixedHeight(_HEAD_PX + rows + 2 * max(1, made.frameWidth()))
         made.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        set_rows(made, first_column)
     return made
+
+
+def set_rows(where: QTableWidget, first_column: Sequence[str]) -> None:
+    """A row for each text, the others empty, and a table as high as its rows."""
+    where.setRowCount(0)
+    where.setRowCount(len(first_column))
+    for row, text in enumerate(first_column):
+        set_cell(where, row, 0, text)
+    rows = len(first_column) * where.verticalHeader().defaultSectionSize()
+    where.setFixedHeight(_HEAD_PX + rows + 2 * max(1, where.frameWidth()))
 
 
 def set_cell(where: QTableWidget, row: int, column: int, text: str) -> None:

@@ -6,16 +6,28 @@ import math
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSignalBlocker, Qt
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QWidget
 
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, button, enable, note, set_cell, set_note, table
+from app.rig_wizard.pages_base import (
+    Arrow,
+    Shape,
+    WizardPage,
+    WizardPicture,
+    button,
+    enable,
+    note,
+    set_cell,
+    set_note,
+    set_rows,
+    table,
+)
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import friction_note
 from app.widgets.painting import NONE
-from core.calibration.servos import Assignment
+from core.calibration.servos import Assignment, alike
 from core.config.calibration import DrumsConfig
-from core.config.safety import JOINT_NAMES, TENDONS, JointName
+from core.config.safety import JointConfig, JointKind, JointName
 from core.config.servo_models import model_name
 from core.devices import UserError
 from hardware.calibration.rig_draft import RigDraft
@@ -32,9 +44,28 @@ _JOINT_TEXT: dict[JointName, str] = {
     "delivery_2": mark("catheter, second"),
 }
 _UP_OR_DOWN = mark(
-    "One camera cannot tell up from down. Choose tendon up, wiggle it and look from the side: does the head rise when the wire is "
+    "One camera cannot tell up from down. Choose {joint}, wiggle it and look from the side: does the head rise when the wire is "
     "pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed."
 )
+_WHICH_WAY_ROUND = mark(
+    "Nothing shows which way the shaft turns: wiggle it. With + its right side goes towards the camera. If the head bends to the "
+    "wrong side when the steering is learnt, the other direction is taken."
+)
+
+
+def tendon_text(joint: JointConfig) -> str:
+    """A tendon in a table of tendons."""
+    return tr_text(joint.name) if joint.name in _JOINT_TEXT else joint_text(joint)
+
+
+def joint_text(joint: JointConfig) -> str:
+    """A joint in words; of a robot of another shape its name, and a tendon's direction."""
+    if joint.name in _JOINT_TEXT:
+        return tr(_JOINT_TEXT[joint.name])
+    text = tr("rotation") if joint.kind is JointKind.ROTATION else joint.name.replace("_", " ")
+    return text if joint.angle_deg is None else f"{text} ({joint.angle_deg:g}°)"
+
+
 _ID_PX, _DIRECTION_PX = 66, 80
 _DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
 
@@ -44,7 +75,7 @@ class PortPage(WizardPage):
 
     name = mark("Port and servos")
     hint = mark(
-        "Which port are the seven servos connected to? Switch their 12 V supply on. Searching asks every servo on the line for its "
+        "Which port are the servos connected to? Switch their 12 V supply on. Searching asks every servo on the line for its "
         "number and model; nothing moves. Without servos the rig only looks."
     )
 
@@ -128,6 +159,7 @@ class DrumsPage(WizardPage):
         super().__init__(model, picture)
         self.diameters: list[QDoubleSpinBox] = []
         self.ways: list[QDoubleSpinBox] = []
+        self._cells: list[tuple[QWidget, ...]] = []
         grid = QGridLayout()
         for title in (mark("Tendons"), mark("Robot forward"), mark("Catheter")):
             diameter, way = self._field(1.0), self._field(math.pi)
@@ -138,6 +170,7 @@ class DrumsPage(WizardPage):
             self.diameters.append(diameter)
             self.ways.append(way)
             cells = (QLabel(tr(title)), QLabel("\N{DIAMETER SIGN}"), diameter, QLabel(tr("way per turn")), way)
+            self._cells.append(cells)
             for place, cell in enumerate(cells):
                 grid.addWidget(cell, len(self.ways), place)
         self.column.addLayout(grid)
@@ -160,21 +193,30 @@ class DrumsPage(WizardPage):
         return draft is not None and (draft.drums is not None or (bench is not None and bench.kind is RigKind.SIM))
 
     def enter(self) -> None:
-        draft = self.draft
-        if draft is not None and self.is_done:
-            joints = (draft.config.servos.joints[place] for place in (0, 4, 5))
-            for joint, diameter, way in zip(joints, self.diameters, self.ways, strict=True):
+        firsts = self._firsts()
+        for cells, joint, diameter, way in zip(self._cells, firsts, self.diameters, self.ways, strict=True):
+            for cell in cells:
+                cell.setVisible(joint is not None or not any(firsts))
+            if joint is not None and self.is_done:
                 self._show(diameter, joint.mm_per_turn / math.pi)
                 self._show(way, joint.mm_per_turn)
         self.refresh()
+
+    def _firsts(self) -> list[JointConfig | None]:
+        """The first joint of each row's kind; None without one."""
+        if self.draft is None:
+            return [None] * len(self.ways)
+        servos = self.draft.config.servos
+        kinds = (JointKind.TENDON, JointKind.ADVANCE, JointKind.DELIVERY)
+        return [next((joint for joint in servos.joints if joint.kind is kind), None) for kind in kinds]
 
     def refresh(self) -> None:
         draft = self.draft
         enable(draft is not None and not self.model.is_busy, *self.diameters, *self.ways)
         if not self.is_done or draft is None:
-            set_note(self.result, tr("Before all three are known no servo is moved."))
+            set_note(self.result, tr("Before all of them are known no servo is moved."))
             return
-        limits = [draft.config.servos.force_limit(draft.config.servos.joints[place]) for place in (0, 4, 5)]
+        limits = [draft.config.servos.force_limit(joint) for joint in self._firsts() if joint is not None]
         forces = " / ".join(f"{limit.force_n:.0f}" for limit in limits)
         told = tr("Greatest force, limited in the servos: {forces} N.", forces=forces)
         set_note(self.result, " ".join(filter(None, (told, friction_note(draft.config.servos)))))
@@ -188,6 +230,8 @@ class DrumsPage(WizardPage):
         self._show(other, mm)
         draft = self.draft
         tendons_mm, advance_mm, delivery_mm = (round(way.value() / math.pi, 3) for way in self.ways)
+        if self._firsts()[2] is None:
+            delivery_mm = advance_mm
         if draft is None or min(tendons_mm, advance_mm, delivery_mm) <= 0.3:
             return
         draft.set_drums(DrumsConfig(tendons_mm=tendons_mm, advance_mm=advance_mm, delivery_mm=delivery_mm))
@@ -206,13 +250,11 @@ class IdentifyPage(WizardPage):
 
     def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
         super().__init__(model, picture)
-        headings, joints = (tr("Joint"), tr("ID"), tr("Direction"), tr("Seen")), [tr(_JOINT_TEXT[name]) for name in JOINT_NAMES]
-        self.rows = table(headings, joints, tr("Joints and their servos"), row_px=30)
+        headings = tr("Joint"), tr("ID"), tr("Direction"), tr("Seen")
+        self.rows = table(headings, (), tr("Joints and their servos"), row_px=30)
         self._ids: list[QComboBox] = []
         self._signs: list[QComboBox] = []
-        for row, joint in enumerate(joints):
-            self._add_choosers(row, joint)
-        self.rows.setCurrentCell(0, 0)
+        self._list_joints(model.config.servos.joints)
         for place, width in ((1, _ID_PX), (2, _DIRECTION_PX)):
             self.rows.horizontalHeader().setSectionResizeMode(place, QHeaderView.ResizeMode.Fixed)
             self.rows.setColumnWidth(place, width)
@@ -221,7 +263,7 @@ class IdentifyPage(WizardPage):
         tip = tr("Turn the servo of the chosen row both ways by 1.5 mm")
         self.wiggle_button = button(tr("&Wiggle the chosen"), self._wiggle, tip)
         self.swap_button = button(tr("Swap &up and down"), self._swap, tr("One camera cannot tell them apart"))
-        self.right_button = button(tr("&Yes, it rises"), self._confirm, tr("Up and down are right as they stand in the table"))
+        self.right_button = button(tr("&Yes, it is so"), self._confirm, tr("What was assumed is right as it stands in the table"))
         self.add_row(self.auto_button, fill=True)
         self.add_row(self.wiggle_button, self.swap_button, self.right_button, fill=True)
         self.result = note("")
@@ -230,6 +272,15 @@ class IdentifyPage(WizardPage):
         self._shown: tuple[Assignment, ...] | None = None
         self._known_ids: tuple[int, ...] = ()
         self._known_draft: RigDraft | None = None
+
+    def _list_joints(self, joints: Sequence[JointConfig]) -> None:
+        self._ids.clear()
+        self._signs.clear()
+        texts = [joint_text(joint) for joint in joints]
+        set_rows(self.rows, texts)
+        for row, text in enumerate(texts):
+            self._add_choosers(row, text)
+        self.rows.setCurrentCell(0, 0)
 
     def _add_choosers(self, row: int, joint: str) -> None:
         ids, signs = QComboBox(), QComboBox()
@@ -257,8 +308,9 @@ class IdentifyPage(WizardPage):
     def refresh(self) -> None:
         draft = self.draft
         enable(self.has_servos, self.auto_button, self.wiggle_button, self.swap_button, self.right_button, *self._ids, *self._signs)
-        assumed = draft is not None and any(one.assumed for one in draft.assignments)
-        self.right_button.setVisible(assumed)
+        assumed = [one.name for one in draft.assignments if one.assumed] if draft is not None else []
+        self.right_button.setVisible(bool(assumed))
+        self.swap_button.setVisible(draft is None or bool(alike(draft.config.servos)))
         if draft is None or draft.found is None:
             set_note(self.result, tr("Search the servos first."))
             return
@@ -271,12 +323,18 @@ class IdentifyPage(WizardPage):
                 self._ids[row].setCurrentIndex(self._ids[row].findData(one.id))
                 self._signs[row].setCurrentIndex(self._signs[row].findData(one.sign))
                 set_cell(self.rows, row, 3, tr_text(one.seen) + (tr(" (assumed)") if one.assumed else ""))
-        not_yet = "" if self.is_done else tr("Not told apart yet; what stands in the table is the configuration's.")
-        set_note(self.result, _UP_OR_DOWN if assumed else not_yet)
+        notes = [] if self.is_done else [tr("Not told apart yet; what stands in the table is the configuration's.")]
+        for joint in draft.config.servos.joints:
+            if joint.name in assumed and joint.kind is JointKind.ROTATION:
+                notes.append(tr(_WHICH_WAY_ROUND))
+            elif joint.name in assumed[:1]:
+                notes.append(tr(_UP_OR_DOWN, joint=joint_text(joint)))
+        set_note(self.result, " ".join(notes))
 
     def _list_servos(self, draft: RigDraft) -> None:
         """Offer the servos that were found; each joint has that of the configuration, or one that no joint has."""
         joints, found = draft.config.servos.joints, draft.found.ids if draft.found is not None else ()
+        self._list_joints(joints)
         spare = [servo_id for servo_id in found if servo_id not in {joint.id for joint in joints}]
         for row, (ids, joint) in enumerate(zip(self._ids, joints, strict=True)):
             ids.clear()
@@ -297,12 +355,14 @@ class IdentifyPage(WizardPage):
             self.run_step(tr("wiggling servo {servo_id}", servo_id=servo_id), lambda draft: draft.wiggle(servo_id))
 
     def _swap(self) -> None:
-        up, down = JOINT_NAMES.index("up"), JOINT_NAMES.index("down")
+        if self.draft is None or not (names := alike(self.draft.config.servos)):
+            return
+        up, down = map(self.draft.config.servos.names.index, names)
         for boxes in (self._ids, self._signs):
             first, second = boxes[up].currentIndex(), boxes[down].currentIndex()
             boxes[up].setCurrentIndex(second)
             boxes[down].setCurrentIndex(first)
-        self._set_by_hand(mark("swapped by hand"), ("up", "down"))
+        self._set_by_hand(mark("swapped by hand"), names)
 
     def _confirm(self) -> None:
         if self.draft is not None:
@@ -320,7 +380,7 @@ class IdentifyPage(WizardPage):
             kept = (Assignment(one.name, one.id, one.sign, hand, one.name in earlier) for one in draft.servos.joints)
             before = {one.name: one for one in kept}
         made = []
-        for row, name in enumerate(JOINT_NAMES):
+        for row, name in enumerate(draft.config.servos.names):
             servo_id, sign, old = int(self._ids[row].currentData()), self._signs[row].currentData(), before.get(name)
             is_same = old is not None and (old.id, old.sign) == (servo_id, sign) and name not in changed
             made.append(old if is_same and old is not None else Assignment(name, servo_id, sign, seen))
@@ -352,7 +412,6 @@ class ZeroPage(WizardPage):
         super().__init__(model, picture)
         self.main = self.find_button = button(tr("&Find automatically"), self._find)
         self.tendon = QComboBox()
-        self.tendon.addItems([tr("tendon {name}", name=tr_text(name)) for name in TENDONS])
         self.tendon.setAccessibleName(tr("Tendon to set by eye"))
         self.tighten = button(tr("&Tighten {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(_NUDGE_MM))
         self.loosen = button(tr("&Loosen {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(-_NUDGE_MM))
@@ -360,8 +419,8 @@ class ZeroPage(WizardPage):
         self.pretension.setAccessibleName(tr("Pretension"))
         self.pretension.setToolTip(tr("Pull of every wire while the robot is straight, so that none hangs"))
         self.pretension.valueChanged.connect(self._set_pretension)
-        headings, names = (tr("Tendon"), tr("Was slack by")), [tr_text(name) for name in TENDONS]
-        self.rows = table(headings, names, tr("Slack of the tendons"))
+        self.rows = table((tr("Tendon"), tr("Was slack by")), (), tr("Slack of the tendons"))
+        self._tendons: tuple[JointConfig, ...] = ()
         self.column.addWidget(self.find_button)
         self.column.addWidget(self.rows)
         self.add_row(self.tendon, self.tighten, self.loosen)
@@ -377,14 +436,19 @@ class ZeroPage(WizardPage):
     def refresh(self) -> None:
         draft = self.draft
         enable(self.has_servos, self.find_button, self.tendon, self.tighten, self.loosen, self.pretension)
+        tendons = (draft.config if draft is not None else self.model.config).servos.tendons
+        if [one.name for one in tendons] != [one.name for one in self._tendons]:
+            self._tendons = tendons
+            set_rows(self.rows, [tendon_text(one) for one in tendons])
+            self.tendon.clear()
+            self.tendon.addItems([joint_text(one) for one in tendons])
         if draft is not None:
             with QSignalBlocker(self.pretension):  # within what the envelope of every wire allows
-                tendons = draft.config.servos.joints[: len(TENDONS)]
                 low, high = max(0.0, *(one.low_mm for one in tendons)), min(5.0, *(one.high_mm for one in tendons))
                 self.pretension.setRange(low, high)
                 self.pretension.setValue(draft.config.servos.pretension_mm)
         zeros = draft.zeros if draft is not None else None
-        for row in range(len(TENDONS)):
+        for row in range(len(tendons)):
             set_cell(self.rows, row, 1, NONE if zeros is None else f"{zeros.slack_mm[row]:+.2f} mm")
         if draft is None or draft.found is None:
             set_note(self.result, tr("Search the servos first."))
@@ -397,8 +461,8 @@ class ZeroPage(WizardPage):
         self.run_step(tr("looking where the wires are taut"), RigDraft.find_zeros)
 
     def _nudge(self, way_mm: float) -> None:
-        name = TENDONS[self.tendon.currentIndex()]
-        self.run_step(tr("moving tendon {name}", name=tr_text(name)), lambda draft: draft.nudge(name, way_mm))
+        joint = self._tendons[self.tendon.currentIndex()]
+        self.run_step(tr("moving {joint}", joint=joint_text(joint)), lambda draft: draft.nudge(joint.name, way_mm))
 
     def _set_pretension(self, pretension_mm: float) -> None:
         if self.draft is not None and not self.model.is_busy:
@@ -410,18 +474,15 @@ class SteeringPage(WizardPage):
 
     name = mark("Steering")
     hint = mark(
-        "From where the page before has left the wires each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has "
-        "shown its way. The robot must have room on both sides."
+        "From where the page before has left the wires the tendons bend the head to each side, up and down, by 0.3 mm at first and "
+        "1.2 mm at most, until it has shown its way. The robot must have room on both sides."
     )
 
     def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
         super().__init__(model, picture)
         self.main = self.learn_button = button(tr("&Learn"), self._learn)
         headings = (tr("Tendon"), tr("Direction of the head"), tr("Way per mm of wire"))
-        self.rows = table(headings, [tr_text(name) for name in TENDONS], tr("Steering directions"))
-        for row in range(len(TENDONS)):
-            for column in (1, 2):
-                set_cell(self.rows, row, column, NONE)
+        self.rows = table(headings, (), tr("Steering directions"))
         self.result = note("")
         for widget in (self.learn_button, self.rows, self.result):
             self.column.addWidget(widget)
@@ -435,7 +496,12 @@ class SteeringPage(WizardPage):
         draft = self.draft
         self.learn_button.setEnabled(self.has_servos)
         steering = draft.steering if draft is not None else None
+        tendons = (draft.config if draft is not None else self.model.config).servos.tendons
+        set_rows(self.rows, [tendon_text(one) for one in tendons])
         if steering is None:
+            for row in range(len(tendons)):
+                for column in (1, 2):
+                    set_cell(self.rows, row, column, NONE)
             set_note(self.result, "" if draft is not None and draft.found is not None else tr("Search the servos first."))
             return
         for row, tendon in enumerate(steering.tendons):

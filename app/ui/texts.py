@@ -10,7 +10,7 @@ from enum import Enum
 from app.ui.i18n import ENGLISH, language_in_use, mark, tr, tr_text
 from core.config.models import PoseConfig
 from core.config.rig_file import RigFile
-from core.config.safety import LIMITS_FORCE, ServosConfig
+from core.config.safety import LIMITS_FORCE, JointKind, ServosConfig
 from core.control.alerts import AlertKey, alert_of
 from core.control.drive_view import DriveView
 from core.control.faults import Area, Cause
@@ -598,14 +598,17 @@ def calibration_lines(rig: RigFile) -> list[str]:
         lines.append(tr("this drive cannot limit its force"))
     if weak := friction_note(rig.servos):
         lines.append(weak)
-    if known.assumed:
+    rotation = rig.servos.names[rig.servos.places(JointKind.ROTATION)]
+    if assumed := [name for name in known.assumed or () if name not in rotation]:
         lines.append(
             tr(
                 "assumed: {joints} by the order of their ids, since one camera cannot tell them apart; look at the head, and swap "
                 "them in the rig wizard if it goes the other way",
-                joints=tr(" and ").join(tr_text(name) for name in known.assumed),
+                joints=tr(" and ").join(tr_text(name) for name in assumed),
             )
         )
+    if set(rotation) & set(known.assumed or ()):
+        lines.append(tr("assumed: the direction of the rotation, which one camera cannot see; confirm it in the rig wizard"))
     if known.steering is not None:
         ways = ", ".join(
             f"{tr_text(tendon.name)} {tr('out of the picture') if tendon.direction_deg is None else f'{tendon.direction_deg:.0f}°'}"

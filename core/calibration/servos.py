@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from core import geometry
 from core.calibration.camera import mm_per_px_at
 from core.config.calibration import ScaleConfig, SteeringConfig, TendonConfig
-from core.config.safety import JOINT_NAMES, JointName, ServosConfig
+from core.config.safety import TENDON_ANGLES_DEG, JointConfig, JointKind, JointName, ServosConfig
 from core.devices import UserError
 from core.messages import message
 from core.perception.vectors import fit_robot_vector
@@ -329,21 +329,43 @@ def classify(wiggle: Wiggle) -> ServoFinding | None:
     return None
 
 
-def assign(found: Mapping[int, ServoFinding]) -> tuple[Assignment, ...]:
-    """Names for seven servos by id, in the order of ``JOINT_NAMES``.
+_ACROSS = 0.3
+"""A tendon whose direction is to the side by this share moves the head to the side; the others out of the picture's plane."""
+
+
+def function_of(joint: JointConfig) -> Function | None:
+    """What one camera sees of a joint's servo; None of a rotation: the head stands straight on."""
+    if joint.is_tendon:
+        across = math.cos(math.radians(joint.angle_deg or 0.0))
+        return Function.PITCH if abs(across) < _ACROSS else Function.RIGHT if across > 0.0 else Function.LEFT
+    return {JointKind.ADVANCE: Function.ADVANCE, JointKind.DELIVERY: Function.DELIVERY}.get(joint.kind)
+
+
+def alike(servos: ServosConfig) -> tuple[JointName, ...]:
+    """The two tendons that one camera cannot tell apart: one rises and one falls; empty without such ones."""
+    functions = [function_of(joint) for joint in servos.tendons]
+    return tuple(joint.name for joint, function in zip(servos.tendons, functions, strict=True) if functions.count(function) > 1)
+
+
+def assign(found: Mapping[int, ServoFinding], servos: ServosConfig, ids_on_line: Sequence[int] = ()) -> tuple[Assignment, ...]:
+    """Names for the servos by id, in the order of the joints.
+
+    A rotation, of which nothing is seen, is the one of `ids_on_line` that is left, and its direction is that of `servos`.
 
     Raises NotIdentified: a function is missing, or several servos have the same one.
     """
-    wanted: tuple[tuple[Function, tuple[JointName, ...]], ...] = (
-        (Function.RIGHT, ("right",)),
-        (Function.LEFT, ("left",)),
-        (Function.PITCH, ("up", "down")),
-        (Function.ADVANCE, ("advance",)),
-        (Function.DELIVERY, ("delivery_1", "delivery_2")),
-    )
     named: dict[JointName, Assignment] = {}
     wrong = []
-    for function, names in wanted:
+    wanted: dict[Function, list[JointName]] = {}
+    for joint in servos.joints:
+        if (function := function_of(joint)) is not None:
+            wanted.setdefault(function, []).append(joint.name)
+        elif len(left := [servo_id for servo_id in ids_on_line if servo_id not in found]) == 1:
+            named[joint.name] = Assignment(joint.name, left[0], joint.sign, "nothing was seen of it", assumed=True)
+        else:
+            wrong.append(f"1 of which nothing is seen, the rotation (found: {', '.join(map(str, left)) or 'none'})")
+    indistinct = alike(servos)
+    for function, names in wanted.items():
         ids = sorted(servo_id for servo_id, finding in found.items() if finding.function is function)
         if len(ids) != len(names):
             listed = ", ".join(map(str, ids)) or "none"
@@ -351,10 +373,10 @@ def assign(found: Mapping[int, ServoFinding]) -> tuple[Assignment, ...]:
             continue
         for name, servo_id in zip(names, ids, strict=True):
             finding = found[servo_id]
-            named[name] = Assignment(name, servo_id, finding.sign, finding.seen, assumed=function is Function.PITCH)
+            named[name] = Assignment(name, servo_id, finding.sign, finding.seen, assumed=name in indistinct)
     if wrong:
         raise NotIdentified(f"not all servos are clear: there should be {'; '.join(wrong)}; wiggle them again, or set them by hand")
-    return tuple(named[name] for name in JOINT_NAMES)
+    return tuple(named[name] for name in servos.names)
 
 
 _FREE_PX = 4.0
@@ -370,7 +392,7 @@ class SteeringNotSeen(UserError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pull:
-    """A tendon's pull (mm beyond the other's) and the head's motion."""
+    """A bend (mm of pull, beyond the opposite tendon's) and the head's motion."""
 
     pull_mm: float
     move: HeadMove
@@ -383,8 +405,8 @@ class _Pair:
     disagreement_deg: float
 
 
-def learn(pulls: Mapping[str, Pull], heading: Points) -> SteeringConfig:
-    """The steering from a pull of each of the four tendons, each from rest. Raises SteeringNotSeen.
+def learn(pulls: Mapping[str, Pull], heading: Points, tendons: Sequence[JointConfig]) -> SteeringConfig:
+    """The steering from bends to the right and left, up and down (``TENDON_ANGLES_DEG``), each from rest. Raises SteeringNotSeen.
 
     Pairs are evaluated together: what the wall, the bend or the end of the mask add to both motions alike falls out of their
     difference. A bent head starts at right angles to its heading, so the direction is the mean of the measured one and of the
@@ -399,23 +421,29 @@ def learn(pulls: Mapping[str, Pull], heading: Points) -> SteeringConfig:
         )
     gains = [0.0 if pair is None else pair.lateral_px_mm for pair in (bend, pitch)]
     seen = [pair for pair in (bend, pitch) if pair is not None]
-    largest = max(abs(gain) for gain in gains)
-    tendons = []
-    for pair, names in ((bend, ("right", "left")), (pitch, ("up", "down"))):
-        in_plane = pair is not None and abs(pair.lateral_px_mm) >= _IN_PLANE_SHARE * largest
-        for k, name in enumerate(names):
-            pull = pulls[name]
-            direction = turn_deg(0.0, pair.direction_deg + 180.0 * k) if in_plane and pair is not None else None
-            moved = pull.move.size_px if in_plane else abs(pull.move.lateral_px)
-            learnt = {"name": name, "direction_deg": direction, "moved_px": moved, "px_per_mm": moved / pull.pull_mm}
-            tendons.append(TendonConfig.model_validate(learnt))
+    least = _IN_PLANE_SHARE * max(abs(gain) for gain in gains)
+    learnt = []
+    for joint in tendons:
+        angle = math.radians(joint.angle_deg or 0.0)
+        shares = math.cos(angle) * gains[0], math.sin(angle) * gains[1]
+        pair, gain = (bend, gains[0]) if abs(shares[0]) >= abs(shares[1]) else (pitch, gains[1])
+        is_seen = pair is not None and abs(sum(shares)) >= max(least, _ROUNDING)
+        direction = turn_deg(0.0, pair.direction_deg + (0.0 if sum(shares) * gain > 0.0 else 180.0)) if is_seen and pair else None
+        apart = {name: abs(turn_deg(joint.angle_deg or 0.0, at_deg)) for name, at_deg in TENDON_ANGLES_DEG.items()}
+        nearest = min(apart, key=lambda name: apart[name])
+        pull = pulls[nearest]
+        moved = math.cos(math.radians(apart[nearest])) * (pull.move.size_px if is_seen else abs(pull.move.lateral_px))
+        learnt.append(TendonConfig(name=joint.name, direction_deg=direction, moved_px=moved, px_per_mm=moved / pull.pull_mm))
     return SteeringConfig(
         heading_deg=heading_deg,
         roll_deg=math.degrees(math.atan2(gains[1], gains[0])),
         disagreement_deg=max(pair.disagreement_deg for pair in seen),
-        turn_deg_per_mm=_turn_deg_per_mm(pulls["right"], pulls["left"]) if tendons[0].direction_deg is not None else None,
-        tendons=tuple(tendons),
+        turn_deg_per_mm=_turn_deg_per_mm(pulls["right"], pulls["left"]) if abs(gains[0]) >= max(least, _ROUNDING) else None,
+        tendons=tuple(learnt),
     )
+
+
+_ROUNDING = 1e-9
 
 
 def _turn_deg_per_mm(right: Pull, left: Pull) -> float | None:
@@ -531,13 +559,13 @@ def feed_disagreement(
     findings : by id.
     size : (width, height) of the pictures that were looked at.
     """
-    (place,) = (one for one in assignments if one.name == "advance")
-    found = findings.get(place.id)
+    (feed,) = servos.joints[servos.places(JointKind.ADVANCE)]
+    found = next((findings.get(one.id) for one in assignments if one.name == feed.name), None)
     if found is None or found.function is not Function.ADVANCE or found.way is None:
         return ""
     way = found.way
-    turned_as = max(joint.mm_per_turn for joint in servos.joints)
-    configured = servos.joints[JOINT_NAMES.index("advance")].mm_per_turn
+    turned_as = max(joint.mm_per_turn for joint in servos.joints if joint.kind is not JointKind.ROTATION)
+    configured = feed.mm_per_turn
     mm_per_px = mm_per_px_at(scale, way.head, size)
     seen = way.px_per_mm * mm_per_px * turned_as
     noise = _NOISE_PX / way.scale * mm_per_px / way.amplitude_mm * turned_as

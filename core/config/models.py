@@ -373,7 +373,7 @@ class TwinConfig(ConfigSection):
     live_frames_per_second: float = Field(20.0, gt=0.0, le=240.0, description="of the running twin, which shares the computer")
     wiring: str | None = Field(
         None,
-        pattern=r"^-?\d{1,3}(,-?\d{1,3}){6}$",
+        pattern=r"^-?\d{1,3}(,-?\d{1,3}){1,11}$",
         description="ids of its servos in the order of the joints, minus: it turns the other way; empty: as servos.joints says",
     )
     roll_deg: float = Field(

@@ -104,7 +104,7 @@ TENDON_ANGLES_DEG: dict[str, float] = {"right": 0.0, "left": 180.0, "up": 90.0, 
 TENDONS: tuple[JointName, ...] = tuple(TENDON_ANGLES_DEG)
 """Tendons of the default robot."""
 JOINT_NAMES: tuple[JointName, ...] = (*TENDONS, "advance", "delivery_1", "delivery_2")
-"""Joints of the default robot, which is the one that the wizard calibrates."""
+"""Joints of the default robot."""
 MIN_JOINTS, MAX_JOINTS = 2, 12
 _TENDON_COUNTS = (2, 3, 4)
 _EVENLY_DEG = 1e-6

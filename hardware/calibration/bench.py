@@ -74,7 +74,7 @@ class CalibrationBench:
 
     @contextmanager
     def steer(self, servos: ServosConfig) -> Iterator[SteeredRobot]:
-        """All seven, zeroed where they stand, armed."""
+        """All of them, zeroed where they stand, armed."""
         with SteeredRobot.opened(servos, self.config.safety, self.stop, self._backups) as robot:
             yield robot
 

@@ -24,11 +24,20 @@ from core.calibration.camera import (
     scale_of_clicks,
     undistort,
 )
-from core.calibration.servos import Assignment, HeadNotSeen, NotIdentified, ServoFinding, SteeringNotSeen, assign, feed_disagreement
+from core.calibration.servos import (
+    Assignment,
+    HeadNotSeen,
+    NotIdentified,
+    ServoFinding,
+    SteeringNotSeen,
+    alike,
+    assign,
+    feed_disagreement,
+)
 from core.config.calibration import CalibrationConfig, DrumsConfig, LensConfig, ScaleConfig, SteeringConfig, ZeroConfig
 from core.config.models import Config
 from core.config.rig_file import RigFile, make_rig
-from core.config.safety import JOINT_NAMES, JointName, ServosConfig, wiring_of
+from core.config.safety import JointKind, JointName, ServosConfig, wiring_of
 from core.config.servo_models import model_name, unsupported
 from core.control.frame_reports import kept_view
 from core.devices import DeviceError
@@ -47,6 +56,8 @@ _NOTICEABLE_PX = 1.0
 _BOARD_MISSES = 6
 """Pictures in a row without the board, three seconds: a hand laid on it must not start the servos."""
 _BOARD_LOOK_S, _BOARD_GONE_WITHIN_S = 0.5, 180.0
+_MIRRORED_DEG = 90.0
+"""Beyond this roll the head went left where it should go right."""
 
 DRUMS_FIRST = (
     "say the diameters of the drums before anything moves, they decide how far and how hard a servo pulls: page Drums of the rig "
@@ -191,32 +202,31 @@ class RigDraft:
     def search_servos(self, bauds: Sequence[int] | None = None) -> FoundServos:
         """Find the servos on the bench's port, and take over their speed and model.
 
-        Raises DeviceError: no port, no answer, not seven, or a model that is not supported.
+        Raises DeviceError: no port, no answer, not as many as the robot has joints, or a model that is not supported.
         """
         servos = self.servos
         assert servos.port is not None
-        if not servos.is_default or servos.driver != "dynamixel":
-            raise DeviceError(
-                "only the default robot's DYNAMIXEL servos can be told apart: write ids and signs of these joints into the rig file"
-            )
+        if servos.driver != "dynamixel":
+            raise DeviceError("only DYNAMIXEL servos can be told apart: write ids and signs of the joints into the rig file")
+        count = len(servos.joints)
         chosen = bauds if bauds is not None else (servos.baud, *(baud for baud in BAUDS if baud != servos.baud))
-        found = find_servos(servos.port, chosen, self.say, self.bench.stop.check)
+        found = find_servos(servos.port, chosen, self.say, self.bench.stop.check, count)
         listed = ", ".join(f"{servo.id} {model_name(servo.model)}" for servo in found.servos)
-        if found.elsewhere and len(found.servos) < len(JOINT_NAMES):
+        if found.elsewhere and len(found.servos) < count:
             others = "; ".join(f"{', '.join(map(str, ids))} at {baud} baud" for baud, ids in found.elsewhere)
             raise DeviceError(
-                "servos at several speeds: {ids} at {a} baud; {others}; set all seven to one",
+                "servos at several speeds: {ids} at {a} baud; {others}; set all to one",
                 ids=", ".join(map(str, found.ids)),
                 a=found.baud,
                 others=others,
             )
-        if len(found.servos) != len(JOINT_NAMES):
+        if len(found.servos) != count:
             raise DeviceError(
-                f"{len(found.servos)} servos answer, seven are needed: {listed}; check cables, and that no id is used twice"
+                f"{len(found.servos)} servos answer, {count} are needed: {listed}; check cables, and that no id is used twice"
             )
         if refused := [f"id {servo.id}: {why}" for servo in found.servos if (why := unsupported(servo.model))]:
             raise DeviceError(refused[0])
-        self.say(message("seven servos at {a} baud: {ids}", a=found.baud, ids=", ".join(map(str, found.ids))))
+        self.say(message("{count} servos at {a} baud: {ids}", count=count, a=found.baud, ids=", ".join(map(str, found.ids))))
         self.found = found
         self.findings = {servo_id: finding for servo_id, finding in self.findings.items() if servo_id in found.ids}
         if any(one.id not in found.ids for one in self.assignments):  # a servo was changed for another one
@@ -260,14 +270,14 @@ class RigDraft:
 
     def take_findings(self) -> tuple[Assignment, ...]:
         """Name the servos after what was found; raises NotIdentified."""
-        assigned = assign(self.findings)
+        assigned = assign(self.findings, self.servos, self.found.ids if self.found is not None else ())
         self.set_assignments(assigned)
         if self.scale is not None:
             feed = feed_disagreement(self.findings, assigned, self.servos, self.scale, self._picture_size())
             if feed:
                 self.say(feed)
                 self.notes.append(feed)
-        if any(one.assumed for one in assigned):
+        if alike(self.servos):
             self.notes.append(
                 "up and down are assumed by the order of their ids: one camera cannot tell them apart; swap them if it is wrong"
             )
@@ -291,7 +301,7 @@ class RigDraft:
         """
         names = [one.name for one in assignments]
         ids = {one.id for one in assignments}
-        if sorted(names) != sorted(JOINT_NAMES) or len(ids) != len(JOINT_NAMES):
+        if sorted(names) != sorted(self.config.servos.names) or len(ids) != len(names):
             raise NotIdentified("every servo must have one name, and every name one servo")
         self.assignments = tuple(assignments)
         before = wiring_of(self.config.servos)
@@ -327,7 +337,7 @@ class RigDraft:
             )
 
     def _set_zero(self, ticks: tuple[int, ...]) -> None:
-        slack = self.zeros.slack_mm if self.zeros is not None else (0.0, 0.0, 0.0, 0.0)
+        slack = self.zeros.slack_mm if self.zeros is not None else (0.0,) * len(self.config.servos.tendons)
         self.zero = ZeroConfig(
             ticks=ticks,
             slack_mm=slack,
@@ -370,6 +380,9 @@ class RigDraft:
             raise DeviceError("it is not known where the wires are taut: find the zeros first")
         with self._moving():
             learnt = servo_identification.learn_steering(self.bench, self.servos, self.say, kept)
+            if abs(learnt.steering.roll_deg) > _MIRRORED_DEG and self._turn_rotation_round():
+                self.say("the head went to the other side: the rotation turns the other way; learning once more")
+                learnt = servo_identification.learn_steering(self.bench, self.servos, self.say, kept)
         steering = learnt.steering
         self.steering, self.head_px = steering, learnt.head_px
         self._set_zero(learnt.zero_ticks)
@@ -382,6 +395,16 @@ class RigDraft:
             )
         )
         return steering
+
+    def _turn_rotation_round(self) -> bool:
+        """Take the other direction for a rotation whose direction is assumed; False without one. The wires' zeros stay."""
+        rotation = self.config.servos.names[self.config.servos.places(JointKind.ROTATION)]
+        if not set(rotation) & {one.name for one in self.assignments if one.assumed}:
+            return False
+        zeros = self.zero, self.zeros
+        self.set_assignments([replace(one, sign=-one.sign) if one.name in rotation else one for one in self.assignments])
+        self.zero, self.zeros = zeros
+        return True
 
     def nudge(self, name: str, way_mm: float) -> None:
         """Tighten one tendon by so much, or let it go (negative), for the operator to watch."""

@@ -1,7 +1,8 @@
 """What moving servos a little shows: which servo is which, where the wires are taut, in which direction each tendon bends the head.
 
-The procedures know neither window nor command line. Every motion is a probe's (one servo, bounded) or a robot's (all seven,
-zeroed); both go through driver and gate, and STOP ends every procedure within one period.
+The procedures know neither window nor command line. Every motion is a probe's (one servo, bounded) or a robot's (all,
+zeroed); both go through driver and gate, and STOP ends every procedure within one period. Robots have the joints of their
+configuration.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from core.calibration.servos import (
     taut_at_mm,
 )
 from core.config.calibration import SteeringConfig, ZeroConfig
-from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
+from core.config.safety import TENDON_ANGLES_DEG, JointConfig, JointKind, ServosConfig
+from core.control.joints import unit_vector
 from core.control.kept_zero import keep, zero_offer
 from core.devices import DeviceError
 from core.messages import message
@@ -41,9 +43,10 @@ _AMPLITUDES_MM = (0.75, 1.5, 3.0)
 _SETTLE_S = 0.5
 _SLACK_MM, _STEP_MM, _FINE_MM, _REACH_MM = 1.25, 0.25, 0.06, 4.0
 _BELOW_MM, _PARK_MM = 0.3, 1.0
-_PAIRS = (("right", "left"), ("up", "down"))
 _PULLS_MM = (0.3, 0.5, 0.8, 1.2)
 _ENOUGH_PX = 6.5
+_TURN_S, _TURNED_DEG, _TURN_TRIES = 0.6, 0.5, 20
+"""Time in which a shaft is to turn back, how far it may be from there, and how often that is tried."""
 _AT_ZERO_MM = 0.1
 """A tendon so near to its kept zero stands at it."""
 
@@ -63,6 +66,8 @@ class Probe(Protocol):
 class Steered(Protocol):
     """The robot with all its servos, zeroed where they stood; bends and holds them while it is looked at."""
 
+    @property
+    def rotation_deg(self) -> float: ...
     def bend_to(self, command: Command) -> None: ...
     def pause(self, seconds: float) -> None: ...
     def alive(self) -> None: ...
@@ -72,7 +77,7 @@ class Steered(Protocol):
 class ServoBench(Protocol):
     """What the procedures work with: observes the robot and moves its servos. `alive` is called while it observes.
 
-    ``observe`` raises HeadNotSeen, DeviceError; ``probe`` (one servo) and ``steer`` (all seven) raise ServoError.
+    ``observe`` raises HeadNotSeen, DeviceError; ``probe`` (one servo) and ``steer`` (all) raise ServoError.
     """
 
     def observe(self, alive: Callable[[], None]) -> Look: ...
@@ -86,7 +91,7 @@ class ServoBench(Protocol):
 class Zeros:
     """How far each tendon was from taut (mm; positive: it was slack), and those that could not be told, with why."""
 
-    slack_mm: tuple[float, float, float, float]
+    slack_mm: tuple[float, ...]
     problems: tuple[str, ...] = ()
 
 
@@ -177,21 +182,25 @@ def find_zeros(bench: ServoBench, servos: ServosConfig, say: Say) -> Zeros:
 
     A tendon that cannot be told is left where it was, and named in ``problems``.
 
-    Raises ServoError: strained, stopped, or the bus is not in order: nothing goes on; DeviceError: the camera is lost; the pair of
-    tendons in hand is as it was.
+    Raises ServoError: strained, stopped, or the bus is not in order: nothing goes on; DeviceError: the camera is lost; the
+    tendons in hand are as they were.
     """
-    slack: dict[str, float] = dict.fromkeys(TENDONS, 0.0)
+    slack = {joint.name: 0.0 for joint in servos.tendons}
     problems = []
-    for first, second in _PAIRS:
-        # Two taut wires share every pull: while one is looked at the other hangs slack.
-        _move(bench, servos, second, -_PARK_MM)
-        for name, hangs_mm, then_mm in ((first, 0.0, -_PARK_MM), (second, _PARK_MM, 0.0)):
+    # opposite wires stand side by side; three share every pull
+    names, size = list(slack), 3 if len(slack) == 3 else 2
+    for group in (names[first : first + size] for first in range(0, len(names), size)):
+        # Taut wires share every pull: while one is looked at the others hang slack.
+        for name in group[1:]:
+            _move(bench, servos, name, -_PARK_MM)
+        for name in group:
+            hangs_mm, then_mm = 0.0 if name == group[0] else _PARK_MM, 0.0 if name == group[-1] else -_PARK_MM
             try:
                 taut_mm = _find_zero(bench, servos, name, then_mm)
             except ServoError:
                 raise
             except DeviceError:
-                for hanging in (second, first)[: 1 if name == first else 2]:
+                for hanging in group[1 if name == group[0] else 0 :]:
                     _move(bench, servos, hanging, _PARK_MM)
                 raise
             except (NeverTaut, HeadNotSeen) as error:
@@ -201,12 +210,17 @@ def find_zeros(bench: ServoBench, servos: ServosConfig, say: Say) -> Zeros:
             else:
                 slack[name] = taut_mm - hangs_mm
                 say(f"{name}: taut {abs(slack[name]):.2f} mm {'farther' if slack[name] >= 0 else 'back'}")
-        _move(bench, servos, first, _PARK_MM)
-    return Zeros((slack["right"], slack["left"], slack["up"], slack["down"]), tuple(problems))
+        for name in group[:-1]:
+            _move(bench, servos, name, _PARK_MM)
+    return Zeros(tuple(slack.values()), tuple(problems))
+
+
+def _joint(servos: ServosConfig, name: str) -> JointConfig:
+    return servos.joints[servos.names.index(name)]
 
 
 def _move(bench: ServoBench, servos: ServosConfig, name: str, way_mm: float) -> None:
-    joint = servos.joints[JOINT_NAMES.index(name)]
+    joint = _joint(servos, name)
     limits = ProbeLimits(-_PARK_MM, _PARK_MM)
     with bench.probe(servos, joint.id, limits, joint.sign) as probe:
         probe.move_to(way_mm)
@@ -218,7 +232,7 @@ def _find_zero(bench: ServoBench, servos: ServosConfig, name: str, then_mm: floa
 
     Raises NeverTaut, HeadNotSeen, DeviceError: it is where it was.
     """
-    joint = servos.joints[JOINT_NAMES.index(name)]
+    joint = _joint(servos, name)
     # A wire that stood too tight is taut below where it was let go to, and hangs lower still: a probe stops at its limits.
     limits = ProbeLimits(-_SLACK_MM - 2.0 * _PARK_MM, _REACH_MM)
     with bench.probe(servos, joint.id, limits, joint.sign) as probe, _or_back(lambda: probe.move_to(0.0)):
@@ -261,14 +275,14 @@ def nudge(bench: ServoBench, servos: ServosConfig, name: str, way_mm: float) -> 
 
 
 def standing_ticks(bench: ServoBench, servos: ServosConfig) -> tuple[int, ...]:
-    """Position registers of the seven joints, armed for a moment where they stand; nothing turns. Raises ServoError."""
+    """Position registers of the joints, armed for a moment where they stand; nothing turns. Raises ServoError."""
     with bench.steer(servos.model_copy(update={"pretension_mm": 0.0})) as robot:
         return robot.ticks()
 
 
 @dataclass(frozen=True, slots=True)
 class LearnedSteering:
-    """The steering, where the head was, and the position registers of the seven joints at zero."""
+    """The steering, where the head was, and the position registers of the joints at zero."""
 
     steering: SteeringConfig
     head_px: Point
@@ -276,7 +290,7 @@ class LearnedSteering:
 
 
 def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say, kept: ZeroConfig | None = None) -> LearnedSteering:
-    """Pull each tendon a little, as far as the head needs to show its way.
+    """Bend to each side, up and down a little, as far as the head needs to show its way: that pulls each tendon.
 
     The tendons must be taut and without tension where they stand: that becomes zero, and there they are in the end. Without the
     pretension, which would be kept and be added once more each time this is done.
@@ -288,24 +302,18 @@ def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say, kept: Zero
     Raises SteeringNotSeen, HeadNotSeen, ServoError, DeviceError.
     """
     pulls: dict[str, Pull] = {}
-    ways: Mapping[str, Callable[[float], Command]] = {
-        "right": lambda share: Command(bend=share),
-        "left": lambda share: Command(bend=-share),
-        "up": lambda share: Command(pitch=share),
-        "down": lambda share: Command(pitch=-share),
-    }
     first: Look | None = None
     slack = servos.model_copy(update={"pretension_mm": 0.0})
-    with bench.steer(slack) as robot, _or_back(lambda: robot.bend_to(Command())):
+    with bench.steer(slack) as robot, _or_back(lambda: _bend(robot, servos, 0.0, 0.0)):
         ticks = robot.ticks()
         if kept is not None:
             _check_at_zero(servos, kept, ticks)
-        for name in TENDONS:
+        for name, angle_deg in TENDON_ANGLES_DEG.items():
             for pull_mm in _PULLS_MM:
-                robot.bend_to(Command())
+                _bend(robot, servos, 0.0, 0.0)
                 rest = _look(bench, robot)
                 first = first or rest
-                robot.bend_to(ways[name](pull_mm / servos.max_pull_mm))
+                _bend(robot, servos, pull_mm / servos.max_pull_mm, angle_deg)
                 pulls[name] = Pull(pull_mm, head_move(rest, _look(bench, robot)))
                 if pulls[name].move.size_px >= _ENOUGH_PX:
                     break
@@ -314,14 +322,32 @@ def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say, kept: Zero
                     "{joint}: {a:g} mm of pull, {b:.1f} px of way", joint=name, a=pulls[name].pull_mm, b=pulls[name].move.size_px
                 )
             )
-        robot.bend_to(Command())
+        _bend(robot, servos, 0.0, 0.0)
     assert first is not None
-    return LearnedSteering(learn(pulls, first.heading), first.head, ticks)
+    return LearnedSteering(learn(pulls, first.heading, servos.tendons), first.head, ticks)
+
+
+def _bend(robot: Steered, servos: ServosConfig, share: float, angle_deg: float) -> None:
+    """Bend by a share of the full bend in a direction; a shaft that turns its tendons there is waited for, and turned back."""
+    across, up = unit_vector(angle_deg)
+    command = Command(bend=share * across, pitch=share * up)
+    robot.bend_to(command)
+    if len(servos.tendons) > 2 or not servos.joints[servos.places(JointKind.ROTATION)]:
+        return
+    for _ in range(_TURN_TRIES):
+        before_deg = robot.rotation_deg
+        if share == 0.0 and abs(before_deg) <= _TURNED_DEG:
+            robot.bend_to(command)
+            return
+        robot.bend_to(command if share else Command(rotation_deg_s=-before_deg / _TURN_S))
+        if share and abs(robot.rotation_deg - before_deg) <= _TURNED_DEG:
+            return
+    raise ServoError("the shaft does not turn to where it should: is it held?")
 
 
 def _check_at_zero(servos: ServosConfig, kept: ZeroConfig, ticks: tuple[int, ...]) -> None:
     """Raise DeviceError when a tendon does not stand at its kept zero: from a bent head every pull would be added to that."""
-    for joint, zero_ticks, now in zip(servos.joints[: len(TENDONS)], kept.ticks, ticks, strict=False):
+    for joint, zero_ticks, now in zip(servos.tendons, kept.ticks, ticks, strict=False):
         model = servos.model_of(joint).number
         offer = zero_offer(joint, model, keep(joint, model, zero_ticks, 0.0, 0.0), now)
         if offer is None or abs(offer.position_mm) > _AT_ZERO_MM:

@@ -385,15 +385,24 @@ class SteeredRobot:
             self._watch_current([reading for reading in status.servos if isinstance(reading, ServoState)])
         self._robot.send(self._command)
 
+    @property
+    def rotation_deg(self) -> float:
+        """Where the shaft is turned to, from where it was zeroed; 0 without a rotation."""
+        states = zip(self._joints, self._states(), strict=True)
+        return sum(state.position_mm or 0.0 for joint, state in states if joint.kind is JointKind.ROTATION)
+
     def ticks(self) -> tuple[int, ...]:
         """Position registers of all joints, as they told last."""
+        return tuple(state.ticks for state in self._states())
+
+    def _states(self) -> list[ServoState]:
         until_s = time.monotonic() + 1.0
         while time.monotonic() < until_s:
             status = self._robot.bus_status()
             readings = () if status is None else status.servos
             states = [reading for reading in readings if isinstance(reading, ServoState)]
             if len(states) == len(self._joints):
-                return tuple(state.ticks for state in states)
+                return states
             self.alive()
             self._stop.sleep(_PERIOD_S)
         raise ServoError("not all servos tell where they are: check cables and supply")

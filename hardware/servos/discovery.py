@@ -68,8 +68,9 @@ def find_servos(
     bauds: Sequence[int] = BAUDS,
     say: Callable[[str], object] = lambda _: None,
     check_stop: Callable[[], None] = lambda: None,
+    count: int = len(JOINT_NAMES),
 ) -> FoundServos:
-    """Ping all ids, at one speed after the other, until seven answer; where they never do, those of the speed with the most.
+    """Ping all ids, at one speed after the other, until `count` answer; where they never do, those of the speed with the most.
 
     Parameters
     ----------
@@ -86,12 +87,12 @@ def find_servos(
         line = ServoLine(port, baud)
         line.open()
         try:
-            found = [FoundServo(servo_id, model) for servo_id in _ids(line) if (model := _model(line, servo_id)) is not None]
+            found = [FoundServo(servo_id, model) for servo_id in _ids(line, count) if (model := _model(line, servo_id)) is not None]
         finally:
             line.close()
         if found:
             answered[baud] = tuple(found)
-        if len(found) >= len(JOINT_NAMES):
+        if len(found) >= count:
             break
     if answered:
         fullest = max(answered, key=lambda baud: len(answered[baud]))
@@ -117,11 +118,11 @@ def slow_bus(baud: int, bus_hz: float) -> str:
     return message("{baud} baud: about {a:.0f} cycles a second instead of {b:g}", baud=baud, a=1.0 / cycle_s, b=bus_hz)
 
 
-def _ids(line: ServoLine) -> list[int]:
+def _ids(line: ServoLine, count: int) -> list[int]:
     """Ids that answer. All talk after one another, and one that is missed is found in the next round."""
     ids = set(line.others())
     for _ in range(_TRIES - 1):
-        if not ids or len(ids) >= len(JOINT_NAMES):
+        if not ids or len(ids) >= count:
             break
         ids |= set(line.others())
     return sorted(ids)

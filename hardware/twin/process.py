@@ -167,13 +167,15 @@ class RemoteTwin:
 def wired(twin: TwinConfig, servos: ServosConfig) -> ServosConfig:
     """The servos as the twin's wiring has them, which the program may not know.
 
-    Raises ValueError when an id is missing or used twice.
+    Raises ValueError when there is not one id for each joint, or one is used twice.
     """
     if twin.wiring is None:
         return servos
     numbers = [int(number) for number in twin.wiring.split(",")]
     if len({abs(number) for number in numbers}) != len(numbers) or not all(0 < abs(number) <= 252 for number in numbers):
         raise ValueError(f"twin.wiring {twin.wiring}: different ids of 1 to 252")
+    if len(numbers) != len(servos.joints):
+        raise ValueError(f"twin.wiring {twin.wiring}: {len(servos.joints)} ids, one for each joint")
     joints = tuple(
         joint.model_copy(update={"id": abs(number), "sign": -1 if number < 0 else 1})
         for joint, number in zip(servos.joints, numbers, strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from core.calibration.servos import Look
 from core.config.models import Config
-from core.config.safety import JOINT_NAMES, SafetyConfig, ServosConfig
+from core.config.safety import JointKind, SafetyConfig, ServosConfig
 from core.control.gate import Source
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.types import Command, Points
@@ -26,11 +26,11 @@ _FRAME_S = 0.05
 
 
 class LockTwin:
-    """The world, and where its seven servos stand (mm in each servo's own positive direction, by id)."""
+    """The world, and where its servos stand (mm in each servo's own positive direction, by id)."""
 
     def __init__(self, config: Config, insertion_mm: float = 70.0) -> None:
         self.config = config
-        self.world = TwinWorld(config.twin, perception=config.perception)
+        self.world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety)
         self.world.insert(insertion_mm)
         self.wiring = wired(config.twin, config.servos)
         self.turned_mm = {joint.id: 0.0 for joint in self.wiring.joints}
@@ -89,7 +89,7 @@ class _Mover:
 class LockProbe(_Mover):
     @property
     def position_mm(self) -> float:
-        return self._servos.positions_mm()[JOINT_NAMES.index("advance")]
+        return sum(self._servos.positions_mm()[self._config.places(JointKind.ADVANCE)])
 
     def move_to(self, target_mm: float) -> None:
         for _ in range(1000):
@@ -106,8 +106,12 @@ class LockSteered(_Mover):
         self._command = command
         self.pause(0.6)
 
+    @property
+    def rotation_deg(self) -> float:
+        return sum(self._servos.positions_mm()[self._config.places(JointKind.ROTATION)])
+
     def ticks(self) -> tuple[int, ...]:
-        return (0,) * len(JOINT_NAMES)
+        return (0,) * len(self._config.joints)
 
 
 class LockBench:

@@ -105,8 +105,8 @@ def test_a_rig_is_shown() -> None:
     ("arguments", "problem"),
     [
         ((), r"^say the diameters of the drums before anything moves, .*--drums TENDONS,FEED,DELIVERY"),
-        (("--drums", "12.7,20"), "^--drums 12.7,20: three diameters in mm"),
-        (("--drums", "12.7,20,x"), "^--drums 12.7,20,x: three diameters in mm"),
+        (("--drums", "12.7"), "^--drums 12.7: diameters in mm"),
+        (("--drums", "12.7,20,x"), "^--drums 12.7,20,x: diameters in mm"),
     ],
 )
 def test_a_live_rig_is_not_moved_before_its_drums_are_known(arguments: tuple[str, ...], problem: str) -> None:

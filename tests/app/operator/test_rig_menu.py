@@ -27,7 +27,6 @@ from hardware.cameras.registry import FoundCamera
 from hardware.rig import FoundDevices
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
 from tests.app.rig_wizard.test_wizard import StillCamera
-from tests.core.robots import THREE
 
 KNOWN = CalibrationConfig(
     made_utc=datetime.now(UTC).replace(microsecond=0),
@@ -132,18 +131,16 @@ def test_a_chosen_rig_is_opened_in_this_window_and_shows_millimetres(
     assert [action.isChecked() for action in desk._rigs] == [True]
 
 
-def test_the_wizard_is_refused_for_joints_that_it_does_not_know(window: OperatorWindow, opened: list[Config], qtbot: QtBot) -> None:
-    write_rig(make_rig(load_config().model_copy(update={"servos": THREE}), "three tendons", None))
-    desk = _desk(window)
-    desk.choose("three tendons")
-    until(qtbot, lambda: len(opened) == 2)
-    assert opened[1].servos.names == THREE.names
+def test_the_wizard_is_refused_for_a_drive_without_servos(window: OperatorWindow, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk, config = _desk(window), load_config()
+    other = config.model_copy(update={"servos": config.servos.model_copy(update={"driver": "stepper board"})})
+    monkeypatch.setattr(desk._rig, "reread_config", lambda: other)
     said: list[str] = []
     window.say = lambda text, **_: said.append(text)
     desk.calibrate()
     assert desk.wizard is None
     assert said == [
-        "The rig stays as it is: the wizard knows the default robot only: write the ids and signs of these joints into the rig file"
+        "The rig stays as it is: the wizard knows DYNAMIXEL servos only: write the ids and signs of the joints into the rig file"
     ]
 
 

@@ -25,7 +25,7 @@ from core.calibration.servos import Assignment
 from core.config.calibration import CalibrationConfig, DrumsConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
 from core.config.models import Config, load_config
 from core.config.rig_file import find_rig, list_rigs
-from core.config.safety import JOINT_NAMES, TENDONS
+from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
 from core.devices import DeviceError
 from core.types import Frame
 from hardware.calibration import bench as calibration_bench
@@ -33,6 +33,7 @@ from hardware.calibration.bench import CalibrationBench
 from hardware.calibration.servo_identification import Zeros
 from hardware.servos.discovery import FoundPort, FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
+from tests.core.robots import THREE, TURNED
 
 
 class StillCamera:
@@ -358,6 +359,35 @@ def test_the_person_is_asked_which_of_two_is_up(opened: RigWizard, qtbot: QtBot)
     qtbot.mouseClick(page.swap_button, Qt.MouseButton.LeftButton)
     assert [(one.name, one.id) for one in draft.assignments[2:4]] == [("up", 4), ("down", 3)]
     assert draft.calibration().assumed is None, "who swaps has looked"
+
+
+@pytest.mark.parametrize(
+    ("servos", "joints", "tendons"),
+    [
+        (THREE, ["tendon 1 (90°)", "tendon 2 (210°)", "tendon 3 (330°)", "robot forward"], "tendon 3 (330°)"),
+        (TURNED, ["tendon 1 (90°)", "tendon 2 (270°)", "robot forward", "rotation"], "tendon 2 (270°)"),
+    ],
+)
+def test_pages_follow_from_the_joints_of_the_robot(
+    make_wizard: MakeWizard, qtbot: QtBot, servos: ServosConfig, joints: list[str], tendons: str
+) -> None:
+    wizard = make_wizard("bench 1", load_config().model_copy(update={"servos": servos}))
+    _open_camera(wizard, qtbot)
+    _to(wizard, wizard.drums_page)
+    assert [row[0].isVisible() for row in wizard.drums_page._cells] == [True, True, False], "there is no catheter"
+    _to(wizard, wizard.identify_page)
+    draft, page = wizard.model.draft, wizard.identify_page
+    wizard.model.bench.port = "/dev/ttyUSB0"
+    draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, tuple(FoundServo(joint.id, 1020) for joint in servos.joints))
+    draft.set_assignments([Assignment(one.name, one.id, 1, "seen", assumed=one.name == "rotation") for one in servos.joints])
+    wizard.model.changed.emit()
+    assert [page.rows.item(row, 0).text() for row in range(page.rows.rowCount())] == joints
+    assert page.swap_button.isVisible() is (servos is TURNED), "its tendons act out of the picture's plane"
+    assert page.right_button.isVisible() is ("which way the shaft turns" in page.result.text()) is (servos is TURNED)
+    draft.zeros = Zeros(tuple(0.1 * k for k in range(len(servos.tendons))))
+    for one in (wizard.zero_page, wizard.steering_page):
+        _to(wizard, one)
+        assert one.rows.item(one.rows.rowCount() - 1, 0).text() == tendons
 
 
 def test_a_rig_may_have_a_space_in_its_name_and_space_is_stop_there_while_a_job_runs(opened: RigWizard, qtbot: QtBot) -> None:

@@ -32,6 +32,7 @@ from core.calibration.servos import (
 from core.config.calibration import ScaleConfig
 from core.config.safety import JOINT_NAMES, ServosConfig
 from core.types import Image, Points
+from tests.core.robots import ADVANCE, ROTATION, robot, tendons
 
 BLANK: Image = np.full((480, 640, 3), 120, np.uint8)
 ROBOT_PX = 300.0
@@ -147,6 +148,7 @@ def test_the_catheter_is_told_by_its_sheath_once_the_servo_has_gone_far() -> Non
         assert (found.sign if found is not None else None) == sign
 
 
+TENDONS = ServosConfig().tendons
 ALL = {
     4: Function.RIGHT,
     9: Function.LEFT,
@@ -159,7 +161,7 @@ ALL = {
 
 
 def test_names_follow_from_functions_and_the_order_of_ids() -> None:
-    named = assign({servo_id: ServoFinding(function, -1, "") for servo_id, function in ALL.items()})
+    named = assign({servo_id: ServoFinding(function, -1, "") for servo_id, function in ALL.items()}, ServosConfig())
     assert tuple(one.name for one in named) == JOINT_NAMES
     assert [one.id for one in named] == [4, 9, 2, 5, 1, 3, 7]
     assert [one.name for one in named if one.assumed] == ["up", "down"]
@@ -169,13 +171,49 @@ def test_names_follow_from_functions_and_the_order_of_ids() -> None:
 def test_a_missing_and_a_double_function_are_named() -> None:
     found = {servo_id: ServoFinding(function, 1, "") for servo_id, function in ALL.items() if servo_id != 4}
     with pytest.raises(NotIdentified, match=r"1 that pulls the head to the right \(found: none\)"):
-        assign(found)
+        assign(found, ServosConfig())
     found |= {4: ServoFinding(Function.LEFT, 1, "")}
     with pytest.raises(NotIdentified, match=r"to the left \(found: 4, 9\)"):
-        assign(found)
+        assign(found, ServosConfig())
+
+
+@pytest.mark.parametrize(
+    ("servos", "seen", "assumed"),
+    [
+        (robot(*tendons(90.0, 210.0, 330.0), ADVANCE), "PLR", set()),
+        (robot(*tendons(0.0, 120.0, 240.0), ADVANCE), "RLL", {"tendon_2", "tendon_3"}),
+        (robot(*tendons(90.0, 270.0), ADVANCE, ROTATION), "PP", {"tendon_1", "tendon_2", "rotation"}),
+        (robot(*tendons(0.0, 180.0), ADVANCE, ROTATION), "RL", {"rotation"}),
+        (robot(*tendons(180.0, 0.0), ADVANCE), "LR", set()),
+    ],
+)
+def test_robots_of_other_shapes_are_told_apart_by_the_directions_of_their_tendons(
+    servos: ServosConfig, seen: str, assumed: set[str]
+) -> None:
+    """Of a rotation nothing is seen: it is the servo that is left."""
+    functions = [{"R": Function.RIGHT, "L": Function.LEFT, "P": Function.PITCH}[one] for one in seen] + [Function.ADVANCE]
+    found = {20 + place: ServoFinding(function, -1, "") for place, function in enumerate(functions)}
+    line = [*found, 7] if "rotation" in servos.names else list(found)
+    named = assign(found, servos, line)
+    assert tuple(one.name for one in named) == servos.names
+    assert [one.id for one in named] == line
+    assert {one.name for one in named if one.assumed} == assumed
+    if "rotation" in servos.names:
+        with pytest.raises(NotIdentified, match=r"1 of which nothing is seen, the rotation \(found: 7, 8\)"):
+            assign(found, servos, [*line, 8])
 
 
 # ---- steering
+
+
+def test_the_directions_of_three_tendons_follow_from_the_bends() -> None:
+    found = learn(_pulls(), np.array([1.0, 0.0]), robot(*tendons(90.0, 210.0, 330.0), ADVANCE).tendons)
+    assert [one.name for one in found.tendons] == ["tendon_1", "tendon_2", "tendon_3"]
+    assert [one.direction_deg for one in found.tendons] == [None, pytest.approx(-90.0), pytest.approx(90.0)]
+    assert found.tendons[2].px_per_mm == pytest.approx(math.hypot(8.0, 1.0) / 0.4 * math.cos(math.radians(30.0)))
+    rolled = learn(_pulls(60.0, way_px=20.0), np.array([1.0, 0.0]), robot(*tendons(90.0, 210.0, 330.0), ADVANCE).tendons)
+    assert rolled.roll_deg == pytest.approx(60.0)
+    assert [one.direction_deg for one in rolled.tendons] == [pytest.approx(90.0), pytest.approx(-90.0), None]
 
 
 def _pulls(roll_deg: float = 0.0, way_px: float = 8.0, retreat_px: float = 1.0) -> dict[str, Pull]:
@@ -186,7 +224,7 @@ def _pulls(roll_deg: float = 0.0, way_px: float = 8.0, retreat_px: float = 1.0) 
 
 
 def test_tendons_that_act_in_the_picture() -> None:
-    found = learn(_pulls(), np.array([1.0, 0.0]))
+    found = learn(_pulls(), np.array([1.0, 0.0]), TENDONS)
     directions = {tendon.name: tendon.direction_deg for tendon in found.tendons}
     assert directions["right"] == pytest.approx(90.0)
     assert directions["left"] == pytest.approx(-90.0)
@@ -203,20 +241,20 @@ def test_the_tips_turn_is_positive_to_the_right() -> None:
 
 def test_the_turn_per_millimetre_is_that_of_the_freer_side() -> None:
     pulls = _pulls()
-    assert learn(pulls, np.array([1.0, 0.0])).turn_deg_per_mm is None, "the head did not turn"
+    assert learn(pulls, np.array([1.0, 0.0]), TENDONS).turn_deg_per_mm is None, "the head did not turn"
     for name, sign, turned_deg in (("right", 1.0, 12.0), ("left", -1.0, 18.0)):
         move = pulls[name].move
         pulls[name] = Pull(0.4, HeadMove(move.vector, move.lateral_px, move.longer_px, sign * turned_deg))
-    assert learn(pulls, np.array([1.0, 0.0])).turn_deg_per_mm == pytest.approx(45.0)
+    assert learn(pulls, np.array([1.0, 0.0]), TENDONS).turn_deg_per_mm == pytest.approx(45.0)
     swapped = pulls | {"right": pulls["left"], "left": pulls["right"]}
-    found = learn(swapped, np.array([1.0, 0.0]))
+    found = learn(swapped, np.array([1.0, 0.0]), TENDONS)
     assert (found.turn_deg_per_mm, abs(found.roll_deg)) == (pytest.approx(45.0), pytest.approx(180.0))
-    assert learn(_pulls(90.0, way_px=20.0), np.array([1.0, 0.0])).turn_deg_per_mm is None, "it acts out of the picture"
+    assert learn(_pulls(90.0, way_px=20.0), np.array([1.0, 0.0]), TENDONS).turn_deg_per_mm is None, "it acts out of the picture"
 
 
 @pytest.mark.parametrize("roll_deg", [-60.0, 30.0, 90.0, 180.0])
 def test_a_robot_that_is_rolled(roll_deg: float) -> None:
-    found = learn(_pulls(roll_deg, way_px=20.0), np.array([1.0, 0.0]))
+    found = learn(_pulls(roll_deg, way_px=20.0), np.array([1.0, 0.0]), TENDONS)
     assert abs(turn_deg(found.roll_deg, roll_deg)) < 1.0
 
 
@@ -226,7 +264,7 @@ def test_way_and_heading_bear_witness_together() -> None:
         name: Pull(pull.pull_mm, HeadMove(_turned(pull.move.vector, 6.0), pull.move.lateral_px, 0.0))
         for name, pull in pulls.items()
     }
-    found = learn(turned, np.array([1.0, 0.0]))
+    found = learn(turned, np.array([1.0, 0.0]), TENDONS)
     assert found.disagreement_deg == pytest.approx(6.0, abs=0.1)
     assert found.tendons[0].direction_deg == pytest.approx(93.0, abs=0.2)
 
@@ -240,12 +278,12 @@ def test_where_one_side_is_a_wall_the_heading_decides() -> None:
     pulls = _pulls()
     pulls["right"] = Pull(0.4, _move(0.5))
     pulls["left"] = Pull(0.4, _move(-9.0, along_px=-2.0))
-    assert learn(pulls, np.array([1.0, 0.0])).tendons[1].direction_deg == pytest.approx(-90.0)
+    assert learn(pulls, np.array([1.0, 0.0]), TENDONS).tendons[1].direction_deg == pytest.approx(-90.0)
 
 
 def test_a_head_against_the_wall_teaches_nothing() -> None:
     with pytest.raises(SteeringNotSeen, match="against a wall"):
-        learn(_pulls(way_px=2.0), np.array([1.0, 0.0]))
+        learn(_pulls(way_px=2.0), np.array([1.0, 0.0]), TENDONS)
 
 
 # ---- taut
@@ -291,6 +329,6 @@ def test_a_feed_that_goes_another_way_than_it_was_sent_is_told(mm_per_px: float,
     scale = ScaleConfig(mm_per_px=2.0 * mm_per_px, size_px=(320, 240), method="board", uncertainty_share=0.01)
     servos = ServosConfig()
     assert {joint.mm_per_turn for joint in servos.joints} == {40.0}
-    line = feed_disagreement(findings, assign(findings), servos, scale, (640, 480))
+    line = feed_disagreement(findings, assign(findings, servos), servos, scale, (640, 480))
     assert bool(line) is bool(told)
     assert told in line

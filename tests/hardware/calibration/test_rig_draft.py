@@ -199,7 +199,7 @@ def test_the_wiring_that_was_found_is_kept(draft: RigDraft) -> None:
     ("elsewhere", "problem"),
     [
         (((57_600, (6, 7)),), r"^servos at several speeds: 1, 2, 3, 4, 5 at 1000000 baud; 6, 7 at 57600 baud; set all"),
-        ((), r"^5 servos answer, seven are needed: .*check cables"),
+        ((), r"^5 servos answer, 7 are needed: .*check cables"),
     ],
 )
 def test_what_keeps_servos_from_being_seven_is_told(

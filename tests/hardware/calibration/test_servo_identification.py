@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from core.calibration.servos import Assignment, Function, HeadMove, HeadNotSeen, Look, angle_deg, assign, turn_deg
-from core.config.models import Config
+from core.config.models import RESOURCES, Config
+from core.config.rig_file import read_rig
 from core.config.safety import JOINT_NAMES, TENDONS, ServosConfig
 from core.devices import DeviceError
 from core.types import Command
@@ -30,7 +31,7 @@ def _config(**twin: object) -> Config:
 
 def _identify(bench: LockBench, say: Callable[[str], object] = lambda _: None) -> tuple[Assignment, ...]:
     found = {servo_id: servo_identification.identify_servo(bench, ServosConfig(), FOUND, servo_id, say) for servo_id in IDS}
-    return assign({servo_id: finding for servo_id, finding in found.items() if finding is not None})
+    return assign({servo_id: finding for servo_id, finding in found.items() if finding is not None}, ServosConfig())
 
 
 def _tendon_mm(twin: LockTwin) -> np.ndarray:
@@ -185,6 +186,46 @@ def test_learning_the_steering_again_and_again_pulls_no_wire() -> None:
     for _ in range(2):
         servo_identification.learn_steering(_TrueBench(twin), twin.wiring, lambda _: None)
         assert _tendon_mm(twin) == pytest.approx([0.0] * 4, abs=0.02)
+
+
+def _of_shape(name: str, wiring: str) -> LockTwin:
+    servos = read_rig(RESOURCES / "rigs" / f"{name}.toml").servos
+    return LockTwin(Config.model_validate({"twin": {"phantom": "tree", "wiring": wiring}, "servos": servos.model_dump()}))
+
+
+SHAPES = [("three_tendons", "3,-7,1,-12,5"), ("two_tendons_rotation", "-9,2,-5,6")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "wiring"), SHAPES)
+def test_zeros_and_steering_of_robots_of_other_shapes(name: str, wiring: str) -> None:
+    """The shaft of two tendons is turned into the picture's plane for it, and back."""
+    twin = _of_shape(name, wiring)
+    bench, tendons = _TrueBench(twin), twin.wiring.tendons
+    slack_mm = np.array([0.6, -0.2, 0.3])[: len(tendons)]
+    for joint, one_mm in zip(tendons, slack_mm, strict=True):
+        twin.turn(joint.id, -joint.sign * one_mm)
+    twin.pass_time(0.5)
+    found = servo_identification.find_zeros(bench, twin.wiring, lambda _: None)
+    assert found.problems == ()
+    assert np.abs(np.array(found.slack_mm) - slack_mm).max() < 0.2
+    learnt = servo_identification.learn_steering(bench, twin.wiring, lambda _: None)
+    assert np.abs(twin.joints_mm()[: len(tendons)]).max() < 0.2
+    assert twin.joints_mm()[-1] == pytest.approx(0.0, abs=0.5), "the shaft is turned back"
+    steering = learnt.steering
+    assert steering.roll_deg == pytest.approx(0.0, abs=10.0)
+    assert steering.turn_deg_per_mm == pytest.approx(38.0, rel=0.25)
+    assert tuple(one.name for one in steering.tendons) == tuple(joint.name for joint in tendons)
+
+
+def test_tendons_feed_and_rotation_are_told_apart() -> None:
+    twin = _of_shape(*SHAPES[1])
+    servos, ids = twin.config.servos, (2, 5, 6, 9)
+    models = {2: 1020, 5: 1020, 6: 1210, 9: 1020}
+    found = {one: servo_identification.identify_servo(_TrueBench(twin), servos, models, one, lambda _: None) for one in ids}
+    named = assign({servo_id: finding for servo_id, finding in found.items() if finding is not None}, servos, ids)
+    assert [(one.name, one.id) for one in named] == [("tendon_1", 2), ("tendon_2", 9), ("advance", 5), ("rotation", 6)]
+    assert [one.sign for one in named[:3]] == [1, -1, -1]
 
 
 _UNSEEN, _LOST = HeadNotSeen("the robot's head is not seen"), DeviceError("webcam is lost")
