@@ -79,6 +79,10 @@ CAMERAS = PluginKind("cameras", ("twin", "realsense", "webcam", "basler", *RECOR
 CameraName = Annotated[str, CAMERAS]
 
 
+_UNUSED = ("contact_slow_n", "lean_mm", "contact_back_off_n", "contact_limit_n")
+"""Settings of earlier versions."""
+
+
 class PursuitConfig(ConfigSection):
     """Look-ahead along the route."""
 
@@ -96,23 +100,23 @@ class PursuitConfig(ConfigSection):
     gentle_turn_deg: float = Field(25.0, gt=0.0, le=180.0, description="turn within the preview that still allows full speed")
     slow_steer_deg: float = Field(20.0, gt=0.0, le=180.0, description="missing turn above which the robot goes slow")
     wall_share: float = Field(0.85, gt=0.1, le=1.5, description="head's distance over the room it has: above, near the wall")
-    contact_slow_n: float = Field(0.06, gt=0.0, le=5.0, description="rise of the contact force that slows the robot down")
-    lean_mm: float = Field(5.0, gt=0.1, le=100.0, description="way over which a contact force becomes the body's own lean")
-    contact_back_off_n: float = Field(0.22, gt=0.0, le=5.0, description="contact force above which it backs off")
-    contact_limit_n: float = Field(0.40, gt=0.0, le=5.0, description="never leans harder, however often it backed off")
     stuck_s: float = Field(1.5, ge=0.2, le=20.0, description="no progress for so long: back off")
     stuck_share: float = Field(0.2, ge=0.0, le=1.0, description="progress below this share of what was advised is none")
-    back_off_mm: float = Field(4.0, gt=0.0, le=50.0, description="way back when stuck; half of it from a wall")
+    back_off_mm: float = Field(4.0, gt=0.0, le=50.0, description="way back when stuck, at least")
     behind_s: float = Field(0.3, ge=0.0, le=5.0, description="the way must have lain behind the head for so long to back off")
     retry_mm: float = Field(9.0, gt=0.0, le=50.0, description="way back from where a missed branch lies beside the head")
     arrive_px: float = Field(8.0, ge=1.0, le=100.0, description="way left at which the target counts as reached")
     most_misses: int = Field(2, ge=1, le=100, description="after missing a branch so often it gives up and stops")
     most_tries: int = Field(4, ge=1, le=100, description="backed off so often without coming farther: it gives up and stops")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _upgrade(cls, values: Any) -> Any:
+        """Files of earlier versions have settings that are not used any more."""
+        return {key: value for key, value in values.items() if key not in _UNUSED} if isinstance(values, dict) else values
+
     @model_validator(mode="after")
     def _check_limits(self) -> Self:
-        if not self.contact_slow_n < self.contact_back_off_n <= self.contact_limit_n:
-            raise ValueError("contact_slow_n must be below contact_back_off_n, and that not above contact_limit_n")
         if self.brake_px <= self.arrive_px:
             raise ValueError("brake_px must be above arrive_px, or it would never brake")
         return self

@@ -1,8 +1,8 @@
-"""Pure pursuit along the route: curvature-limited steering, slow before bends and bifurcations, backs off from walls.
+"""Pure pursuit along the route: curvature-limited steering, slow before bends and bifurcations.
 
 Everything is taken from the picture: the head and its direction from the robot's path, the way from the operator's route or,
-without one, from the centerline's piece. Contact force is used where the rig reports it (the twin does). Progress monitors tell
-whether the head moves as it is fed and how hard it presses.
+without one, from the centerline's piece. It backs off when the way to the target leads backwards, a missed branch, and when the
+robot is fed but its head does not move.
 """
 
 from __future__ import annotations
@@ -18,10 +18,6 @@ from core.types import Advice, Point, RobotStatus, Scene, Speed
 
 _MOST_BACK_MM = 60.0
 """Longest way back from a missed branch."""
-_RAISE = 1.25
-"""Factor by which a back-off raises the contact limit."""
-_PAST_PX = 60.0
-"""A head that is so far past the place of a back-off has the first contact limit again."""
 _STILL_MM_S = 0.3
 """Servos at rest measure a little motion, too."""
 _STATUS_GAP_S = 0.5
@@ -34,49 +30,6 @@ _PROGRESS_PX = 6.0
 """The head has come further when the way left is shorter by this."""
 _SAME_BRANCH_PX = 100.0
 """The way left jumps by the lumen's width where the head changes from one branch's centerline to the other's."""
-
-
-class WallContactMonitor:
-    """Detects a head that meets the wall by a contact force that rises faster than the body's own.
-
-    The longer a body lies in a winding vessel, the harder it leans on the wall, at any speed: going slow because of that only makes
-    it lean longer. So the force is compared with its average over the way fed.
-    """
-
-    def __init__(self, config: PursuitConfig) -> None:
-        self._config = config
-        self._average_n: float | None = None
-
-    def rises(self, contact_n: float | None, fed_mm: float) -> bool:
-        """Update with a frame `fed_mm` after the last; `contact_n`: None where the rig does not measure it."""
-        if contact_n is None:
-            return False
-        before_n = contact_n if self._average_n is None else self._average_n
-        self._average_n = contact_n + (before_n - contact_n) * math.exp(-abs(fed_mm) / self._config.lean_mm)
-        return contact_n > self._average_n + self._config.contact_slow_n
-
-
-class ContactLimit:
-    """The contact force above which the robot backs off, if it still rises.
-
-    Each back-off at the same place raises the limit a little, up to the hard one, which always counts, until the head has come well
-    past that place: a body that leans on the wall of a winding vessel does so wherever its head is.
-    """
-
-    def __init__(self, config: PursuitConfig) -> None:
-        self._config = config
-        self._limit_n = config.contact_back_off_n
-        self._raised_at_px: float | None = None
-
-    def exceeded(self, contact_n: float | None, rises: bool, left_px: float | None) -> bool:
-        """Whether to back off; `contact_n`: None where the rig does not measure it, `rises` is ``WallContactMonitor.rises``."""
-        if self._raised_at_px is not None and left_px is not None and left_px < self._raised_at_px - _PAST_PX:
-            self._limit_n, self._raised_at_px = self._config.contact_back_off_n, None
-        if contact_n is None or contact_n <= self._limit_n or not (rises or contact_n > self._config.contact_limit_n):
-            return False
-        self._limit_n = min(_RAISE * max(contact_n, self._limit_n), self._config.contact_limit_n)
-        self._raised_at_px = left_px
-        return True
 
 
 class FeedMonitor:
@@ -236,7 +189,7 @@ _PAUSE_S = 0.5
 
 
 class Pursuit:
-    """Pure pursuit with smoothed steering, which backs off from walls and missed branches until there is room."""
+    """Pure pursuit with smoothed steering, which backs off from missed branches and where the head does not move."""
 
     def __init__(self, config: PursuitConfig, advice: AdviceConfig, bend_deg: float = 94.0) -> None:
         self._config = config
@@ -250,8 +203,6 @@ class Pursuit:
         self._steer_deg = self._error_deg = 0.0
         self._last_s: float | None = None
         self._stall = StallMonitor(self._config)
-        self._contact_limit = ContactLimit(self._config)
-        self._wall_contact = WallContactMonitor(self._config)
         self._misses = MissCounter()
         self._retries = RetryCounter()
         self._feed = FeedMonitor()
@@ -264,7 +215,7 @@ class Pursuit:
         self._is_miss_counted = False
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
-        """Advice for a scene; `status` adds the contact force and the measured feed. None when there is no pose.
+        """Advice for a scene; `status` adds the measured feed. None when there is no pose.
 
         Only a robot that is `followed`, driven by this advice, is concluded to be stranded.
         """
@@ -280,7 +231,6 @@ class Pursuit:
         if since_s > _PAUSE_S:
             self._stall.reset()
             self._behind_s = 0.0
-        contact_n = status.wall_contact_n if status is not None else None
         # counted down, not reset: where head and branch lie in a wide bifurcation, single frames still see the way ahead
         self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
         wanted_deg = limited(config.gain * way.steer_deg, self._words.max_steer_deg)
@@ -298,14 +248,9 @@ class Pursuit:
         self._still_s = self._still_s + elapsed_s if is_still else 0.0
         self._is_stranded = self._is_stranded and way.behind and fed_mm_s == 0.0 and way.target == self._stranded_for
         self._is_miss_counted = self._is_miss_counted and self._behind_s > 0.0
-        rises = self._wall_contact.rises(contact_n, fed_mm)
-        return (
-            self._backing_advice(way, contact_n, rises, stuck, fed_mm)
-            or self._give_up_advice(way)
-            or self._forward_advice(way, rises, scene)
-        )
+        return self._backing_advice(way, stuck, fed_mm) or self._give_up_advice(way) or self._forward_advice(way, scene)
 
-    def _backing_advice(self, way: LookAhead, contact_n: float | None, rises: bool, stuck: bool, fed_mm: float) -> Advice | None:
+    def _backing_advice(self, way: LookAhead, stuck: bool, fed_mm: float) -> Advice | None:
         """Backwards while there is a reason to, which one picture alone never is; None to go on."""
         config = self._config
         stranded = "the robot cannot go back any farther: take over, or choose another destination"
@@ -319,10 +264,6 @@ class Pursuit:
                     self._misses.add(way)
                 self._is_miss_counted = True
                 self._back_off = BackOff("the way to the target branches off behind the head", config.retry_mm)
-            elif self._contact_limit.exceeded(contact_n, rises, way.left_px):
-                self._retries.add(way)
-                why = message("the robot presses against the wall with {a:.2f} N", a=contact_n or 0.0)
-                self._back_off = BackOff(why, config.back_off_mm / 2)
             elif stuck:
                 self._retries.add(way)
                 # all that was fed without effect lies bent behind the head
@@ -357,7 +298,7 @@ class Pursuit:
             )
         return None
 
-    def _forward_advice(self, way: LookAhead, rises: bool, scene: Scene) -> Advice:
+    def _forward_advice(self, way: LookAhead, scene: Scene) -> Advice:
         config, words = self._config, self._words
         limits = [(words.fast_mm_s, "along the route")]
         if way.turn_deg > config.gentle_turn_deg:
@@ -370,8 +311,6 @@ class Pursuit:
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
         if way.wall > config.wall_share:
             limits.append((words.moderate_mm_s, "the head is near the wall"))
-        if rises:
-            limits.append((words.slow_mm_s, "the robot meets the wall"))
         if way.left_px is not None and way.left_px < config.brake_px:
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * way.left_px / config.brake_px), "the target is near"))
         speed_mm_s, why = min(limits)

@@ -25,6 +25,10 @@ def test_defaults_and_presets_load() -> None:
     assert not paper.cleaning.extend_ends
 
 
+def test_files_with_settings_that_are_not_used_any_more_open(tmp_path: Path) -> None:
+    assert load_config(_write(tmp_path, "[policy.pursuit]\ncontact_slow_n = 0.1\nretry_mm = 8.0\n")).policy.pursuit.retry_mm == 8.0
+
+
 def test_a_users_file_wins_over_the_preset_and_keeps_the_rest(tmp_path: Path) -> None:
     path = _write(tmp_path, "[perception.gaps]\ngap_threshold_px = 12\n")
     config = load_config(path, preset="paper")
