@@ -74,7 +74,7 @@ def rehearse(
     config = Config.model_validate(told["config"]) if given else load_config(config_path, None, {})
     config = with_own_phantom(config, bench) if bench is not None else config
     picture = RehearsalPicture.of(config, point_option(target), told.get("size_px"))
-    trial = TrialPlan(config, max_seconds=max_seconds, look="bench", wall_force=False, own=True, target_px=picture.trial_px)
+    trial = TrialPlan(config, max_seconds=max_seconds, look="bench", own=True, target_px=picture.trial_px)
     plan, sharp = RehearsalPlan(trial, head_px, missing), picture.sharp(config)
     for turn in sharp if not (as_json or progress_json) else ():
         x, y = turn.xy

@@ -67,10 +67,6 @@ def trial(
             help="random: every trial another picture; bench: the clear one; own: your bench's picture; or a family, as in synth"
         ),
     ] = "random",
-    wall_force: Annotated[
-        bool,
-        typer.Option("--wall-force/--no-wall-force", help="whether the policy is told the wall force, which no real rig measures"),
-    ] = True,
     rig: Annotated[
         str | None, typer.Option(help="rig file, by name or path: the robot has its joints (resources/rigs has examples)")
     ] = None,
@@ -98,7 +94,7 @@ def trial(
         from hardware.twin.own_phantom import with_own_phantom
 
         config = with_own_phantom(config, bench)
-    plan = TrialPlan(config, true_masks, max_seconds, look, wall_force, bench is not None)
+    plan = TrialPlan(config, true_masks, max_seconds, look, bench is not None)
     # All policies meet a seed one after the other, so that a part of a campaign can already be compared.
     jobs: list[Job] = [(name, seed) for seed in parse_seeds(seeds) for name in policies]
     rows, interrupted = _run(plan, jobs, out, workers, scheduler)
@@ -208,7 +204,6 @@ def _described(plan: TrialPlan) -> dict[str, Any]:
         info = read_model_info(model_folder(plan.config.perception.segmentation.model), verify=())
         model_sha256 = hashlib.sha256(info.model_dump_json(exclude={"figures"}).encode()).hexdigest()
     described: dict[str, Any] = {"true_masks": plan.true_masks, "max_seconds": plan.max_seconds, "look": plan.look}
-    described |= {} if plan.wall_force else {"wall_force": False}
     if plan.own and (file := own_file(plan.config.twin.phantom)) is not None:
         described["own_phantom"] = hashlib.sha256(file.read_bytes()).hexdigest()
     if not plan.config.servos.is_default:
@@ -356,7 +351,6 @@ def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> N
     everything = [row for rows in by_policy.values() for row in rows]
     looks = {RANDOM_LOOK: "random looks", BENCH_LOOK: "the default look"}.get(plan.look, f"looks: {plan.look}")
     seen = "true masks instead of the network" if plan.true_masks else f"model {plan.config.perception.segmentation.model}"
-    seen += "" if plan.wall_force else ", without wall force"
     made = f"LumenPilot {program_line()} · {time.strftime('%Y-%m-%d', time.gmtime())}"
     lowest = enumerate(worst(everything, _WORST))
     text = render_page(

@@ -53,16 +53,14 @@ class TrialPlan:
     """Settings of all trials of a campaign.
 
     ``true_masks``: the twin's masks in place of the network's. ``look`` of ``TRIAL_LOOKS``: every trial has another look, of any
-    of the ten families or of the named one, or all have the default clear bench. ``wall_force``: whether the policy is told the
-    wall contact force, which real rigs do not measure. ``own``: in the configured phantom, a bench's, not in random ones;
-    ``target_px``: to the place in the vessel that is nearest to this one of the picture, not to a random end.
+    of the ten families or of the named one, or all have the default clear bench. ``own``: in the configured phantom, a bench's, not
+    in random ones; ``target_px``: to the place in the vessel that is nearest to this one of the picture, not to a random end.
     """
 
     config: Config
     true_masks: bool = False
     max_seconds: float = 120.0
     look: str = RANDOM_LOOK
-    wall_force: bool = True
     own: bool = False
     target_px: Point | None = None
 
@@ -212,7 +210,7 @@ class Trial:
         frame = self._read()
         scene = self._perceive(frame)
         status = self._world.physics.status()
-        advice = self._policy(scene, status if self._plan.wall_force else replace(status, wall_contact_n=None))
+        advice = self._policy(scene, replace(status, wall_contact_n=None))  # no real rig measures it
         if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
             advice = None  # autonomy has to hold
         self._watch_direction(scene)

@@ -74,7 +74,7 @@ def test_a_branch_is_too_sharp_by_its_turn_and_the_lumen_s_width(turn_deg: float
 def test_a_run_is_the_same_for_its_seed_and_perceives_with_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hardware.twin.trial.make_phantom", lambda _name: forked(50.0, 5.0))
     config = Config()
-    plan = RehearsalPlan(TrialPlan(config, max_seconds=0.7, look="bench", wall_force=False, own=True, target_px=(320.0, 240.0)))
+    plan = RehearsalPlan(TrialPlan(config, max_seconds=0.7, look="bench", own=True, target_px=(320.0, 240.0)))
     rows = [Rehearsal(replace(plan, missing=missing), 3).run() for missing in (0.0, 0.0, 0.9)]
     assert rows[0] == rows[1] and rows[0]["outcome"] == "time out"
     assert rows[0]["answered_share"] == 1.0 and rows[2]["answered_share"] < 0.5
