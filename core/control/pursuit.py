@@ -2,7 +2,7 @@
 
 Everything is taken from the picture: the head and its direction from the robot's path, the way from the operator's route or,
 without one, from the centerline's piece. It backs off when the way to the target leads backwards, a missed branch, and when the
-robot is fed but its head does not move.
+robot is fed but its head does not move; after a few of either it stops and says so.
 """
 
 from __future__ import annotations
@@ -16,20 +16,181 @@ from core.control.look_ahead import SHARP_MM, LookAhead, look_ahead, sharp_branc
 from core.messages import message
 from core.types import Advice, Point, RobotStatus, Scene, Speed
 
+_LONGEST_S = 0.15
+"""A frame counts for no longer than this, so that after a pause no single one decides."""
+_PAUSE_S = 0.5
+"""A longer pause between frames resets the stall monitor."""
+_UNFOLLOWED_S = 1.0
+"""An operator who does not take the robot back for so long has other plans; if the reason is gone, the advice is, too."""
+
+
+class Pursuit:
+    """Pure pursuit with smoothed steering, which backs off from missed branches and where the head does not move."""
+
+    def __init__(self, config: PursuitConfig, advice: AdviceConfig, bend_deg: float = 94.0) -> None:
+        self._config = config
+        self._words = advice
+        self._bend_deg = bend_deg
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the frames before."""
+        self._speed_mm_s = 0.0
+        self._steer_deg = self._error_deg = 0.0
+        self._last_s: float | None = None
+        self._behind_s = self._by_hand_s = 0.0
+        self._feed = FeedMonitor()
+        self._stall = StallMonitor(self._config)
+        self._misses, self._stalls = TryCounter(), TryCounter()
+        self._back_off: BackOff | None = None
+
+    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
+        """Advice for a scene; `status` adds the measured feed. None when there is no pose.
+
+        Only a robot that is `followed`, driven by this advice, is concluded to be stranded.
+        """
+        config = self._config
+        ahead_px = config.look_ahead_px + config.look_ahead_s * max(0.0, self._speed_mm_s) * config.pixels_per_mm
+        # a missed branch was turned into too late: each new try begins to turn earlier
+        way = look_ahead(scene, ahead_px, config, self._misses.count * config.rounding_px)
+        if way is None:
+            return None
+        since_s = 0.0 if self._last_s is None else max(0.0, scene.captured_s - self._last_s)
+        self._last_s = scene.captured_s
+        elapsed_s = min(since_s, _LONGEST_S)
+        if since_s > _PAUSE_S:
+            self._stall.reset()
+            self._behind_s = 0.0
+        # counted down, not reset: where head and branch lie in a wide bifurcation, single frames still see the way ahead
+        self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
+        wanted_deg = limited(config.gain * way.steer_deg, self._words.max_steer_deg)
+        keep = math.exp(-since_s / config.smoothing_s) if config.smoothing_s > 0.0 and since_s > 0.0 else 0.0
+        self._steer_deg = keep * self._steer_deg + (1.0 - keep) * wanted_deg
+        self._error_deg = keep * self._error_deg + (1.0 - keep) * way.error_deg
+        fed_mm_s, fed_mm = self._feed.update(status, self._speed_mm_s, elapsed_s)
+        stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)
+        if self._back_off is not None:
+            self._back_off.update(way.behind, fed_mm_s, fed_mm, elapsed_s, followed)
+        return (
+            self._backing_advice(way, stuck)
+            or self._give_up_advice(way, elapsed_s if fed_mm_s else 0.0)
+            or self._forward_advice(way, scene)
+        )
+
+    def _backing_advice(self, way: LookAhead, stuck: bool) -> Advice | None:
+        """Backwards while there is a reason to, which one picture alone never is; None to go on."""
+        config, back_off = self._config, self._back_off
+        if back_off is not None and (back_off.is_done or (back_off.unfollowed_s > _UNFOLLOWED_S and not way.behind)):
+            self._back_off = None
+            return None
+        if back_off is not None and way.left_px is not None and way.target != back_off.target:
+            back_off = None
+        if back_off is None and way.behind:
+            if self._behind_s < config.behind_s:
+                return self._advise(0.0, 0.0, "the way seems to lie behind the head: looking again")
+            self._misses.add(way)
+            back_off = BackOff("the way to the target branches off behind the head", config.retry_mm, way.target)
+        elif back_off is None and stuck:
+            self._stalls.add(way)
+            # all that was fed without effect lies bent behind the head
+            back_mm = max(config.back_off_mm, self._stall.lost_mm)
+            back_off = BackOff("the robot is fed but its head does not move", back_mm, way.target)
+        self._back_off = back_off
+        if back_off is None:
+            return None
+        if back_off.is_stranded:
+            return self._advise(0.0, 0.0, "the robot cannot go back any farther: take over, or choose another destination")
+        # the way back is free, since the head follows its own body: going slow would only let the body lean longer
+        return self._advise(
+            -self._words.fast_mm_s, 0.0 if way.behind else self._steer_deg, message("backing off: {why}", why=back_off.why)
+        )
+
+    def _give_up_advice(self, way: LookAhead, moved_s: float) -> Advice | None:
+        """Stop after too many misses or tries, until the operator has gone on by hand; `moved_s`: of this frame's time."""
+        if (count := self._misses.count_at(way)) >= self._config.most_misses:
+            why = message("missed the branch {a} times: take over, or choose another destination", a=count)
+        elif (count := self._stalls.count_at(way)) >= self._config.most_tries:
+            why = message("came no farther in {a} tries: take over, or choose another destination", a=count)
+        else:
+            return None
+        self._by_hand_s = self._by_hand_s + moved_s if moved_s else 0.0
+        if self._by_hand_s <= _UNFOLLOWED_S:
+            return self._advise(0.0, 0.0, why)
+        self._misses.count, self._stalls.count, self._by_hand_s = 0, 0, 0.0
+        return None
+
+    def _forward_advice(self, way: LookAhead, scene: Scene) -> Advice:
+        config, words = self._config, self._words
+        limits = [(words.fast_mm_s, "along the route")]
+        if way.turn_deg > config.gentle_turn_deg:
+            limits.append((words.fast_mm_s * config.gentle_turn_deg / way.turn_deg, "a bend ahead"))
+        if way.junction_px is not None:
+            limits.append((words.moderate_mm_s, "a bifurcation ahead"))
+        if (error_deg := abs(self._error_deg)) > config.slow_steer_deg:
+            # no step where it begins: an error that trembles about the limit must not make the feed stutter
+            share = (config.slow_steer_deg / error_deg) ** 2
+            limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
+        if way.wall > config.wall_share:
+            limits.append((words.moderate_mm_s, "the head is near the wall"))
+        if way.left_px is not None and way.left_px < config.brake_px:
+            limits.append((max(words.slowest_mm_s, words.fast_mm_s * way.left_px / config.brake_px), "the target is near"))
+        speed_mm_s, why = min(limits)
+        graph, path, px = scene.vessel_graph, scene.path, config.pixels_per_mm
+        if way.left_px and graph and path and sharp_branches(graph, way.points, path.radius_px, self._bend_deg, SHARP_MM, px):
+            why = message("{why}; a branch ahead may turn more sharply than the head bends", why=why)
+        return self._advise(speed_mm_s, self._steer_deg, why)
+
+    def _advise(self, speed_mm_s: float, steer_deg: float, why: str) -> Advice:
+        self._speed_mm_s = speed_mm_s
+        return Advice(speed_word(abs(speed_mm_s), self._words), speed_mm_s, steer_deg, why)
+
+
 _MOST_BACK_MM = 60.0
 """Longest way back from a missed branch."""
+_STRANDED_S = 3.0
+"""A robot that is advised to go back for so long and does not move cannot: the feed is at the end of its travel, say."""
+
+
+@dataclass(slots=True)
+class BackOff:
+    """A way back of ``distance_mm``, counted from where the ``target`` does not lie behind the head any more."""
+
+    why: str
+    distance_mm: float
+    target: Point | None
+    unfollowed_s: float = field(default=0.0, init=False)
+    _cleared_mm: float = field(default=0.0, init=False)
+    _moved_mm: float = field(default=0.0, init=False)
+    _still_s: float = field(default=0.0, init=False)
+
+    def update(self, behind: bool, fed_mm_s: float, fed_mm: float, elapsed_s: float, followed: bool) -> None:
+        """Update with a frame."""
+        back_mm = max(0.0, -fed_mm)
+        self._moved_mm += back_mm
+        self._cleared_mm = 0.0 if behind else self._cleared_mm + back_mm
+        self.unfollowed_s = self.unfollowed_s + elapsed_s if fed_mm_s >= 0.0 else 0.0
+        if fed_mm_s or not behind:
+            self._still_s = 0.0
+        elif followed:
+            self._still_s += elapsed_s
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has gone far enough."""
+        return self._cleared_mm >= self.distance_mm or self._moved_mm >= _MOST_BACK_MM
+
+    @property
+    def is_stranded(self) -> bool:
+        """Whether the robot does not go back, though it is driven."""
+        return self._still_s > _STRANDED_S
+
+
 _STILL_MM_S = 0.3
 """Servos at rest measure a little motion, too."""
 _STATUS_GAP_S = 0.5
 """What happened between two statuses further apart is not known."""
 _SHORTEST_S = 0.02
 """Frames and statuses come no faster than this: two that do are one moment, and a way divided by it would be a wild speed."""
-_REST_S = 0.3
-"""A robot that is not fed for so long rests; a shorter pause is one of the measurement."""
-_PROGRESS_PX = 6.0
-"""The head has come further when the way left is shorter by this."""
-_SAME_BRANCH_PX = 100.0
-"""The way left jumps by the lumen's width where the head changes from one branch's centerline to the other's."""
 
 
 class FeedMonitor:
@@ -61,6 +222,10 @@ class FeedMonitor:
             return self._speed_mm_s, 0.0
         self._speed_mm_s = fed_mm / since_s if abs(fed_mm) > _STILL_MM_S * since_s else 0.0
         return self._speed_mm_s, fed_mm if self._speed_mm_s else 0.0
+
+
+_REST_S = 0.3
+"""A robot that is not fed for so long rests; a shorter pause is one of the measurement."""
 
 
 class StallMonitor:
@@ -109,41 +274,12 @@ class StallMonitor:
         return stuck
 
 
-class RetryCounter:
-    """Counts back-offs without progress of the head since; feeding on would only press and buckle the robot.
-
-    The head's place counts only at a back-off: there it stood still, and no single frame beside a branch, from where the way left
-    seems shorter, hides later progress. A frame in which no way was found has no information.
-    """
-
-    def __init__(self) -> None:
-        self._target: Point | None = None
-        self.reset()
-
-    def reset(self) -> None:
-        self.count = 0
-        self._nearest_px: float | None = None
-
-    def update(self, way: LookAhead) -> None:
-        """Another target resets the count."""
-        if way.left_px is None:
-            return
-        if way.target != self._target:
-            self.reset()
-        self._target = way.target
-
-    def add(self, way: LookAhead) -> None:
-        """The robot backs off once more."""
-        if way.left_px is None:
-            return
-        if self._nearest_px is None or way.left_px < self._nearest_px - _PROGRESS_PX:
-            self.count, self._nearest_px = 1, way.left_px
-        else:
-            self.count += 1
+_SAME_PLACE_PX = 100.0
+"""Of the way left, which jumps by the lumen's width where the head changes from one branch's centerline to the other's."""
 
 
-class MissCounter:
-    """Counts how often the same branch was missed for the same target: a head that cannot bend that far would miss it for ever."""
+class TryCounter:
+    """Counts what failed at the same place of the way to the same target: a head that cannot bend or go on so far never could."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -151,177 +287,15 @@ class MissCounter:
         self._target: Point | None = None
 
     def add(self, way: LookAhead) -> None:
-        """Missed once more."""
+        """It failed once more."""
         self.count = self.count_at(way) + 1
         self._left_px, self._target = way.left_px or 0.0, way.target
 
     def count_at(self, way: LookAhead) -> int:
-        """How often the branch here was missed; another target or branch resets the count."""
-        if way.left_px is not None and (way.target != self._target or abs(way.left_px - self._left_px) > _SAME_BRANCH_PX):
+        """How often it failed here; another target or place resets the count, a frame without a way does not."""
+        if way.left_px is not None and (way.target != self._target or abs(way.left_px - self._left_px) > _SAME_PLACE_PX):
             self.count = 0
         return self.count
-
-
-@dataclass(slots=True)
-class BackOff:
-    """A way back of ``distance_mm``, counted from where its reason is gone."""
-
-    why: str
-    distance_mm: float
-    _cleared_mm: float = field(default=0.0, init=False)
-    _moved_mm: float = field(default=0.0, init=False)
-
-    def done(self, still: bool, moved_mm: float) -> bool:
-        """Whether it has gone far enough; `still`: the reason is still there; `moved_mm`: since the last call."""
-        self._moved_mm += max(0.0, moved_mm)
-        self._cleared_mm = 0.0 if still else self._cleared_mm + max(0.0, moved_mm)
-        return self._cleared_mm >= self.distance_mm or self._moved_mm >= _MOST_BACK_MM
-
-
-_UNFOLLOWED_S = 1.0
-"""An operator who does not take the robot back for so long has other plans; if the reason is gone, the advice is, too."""
-_STRANDED_S = 3.0
-"""A robot that is advised to go back for so long and does not move cannot: the feed is at the end of its travel, say."""
-_LONGEST_S = 0.15
-"""A frame counts for no longer than this, so that after a pause no single one decides."""
-_PAUSE_S = 0.5
-"""A longer pause between frames resets the stall monitor."""
-
-
-class Pursuit:
-    """Pure pursuit with smoothed steering, which backs off from missed branches and where the head does not move."""
-
-    def __init__(self, config: PursuitConfig, advice: AdviceConfig, bend_deg: float = 94.0) -> None:
-        self._config = config
-        self._words = advice
-        self._bend_deg = bend_deg
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the frames before."""
-        self._speed_mm_s = 0.0
-        self._steer_deg = self._error_deg = 0.0
-        self._last_s: float | None = None
-        self._stall = StallMonitor(self._config)
-        self._misses = MissCounter()
-        self._retries = RetryCounter()
-        self._feed = FeedMonitor()
-        self._back_off: BackOff | None = None
-        self._behind_s = 0.0
-        self._unfollowed_s = 0.0
-        self._still_s = 0.0
-        self._is_stranded = False
-        self._stranded_for: Point | None = None
-        self._is_miss_counted = False
-
-    def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
-        """Advice for a scene; `status` adds the measured feed. None when there is no pose.
-
-        Only a robot that is `followed`, driven by this advice, is concluded to be stranded.
-        """
-        config = self._config
-        ahead_px = config.look_ahead_px + config.look_ahead_s * max(0.0, self._speed_mm_s) * config.pixels_per_mm
-        # a missed branch was turned into too late: each new try begins to turn earlier
-        way = look_ahead(scene, ahead_px, config, self._misses.count * config.rounding_px)
-        if way is None:
-            return None
-        since_s = 0.0 if self._last_s is None else max(0.0, scene.captured_s - self._last_s)
-        self._last_s = scene.captured_s
-        elapsed_s = min(since_s, _LONGEST_S)
-        if since_s > _PAUSE_S:
-            self._stall.reset()
-            self._behind_s = 0.0
-        # counted down, not reset: where head and branch lie in a wide bifurcation, single frames still see the way ahead
-        self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
-        wanted_deg = limited(config.gain * way.steer_deg, self._words.max_steer_deg)
-        keep = math.exp(-since_s / config.smoothing_s) if config.smoothing_s > 0.0 and since_s > 0.0 else 0.0
-        self._steer_deg = keep * self._steer_deg + (1.0 - keep) * wanted_deg
-        self._error_deg = keep * self._error_deg + (1.0 - keep) * way.error_deg
-        fed_mm_s, fed_mm = self._feed.update(status, self._speed_mm_s, elapsed_s)
-        stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)
-        self._retries.update(way)
-        is_backing = self._back_off is not None
-        gave_up = not is_backing and (self._misses.count >= config.most_misses or self._retries.count >= config.most_tries)
-        is_unfollowed = fed_mm_s >= 0.0 if is_backing else gave_up and fed_mm_s != 0.0
-        self._unfollowed_s = self._unfollowed_s + elapsed_s if is_unfollowed else 0.0
-        is_still = followed and is_backing and way.behind and fed_mm_s == 0.0
-        self._still_s = self._still_s + elapsed_s if is_still else 0.0
-        self._is_stranded = self._is_stranded and way.behind and fed_mm_s == 0.0 and way.target == self._stranded_for
-        self._is_miss_counted = self._is_miss_counted and self._behind_s > 0.0
-        return self._backing_advice(way, stuck, fed_mm) or self._give_up_advice(way) or self._forward_advice(way, scene)
-
-    def _backing_advice(self, way: LookAhead, stuck: bool, fed_mm: float) -> Advice | None:
-        """Backwards while there is a reason to, which one picture alone never is; None to go on."""
-        config = self._config
-        stranded = "the robot cannot go back any farther: take over, or choose another destination"
-        if self._is_stranded:
-            return self._advise(0.0, 0.0, stranded)
-        if self._back_off is None:
-            if way.behind and self._behind_s < config.behind_s:
-                return self._advise(0.0, 0.0, "the way seems to lie behind the head: looking again")
-            if way.behind:
-                if not self._is_miss_counted:  # the same miss, whichever source has driven meanwhile
-                    self._misses.add(way)
-                self._is_miss_counted = True
-                self._back_off = BackOff("the way to the target branches off behind the head", config.retry_mm)
-            elif stuck:
-                self._retries.add(way)
-                # all that was fed without effect lies bent behind the head
-                self._back_off = BackOff(
-                    "the robot is fed but its head does not move", max(config.back_off_mm, self._stall.lost_mm)
-                )
-            else:
-                return None
-        if self._still_s > _STRANDED_S:
-            self._back_off, self._still_s, self._is_stranded, self._stranded_for = None, 0.0, True, way.target
-            return self._advise(0.0, 0.0, stranded)
-        is_unfollowed = self._unfollowed_s > _UNFOLLOWED_S and not way.behind
-        is_done = self._back_off.done(way.behind, -fed_mm)
-        if is_unfollowed or is_done:
-            self._back_off, self._unfollowed_s = None, 0.0
-            self._is_miss_counted = self._is_miss_counted and not is_done
-            return None
-        # the way back is free, since the head follows its own body: going slow would only let the body lean longer
-        return self._advise(
-            -self._words.fast_mm_s, 0.0 if way.behind else self._steer_deg, message("backing off: {why}", why=self._back_off.why)
-        )
-
-    def _give_up_advice(self, way: LookAhead) -> Advice | None:
-        if self._unfollowed_s > _UNFOLLOWED_S:  # the operator goes on by hand
-            self._misses.count = 0
-            self._retries.reset()
-        if (count := self._misses.count_at(way)) >= self._config.most_misses:
-            return self._advise(0.0, 0.0, message("missed the branch {a} times: take over, or choose another destination", a=count))
-        if (count := self._retries.count) >= self._config.most_tries:
-            return self._advise(
-                0.0, 0.0, message("came no farther in {a} tries: take over, or choose another destination", a=count)
-            )
-        return None
-
-    def _forward_advice(self, way: LookAhead, scene: Scene) -> Advice:
-        config, words = self._config, self._words
-        limits = [(words.fast_mm_s, "along the route")]
-        if way.turn_deg > config.gentle_turn_deg:
-            limits.append((words.fast_mm_s * config.gentle_turn_deg / way.turn_deg, "a bend ahead"))
-        if way.junction_px is not None:
-            limits.append((words.moderate_mm_s, "a bifurcation ahead"))
-        if (error_deg := abs(self._error_deg)) > config.slow_steer_deg:
-            # no step where it begins: an error that trembles about the limit must not make the feed stutter
-            share = (config.slow_steer_deg / error_deg) ** 2
-            limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
-        if way.wall > config.wall_share:
-            limits.append((words.moderate_mm_s, "the head is near the wall"))
-        if way.left_px is not None and way.left_px < config.brake_px:
-            limits.append((max(words.slowest_mm_s, words.fast_mm_s * way.left_px / config.brake_px), "the target is near"))
-        speed_mm_s, why = min(limits)
-        graph, path, px = scene.vessel_graph, scene.path, config.pixels_per_mm
-        if way.left_px and graph and path and sharp_branches(graph, way.points, path.radius_px, self._bend_deg, SHARP_MM, px):
-            why = message("{why}; a branch ahead may turn more sharply than the head bends", why=why)
-        return self._advise(speed_mm_s, self._steer_deg, why)
-
-    def _advise(self, speed_mm_s: float, steer_deg: float, why: str) -> Advice:
-        self._speed_mm_s = speed_mm_s
-        return Advice(speed_word(abs(speed_mm_s), self._words), speed_mm_s, steer_deg, why)
 
 
 def speed_word(speed_mm_s: float, config: AdviceConfig) -> Speed:
