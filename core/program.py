@@ -100,6 +100,7 @@ EXTRAS = {
     "pylsl": "lsl",
     "pyarrow": "lerobot",
     "gymnasium": "gym",
+    "matplotlib": "figures",
 }
 """Optional package -> the extra of pyproject.toml that brings it."""
 
@@ -141,7 +142,12 @@ def import_problem(error: ImportError) -> str | None:
     return f"this needs the package {package}, which is not installed: {how_to_install(package)}"
 
 
+def missing(package: str) -> str | None:
+    """The line that says so when an optional package is not installed; it is not imported."""
+    return import_problem(ModuleNotFoundError(name=package)) if util.find_spec(package) is None else None
+
+
 def need_package(package: str) -> None:
     """Raise UserError when an optional package is not installed; it is not imported."""
-    if util.find_spec(package) is None:
-        raise UserError(str(import_problem(ModuleNotFoundError(name=package))))
+    if why := missing(package):
+        raise UserError(why)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 LOCK = ROOT / "requirements.lock"
-EXTRAS = ("cluster", "foxglove", "gym", "l515", "lerobot", "lsl", "ros2", "train")
+EXTRAS = ("cluster", "figures", "foxglove", "gym", "l515", "lerobot", "lsl", "ros2", "train")
 """Extras that set-up installs."""
 FOR_NEWER_PYTHON = "pyrealsense2>=2.55 ; python_version >= '3.12'"
 """In the place of the extra l515, which has no build for it."""

@@ -198,7 +198,7 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 def _export_angles(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], out: Path) -> None:
     """The angles over time as a table, and as a figure beside it. Raises AnnotationError."""
     from app.annotator.comparison import ANGLE_COLUMNS, angles_over_time
-    from app.commands.figures import draw_angles, save_figure
+    from app.commands.evaluation_report import can_draw
 
     figure = out.with_suffix(".svg")
     for path in (out, figure):
@@ -212,7 +212,10 @@ def _export_angles(annotations: Sequence[StoredAnnotation], images: Sequence[Fou
             table = csv.DictWriter(file, ANGLE_COLUMNS)
             table.writeheader()
             table.writerows(rows)
-        save_figure(draw_angles(rows), figure)
+        if can_draw():
+            from app.commands.figures import draw_angles, save_figure
+
+            save_figure(draw_angles(rows), figure)
     except OSError as error:
         raise AnnotationError(f"{error.filename or out}: cannot be written ({error.strerror}); choose another --out") from None
     sys.stderr.write(f"{len(rows)} angles in {out}, their course in {figure}\n")

@@ -26,8 +26,11 @@ from core.evaluation import evaluation
 from core.evaluation.evaluation import EvaluationError, Measurement, angle_pairs, read_measurements, write_measurements
 from core.evaluation.paper import PAPER, against_paper, choose_images, measure_twice, wanted_images
 from core.files import name_as_text, name_of, write_atomic
-from core.program import COMMAND, program_id
+from core.program import COMMAND, missing, program_id
 from core.types import Frame
+
+_FIGURES = ("error_distribution", "bland_altman", "scatter", "confusion")
+_ENDINGS = (".svg", ".pdf")
 
 
 @dataclass(slots=True)
@@ -106,6 +109,8 @@ def evaluate(
     if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
         raise EvaluationError(f"{csv}: no row has both a manual and an algorithmic measure; nothing to compare")
     metrics["notes"] = found.notes + metrics["notes"]
+    if why := missing("matplotlib"):
+        metrics["notes"].append(f"No figures: {why}")
     metrics["paper"] = PAPER
     if found.agreement is not None:
         _insert_repeatability(metrics, found.agreement["within"])
@@ -157,25 +162,23 @@ def _make_out(out: Path) -> None:
 
 def _written_names() -> list[str]:
     """All files that are written to ``--out``, or removed there because an earlier evaluation wrote them."""
-    from app.commands.figures import ENDINGS, FIGURES
-
-    drawn = [f"{name}{ending}" for name in FIGURES for ending in ENDINGS]
+    drawn = [f"{name}{ending}" for name in _FIGURES for ending in _ENDINGS]
     return ["metrics.json", "measurements.csv", "raters.csv", "report.html", *drawn]
 
 
 def _write(out: Path, rows: list[Measurement], metrics: dict[str, Any]) -> None:
-    from app.commands.figures import ENDINGS, FIGURES, draw_figures, drawn
+    figures: dict[str, dict[str, bytes]] = {}
+    if not missing("matplotlib"):
+        from app.commands.figures import draw_figures, drawn
 
+        for name, figure in draw_figures(angle_pairs(rows), metrics).items():
+            figures[name] = {ending: drawn(figure, ending) for ending in _ENDINGS}
     text = json.dumps(metrics, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     write_atomic(out / "metrics.json", text.encode())
     write_measurements(out / "measurements.csv", rows)
     (out / "raters.csv").unlink(missing_ok=True)  # of an earlier evaluation, as figures below
-    figures = {
-        name: {ending: drawn(figure, ending) for ending in ENDINGS}
-        for name, figure in draw_figures(angle_pairs(rows), metrics).items()
-    }
-    for name in FIGURES:
-        for ending in ENDINGS:
+    for name in _FIGURES:
+        for ending in _ENDINGS:
             path = out / f"{name}{ending}"
             if name in figures:
                 write_atomic(path, figures[name][ending])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from app.annotator.comparison import agreement_tables, between_words, report_wor
 from core.config.models import RESOURCES
 from core.evaluation.metrics import RESAMPLES
 from core.evaluation.paper import ANGLE_FIGURES, CLASS_SCORES, PAPER, STATE_FIGURES, FigureFormat, FigureKind, Verdict, verdict
-from core.program import program_line
+from core.program import missing, program_line
 from core.session.rehearsed_run import beside_line
 
 _NAMED = 8
@@ -215,6 +216,13 @@ def _lead(metrics: Mapping[str, Any]) -> str:
     parts += [f"{name} {session[name]}" for name in names if session.get(name)]
     parts += [f"LumenPilot {program_line()}", time.strftime("%Y-%m-%d", time.gmtime())]
     return " · ".join(parts)
+
+
+def can_draw() -> bool:
+    """Whether there can be figures; else says so on standard error."""
+    if why := missing("matplotlib"):
+        sys.stderr.write(f"no figures: {why}\n")
+    return not why
 
 
 def inline_svg(file: bytes, prefix: str) -> str:

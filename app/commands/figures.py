@@ -38,8 +38,6 @@ _MEAN, _LIMIT = VERMILLION, GREEN
 """Mean and limits of agreement, as in the paper."""
 _SIZE_IN = (3.46, 2.75)
 """One column of a journal's page: 88 mm."""
-FIGURES = ("error_distribution", "bland_altman", "scatter", "confusion")
-ENDINGS = (".svg", ".pdf")
 _DATELESS: dict[str, dict[str, Any]] = {".svg": {"Date": None, "Creator": None}, ".pdf": {"CreationDate": None}}
 _MOST_POINTS = 3000
 """Points of a curve: an hour has a hundred thousand frames, several per printed dot."""

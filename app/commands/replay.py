@@ -338,15 +338,18 @@ def prepare_out(out: Path) -> None:
 
 def write_replay(out: Path, name: str, changes: Sequence[Change], result: dict[str, Any]) -> None:
     """A session's files in the folder; raises UserError."""
-    from app.commands.figures import draw_replay, save_figure
+    from app.commands.evaluation_report import can_draw
 
     try:
         (out / "replay.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         with (out / "changes.jsonl").open("w", encoding="utf-8") as file:
             file.writelines(json.dumps(change_to_json(change), allow_nan=False) + "\n" for change in changes)
-        figure = draw_replay(changes, result["states"]["matrix"], name)
-        for ending in (".svg", ".pdf"):
-            save_figure(figure, out / f"replay{ending}")
+        if can_draw():
+            from app.commands.figures import draw_replay, save_figure
+
+            figure = draw_replay(changes, result["states"]["matrix"], name)
+            for ending in (".svg", ".pdf"):
+                save_figure(figure, out / f"replay{ending}")
     except OSError as error:
         raise UserError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
 

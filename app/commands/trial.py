@@ -344,23 +344,28 @@ def print_tables(rows: Rows, sums: Mapping[str, Mapping[str, Any]]) -> None:
 
 def write_report(out: Path, by_policy: Mapping[str, Rows], plan: TrialPlan) -> None:
     """``report.html`` and ``summary.json`` in `out`; raises OSError."""
-    from app.commands.evaluation_report import inline_svg, render_page
-    from app.commands.figures import draw_spreads, draw_track, drawn
+    from app.commands.evaluation_report import can_draw, inline_svg, render_page
 
+    spreads, tracks = "", []
     sums = {policy: summarise(rows) for policy, rows in by_policy.items()}
     everything = [row for rows in by_policy.values() for row in rows]
     looks = {RANDOM_LOOK: "random looks", BENCH_LOOK: "the default look"}.get(plan.look, f"looks: {plan.look}")
     seen = "true masks instead of the network" if plan.true_masks else f"model {plan.config.perception.segmentation.model}"
     made = f"LumenPilot {program_line()} · {time.strftime('%Y-%m-%d', time.gmtime())}"
-    lowest = enumerate(worst(everything, _WORST))
+    if everything and can_draw():
+        from app.commands.figures import draw_spreads, draw_track, drawn
+
+        spreads = inline_svg(drawn(draw_spreads(by_policy), ".svg"), "spreads")
+        for place, row in enumerate(worst(everything, _WORST)):
+            tracks.append((trial_cells(row), inline_svg(drawn(draw_track(row), ".svg"), f"track{place}")))
     text = render_page(
         "trial.html.j2",
         title="Closed-loop trials in the bench twin",
         lead=f"{len(everything)} trials · {looks} · {seen} · {made}",
         policies=list(sums),
         summary=summary_rows(sums),
-        spreads=inline_svg(drawn(draw_spreads(by_policy), ".svg"), "spreads") if everything else "",
-        tracks=[(trial_cells(row), inline_svg(drawn(draw_track(row), ".svg"), f"track{place}")) for place, row in lowest],
+        spreads=spreads,
+        tracks=tracks,
         headings=HEADINGS,
         trials=[trial_cells(row) for row in everything],
     )

@@ -123,6 +123,18 @@ def test_json_is_all_there_is_on_standard_output_and_the_same_input_gives_the_sa
         assert path.read_bytes() == (drawn / path.name).read_bytes(), path.name
 
 
+def test_without_matplotlib_the_report_says_how_to_get_its_figures(
+    paper_csv: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "missing", lambda package: f"this needs the package {package}")
+    metrics = evaluate(csv=paper_csv, out=tmp_path)
+    assert metrics["notes"][-1] == "No figures: this needs the package matplotlib"
+    assert {path.name for path in tmp_path.iterdir()} == {"metrics.json", "measurements.csv", "report.html"}
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<svg" not in text
+    assert metrics["notes"][-1] in text
+
+
 def test_the_report_is_one_page_that_needs_nothing_else(drawn: Path) -> None:
     text = (drawn / "report.html").read_text(encoding="utf-8")
     assert re.findall(r'(?:src|href)="(?!#)', text) == []

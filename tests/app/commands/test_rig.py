@@ -10,6 +10,7 @@ from typing import cast
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 from app import cli
@@ -155,6 +156,11 @@ def test_the_board_is_printed_at_true_size(tmp_path: Path) -> None:
     pdf = tmp_path / "board.pdf"
     _run("board", "--out", str(pdf))
     assert b"841.8" in pdf.read_bytes()  # A4 across, in points
+    with Image.open(out) as printed:
+        assert printed.info["dpi"] == pytest.approx((600, 600), abs=0.1)
+    file = pdf.read_bytes()
+    places = [int(line[:10]) for line in file[int(file.split()[-2]) :].splitlines() if line.endswith(b" n ")]
+    assert [file[place:].split()[:2] for place in places] == [[b"%d" % number, b"0"] for number in range(1, 6)]
 
 
 def test_boards_that_cannot_be_printed(tmp_path: Path) -> None:
