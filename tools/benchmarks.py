@@ -68,30 +68,27 @@ _STEPS = 24  # pictures of the stream, one way
 _DRAWN_PX = 60.0  # length of the robot's line that is followed
 
 
-def measure_recording(config: Config, frames: int) -> dict[str, Any]:
-    """Perceive a paced stream of 640x480 pictures, a second without and a second with a recording, in turn.
+def recording(
+    frames: Annotated[int, typer.Option(min=3, max=10_000, help="of each kind; rounded up to whole seconds")] = 120,
+    json: JsonOption = False,
+    model: ModelOption = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """How much a recording slows perception of 640x480 pictures down: a second without and a second with one, in turn.
 
     The recorder encodes and writes to the system's temporary folder beside perception, and the network leaves a core to the rest of
-    the program, as in the window.
-
-    Parameters
-    ----------
-    frames : of each kind; rounded up to whole seconds.
-
-    Returns
-    -------
-    dict
-        ``without_ms`` and ``with_ms`` (of perceiving), ``slowdown`` (ratio of the medians; 1.0 = none) with a 95 % interval over
-        the blocks, ``dropped`` frames, ``mb_per_minute``.
+    the program, as in the window. The slowdown is the ratio of the medians, with a 95 % interval over the seconds.
     """
-    pipeline = open_pipeline(leaving_a_core(config.perception))
+    settings = stream_config(load_config(config, preset, choose_model(model)))
+    pipeline = open_pipeline(leaving_a_core(settings.perception))
     images = _stream_images()
-    settings = config.record.model_copy(update={"ring_s": 0.0, "stop_free_mb": 0.0})
+    record = settings.record.model_copy(update={"ring_s": 0.0, "stop_free_mb": 0.0})
     blocks = -(-frames // _BLOCK)
     without: list[list[float]] = []
     recorded: list[list[float]] = []
     with tempfile.TemporaryDirectory(prefix="lumenpilot_benchmark_") as folder, progress_bar() as bar:
-        writer = SessionWriter(settings, about_rig(config, "SIM", "benchmark"), folder=Path(folder))
+        writer = SessionWriter(record, about_rig(settings, "SIM", "benchmark"), folder=Path(folder))
         task = bar.add_task("frames", total=2 * blocks * _BLOCK)
         try:
             writer.start()
@@ -107,7 +104,7 @@ def measure_recording(config: Config, frames: int) -> dict[str, Any]:
             is_whole = writer.close()
         status = writer.status()
     minutes = max(status.frames, 1) / FRAMES_PER_SECOND / 60.0
-    return {
+    figures = {
         "without_ms": quantiles([ms for block in without for ms in block]),
         "with_ms": quantiles([ms for block in recorded for ms in block]),
         **_slowdown(without, recorded),
@@ -119,6 +116,7 @@ def measure_recording(config: Config, frames: int) -> dict[str, Any]:
         "engine": pipeline.engine,
         "cores": os.cpu_count(),
     }
+    print_figures(figures, json, "recording")
 
 
 def _stream_images() -> list[Image]:
@@ -183,17 +181,20 @@ while client.recv(1 << 20):
 """A client that subscribes to all and drops what it gets: what is measured is the program, not the client."""
 
 
-def measure_stream(config: Config, blocks: int) -> dict[str, Any]:
-    """Run the twin's rig, with a client of the live stream that takes all and without one, in turn.
+def stream(
+    blocks: Annotated[int, typer.Option(min=1, max=200, help="of 120 frames, of each kind")] = 6,
+    json: JsonOption = False,
+    model: ModelOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """How much the live stream slows the twin's rig down: blocks with one client that takes all and without, in turn.
 
-    Returns
-    -------
-    dict
-        Of perceiving a frame (``frame``) and of the time from one turn of the pilot to the next (``control``): ``without_ms``,
-        ``with_ms`` and ``slowdown`` (ratio of the medians) with a 95 % interval over the blocks; and frames a second.
+    Of perceiving a frame, and of the time from one turn of the pilot to the next; the slowdown is the ratio of the medians, with a
+    95 % interval over the blocks.
     """
-    twin = config.twin.model_copy(update={"live_frames_per_second": FRAMES_PER_SECOND})
-    engine = EngineMaker()(config.model_copy(update={"twin": twin}))
+    settings = load_config(config, None, choose_model(model))
+    twin = settings.twin.model_copy(update={"live_frames_per_second": FRAMES_PER_SECOND})
+    engine = EngineMaker()(settings.model_copy(update={"twin": twin}))
     output = LiveOutput(partial(FoxgloveServer, 0))
     frames: dict[bool, list[list[float]]] = {False: [], True: []}
     turns: dict[bool, list[list[float]]] = {False: [], True: []}
@@ -229,7 +230,7 @@ def measure_stream(config: Config, blocks: int) -> dict[str, Any]:
         engine.close()
     count = min(len(block) for kind in turns.values() for block in kind)
     cut = {kind: [block[:count] for block in found] for kind, found in turns.items()}
-    return {
+    figures = {
         name: {
             "without_ms": quantiles([ms for block in found[False] for ms in block]),
             "with_ms": quantiles([ms for block in found[True] for ms in block]),
@@ -237,6 +238,7 @@ def measure_stream(config: Config, blocks: int) -> dict[str, Any]:
         }
         for name, found in (("frame", frames), ("control", cut))
     } | {"frames_per_second": round(blocks * _STREAM_FRAMES / streamed_s, 1), "blocks": blocks, "cores": os.cpu_count()}
+    print_figures(figures, json, "stream")
 
 
 def _step(engine: RigEngine, count: int, output: LiveOutput | None) -> list[float]:
@@ -258,25 +260,29 @@ _SEEKS = 60
 _WAIT_S = 120.0
 
 
-def measure_player(config: Config, minutes: float) -> dict[str, Any]:
-    """Make a session of so many minutes, open it in the player window, and seek in it at random.
+def player(
+    minutes: Annotated[float, typer.Argument(min=0.5, max=600.0, help="length of the session")],
+    json: JsonOption = False,
+    model: ModelOption = None,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+) -> None:
+    """Open a session of so many minutes in the player and seek in it at random (offscreen when there is no display).
 
-    Returns
-    -------
-    dict
-        ``opens_s`` until the first picture is on the screen and ``known_s`` until every row can be reached, both from when the
-        reader gets the folder; ``seek_ms`` from the wish to that row's picture on the screen; ``memory_mb`` of this process at the
-        end, which did not make the session; and the session's size.
+    Seconds until the first picture is on the screen and until every row can be reached; from the wish to a row's picture; memory of
+    this process, which did not make the session.
     """
+    use_offscreen(os.environ)
+    settings = load_config(config, preset, choose_model(model))
     with tempfile.TemporaryDirectory(prefix="lumenpilot_benchmark_") as parent:
-        child = multiprocessing.get_context("spawn").Process(target=_make_session, args=(config, minutes, parent))
+        child = multiprocessing.get_context("spawn").Process(target=_make_session, args=(settings, minutes, parent))
         child.start()
         child.join()
         if child.exitcode:
             raise UserError(f"{parent}: the session could not be made (exit code {child.exitcode}); is the disk full?")
         (folder,) = Path(parent).iterdir()
         size_mb = sum(file.stat().st_size for file in folder.iterdir()) / 1e6
-        return _measure(folder, config) | {"minutes": minutes, "size_mb": round(size_mb, 1)}
+        print_figures(_measure(folder, settings) | {"minutes": minutes, "size_mb": round(size_mb, 1)}, json, "player")
 
 
 def _make_session(config: Config, minutes: float, parent: str) -> None:
@@ -517,16 +523,21 @@ class WindowWatch(QObject):
         }
 
 
-def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
-    """Run the window on the twin for some seconds; the figures of ``WindowWatch.result``."""
-    config, kind = rig_config("twin", config_path, None)
+def window(
+    seconds: Annotated[float, typer.Argument(min=5.0, max=3600.0, help="from the first picture on")],
+    json: JsonOption = False,
+    config: ConfigOption = None,
+) -> None:
+    """Run the operator window on the twin and measure its pace (offscreen when there is no display)."""
+    use_offscreen(os.environ)
+    settings, kind = rig_config("twin", config, None)
     application = make_application()
     finish_loading()
-    window = make_window(config, kind)
-    application.aboutToQuit.connect(window.shut_down)
-    window.show()
-    window.start()
-    watch = WindowWatch(window, seconds)
+    shown = make_window(settings, kind)
+    application.aboutToQuit.connect(shown.shut_down)
+    shown.show()
+    shown.start()
+    watch = WindowWatch(shown, seconds)
     signals = quit_on_signal(application)
     application.exec()
     signals.stop()
@@ -535,29 +546,36 @@ def measure_window(seconds: float, config_path: Path | None) -> dict[str, Any]:
         sys.stderr.write("note: no picture was shown; start the window (python main.py) to see why\n")
     elif watch.ended_early:
         sys.stderr.write(f"note: closed before its {seconds:g} s; the figures are of the time until then\n")
-    return watch.result()
+    print_figures(watch.result(), json, "window")
 
 
-def measure_follow(clips: int, after: Sequence[int] = (10, 30, 60)) -> dict[str, Any]:
-    """Errors of lines that are followed on clips of the twin, so many pictures after the drawn one: direction and head."""
+_AFTER = (10, 30, 60)  # pictures after the drawn one
+
+
+def follow(
+    clips: Annotated[int, typer.Option(min=1, max=200, help="of the twin, two seconds each")] = 8,
+    json: JsonOption = False,
+) -> None:
+    """How far lines that are followed through a clip are off (Ctrl+F in the annotator), in direction and at the head."""
     vectors = PerceptionConfig().vectors
-    degrees: dict[int, list[float]] = {count: [] for count in after}
-    heads_px: dict[int, list[float]] = {count: [] for count in after}
+    degrees: dict[int, list[float]] = {count: [] for count in _AFTER}
+    heads_px: dict[int, list[float]] = {count: [] for count in _AFTER}
     for seed in range(1, 2 * clips, 2):
-        images, truths = _clip(seed, max(after) + 1)
+        images, truths = _clip(seed, max(_AFTER) + 1)
         path = truths[0].robot_path
         length = float(geometry.arc_length(path)[-1])
         drawn = Annotation(tuple(map(tuple, geometry.cut(path, length - _DRAWN_PX, length).tolist())))
         for place, robot, _ in followed_lines(images.__getitem__, {0: drawn}, len(images)):
-            found = fit_robot_vector(np.array(robot), vectors.robot_length_px, vectors.line_fit)
-            if place in after and found is not None:
-                cosine = float(np.dot(found.direction, truths[place].robot_vector.direction))
+            vector = fit_robot_vector(np.array(robot), vectors.robot_length_px, vectors.line_fit)
+            if place in _AFTER and vector is not None:
+                cosine = float(np.dot(vector.direction, truths[place].robot_vector.direction))
                 degrees[place].append(math.degrees(math.acos(min(1.0, cosine))))
                 heads_px[place].append(math.dist(robot[-1], truths[place].robot_path[-1]))
-    return {
+    found = {
         f"after {count} pictures": {"direction_deg": quantiles(degrees[count]), "head_px": quantiles(heads_px[count])}
-        for count in after
+        for count in _AFTER
     }
+    print_figures(found, json, "follow")
 
 
 def _clip(seed: int, count: int) -> tuple[list[Image], list[Any]]:
@@ -573,58 +591,6 @@ def _clip(seed: int, count: int) -> tuple[list[Image], list[Any]]:
         images.append(world.frame().image)
         truths.append(world.truth())
     return images, truths
-
-
-def window(
-    seconds: Annotated[float, typer.Argument(min=5.0, max=3600.0, help="from the first picture on")],
-    json: JsonOption = False,
-    config: ConfigOption = None,
-) -> None:
-    """Run the operator window and measure its pace (offscreen when there is no display)."""
-    use_offscreen(os.environ)
-    print_figures(measure_window(seconds, config), json, "window")
-
-
-def player(
-    minutes: Annotated[float, typer.Argument(min=0.5, max=600.0, help="length of the session")],
-    json: JsonOption = False,
-    model: ModelOption = None,
-    preset: PresetOption = None,
-    config: ConfigOption = None,
-) -> None:
-    """Open a session of so many minutes in the player and seek in it (offscreen when there is no display)."""
-    use_offscreen(os.environ)
-    print_figures(measure_player(load_config(config, preset, choose_model(model)), minutes), json, "player")
-
-
-def recording(
-    frames: Annotated[int, typer.Option(min=3, max=10_000, help="frames to time")] = 120,
-    json: JsonOption = False,
-    model: ModelOption = None,
-    preset: PresetOption = None,
-    config: ConfigOption = None,
-) -> None:
-    """How much a recording slows perception down, in turns."""
-    settings = stream_config(load_config(config, preset, choose_model(model)))
-    print_figures(measure_recording(settings, frames), json, "recording")
-
-
-def stream(
-    blocks: Annotated[int, typer.Option(min=1, max=200, help="of 120 frames, of each kind")] = 6,
-    json: JsonOption = False,
-    model: ModelOption = None,
-    config: ConfigOption = None,
-) -> None:
-    """How much the live stream to one client slows perception and control of the twin down, in turns."""
-    print_figures(measure_stream(load_config(config, None, choose_model(model)), blocks), json, "stream")
-
-
-def follow(
-    clips: Annotated[int, typer.Option(min=1, max=200, help="of the twin, two seconds each")] = 8,
-    json: JsonOption = False,
-) -> None:
-    """How far lines that are followed through a clip are off (Ctrl+F in the annotator)."""
-    print_figures(measure_follow(clips), json, "follow")
 
 
 if __name__ == "__main__":

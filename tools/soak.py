@@ -47,7 +47,7 @@ from hardware.servos.bus_ipc import BusStatus
 from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.process import drive_world
-from hardware.twin.servos.device import OVERLOAD_BIT
+from hardware.twin.servos.device import OVERLOAD_BIT, SoftServo
 from hardware.twin.world import TwinCamera, TwinWorld
 from tools.run import run_tool
 from tools.wire_monitor import MonitoredBus, WireMonitor
@@ -202,11 +202,8 @@ def soak_config(folder: Path) -> Config:
     )
 
 
-def make_writer(config: Config, folder: Path) -> SessionWriter:
-    return SessionWriter(config.record, about_rig(config, RigKind.SIM.value, "soak"), folder=folder)
-
-
-Undo = Callable[[], None]
+Undo = Callable[[], object]
+Breaks = Callable[[SoakRig, random.Random], Undo]
 _EVERY_S = (4.0, 15.0)
 _SAFE_C, _SAFE_V = 25.0, 12.0
 
@@ -216,7 +213,7 @@ class FaultKind:
     """``do`` breaks it and returns what mends it; ``lasts_s`` is between these."""
 
     name: str
-    do: Callable[[SoakRig, random.Random], Undo]
+    do: Breaks
     lasts_s: tuple[float, float]
 
 
@@ -237,26 +234,15 @@ def _vanish(rig: SoakRig, draw: random.Random) -> Undo:
     return rig.bus.reappear
 
 
-def _restart(rig: SoakRig, draw: random.Random) -> Undo:
-    rig.bus.modify_servo(draw.randint(1, 7), lambda servo: servo.restart())
-    return lambda: None
+def _servo(harm: Callable[[SoftServo, random.Random], object], mend: Callable[[SoftServo], object] | None = None) -> Breaks:
+    """One of the seven."""
 
+    def do(rig: SoakRig, draw: random.Random) -> Undo:
+        servo = draw.randint(1, 7)
+        rig.bus.modify_servo(servo, lambda device: harm(device, draw))
+        return lambda: rig.bus.modify_servo(servo, mend) if mend is not None else None
 
-def _overload(rig: SoakRig, draw: random.Random) -> Undo:
-    rig.bus.modify_servo(draw.randint(1, 7), lambda servo: servo.alert(OVERLOAD_BIT))
-    return lambda: None
-
-
-def _jam(rig: SoakRig, draw: random.Random) -> Undo:
-    servo = draw.randint(1, 7)
-    rig.bus.modify_servo(servo, lambda device: device.freeze(True))
-    return lambda: rig.bus.modify_servo(servo, lambda device: device.freeze(False))
-
-
-def _heat(rig: SoakRig, draw: random.Random) -> Undo:
-    servo, hot_c = draw.randint(1, 7), draw.uniform(60.0, 74.0)
-    rig.bus.modify_servo(servo, lambda device: device.heat(hot_c))
-    return lambda: rig.bus.modify_servo(servo, lambda device: device.heat(_SAFE_C))
+    return do
 
 
 def _sag(rig: SoakRig, draw: random.Random) -> Undo:
@@ -270,7 +256,7 @@ def _sag(rig: SoakRig, draw: random.Random) -> Undo:
     return lambda: supply(_SAFE_V)
 
 
-def _set(name: str, value: Callable[[random.Random], object], rest: object) -> Callable[[SoakRig, random.Random], Undo]:
+def _set(name: str, value: Callable[[random.Random], object], rest: object) -> Breaks:
     def do(rig: SoakRig, draw: random.Random) -> Undo:
         setattr(rig.injected, name, value(draw))
         return lambda: setattr(rig.injected, name, rest)
@@ -282,10 +268,12 @@ FAULT_KINDS = (
     FaultKind("servo silent", _mute, (0.1, 2.0)),
     FaultKind("bad packets", _noise, (0.5, 1.0)),
     FaultKind("port vanishes", _vanish, (0.5, 3.0)),
-    FaultKind("servo restarts", _restart, (0.0, 0.0)),
-    FaultKind("overload", _overload, (0.0, 0.0)),
-    FaultKind("jam", _jam, (0.2, 2.0)),
-    FaultKind("heat", _heat, (1.0, 3.0)),
+    FaultKind("servo restarts", _servo(lambda servo, draw: servo.restart()), (0.0, 0.0)),
+    FaultKind("overload", _servo(lambda servo, draw: servo.alert(OVERLOAD_BIT)), (0.0, 0.0)),
+    FaultKind("jam", _servo(lambda servo, draw: servo.freeze(True), lambda servo: servo.freeze(False)), (0.2, 2.0)),
+    FaultKind(
+        "heat", _servo(lambda servo, draw: servo.heat(draw.uniform(60.0, 74.0)), lambda servo: servo.heat(_SAFE_C)), (1.0, 3.0)
+    ),
     FaultKind("supply sags", _sag, (1.0, 3.0)),
     FaultKind("camera silent", _set("silent", lambda draw: True, False), (0.1, 1.5)),
     FaultKind("camera frozen", _set("frozen", lambda draw: True, False), (0.3, 1.5)),
@@ -363,9 +351,8 @@ class SoakOperator:
             self._decide_s = now_s + self._draw.uniform(*_DECIDES_S)
             self._decide(rig, now_s)
 
-    def _do(self, what: str, action: object) -> None:
+    def _do(self, what: str, action: Callable[[], object]) -> None:
         self.count[what] += 1
-        assert callable(action)
         action()
 
     def _decide(self, rig: SoakRig, now_s: float) -> None:
@@ -429,9 +416,7 @@ class SoakOperator:
     def _hand_over(self, rig: SoakRig) -> None:
         draw, pilot = self._draw, rig.pilot
         self._held = draw.random() < 0.9
-        if draw.random() < 0.3 or not rig.pilot.view.against_hand_over:
-            pass
-        else:
+        if draw.random() >= 0.3 and rig.pilot.view.against_hand_over:
             width, height = rig.config.twin.image_width_px, rig.config.twin.image_height_px
             target = draw.uniform(0.3, 0.95) * width, draw.uniform(0.15, 0.85) * height
             self._do("click", lambda: rig.engine.set_target(target))
@@ -575,7 +560,8 @@ class Soak:
         self._folder = Path(tempfile.mkdtemp(prefix="lumenpilot_soak_"))
         self._config = soak_config(self._folder)
         self.watch = WireMonitor(self._config.servos)
-        self._writer = make_writer(self._config, self._folder)
+        about = about_rig(self._config, RigKind.SIM.value, "soak")
+        self._writer = SessionWriter(self._config.record, about, folder=self._folder)
         self._maker = EngineMaker()
         self.faults = RandomFaults(seed)
         self.operator = SoakOperator(seed + 1, self.watch, self._writer)
