@@ -9,6 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from core.config.models import PerceptionConfig, PoseConfig
@@ -350,3 +353,10 @@ class FakeEngine:
 
 def until(qtbot: QtBot, condition: Callable[[], bool]) -> None:
     qtbot.waitUntil(condition, timeout=30_000)
+
+
+def turn_the_wheel(over: QWidget, notches: int = -1, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> QWheelEvent:
+    at, none, phase = QPointF(over.rect().center()), Qt.MouseButton.NoButton, Qt.ScrollPhase.NoScrollPhase
+    event = QWheelEvent(at, over.mapToGlobal(at), QPoint(), QPoint(0, 120 * notches), none, modifier, phase, False)
+    QApplication.sendEvent(over, event)
+    return event

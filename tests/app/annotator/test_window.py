@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent, QKeyEvent, QWheelEvent
+from PySide6.QtGui import QDropEvent, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -44,7 +44,7 @@ from core.evaluation.accuracy import TrueMasks
 from core.learning.dataset import write_png
 from core.perception.pipeline import Pipeline
 from core.types import Frame, Point, PoseState, Scene
-from tests.app.fakes import make_scene
+from tests.app.fakes import make_scene, turn_the_wheel
 
 Key = Qt.Key
 SIZE = (640, 480)
@@ -111,11 +111,6 @@ class Rater:
         QTest.mouseMove(self.canvas, self.at(end))
         QTest.mouseRelease(self.canvas, Qt.MouseButton.LeftButton, pos=self.at(end))
         self.events += 1
-
-    def wheel(self, turns: int, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
-        at = QPointF(self.at((320.0, 240.0)))
-        angle, buttons, phase = QPoint(0, 120 * turns), Qt.MouseButton.NoButton, Qt.ScrollPhase.NoScrollPhase
-        QApplication.sendEvent(self.canvas, QWheelEvent(at, at, QPoint(), angle, buttons, modifier, phase, False))
 
     def press(self, *keys: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
         for key in keys:
@@ -618,14 +613,14 @@ def test_the_wheel_is_the_circles_size_and_with_ctrl_the_zoom(vessel_rater: Rate
     canvas = vessel_rater.canvas
     zoom, radius_px = canvas.view.zoom, canvas.editor.radius_px
     vessel_rater.press(Key.Key_Y)
-    vessel_rater.wheel(1)
+    turn_the_wheel(canvas, 1)
     assert canvas.editor.radius_px == pytest.approx(radius_px * RADIUS_NOTCH) and canvas.view.zoom == zoom
-    vessel_rater.wheel(1, Qt.KeyboardModifier.ControlModifier)
+    turn_the_wheel(canvas, 1, Qt.KeyboardModifier.ControlModifier)
     assert canvas.view.zoom > zoom
     vessel_rater.press(Key.Key_Y)
     assert canvas.mask_mode is MaskMode.POINTS
     radius_px = canvas.editor.radius_px
-    vessel_rater.wheel(-1)
+    turn_the_wheel(canvas)
     assert canvas.editor.radius_px == radius_px
 
 

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt, QTimer
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QFileDialog, QSpinBox, QWidget
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QFileDialog, QSpinBox
 from pytestqt.qtbot import QtBot
 
 from app.rig_wizard import servo_pages
@@ -32,7 +31,7 @@ from hardware.calibration import bench as calibration_bench
 from hardware.calibration.bench import CalibrationBench
 from hardware.calibration.servo_identification import Zeros
 from hardware.servos.discovery import FoundPort, FoundServo, FoundServos
-from tests.app.fakes import make_scene, until
+from tests.app.fakes import make_scene, turn_the_wheel, until
 from tests.core.robots import THREE, TURNED
 
 
@@ -566,15 +565,6 @@ def test_without_results_it_closes_at_once_and_frees_the_camera(opened: RigWizar
     assert list_rigs() == ()
     assert opened.model.wait_closed()
     assert opened.model.bench is None
-
-
-def turn_the_wheel(over: QWidget) -> QWheelEvent:
-    at = QPointF(over.rect().center())
-    down, none = QPoint(0, -120), Qt.MouseButton.NoButton
-    everywhere = QPointF(over.mapToGlobal(at.toPoint()))
-    event = QWheelEvent(at, everywhere, QPoint(), down, none, Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False)
-    QApplication.sendEvent(over, event)
-    return event
 
 
 def test_the_wheel_changes_no_servo_no_direction_and_no_number(opened: RigWizard) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.widgets.phantom_picker import PhantomPicker
+from tests.app.fakes import turn_the_wheel
 from tests.app.widgets.conftest import Own
 
 
@@ -30,19 +30,8 @@ def test_the_wheel_chooses_nothing(own: Own) -> None:
     chosen: list[str] = []
     picker.chosen.connect(chosen.append)
     for widget in (picker._combo, picker._seed):
-        for notch in (-120, 120):
-            middle = QPointF(widget.rect().center())
-            event = QWheelEvent(
-                middle,
-                widget.mapToGlobal(middle),
-                QPoint(),
-                QPoint(0, notch),
-                Qt.MouseButton.NoButton,
-                Qt.KeyboardModifier.NoModifier,
-                Qt.ScrollPhase.NoScrollPhase,
-                False,
-            )
-            QApplication.sendEvent(widget, event)
+        for notches in (-1, 1):
+            turn_the_wheel(widget, notches)
     assert chosen == []
     assert picker.name == "random:5"
 

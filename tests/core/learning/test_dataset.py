@@ -117,9 +117,10 @@ def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None
     path = tmp_path / "truth.jsonl"
     path.write_text('{"stem": "a"}\n{"stem": "b", "x"')
     assert list(read_truth(tmp_path)) == ["a"]
-    path.write_text('{"stem": "a"\n{"stem": "b"}\n')
-    with pytest.raises(DatasetError, match="line 1 is damaged"):
-        read_truth(tmp_path)
+    for text, line in (('{"stem": "a"\n{"stem": "b"}\n', 1), ('[]\n{"stem": "a"}\n', 1), ('{"stem": "a"}\n[]\n', 2)):
+        path.write_text(text)
+        with pytest.raises(DatasetError, match=f"line {line} is damaged"):
+            read_truth(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -128,18 +129,14 @@ def test_truth_skips_a_cut_last_line_and_names_any_other(tmp_path: Path) -> None
         ('"theta_deg": -Infinity', "theta_deg: must be a finite number, or null"),
         ('"head_xy": [1, 2, 3]', "head_xy: must be two finite numbers, or null"),
         ('"theta_deg": null, "state": "A"', "state: is said, but theta_deg is not"),
-        ('"theta_deg": NaN', "theta_deg"),
         ('"theta_signed_deg": "x"', "theta_signed_deg"),
         ('"theta_deg": true', "theta_deg"),
-        ('"head_xy": [1]', "head_xy"),
         ('"head_xy": [1, Infinity]', "head_xy"),
         ('"state": ["A"]', "state"),
         ('"state": "Z"', "state"),
         ('"seed": [1]', "seed"),
         ('"family": 3', "family"),
         ('"tail_xy": "there"', "tail_xy"),
-        ('"state": "A", "theta_deg": null', "state"),
-        ('"theta_deg": "x", "state": "A"', "theta_deg"),
     ],
 )
 def test_a_truth_that_makes_no_sense_is_named_by_line_and_key(tmp_path: Path, entry: str, named: str) -> None:
@@ -179,13 +176,6 @@ def test_looks_are_left_out_by_what_the_truth_says(tmp_path: Path) -> None:
     (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows[:2]))
     with pytest.raises(DatasetError, match=f"names no family of looks for frame {samples[2].stem}"):
         leave_out_looks(folder, samples, ["x-ray"])
-
-
-def test_a_row_that_is_no_object_is_damaged(tmp_path: Path) -> None:
-    for text, line in (('[]\n{"stem": "a"}\n', 1), ('{"stem": "a"}\n[]\n', 2)):
-        (tmp_path / "truth.jsonl").write_text(text)
-        with pytest.raises(DatasetError, match=f"line {line} is damaged"):
-            read_truth(tmp_path)
 
 
 def test_a_pose_has_what_it_is_to_be_measured_by(tmp_path: Path) -> None:
