@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF
@@ -115,6 +115,7 @@ def _share(value: float, positive: str, negative: str) -> str:
     return f"{abs(value):.2f} {positive if value > 0.0 else negative}"
 
 
+_SHOW_EVERY_S = 0.2
 _IDLE = frozenset({RejectReason.NO_COMMAND, RejectReason.NOT_ARMED})  # nothing was asked for, so nothing was refused
 
 
@@ -139,11 +140,23 @@ class GateEvents:
     are taken from the status' own counts, and none is missed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._pace = Pace(_SHOW_EVERY_S, clock)
         self._cycle: int | None = None
         self._rejections: dict[RejectReason, int] = {}
+        self._waiting: dict[Hashable, GateEvent] = {}
 
     def since_last(self, status: BusStatus) -> list[GateEvent]:
+        """What is to be told now: nothing more than five times a second."""
+        for event in self._found(status):
+            times = event.times + (self._waiting[event.key].times if event.key in self._waiting else 0)
+            self._waiting[event.key] = replace(event, times=times)
+        if not self._waiting or not self._pace.due():
+            return []
+        told, self._waiting = list(self._waiting.values()), {}
+        return told
+
+    def _found(self, status: BusStatus) -> list[GateEvent]:
         if self._cycle is None or status.cycle < self._cycle:  # the first of a bus process: what it counted before is no news
             self._rejections = dict(status.rejections)
         elif status.cycle == self._cycle:
@@ -251,9 +264,6 @@ def _paint_row(painter: QPainter, box: QRectF, row: ProvenanceRow, width: float,
         place = QRectF(_LABEL_WIDTH + k * width, box.top(), width - 4, box.height())
         font = theme.semi_bold(size) if cell.tone >= Tone.WARN else plain
         draw_text(painter, place, cell.text, font, theme.of(TONE_ROLE[cell.tone]), smallest_px=11)
-
-
-_SHOW_EVERY_S = 0.2
 
 
 class CommandPanel(QWidget):

@@ -429,7 +429,7 @@ def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindo
     assert player.selection == (pytest.approx(1.0), pytest.approx(1.4))
     assert player.panels.bar.clip.text() == "Clip 0.4 s"
     press(player, Key.Key_E)
-    until(qtbot, lambda: "Exported" in player.panels.offers.text)
+    qtbot.waitUntil(lambda: "Exported" in player.panels.offers.text, timeout=120_000)
     assert next(iter(player.panels.offers.answers)) == "Open its folder"
     (path,) = (tmp_path / "kept").iterdir()
     assert path.name.endswith("_1000-1400ms.mp4")
@@ -440,7 +440,7 @@ def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindo
 def test_a_clip_is_cancelled_without_a_trace(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:
     press(player, Key.Key_E)
     player.panels.offers.answers["Cancel"].click()
-    until(qtbot, lambda: player.panels.toast.text() == "Cancelled")
+    qtbot.waitUntil(lambda: player.panels.toast.text() == "Cancelled", timeout=120_000)
     assert not list((tmp_path / "kept").glob("*"))
 
 

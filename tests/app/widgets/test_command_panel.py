@@ -57,10 +57,21 @@ SEEN = Rejection(STALE, "182 ms (at most 150 ms)")
     ids=["in their order", "a cycle once", "counted before", "between cycles", "rest", "new bus process", "end of envelope"],
 )
 def test_what_the_gate_limited_and_rejected(statuses: list[dict[str, object]], entries: list[tuple[str, int]]) -> None:
-    gate, found = GateEvents(), []
+    clock = Clock()
+    gate, found = GateEvents(clock), []
     for cycle, changes in enumerate(statuses, start=1):
+        clock.now_s += 1.0
         found += gate.since_last(bus(**{"cycle": cycle, **changes}))
     assert [(event.text, event.times) for event in found] == entries
+
+
+def test_repetitions_are_told_together_five_times_a_second_at_most() -> None:
+    clock = Clock()
+    gate, told = GateEvents(clock), []
+    for cycle in range(1, 11):
+        clock.now_s += 0.0625
+        told.append([event.times for event in gate.since_last(bus(cycle=cycle, clamps=(clamp(),)))])
+    assert told == [[1], [], [], [], [4], [], [], [], [4], []]
 
 
 ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
