@@ -46,7 +46,7 @@ FIXED = (
     "both of its ends lie at the image border, so its head may be out of view", "it has no direction",
     "the centerline beside the head has no direction", "no vessel was found", "no vessel that was found leads there",
     "on the centerline and along it", "straight on", "at the target", "along the route", "a bend ahead", "a bifurcation ahead",
-    "the head must turn first", "the head is near the wall", "the target is near",
+    "the head must turn first", "the target is near",
     "the way seems to lie behind the head: looking again", "the way to the target branches off behind the head",
     "the robot is fed but its head does not move", "no report yet", "no frame yet", "no pose yet", "it shows something else",
     "not checked yet", "the servo process is not armed", "no sign of life yet", "the rig stopped while it was armed",

@@ -79,7 +79,7 @@ CAMERAS = PluginKind("cameras", ("twin", "realsense", "webcam", "basler", *RECOR
 CameraName = Annotated[str, CAMERAS]
 
 
-_UNUSED = ("contact_slow_n", "lean_mm", "contact_back_off_n", "contact_limit_n")
+_UNUSED = ("contact_slow_n", "lean_mm", "contact_back_off_n", "contact_limit_n", "wall_share")
 """Settings of earlier versions."""
 
 
@@ -99,7 +99,6 @@ class PursuitConfig(ConfigSection):
     brake_px: float = Field(16.0, ge=5.0, le=400.0, description="way left at which it begins to slow down for the target")
     gentle_turn_deg: float = Field(25.0, gt=0.0, le=180.0, description="turn within the preview that still allows full speed")
     slow_steer_deg: float = Field(20.0, gt=0.0, le=180.0, description="missing turn above which the robot goes slow")
-    wall_share: float = Field(0.85, gt=0.1, le=1.5, description="head's distance over the room it has: above, near the wall")
     stuck_s: float = Field(1.5, ge=0.2, le=20.0, description="no progress for so long: back off")
     stuck_share: float = Field(0.2, ge=0.0, le=1.0, description="progress below this share of what was advised is none")
     back_off_mm: float = Field(4.0, gt=0.0, le=50.0, description="way back when stuck, at least")

@@ -37,7 +37,6 @@ class LookAhead:
     behind : the way leaves backwards.
     turn_deg : sharpest turn within the preview.
     junction_px : distance to the next bifurcation on the way; None: none within the preview.
-    wall : share of the room beside the centerline that the head has used; 1: it touches the wall.
     """
 
     head: Point
@@ -49,7 +48,6 @@ class LookAhead:
     behind: bool
     turn_deg: float
     junction_px: float | None
-    wall: float
 
 
 def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, rounding_px: float = 0.0) -> LookAhead | None:
@@ -84,8 +82,6 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, roundi
     error_deg = straight_deg - config.follow_arc * max(-45.0, min(45.0, arc_deg))
     # the angle to a point at the look-ahead distance on the tightest arc that is steered for
     sharpest_deg = math.degrees(math.asin(min(1.0, look_ahead_px / (2.0 * config.min_bend_radius_px))))
-    radius_px, robot_px = scene.centerline.radius_px, scene.path.radius_px
-    away_px = math.hypot(head[0] - scene.centerline.nearest[0], head[1] - scene.centerline.nearest[1])
     return LookAhead(
         head=head,
         points=points,
@@ -96,7 +92,6 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, roundi
         behind=behind,
         turn_deg=_turn_deg(points, config.preview_px),
         junction_px=_junction_px(scene.vessel_graph, points, config.preview_px),
-        wall=away_px / max(radius_px - robot_px, 0.25 * radius_px, 1.0),
     )
 
 

@@ -130,8 +130,6 @@ class Pursuit:
             # no step where it begins: an error that trembles about the limit must not make the feed stutter
             share = (config.slow_steer_deg / error_deg) ** 2
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * share), "the head must turn first"))
-        if way.wall > config.wall_share:
-            limits.append((words.moderate_mm_s, "the head is near the wall"))
         if way.left_px is not None and way.left_px < config.brake_px:
             limits.append((max(words.slowest_mm_s, words.fast_mm_s * way.left_px / config.brake_px), "the target is near"))
         speed_mm_s, why = min(limits)
