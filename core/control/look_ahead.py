@@ -79,7 +79,7 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, roundi
             goal = float(points[0][0]), float(points[0][1])
             straight_deg = _angle_deg(heading, _step(head, goal))
             left_px = math.dist(head, goal) + float(geometry.arc_length(points)[-1])
-    error_deg = straight_deg - config.follow_arc * max(-45.0, min(45.0, arc_deg))
+    error_deg = straight_deg - limited(arc_deg, 45.0)
     # the angle to a point at the look-ahead distance on the tightest arc that is steered for
     sharpest_deg = math.degrees(math.asin(min(1.0, look_ahead_px / (2.0 * config.min_bend_radius_px))))
     return LookAhead(
