@@ -79,7 +79,7 @@ CAMERAS = PluginKind("cameras", ("twin", "realsense", "webcam", "basler", *RECOR
 CameraName = Annotated[str, CAMERAS]
 
 
-_UNUSED = ("contact_slow_n", "lean_mm", "contact_back_off_n", "contact_limit_n", "wall_share", "follow_arc")
+_UNUSED = ("contact_slow_n", "lean_mm", "contact_back_off_n", "contact_limit_n", "wall_share", "follow_arc", "min_bend_radius_px")
 """Settings of earlier versions."""
 
 
@@ -92,7 +92,6 @@ class PursuitConfig(ConfigSection):
     rounding_px: float = Field(8.0, ge=0.0, le=100.0, description="added to the rounding of a branch's corner after each miss")
     heading_px: float = Field(16.0, ge=4.0, le=100.0, description="end of the robot whose direction is the head's")
     gain: float = Field(1.0, gt=0.0, le=5.0, description="degrees of steering per degree of error")
-    min_bend_radius_px: float = Field(30.0, ge=5.0, le=500.0, description="tightest arc that is steered for")
     smoothing_s: float = Field(0.08, ge=0.0, le=1.0, description="time constant of the steering's low-pass")
     preview_px: float = Field(50.0, ge=5.0, le=400.0, description="bends and bifurcations so far ahead slow the robot down")
     brake_px: float = Field(16.0, ge=5.0, le=400.0, description="way left at which it begins to slow down for the target")

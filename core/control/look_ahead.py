@@ -33,7 +33,6 @@ class LookAhead:
     points : (N, 2) from the place beside the ``head``, or, where that leads back, from the place in sight ahead of it.
     left_px : way left to the ``target``; None: no target.
     error_deg : the missing turn, positive to the right.
-    steer_deg : of it what is steered for at once: no more than along the tightest arc.
     behind : the way leaves backwards.
     turn_deg : sharpest turn within the preview.
     junction_px : distance to the next bifurcation on the way; None: none within the preview.
@@ -44,7 +43,6 @@ class LookAhead:
     left_px: float | None
     target: Point | None
     error_deg: float
-    steer_deg: float
     behind: bool
     turn_deg: float
     junction_px: float | None
@@ -79,16 +77,12 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, roundi
             goal = float(points[0][0]), float(points[0][1])
             straight_deg = _angle_deg(heading, _step(head, goal))
             left_px = math.dist(head, goal) + float(geometry.arc_length(points)[-1])
-    error_deg = straight_deg - limited(arc_deg, 45.0)
-    # the angle to a point at the look-ahead distance on the tightest arc that is steered for
-    sharpest_deg = math.degrees(math.asin(min(1.0, look_ahead_px / (2.0 * config.min_bend_radius_px))))
     return LookAhead(
         head=head,
         points=points,
         left_px=left_px,
         target=target,
-        error_deg=error_deg,
-        steer_deg=limited(error_deg, sharpest_deg),
+        error_deg=straight_deg - limited(arc_deg, 45.0),
         behind=behind,
         turn_deg=_turn_deg(points, config.preview_px),
         junction_px=_junction_px(scene.vessel_graph, points, config.preview_px),

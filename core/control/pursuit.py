@@ -1,4 +1,4 @@
-"""Pure pursuit along the route: curvature-limited steering, slow before bends and bifurcations.
+"""Pure pursuit along the route, slow before bends and bifurcations.
 
 Everything is taken from the picture: the head and its direction from the robot's path, the way from the operator's route or,
 without one, from the centerline's piece. It backs off when the way to the target leads backwards, a missed branch, and when the
@@ -63,10 +63,9 @@ class Pursuit:
             self._behind_s = 0.0
         # counted down, not reset: where head and branch lie in a wide bifurcation, single frames still see the way ahead
         self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
-        wanted_deg = limited(config.gain * way.steer_deg, self._words.max_steer_deg)
         keep = math.exp(-since_s / config.smoothing_s) if config.smoothing_s > 0.0 and since_s > 0.0 else 0.0
-        self._steer_deg = keep * self._steer_deg + (1.0 - keep) * wanted_deg
         self._error_deg = keep * self._error_deg + (1.0 - keep) * way.error_deg
+        self._steer_deg = limited(config.gain * self._error_deg, self._words.max_steer_deg)
         fed_mm_s, fed_mm = self._feed.update(status, self._speed_mm_s, elapsed_s)
         stuck = self._stall.update(way.left_px, way.head, fed_mm_s, elapsed_s)
         if self._back_off is not None:

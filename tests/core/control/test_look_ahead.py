@@ -16,16 +16,9 @@ CONFIG = PursuitConfig(smoothing_s=0.0)
 
 
 def test_the_error_is_the_angle_to_the_look_ahead_point() -> None:
-    config = CONFIG.model_copy(update={"min_bend_radius_px": 10.0})
-    way = look_ahead(scene_at(STRAIGHT, (100, 94), (380, 100)), 12.0, config)
+    way = look_ahead(scene_at(STRAIGHT, (100, 94), (380, 100)), 12.0, CONFIG)
     # The route is walked in steps of 2 px: its first point at least 12 px away lies 12 px ahead and 6 px aside.
     assert way.error_deg == pytest.approx(math.degrees(math.atan2(6, 12)), abs=0.1)
-
-
-def test_steering_is_limited_to_the_tightest_arc() -> None:
-    way = look_ahead(scene_at(STRAIGHT, (100, 90), (380, 100), -60), 12.0, CONFIG)
-    assert way.error_deg > 60.0
-    assert way.steer_deg == pytest.approx(math.degrees(math.asin(12.0 / (2 * CONFIG.min_bend_radius_px))))
 
 
 @pytest.mark.parametrize("heading", [70.0, 95.0])
@@ -37,8 +30,7 @@ def test_a_branch_beside_the_head_is_turned_into_and_not_backed_away_from(headin
 
 
 def test_a_head_far_beside_the_way_looks_at_a_place_ahead_and_not_across() -> None:
-    config = CONFIG.model_copy(update={"min_bend_radius_px": 5.0})
-    way = look_ahead(scene_at(STRAIGHT, (100, 113), (380, 100), 0.0), 10.0, config)
+    way = look_ahead(scene_at(STRAIGHT, (100, 113), (380, 100), 0.0), 10.0, CONFIG)
     assert way.error_deg == pytest.approx(-45.0, abs=3.0)
 
 

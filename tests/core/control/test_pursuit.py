@@ -56,10 +56,9 @@ def test_a_branch_that_is_too_sharp_is_told_before_the_head_is_there() -> None:
 
 
 def test_the_more_the_head_must_turn_the_slower_and_never_by_a_jump() -> None:
-    pointing = PursuitConfig(smoothing_s=0.0, min_bend_radius_px=5.0)  # the error is the heading
     errors_deg, speeds = [], []
     for heading in np.arange(0.0, 40.0, 0.25):
-        advice = Pursuit(pointing, WORDS)(scene_at(STRAIGHT, (100, 100), (380, 100), float(heading)))
+        advice = Pursuit(CONFIG, WORDS)(scene_at(STRAIGHT, (100, 100), (380, 100), float(heading)))
         errors_deg.append(abs(advice.steer_deg))
         speeds.append(advice.advance_mm_s)
     small = np.array(errors_deg) < CONFIG.slow_steer_deg
