@@ -118,6 +118,7 @@ def test_figures_by_hand() -> None:
     assert first["theta_median_deg"].difference is None
     assert second["theta_median_deg"].value == 2.0
     assert second["theta_median_deg"].difference == -0.5
+    assert second["theta_mean_deg"].value == pytest.approx(8 / 3), "of the three that were answered"
     assert second["answered_share"].value == 3 / 4, "the frame without a robot does not count"
     assert second["wrong_share"].difference == pytest.approx(-1 / 2)
 
@@ -175,6 +176,7 @@ def test_swaps_jumps_and_changes_are_counted() -> None:
     assert found["jumps"] == 3
     assert found["state_changes"] == 2  # C B C within the first stream; the second stands alone
     assert found["true_state_changes"] == 0
+    assert stream_figures([[seen(-178.0, 179.0)]])["theta_mean_deg"] == 3.0, "the short way round"
 
 
 def test_jitter_is_the_spread_of_the_errors_change() -> None:

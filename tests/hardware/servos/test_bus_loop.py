@@ -326,10 +326,12 @@ def test_a_servo_that_is_missing_does_not_keep_the_others_tight(paper: Paper) ->
     assert (paper.end.told.releases, paper.end.told.still_tight) == (1, ("down",))
 
 
-def test_wires_that_were_let_out_are_told_so(paper: Paper) -> None:
+@pytest.mark.parametrize("cause", [Cause.STRAINED, Cause.TRACKING, Cause.HOT])
+def test_wires_are_let_out_after_these_faults_and_that_is_told(paper: Paper, cause: Cause) -> None:
+    """A servo that is too hot held the wires, got hotter, and shut itself down with a snap."""
     paper.reads(tendon_mm=2.0)
     paper.loop._read_decide_write()
-    paper.loop._end_motion(Fault(Cause.STRAINED, "right"))
+    paper.loop._end_motion(Fault(cause, "right"))
     paper.loop._publish(paper.now_s)
     assert paper.end.told.releases == 0
     _follow(paper, 110)
