@@ -320,26 +320,31 @@ _LEAST_ROBOT_PX, _MOVED_SHARE = 400, 0.5
 """Least area of what the network takes for a robot, and the share of it that has changed when it was one."""
 
 
-def combined(network: Probability, difference: Difference, view: BenchView) -> Probability:
+def combined(network: Probability, difference: Difference, view: BenchView, *, is_taught: bool = False) -> Probability:
     """The robot's probability (h, w): what differs from the empty bench, and what the `network` (h, w) sees beside that.
 
     Where the empty bench is not known, and where the difference is unusable, the network alone counts. In noise the difference says
-    only where the robot is about; its outline is the network's.
+    only where the robot is about; its outline is the network's. With `is_taught`, a network that was taught on a bench, both are
+    averaged: what that network does not see, such as a shadow beside the robot, must differ more.
     """
     differs = difference.probability >= np.float32(0.5)
+    near = cv2.dilate(differs.view(np.uint8), _square(_NEAR_PX)) > 0 if difference.is_noisy or is_taught else differs
+    outline = np.asarray(np.where(near | ~view.known | difference.unusable, network, np.float32(0.0)), np.float32)
     if difference.is_noisy:
-        near = cv2.dilate(differs.view(np.uint8), _square(_NEAR_PX)) > 0
-        return np.asarray(np.where(near | ~view.known | difference.unusable, network, np.float32(0.0)), np.float32)
+        return outline
     beside = cv2.dilate(differs.view(np.uint8), _square(_BESIDE_PX)) > 0
     seen = np.where(network + difference.evidence >= np.float32(_BOTH), network, np.minimum(network, np.float32(0.49)))
     robot = np.where(differs, np.maximum(network, difference.probability), np.where(beside, seen, np.float32(0.0)))
-    return np.asarray(np.where(view.known & ~difference.unusable, robot, network), np.float32)
+    robot = np.asarray(np.where(view.known & ~difference.unusable, robot, network), np.float32)
+    return robot + np.float32(_TAUGHT_SHARE) * (outline - robot) if is_taught else robot
 
 
 _BESIDE_PX = 9
 """Side of the square around what differs within which the network adds to the robot: a part that looks like the bench."""
 _NEAR_PX = 41
-"""In noise: side of the square around what differs in which the network is believed."""
+"""Side of the square around what differs in which the network is believed where its outline counts."""
+_TAUGHT_SHARE = 0.4
+"""Weight of a taught network's outline. From 0.5 on a robot that it has not learnt to see would be lost."""
 _BOTH = 1.0
 """There the network's probability and the difference's evidence add up to this at least; a blurred rim or a shadow is no robot."""
 

@@ -370,7 +370,7 @@ class Pipeline:
         """The robot's probability (h, w) of the network and of the difference to the empty bench."""
         if view.vessel is None:  # where it was not drawn, the robot lies in the vessel that the network sees
             view = replace(view, reachable=reachable(vessel >= self._config.segmentation.vessel_threshold))
-        return combined(robot, robot_by_difference(image, view), view)
+        return combined(robot, robot_by_difference(image, view), view, is_taught=self._stream.is_taught)
 
     def _trace(self, run: _Run, masks: Masks) -> _Structures | Refusal:
         """Skeletons and vessel graph of masks; those of a drawn vessel are known."""

@@ -165,3 +165,20 @@ def test_a_mark_beside_the_robot_is_no_end_of_it(bench: Bench) -> None:
     image = with_line(with_line(board(), (100, 136), (108, 136), (170, 90, 60)), *ROBOT, (250, 250, 250))
     difference = found(noisy(image, 2.0, 3), bench)
     assert dice(difference.probability >= 0.5, line(*ROBOT)) > 0.9
+
+
+def seen_by_network(robot: Mask) -> np.ndarray:
+    return np.where(robot, np.float32(0.97), np.float32(0.02))
+
+
+def test_a_taught_network_denies_a_shadow_and_not_a_robot_that_it_overlooks(bench: Bench) -> None:
+    shadow = tuple(int(0.7 * level) for level in board()[135, 100])
+    image = noisy(with_line(with_line(board(), (0, 126), (200, 134), shadow), *ROBOT, (60, 60, 60)), 2.0, 3)
+    view = register(image, bench)
+    difference, elsewhere = robot_by_difference(image, view), line((280, 120), (300, 120))
+    seen = seen_by_network(line(*ROBOT) | elsewhere)
+    assert dice(combined(seen, difference, view) >= 0.5, line(*ROBOT)) < 0.9
+    for network in (seen, seen_by_network(elsewhere)):
+        robot = combined(network, difference, view, is_taught=True) >= 0.5
+        assert dice(robot, line(*ROBOT)) > 0.98
+        assert not (robot & elsewhere).any()
