@@ -19,7 +19,7 @@ from unittest.mock import patch
 from core.config.safety import SafetyConfig, ServosConfig
 from core.control.faults import Cause
 from core.control.gate import Source
-from core.control.kept_zero import ALL_AT_ZERO
+from core.control.kept_zero import all_at_zero
 from hardware.servos import bus_process, dynamixel_bus, dynamixel_port
 from hardware.servos.bus_ipc import BusOrder, BusServer, BusStatus, Heartbeat, Request
 from hardware.servos.bus_process import BusLoop
@@ -231,7 +231,7 @@ class LockstepEnd:
 
 Ask = tuple[str, dict[str, Any]]
 """A request, and its details."""
-_ZERO: Ask = ("zero", ALL_AT_ZERO.model_dump(mode="json"))
+_ZERO: Ask = ("zero", all_at_zero(ServosConfig()).model_dump(mode="json"))
 _ARM: Ask = ("arm", {})
 PROCEDURES: dict[str, tuple[bool, list[Ask]]] = {
     "open, zero and switch on": (False, [("open", {}), _ZERO, _ARM]),

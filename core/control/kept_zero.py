@@ -15,7 +15,7 @@ from enum import StrEnum
 
 from pydantic import Field
 
-from core.config.safety import JOINT_NAMES, TICKS_PER_TURN, JointConfig, JointName, ServosConfig
+from core.config.safety import TICKS_PER_TURN, JointConfig, JointName, ServosConfig
 from core.config.section import ConfigSection
 from core.messages import message
 
@@ -43,10 +43,6 @@ class ZeroRequest(ConfigSection):
     kept: tuple[JointName, ...] = Field((), description="joints whose kept zero holds, as the operator has confirmed")
     forgotten: tuple[JointName, ...] = Field((), description="tendons whose kept zero holds no more, as they were hung in again")
     basis: ZeroBasis = Field(ZeroBasis.SLACK, description="of the tendons in positions_mm")
-
-
-ALL_AT_ZERO = ZeroRequest(positions_mm=dict.fromkeys(JOINT_NAMES, 0.0))
-"""All joints of the default robot stand at zero, with slack wires."""
 
 
 def all_at_zero(servos: ServosConfig) -> ZeroRequest:

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from core.config.safety import TENDONS, TICKS_PER_TURN, JointConfig, ServosConfig
 from core.control.kept_zero import (
-    ALL_AT_ZERO,
     KeptJoint,
     KeptZeros,
     ZeroOffer,
     ZeroRequest,
+    all_at_zero,
     keep,
     request_problem,
     unknown_joint,
@@ -26,6 +26,7 @@ from core.control.kept_zero import (
 SERVOS = ServosConfig()
 RIGHT, ADVANCE = SERVOS.joints[0], SERVOS.joints[4]
 MODEL = SERVOS.model
+ALL_AT_ZERO = all_at_zero(SERVOS)
 
 
 def kept(joint: JointConfig, ticks: int, position_mm: float) -> KeptJoint:
@@ -168,6 +169,7 @@ def test_a_joint_that_the_robot_does_not_have_is_named(key: str) -> None:
     request = ZeroRequest.model_validate({key: {"hook": 0.0} if key == "positions_mm" else ("hook",)})
     assert unknown_joint(request, SERVOS).startswith("hook is no joint of this robot: right, left")
     assert unknown_joint(ALL_AT_ZERO, SERVOS) == ""
+    assert ALL_AT_ZERO.positions_mm == dict.fromkeys(SERVOS.names, 0.0)
 
 
 def test_a_file_is_read_as_it_was_written_and_another_one_is_refused() -> None:

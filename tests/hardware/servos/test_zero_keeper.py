@@ -18,7 +18,7 @@ from core.config.calibration import ZeroConfig
 from core.config.safety import JointName, SafetyConfig, ServosConfig
 from core.control.gate import Source
 from core.control.joints import Retracted
-from core.control.kept_zero import ALL_AT_ZERO, KeptZeros, ZeroBasis, ZeroOffer, ZeroRequest, keep
+from core.control.kept_zero import KeptZeros, ZeroBasis, ZeroOffer, ZeroRequest, all_at_zero, keep
 from core.types import Command
 from hardware.servos.bus_ipc import BusStatus
 from hardware.servos.dynamixel_port import NotReady
@@ -35,6 +35,7 @@ CONFIG, SAFETY = ServosConfig(watchdog_s=2.5, heartbeat_timeout_s=3.0, unattende
 TENDONS: tuple[JointName, ...] = ("right", "left", "up", "down")
 PATIENCE_S = 10.0
 REST = Command()
+ALL_AT_ZERO = all_at_zero(CONFIG)
 
 
 @pytest.fixture
