@@ -5,7 +5,7 @@ where the vessel turns away, theta grows without a turn of the head. So a turn c
 command in the picture and also against the vessel's direction, or did not follow a large command there, beyond what feeding a
 bent head and the poses' noise explain. A head that springs free turns by what was commanded before and had no effect: that is no
 wrong turn either. The same holds for the way of the head along itself against the feed. Robots wired right stay far below the
-limits, swapped tendons and a reversed feed reach them within about a second.
+limits, swapped tendons and a reversed feed reach them within a second.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from core.types import Point, Scene
 
 WRONG_TURN_DEG = 4.0
 """Turn against the command that disarms."""
-WRONG_FEED_MM = 1.5
-"""Way against the feed that disarms."""
+WRONG_FEED_MM, FIRST_WRONG_FEED_MM = 1.5, 0.7
+"""Way against the feed that disarms, and until the head was seen to follow; where it turns first it is fed by 1 mm/s alone then."""
 _LINE_PX = 32.0
 """End of the robot whose direction is compared: the 40 px of theta turn by half of what the tip does, 16 px are not steady."""
 _WINDOW_S, _DENSE_S, _APART_S = 4.0, 0.3, 0.12
@@ -207,7 +207,7 @@ class DirectionMonitor:
                 "{a:.0f}° against a bend of {b:.0f}° to the {side}", a=self.wrong_turn_deg, b=abs(self.commanded[0]), side=side
             )
             found.append(Fault(Cause.WRONG_TURN, detail))
-        if self.wrong_feed_mm >= WRONG_FEED_MM:
+        if self.wrong_feed_mm >= (WRONG_FEED_MM if self.feeds else FIRST_WRONG_FEED_MM):
             detail = message("{a:.1f} mm against a feed of {b:+.1f} mm", a=self.wrong_feed_mm, b=self.commanded[1])
             found.append(Fault(Cause.WRONG_FEED, detail))
         return found
