@@ -723,7 +723,7 @@ def _save(picture: QImage, path: Path) -> None:
     if not picture.save(str(path)):
         raise UserError(f"{path}: cannot be written")
     with PIL.Image.open(path) as saved:
-        small = saved.convert("RGB").quantize(256, method=PIL.Image.Quantize.MEDIANCUT, dither=PIL.Image.Dither.FLOYDSTEINBERG)
+        small = saved.convert("RGB").quantize(256, method=PIL.Image.Quantize.MEDIANCUT, kmeans=2)
     small.save(path, optimize=True)
 
 
