@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import os
 import sys
 import tempfile
@@ -331,6 +332,7 @@ class OperatorScene:
     def __enter__(self) -> OperatorScene:
         self.window.show()
         self.window.start()
+        self.window._stale_after_s = math.inf  # how busy this machine is, the pictures do not show
         try:
             self.run_aside(self.engine.switch_on)
         except UserError:
