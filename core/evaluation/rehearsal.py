@@ -6,6 +6,7 @@ Places are pixels of the picture.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,10 @@ from core.types import Point
 
 FEWEST_RUNS = 20
 """Runs, at least, from which a speed is recommended."""
+_LEAST_WAY_MM = 20.0
+"""A shorter way does not tell the feed."""
+FedMoment = tuple[float, float, float]
+"""Of a run: time, place along the way (mm), and the speed of the feed that was commanded (mm/s)."""
 
 
 class _Part(BaseModel):
@@ -93,6 +98,7 @@ class RehearsalResult(_Part):
     wall_force_n: WallForce = WallForce()
     weakest: WeakestPlace | None = None
     way: RehearsedWay = RehearsedWay()
+    way_per_feed: tuple[float, float, float] | None = Field(None, description="mm per mm, percentiles (5, 50, 95) over the runs")
     sharp: tuple[SharpBranch, ...] = ()
     speed_mm_s: float
     recommended_speed_mm_s: float | None = None
@@ -132,4 +138,14 @@ def place_beside(result: RehearsalResult, head: Point) -> PlaceBeside | None:
     offset, *sides = (float(np.subtract(at, foot) @ across) for at in (head, way.low_xy[place], way.high_xy[place]))
     beyond_px = math.sqrt(max(0.0, math.dist(head, foot) ** 2 - offset**2)) - (along[-1] - along[-2])  # one place after the last
     outside_px = max(0.0, offset - max(sides), min(sides) - offset, beyond_px if at_px >= along[-1] else 0.0)
-    return PlaceBeside(way.along_mm[place], outside_px, way.wall_force_n[place], way.time_s[place])
+    along_mm = round(float(np.interp(at_px, along, way.along_mm)), 1)
+    return PlaceBeside(along_mm, outside_px, way.wall_force_n[place], way.time_s[place])
+
+
+def way_per_feed(run: Sequence[FedMoment]) -> float | None:
+    """How far the head came for each millimetre that was fed; None for a short way."""
+    if len(run) < 2:
+        return None
+    time_s, along_mm, feed_mm_s = np.array(run).T
+    way_mm, fed_mm = float(along_mm[-1] - along_mm[0]), float(np.diff(time_s) @ feed_mm_s[:-1])
+    return round(way_mm / fed_mm, 4) if way_mm >= _LEAST_WAY_MM and fed_mm > 0.0 else None

@@ -11,7 +11,7 @@ import numpy as np
 
 from core import geometry
 from core.control.modes import Mode
-from core.evaluation.rehearsal import PlaceBeside, RehearsalResult, place_beside, rehearsal_of
+from core.evaluation.rehearsal import FedMoment, PlaceBeside, RehearsalResult, place_beside, rehearsal_of, way_per_feed
 from core.session.manifest import EventKind
 from core.session.reader import SessionReader
 from core.types import Point, PoseState
@@ -20,6 +20,8 @@ _BESIDE_PX = 4.0
 """Of a picture of 640 px: so far off a head may be perceived; the band is one of true heads."""
 _LEFT_S = 0.5
 """A head that is outside for so long has left the band."""
+_FEED_SHARE = 0.03
+"""So far outside the rehearsed ones the way per feed is another: commands and pictures are not of one moment."""
 _ARRIVED_MM = 5.0
 """Of the destination: the rehearsed way may end before it."""
 
@@ -45,6 +47,7 @@ def runs_beside(reader: SessionReader) -> list[dict[str, Any]]:
 def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence[int]) -> dict[str, Any] | None:
     """None where the head was never on the rehearsed way."""
     found: list[tuple[float, PlaceBeside, Point]] = []
+    fed: list[FedMoment] = []
     states, forces = [], []
     limit_px, way = _BESIDE_PX * max(result.size_px) / 640, result.way
     px_per_mm = float(geometry.arc_length(np.array(way.xy))[-1]) / (way.along_mm[-1] - way.along_mm[0]) if len(way.xy) > 1 else 0.0
@@ -59,6 +62,7 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
         head = row.scene.to_source(row.scene.path.head) if row.scene.path is not None else None
         if head is not None and (beside := place_beside(result, head)) is not None:
             found.append((row.captured_s, beside, head))
+            fed.append((row.captured_s, beside.along_mm, row.sent.advance_mm_s if row.sent is not None else 0.0))
             if arrived := math.dist(head, result.target_xy) <= _ARRIVED_MM * px_per_mm:
                 break
     if not found:
@@ -76,12 +80,17 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
             is_told = True
             xy = [round(value, 1) for value in since[2]]
             left.append({"time_s": round(since[0] - zero_s, 2), "along_mm": since[1].along_mm, "xy": xy})
+    seconds, share, explained_s = ended_s - began_s, way_per_feed(fed), None
+    if share is not None and result.way_per_feed is not None:
+        low, middle, high = result.way_per_feed
+        if not low - _FEED_SHARE <= share <= high + _FEED_SHARE:
+            explained_s = round(seconds * (1.0 - share / middle), 2)
     return {
         "target_xy": list(result.target_xy),
         "runs": result.runs,
         "arrived_share": result.arrived.share,
         "arrived": arrived,
-        "seconds": round(ended_s - began_s, 2),
+        "seconds": round(seconds, 2),
         "rehearsed_seconds": [round(value - first.time_s[1], 2) for value in last.time_s],
         "inside_share": round(1.0 - len(outside) / len(found), 4),
         "left_band": left,
@@ -89,6 +98,9 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
         "rehearsed_wall_force_max_n": result.wall_force_n.max,
         "states": {state.value: round(states.count(state) / len(states), 4) for state in PoseState} if states else None,
         "rehearsed_states": result.states or None,
+        "way_per_feed": share,
+        "rehearsed_way_per_feed": result.way_per_feed,
+        "feed_explains_s": explained_s,
     }
 
 
@@ -106,4 +118,7 @@ def beside_line(run: dict[str, Any]) -> str:
     if run["states"] is not None and run["rehearsed_states"] is not None:
         shares = (f"{name} {share:.0%} ({run['rehearsed_states'].get(name, 0.0):.0%})" for name, share in run["states"].items())
         parts.append(f"states {', '.join(shares)}")
+    if run["feed_explains_s"] is not None:
+        way = f"{run['way_per_feed']:.2f} mm of way per mm fed (rehearsed {run['rehearsed_way_per_feed'][1]:.2f})"
+        parts.append(f"the feed slips or is another: {way}, which explains {run['feed_explains_s']:+.1f} s")
     return "; ".join(parts)

@@ -19,7 +19,7 @@ from core import geometry
 from core.config.models import Config
 from core.control.look_ahead import sharp_branches
 from core.evaluation.metrics import wilson_95
-from core.evaluation.rehearsal import RehearsedWay, SharpBranch, WeakestPlace
+from core.evaluation.rehearsal import FedMoment, RehearsedWay, SharpBranch, WeakestPlace, way_per_feed
 from core.evaluation.trial import Row, TrialSample, summarise
 from core.perception.centerline import centerline_at, plan_route
 from core.perception.pose import measure_pose
@@ -91,6 +91,11 @@ class Rehearsal(Trial):
         self._graph = true_graph(self._world.phantom, view, self._scale)
         self._masks_shown = _vessel_masks(self._world, self._scale)
         self._error_px, self._is_blind = rng.normal(0.0, 1.0, 2), False
+        self._fed: list[FedMoment] = []
+
+    def run(self) -> Row:
+        """The row, with the ``way_per_feed``."""
+        return super().run() | {"way_per_feed": way_per_feed(self._fed)}
 
     def _read(self) -> Frame:
         self._world.advance(1.0 / self._world.config.frames_per_second)
@@ -127,6 +132,7 @@ class Rehearsal(Trial):
         head_mm = self._world.physics.head_mm
         error_px = float(np.hypot(*self._error_px)) * self._eye.head_px / _MEDIAN if scene.path is not None else None
         self._log.measures.append(TrialSample(time_s, head_mm, insertion_mm, wall_contact_n, head_error_px=error_px))
+        self._fed.append((time_s, geometry.nearest(self.target.route, head_mm)[1], self._world.command.advance_mm_s))
         self._update_progress(head_mm, time_s)
 
     def _with_error(self, path: Points, period_s: float) -> Points:
@@ -274,6 +280,8 @@ class RehearsalPicture:
         """The figures, the weakest place, and what happened along the way, as ``RehearsalResult`` has them."""
         weakest = self.weakest(rows)
         parts = {"weakest": weakest.model_dump(mode="json") if weakest else None, "way": self.way(rows).model_dump(mode="json")}
+        shares = [share for row in rows if (share := row.get("way_per_feed")) is not None]
+        parts["way_per_feed"] = np.percentile(shares, (5, 50, 95)).round(4).tolist() if shares else None
         return figures(rows) | parts
 
 

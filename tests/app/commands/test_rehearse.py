@@ -60,10 +60,11 @@ def rehearse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., l
 
 
 def test_a_good_way_is_told_with_its_band(rehearse: Callable[..., list[dict[str, Any]]]) -> None:
-    (told,) = rehearse(lambda _speed, seed: row(seed), "--json", "--runs", "20")
+    (told,) = rehearse(lambda _speed, seed: row(seed) | {"way_per_feed": 0.9 + 0.01 * seed}, "--json", "--runs", "20")
     found = RehearsalResult.model_validate(told)
     assert (found.runs, found.arrived.share, found.recommended_speed_mm_s) == (20, 1.0, told["speed_mm_s"])
     assert found.way.runs == (20, 20) and found.way.wall_force_n == (0.0, 0.1) and found.way.time_s[1] == (3.0, 3.0, 3.0)
+    assert found.way_per_feed == pytest.approx((0.9095, 0.995, 1.0805))
     assert found.target_xy == pytest.approx((430, 400), abs=12) and found.size_px == (640, 480)
 
 

@@ -41,6 +41,7 @@ FOUND: dict[str, Any] = {
         "time_s": [[0, 0.5, 1], [1, 1.5, 2], [2, 2.5, 3]],
         "runs": [50, 50, 50],
     },
+    "way_per_feed": [0.98, 1.0, 1.02],
     "sharp": [{"xy": [200.0, 180.0], "turn_deg": 74.0, "limit_deg": 61.0}],
     "speed_mm_s": 8.0,
     "recommended_speed_mm_s": 5.6,
