@@ -12,7 +12,7 @@ import pytest
 
 from core.calibration.camera import BoardError, BoardSpec
 from core.calibration.servos import Assignment, HeadNotSeen, ServoFinding, SteeringNotSeen
-from core.config.calibration import CalibrationConfig, DrumsConfig, ScaleConfig, ZeroConfig
+from core.config.calibration import CalibrationConfig, DrumsConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
 from core.config.models import Config
 from core.config.safety import ServosConfig, wiring_of
 from core.devices import DeviceError
@@ -24,6 +24,7 @@ from hardware.calibration.servo_probe import ProcedureStopped, StopSwitch, Strai
 from hardware.rig import RigKind
 from hardware.servos.discovery import FoundServo, FoundServos
 from hardware.servos.dynamixel_port import NoAnswer
+from tests.core.robots import TURNED
 
 WHEN = datetime(2026, 1, 1, tzinfo=UTC)
 TICKS = (2048, 2049, 2050, 2051, 0, 1, 2)
@@ -193,6 +194,31 @@ def test_the_wiring_that_was_found_is_kept(draft: RigDraft) -> None:
     assert known.wiring == ((2, -1), (1, 1), (3, 1), (4, 1), (5, 1), (6, 1), (7, 1)) == wiring_of(draft.config.servos)
     again = RigDraft(Bench(), draft.config, known)
     assert again.calibration().wiring == known.wiring
+
+
+@pytest.mark.parametrize(("assumed", "sign", "learnt"), [(True, -1, 2), (False, 1, 1)])
+def test_a_head_that_bends_to_the_other_side_turns_an_assumed_rotation_round(
+    monkeypatch: pytest.MonkeyPatch, assumed: bool, sign: int, learnt: int
+) -> None:
+    """One camera shows no direction of a rotation before its shaft is turned and bent."""
+    draft = RigDraft(Bench(), Config(servos=TURNED))
+    draft.set_assignments([Assignment(one.name, one.id, 1, "seen", assumed and one.name == "rotation") for one in TURNED.joints])
+    draft.zeros = Zeros((0.1, 0.2))
+    asked: list[int] = []
+
+    def learn(_bench: object, servos: ServosConfig, *_: object) -> servo_identification.LearnedSteering:
+        asked.append(servos.joints[-1].sign)
+        tendons = tuple(TendonConfig(name=one.name, moved_px=9.0, px_per_mm=6.0) for one in TURNED.tendons)
+        roll_deg = 180.0 if len(asked) == 1 else 0.0
+        steering = SteeringConfig(heading_deg=0.0, roll_deg=roll_deg, disagreement_deg=1.0, tendons=tendons)
+        return servo_identification.LearnedSteering(steering, (1.0, 2.0), (1, 2, 3, 4))
+
+    monkeypatch.setattr(servo_identification, "learn_steering", learn)
+    steering = draft.learn_steering()
+    assert (len(asked), draft.config.servos.joints[-1].sign) == (learnt, sign)
+    assert (steering.roll_deg == 0.0) is assumed
+    assert draft.are_zeros_known and draft.zero is not None
+    assert draft.calibration().misfit(draft.config.servos) == ""
 
 
 @pytest.mark.parametrize(
