@@ -339,6 +339,32 @@ def combined(network: Probability, difference: Difference, view: BenchView, *, i
     return robot + np.float32(_TAUGHT_SHARE) * (outline - robot) if is_taught else robot
 
 
+def disagreement(network: Probability, difference: Difference, robot: Mask) -> Mask:
+    """Where the `network` (h, w) and the difference contradict each other about the outline of the `robot` (h, w).
+
+    A shadow beside the robot differs from the empty bench, and a tip as bright as the bench hardly does: beyond an end of it a
+    weak sign is enough. What the network overlooks in half of the robot's width and more is no outline: there the difference
+    is believed.
+    """
+    if not robot.any():
+        return robot
+    depth = cv2.distanceTransform(robot.view(np.uint8), cv2.DIST_L2, 3)
+    width = 4.0 * float(depth[robot].mean())  # a strip's mean depth is a quarter of its width
+    side = 2 * round(_END_REACH * width) + 1
+    beside = cv2.blur(robot.view(np.uint8).astype(np.float32), (side, side))
+    is_beyond = ~robot & (beside < np.float32(_BEYOND)) & (beside > 0.0)
+    unsure = np.abs(network - difference.evidence) > np.float32(_CONTRADICT)
+    unsure |= is_beyond & (network + difference.evidence > np.float32(_WEAK_SIGN))
+    unsure &= cv2.dilate(robot.view(np.uint8), _square(2 * round(width) + 1)) > 0
+    overlooked = robot & (network < np.float32(0.5))
+    wide = cv2.morphologyEx(overlooked.view(np.uint8), cv2.MORPH_OPEN, _disc(max(3, 2 * round(width / 4.0) + 1)))
+    return np.asarray(unsure & ~(overlooked & (cv2.dilate(wide, _disc(3)) > 0)))
+
+
+_CONTRADICT = 0.5
+"""Difference of the network's probability and the difference's evidence above which they contradict each other."""
+_BEYOND, _WEAK_SIGN = 0.22, 0.1
+"""Beyond an end of the robot a lesser share of the surroundings is robot than beside it; there a greater sum of both is a sign."""
 _BESIDE_PX = 9
 """Side of the square around what differs within which the network adds to the robot: a part that looks like the bench."""
 _NEAR_PX = 41

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from core.bench.bench import Bench, read_bench, write_bench
-from core.bench.difference import combined, distance_to_empty, robot_by_difference
+from core.bench.difference import combined, disagreement, distance_to_empty, robot_by_difference
 from core.bench.registration import register
 from core.config.section import first_problem
 from core.devices import UserError
@@ -75,7 +75,7 @@ _ENTRY_REACH_PX = 12
 """Distance from there within which a robot's mask must begin."""
 _LEAST_FOCUS = 0.3
 """Fine structure of a frame against the empty picture's."""
-_MOST_DOUBT = 0.35
+_MOST_DOUBT = 0.6
 """Share of the robot's mask that may be doubtful."""
 _GHOST_SHARE, _GHOST_PX = 0.9, 60
 """Share of the frames in which an area of the vessel, of this size at least, differs from the empty picture: all or none of them
@@ -249,9 +249,11 @@ def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = 
     vessel = view.vessel if view.vessel is not None else np.zeros(picture.image.shape[:2], bool)
     robot, doubtful = difference.probability >= np.float32(0.5), difference.doubtful
     if segment is not None:
-        both = combined(segment(picture.image)[1], difference, view) >= np.float32(0.5)
+        network = segment(picture.image)[1]
+        both = combined(network, difference, view) >= np.float32(0.5)
         core = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
         robot = cv2.morphologyEx((both & (view.known & ~difference.unusable)).view(np.uint8), cv2.MORPH_OPEN, core) > 0
+        doubtful = doubtful | disagreement(network, difference, robot)
     specks = _specks(robot)
     robot, doubtful = robot & ~specks, doubtful | _widened(specks, 2)
     focus, hidden = structure_of(picture.image, view.placed, view.known, view.noise)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.bench.bench import Bench, BenchError, bench_from_pictures
-from core.bench.difference import Difference, check_without_robot, combined, robot_by_difference
+from core.bench.difference import Difference, check_without_robot, combined, disagreement, robot_by_difference
 from core.bench.registration import BenchView, register
 from core.types import Image, Mask
 from tests.core.bench.drawn_bench import SIZE, board, noisy, tube, with_line
@@ -169,6 +169,37 @@ def test_a_mark_beside_the_robot_is_no_end_of_it(bench: Bench) -> None:
 
 def seen_by_network(robot: Mask) -> np.ndarray:
     return np.where(robot, np.float32(0.97), np.float32(0.02))
+
+
+def test_a_shadow_beside_the_robot_is_unsure_and_the_robot_is_not(bench: Bench) -> None:
+    shadow = tuple(int(0.75 * level) for level in board()[135, 100])
+    image = noisy(with_line(with_line(board(), (0, 126), (200, 134), shadow), *ROBOT, (110, 110, 110)), 2.0, 3)
+    difference, robot = found(image, bench), line(*ROBOT)
+    mask = difference.probability >= 0.5
+    assert (mask & ~robot).sum() > 0.3 * robot.sum(), "the shadow differs as the robot does"
+    unsure = disagreement(seen_by_network(robot), difference, mask)
+    assert (mask & ~robot & ~unsure).sum() < 0.01 * robot.sum()
+    assert (mask & robot & ~unsure).sum() > 0.9 * robot.sum(), "there is a robot to learn from"
+
+
+def test_what_the_network_overlooks_in_the_whole_width_is_sure(bench: Bench) -> None:
+    image = noisy(with_line(board(), *ROBOT), 2.0, 3)
+    difference = found(image, bench)
+    mask = difference.probability >= 0.5
+    unsure = disagreement(seen_by_network(line((0, 122), (100, 126))), difference, mask)
+    assert not (unsure & mask)[:, 110:190].any()
+
+
+def test_a_tip_as_bright_as_the_bench_is_not_taught_as_background(bench: Bench) -> None:
+    faint = tuple(int(level) - 9 for level in board()[130, 206])
+    image = noisy(with_line(with_line(board(), *ROBOT, faint), (0, 122), (190, 129)), 1.0, 3)
+    difference, robot = found(image, bench), line(*ROBOT)
+    mask = difference.probability >= 0.5
+    missed = (robot & ~mask)[:, 195:]
+    assert missed.sum() > 50
+    for network, share in ((seen_by_network(mask), 0.6), (seen_by_network(robot), 0.99)):
+        assert disagreement(network, difference, mask)[:, 195:][missed].mean() > share
+    assert not disagreement(seen_by_network(robot), difference, np.zeros_like(mask)).any()
 
 
 def test_a_taught_network_denies_a_shadow_and_not_a_robot_that_it_overlooks(bench: Bench) -> None:

@@ -275,6 +275,15 @@ def test_a_network_completes_what_differs_little_beside_the_robot_and_nothing_el
     assert not (together.robot & elsewhere).any(), "a network alone makes no robot"
 
 
+def test_where_network_and_difference_contradict_each_other_is_not_trained_on(bench: Bench) -> None:
+    body = toy_robot(0, 0.8)
+    seen = cv2.erode(body.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    frame = propose(TeachingPicture("narrow", "narrow", toy_picture(body, seed=3)), bench, _Sees(seen))
+    assert not frame.reason
+    assert frame.doubtful[frame.robot & ~seen].mean() > 0.8
+    assert not frame.doubtful[seen & frame.robot].any()
+
+
 def _around(mask: Mask) -> Mask:
     return np.asarray(cv2.dilate(mask.view(np.uint8), np.ones((25, 25), np.uint8)) > 0)
 
