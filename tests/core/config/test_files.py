@@ -321,3 +321,9 @@ def test_the_windows_begin_with_the_users_own_settings_or_a_named_file(tmp_path:
     assert settings_of_windows(named).problems
     assert named.is_file(), "a named file is never moved"
     assert own_config() == load_config()
+
+
+def test_a_disk_that_does_not_take_a_profile_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(ProfileError, match="cannot be written"):
+        Profiles(tmp_path / "file").save("mine", BRIGHT)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -460,7 +461,7 @@ def test_a_note_is_added_to_a_session_that_has_ended(session: Path) -> None:
         add_event(session, Event(1001.5, EventKind.NOTE, "kink here"))
 
 
-@pytest.fixture
+@contextmanager
 def short_of_room(session: Path) -> Iterator[None]:
     """The disk takes twenty bytes more of the events."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -471,10 +472,9 @@ def short_of_room(session: Path) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.usefixtures("short_of_room")
 def test_a_note_that_finds_no_room_leaves_nothing_of_itself(session: Path) -> None:
     before = (session / EVENTS).read_bytes()
-    with pytest.raises(SessionError, match="the note was not kept"):
+    with short_of_room(session), pytest.raises(SessionError, match="the note was not kept"):
         add_event(session, Event(1001.0, EventKind.NOTE, "the tip touched the wall here"))
     assert (session / EVENTS).read_bytes() == before
 
@@ -488,3 +488,9 @@ def test_lines_of_gives_places_by_which_a_line_can_be_read_again(tmp_path: Path)
         (4, 13, b'{"b":2}', False),
         (5, 21, b'{"c"', True),
     ]
+
+
+def test_a_copy_that_cannot_be_written_is_one_line(session: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(SessionError, match=r"make room or choose another folder"):
+        recover(session, tmp_path / "file")

@@ -202,3 +202,9 @@ def test_a_set_of_scenes_goes_on_and_is_no_set_of_frames(scenes: SynthPlan, tmp_
         write_set(replace(again, count=2))
     with pytest.raises(SynthError, match="other settings"):
         write_set(replace(again, scenes=False))
+
+
+def test_an_unwritable_folder_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(SynthError, match="cannot be written"):
+        write_set(SynthPlan(tmp_path / "file" / "set", 1, 0))
