@@ -721,11 +721,11 @@ def study_figures(job: PictureJob) -> None:
 
 
 def _save(picture: QImage, path: Path) -> None:
-    """Write a PNG of 200 colours: less than half the size of one in true colour, and alike to the eye."""
+    """Write a PNG of 256 colours: less than half the size of one in true colour, and alike to the eye."""
     if not picture.save(str(path)):
         raise UserError(f"{path}: cannot be written")
     with PIL.Image.open(path) as saved:
-        small = saved.convert("RGB").quantize(200, method=PIL.Image.Quantize.MEDIANCUT, kmeans=2)
+        small = saved.convert("RGB").quantize(256, method=PIL.Image.Quantize.MEDIANCUT, kmeans=2)
     small.save(path, optimize=True)
 
 
