@@ -181,3 +181,9 @@ def test_a_model_per_joint() -> None:
 
 def _with_model(joint: JointConfig, number: int) -> JointConfig:
     return joint.model_copy(update={"model": number})
+
+
+def test_the_limit_is_the_stall_current_itself_where_more_is_asked_for() -> None:
+    """A whole number of units is not rounded down by one."""
+    model = SERVO_MODELS[1190]
+    assert force_limit(model, 40.0, 150.0).units == 1470 == model.stall_ma / model.current_unit_ma
