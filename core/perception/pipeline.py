@@ -25,7 +25,7 @@ from core.perception.out_of_distribution import OutOfDistributionReference
 from core.perception.pose import measure_pose
 from core.perception.quality import ConfidenceCalibration, confidence_features
 from core.perception.roi import Background, segment_roi
-from core.perception.segmentation import OrientationAverage, Segmenter, inner_area, to_working
+from core.perception.segmentation import LumenSizeAverage, OrientationAverage, Segmenter, inner_area, to_working
 from core.perception.tip_refinement import MAX_PASSES, TipRefinement
 from core.perception.tracking import RouteMemory, StreamState, check_in_view, check_jump, recall, track
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
@@ -574,7 +574,7 @@ def configured_bench(config: PerceptionConfig) -> Bench | None:
 
 
 def open_calibrated(config: PerceptionConfig, *, recalibrating: bool = False) -> tuple[CalibratedSegmenter, CalibratedSegmenter]:
-    """The configured model on a picture as it is, and averaged over all its orientations; raises ModelError.
+    """The configured model on a picture as it is, and averaged over all its orientations and two sizes; raises ModelError.
 
     A model whose confidence was calibrated with fewer passes of tip refinement, or without threshold sensitivity, keeps them;
     `recalibrating`: use all of both, and no calibration of kinds of pictures.
@@ -582,7 +582,7 @@ def open_calibrated(config: PerceptionConfig, *, recalibrating: bool = False) ->
     segmenter, near = open_segmenter(config.segmentation), open_second_look(config.segmentation)
     info = segmenter.info
     plain: Segmenter = segmenter
-    averaged: Segmenter = OrientationAverage(segmenter)
+    averaged: Segmenter = LumenSizeAverage(OrientationAverage(segmenter))
     if near is not None:
         if recalibrating or info.calibration is None:
             passes = MAX_PASSES
