@@ -467,3 +467,15 @@ def test_names_that_are_no_utf8_are_shown_as_bytes(paper_csv: Path, labelled: Pa
     truth.write_text(truth.read_text().replace('"000000"', json.dumps(name)))
     assert evaluate(folder, out=tmp_path / "of_set")["source"]["name"] == r"caf\xe9"
     assert read_measurements(tmp_path / "of_set" / "measurements.csv")[-1].image == r"caf\xe9"
+
+
+def test_an_interrupted_evaluation_of_annotated_images_keeps_what_was_perceived(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measure(tmp_path / "annotations.lumenpilot.sqlite", tubes(tmp_path, 3), [0.0, 10.0, 5.0], study="main", rater="al")
+    interrupt_at_the_third_picture(monkeypatch)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(tmp_path, out=tmp_path / "out")
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert "Interrupted after 2 of 3 images." in metrics["notes"]
+    assert len(read_measurements(tmp_path / "out" / "measurements.csv")) == 2

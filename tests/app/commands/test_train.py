@@ -336,3 +336,9 @@ def test_a_damaged_scene_ends_a_training_with_one_line(tmp_path: Path) -> None:
 def test_several_poses_of_a_scene_are_refused(tmp_path: Path) -> None:
     done = run("synth", "--scenes", "--out", tmp_path / "x", "--count", 1, "--poses", 2)
     assert (done.returncode, "--poses is for frames" in done.stderr) == (2, True)
+
+
+def test_an_unknown_look_is_named(tmp_path: Path) -> None:
+    done = run("synth", "--out", tmp_path / "x", "--count", 1, "--family", "velvet")
+    assert done.returncode == 2
+    assert "unknown look family 'velvet'" in done.stderr
