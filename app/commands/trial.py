@@ -72,6 +72,7 @@ def trial(
     ] = None,
     bench: BenchOption = None,
     scheduler: SchedulerOption = None,
+    no_wall_force: Annotated[bool, typer.Option("--no-wall-force", hidden=True, help="policies are never told it")] = True,
     model: ModelOption = None,
     config_path: ConfigOption = None,
 ) -> None:

@@ -229,16 +229,6 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/files.py"/>
-        <source>Cancel</source>
-        <translation>取消</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/files.py"/>
-        <source>Stop it</source>
-        <translation>停止</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/files.py"/>
         <source>Written: {path}</source>
         <translation>已写入：{path}</translation>
     </message>
@@ -259,18 +249,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/files.py"/>
-        <source>Cancelled</source>
-        <translation>已取消</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/files.py"/>
         <source>Nothing was imported</source>
         <translation>没有导入任何内容</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/files.py"/>
-        <source>It ended with exit code {code}</source>
-        <translation>以退出码 {code} 结束</translation>
     </message>
     <message>
         <location filename="../../app/annotator/outline_editor.py"/>
@@ -519,11 +499,6 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
-        <source>, {left} left</source>
-        <translation>，剩余 {left}</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/panels.py"/>
         <source>hidden</source>
         <translation>已隐藏</translation>
     </message>
@@ -536,6 +511,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/annotator/panels.py"/>
         <source>lines used</source>
         <translation>所用线长</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/panels.py"/>
+        <source>, {left} left</source>
+        <translation>，剩余 {left}</translation>
     </message>
     <message>
         <location filename="../../app/annotator/panels.py"/>
@@ -1209,13 +1189,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
-        <source>Opening the annotator: {name}</source>
-        <translation>正在打开标注窗口：{name}</translation>
-    </message>
-    <message>
-        <location filename="../../app/library/window.py"/>
-        <source>Export {name}</source>
-        <translation>导出 {name}</translation>
+        <source>Exported: {path}</source>
+        <translation>已导出：{path}</translation>
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
@@ -1264,11 +1239,6 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
-        <source>Opening the player: {name}</source>
-        <translation>正在打开回放器：{name}</translation>
-    </message>
-    <message>
-        <location filename="../../app/library/window.py"/>
         <source>Recovering a copy: {name}</source>
         <translation>正在恢复副本：{name}</translation>
     </message>
@@ -1279,13 +1249,8 @@ destination, target: 目标点, 目标            route: 路线                 
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
-        <source>Exported: {path}</source>
-        <translation>已导出：{path}</translation>
-    </message>
-    <message>
-        <location filename="../../app/library/window.py"/>
-        <source>Nothing is left of it</source>
-        <translation>其中没有剩下任何内容</translation>
+        <source>Export {name}</source>
+        <translation>导出 {name}</translation>
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
@@ -1306,11 +1271,6 @@ destination, target: 目标点, 目标            route: 路线                 
         <location filename="../../app/library/window.py"/>
         <source>unknown</source>
         <translation>未知</translation>
-    </message>
-    <message>
-        <location filename="../../app/library/window.py"/>
-        <source>Ended with exit code {code}</source>
-        <translation>以退出码 {code} 结束</translation>
     </message>
     <message>
         <location filename="../../app/operator/awake.py"/>
@@ -1933,16 +1893,6 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>{count} pictures are whole</source>
-        <translation>{count} 张图像完整</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Make a whole copy beside {session}</source>
-        <translation>在 {session} 旁生成完整副本</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>nothing of it is lost</source>
         <translation>没有丢失任何内容</translation>
     </message>
@@ -1958,33 +1908,18 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Measure by hand: {frames} pictures, evenly over the session</source>
-        <translation>人工测量：{frames} 张图像，均匀取自整个会话</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>{name}, in {parent}</source>
         <translation>{name}，位于 {parent}</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>{done:.0f} of {total:.0f} {what}{left}</source>
-        <translation>{done:.0f} / {total:.0f} {what}{left}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Evaluating {name}</source>
-        <translation>正在评估 {name}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>{frames} pictures, evenly over the session</source>
-        <translation>{frames} 张图像，均匀取自整个会话</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>The annotator takes {frames} pictures, evenly over the session. Then evaluate again.</source>
         <translation>标注窗口从会话中均匀取 {frames} 幅图像。之后再次评估。</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Measure by hand: {frames} pictures, evenly over the session</source>
+        <translation>人工测量：{frames} 张图像，均匀取自整个会话</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -2003,48 +1938,13 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Cut sessions could not be looked for: {line}</source>
-        <translation>无法查找中断的会话：{line}</translation>
+        <source>A recording was cut</source>
+        <translation>一段录制被中断</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Never</source>
-        <translation>不再提示</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Do not ask again for this one</source>
-        <translation>不再询问这一个</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>A recording was cut, and it cannot be recovered</source>
-        <translation>一段录制被中断，且无法恢复</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source> ({place} of {count})</source>
-        <translation> （{place} / {count}）</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>A recording was cut{place}: {loss}</source>
-        <translation>一段录制被中断{place}：{loss}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>{name}; {kept}. The damaged original stays as it is.</source>
-        <translation>{name}；{kept}。受损的原件保持不变。</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Not now</source>
-        <translation>暂不</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Ask again at the next start</source>
-        <translation>下次启动时再问</translation>
+        <source>{count} recordings were cut</source>
+        <translation>{count} 段录制被中断</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -2058,23 +1958,8 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Opening the library</source>
-        <translation>正在打开会话库</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>loading the network</source>
-        <translation>正在加载网络</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>, {left:.0f} s left</source>
-        <translation>，剩余 {left:.0f} 秒</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Stop; a report of before stays</source>
-        <translation>停止；之前的报告保留</translation>
+        <source>Evaluating {name}</source>
+        <translation>正在评估 {name}</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -2118,8 +2003,38 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>No cut session in {folder}</source>
-        <translation>{folder} 中没有中断的会话</translation>
+        <source>Recover</source>
+        <translation>恢复</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Make a whole copy beside each</source>
+        <translation>在每段旁边生成一份完整副本</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Not now</source>
+        <translation>暂不</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Ask again at the next start</source>
+        <translation>下次启动时再问</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Never</source>
+        <translation>不再提示</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Do not ask again for these</source>
+        <translation>不再询问这些录制</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>{name}. The damaged original stays as it is.</source>
+        <translation>{name}。损坏的原件保持不变。</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -2138,26 +2053,6 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>A recording was cut; the program that recovers it could not be started</source>
-        <translation>一段录制被中断；恢复它的程序无法启动</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>A recording was cut; the program that recovers it was ended from outside</source>
-        <translation>一段录制被中断；恢复它的程序被外部终止</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Try again</source>
-        <translation>重试</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Once there is memory and room on the disk, for instance</source>
-        <translation>例如在有足够内存和磁盘空间之后</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>The player, with everything as it was understood</source>
         <translation>打开回放器，显示当时理解的全部内容</translation>
     </message>
@@ -2173,8 +2068,8 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Evaluation cancelled</source>
-        <translation>评估已取消</translation>
+        <source>No picture is measured to the end yet: both lines and a state, can't tell, or no robot</source>
+        <translation>还没有图像测量完毕：两条线和一个状态、无法判断，或没有机器人</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -2183,18 +2078,18 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Recover</source>
-        <translation>恢复</translation>
+        <source>Cut sessions could not be looked for: {line}</source>
+        <translation>无法查找中断的会话：{line}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>No cut session in {folder}</source>
+        <translation>{folder} 中没有中断的会话</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
         <source>That you do not want to be asked could not be kept ({why})</source>
         <translation>“不再询问”未能保存（{why}）</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>Recovering a copy</source>
-        <translation>正在恢复副本</translation>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
@@ -2208,18 +2103,13 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>No picture is measured to the end yet: both lines and a state, can't tell, or no robot</source>
-        <translation>还没有图像测量完毕：两条线和一个状态、无法判断，或没有机器人</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>Not evaluated: {why}</source>
         <translation>未能评估：{why}</translation>
     </message>
     <message>
-        <location filename="../../app/operator/recording.py"/>
-        <source>exit code {code}</source>
-        <translation>退出码 {code}</translation>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Rehearsing: {done} of {total}</source>
+        <translation>正在预演：{done} / {total}</translation>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
@@ -2253,8 +2143,13 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
-        <source>Rehearsing: {done} of {total}</source>
-        <translation>正在预演：{done} / {total}</translation>
+        <source>At {share:.0f} % of the set speeds: {done} of {total}</source>
+        <translation>设定速度的 {share:.0f} %：{done} / {total}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>Cancel</source>
+        <translation>取消</translation>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
@@ -2317,11 +2212,6 @@ Torque off now: the wires spring back at once.</source>
         <translation>未预演：{why}</translation>
     </message>
     <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>the computer is too busy; close other programs, and rehearse again</source>
-        <translation>计算机太忙；请关闭其他程序后重新预演</translation>
-    </message>
-    <message>
         <location filename="../../app/operator/rehearsing.py"/>
         <source>rehearsal</source>
         <translation>预演</translation>
@@ -2370,6 +2260,11 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/rehearsing.py"/>
         <source>Re&amp;hearse this destination</source>
         <translation>预演此目标点(&amp;H)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsing.py"/>
+        <source>exit code {code}</source>
+        <translation>退出码 {code}</translation>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
@@ -2438,8 +2333,8 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
-        <source>the wizard knows the default robot only: write the ids and signs of these joints into the rig file</source>
-        <translation>向导只支持默认机器人:请把这些关节的编号和方向写入台架文件</translation>
+        <source>the wizard knows DYNAMIXEL servos only: write the ids and signs of the joints into the rig file</source>
+        <translation>向导只认识 DYNAMIXEL 舵机：请把各关节的 id 和符号写入装置文件</translation>
     </message>
     <message>
         <location filename="../../app/operator/rig_menu.py"/>
@@ -2533,13 +2428,13 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
-        <source>Annotations to train on</source>
-        <translation>用于训练的标注</translation>
+        <source>Annotations (*.sqlite)</source>
+        <translation>标注 (*.sqlite)</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
-        <source>Annotations (*.sqlite)</source>
-        <translation>标注 (*.sqlite)</translation>
+        <source>Annotations to train on</source>
+        <translation>用于训练的标注</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -2821,6 +2716,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/twin_menu.py"/>
+        <source>Rarer loo&amp;ks</source>
+        <translation>较少见的外观(&amp;K)</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/twin_menu.py"/>
         <source>Look: {title}</source>
         <translation>外观：{title}</translation>
     </message>
@@ -2921,16 +2821,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
-        <source>Stop writing the clip  (Esc)</source>
-        <translation>停止写入片段  (Esc)</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/controls.py"/>
-        <source>recorded {kind}, {note}</source>
-        <translation>录制 {kind}，{note}</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/controls.py"/>
         <source>{name}: its manifest is damaged</source>
         <translation>{name}：清单已损坏</translation>
     </message>
@@ -3006,16 +2896,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
-        <source>Clip being written</source>
-        <translation>正在写入片段</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/controls.py"/>
-        <source>Cancel the clip</source>
-        <translation>取消片段</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/controls.py"/>
         <source>of {time}</source>
         <translation>/ {time}</translation>
     </message>
@@ -3046,11 +2926,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/controls.py"/>
-        <source>recorded {kind}</source>
-        <translation>录制 {kind}</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/controls.py"/>
         <source>, being recorded</source>
         <translation>，正在录制</translation>
     </message>
@@ -3078,6 +2953,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/controls.py"/>
         <source>Clip {seconds:.1f} s</source>
         <translation>片段 {seconds:.1f} 秒</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/controls.py"/>
+        <source>recorded {kind}</source>
+        <translation>录制 {kind}</translation>
     </message>
     <message>
         <location filename="../../app/player/course.py"/>
@@ -3286,21 +3166,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
-        <source>A clip is being written already; Esc cancels it</source>
-        <translation>已有一个片段正在写入；按 Esc 取消</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/session_model.py"/>
-        <source>, {count} pictures are lost</source>
-        <translation>，丢失 {count} 张图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/session_model.py"/>
-        <source>Clip saved: {file} ({count} pictures{note})</source>
-        <translation>片段已保存：{file}（{count} 张图像{note}）</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/session_model.py"/>
         <source>No angles by hand: {why}</source>
         <translation>没有人工测量的角度：{why}</translation>
     </message>
@@ -3316,18 +3181,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
-        <source>Clip not saved: {why}</source>
-        <translation>片段未保存：{why}</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/session_model.py"/>
         <source>Kept beside the session</source>
         <translation>保存在会话旁</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/session_model.py"/>
-        <source>Clip cancelled; nothing was kept</source>
-        <translation>片段已取消；没有保留任何内容</translation>
     </message>
     <message>
         <location filename="../../app/player/session_model.py"/>
@@ -3393,11 +3248,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/window.py"/>
         <source>Played back, not live</source>
         <translation>回放，非实时</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/window.py"/>
-        <source>Opening the annotator: {count} frames</source>
-        <translation>正在打开标注窗口：{count} 帧</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -3541,16 +3391,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
-        <source>Open its folder</source>
-        <translation>打开其文件夹</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/window.py"/>
-        <source>Open the clip</source>
-        <translation>打开片段</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/window.py"/>
         <source>A session, or a folder of pictures</source>
         <translation>会话，或图像文件夹</translation>
     </message>
@@ -3558,6 +3398,16 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/window.py"/>
         <source>Export the session as</source>
         <translation>会话导出为</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Open its folder</source>
+        <translation>打开其文件夹</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>Open it</source>
+        <translation>打开</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -3748,11 +3598,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/window.py"/>
         <source>No clip: there are no frames</source>
         <translation>没有片段：没有图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/player/window.py"/>
-        <source>No clip yet: the session is still being read, and would be cut short</source>
-        <translation>尚不能导出片段：会话仍在读取中，否则片段会被截短</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -4006,8 +3851,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>One camera cannot tell up from down. Choose tendon up, wiggle it and look from the side: does the head rise when the wire is pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed.</source>
-        <translation>一台相机分不清上下。选择“驱动丝 上”，摆动它并从侧面观察：拉丝时头端是否上抬？若不回答，则按 id 的顺序，装置文件会注明是假定的。</translation>
+        <source>One camera cannot tell up from down. Choose {joint}, wiggle it and look from the side: does the head rise when the wire is pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed.</source>
+        <translation>一台相机分不清上下。选择“{joint}”，摆动它并从侧面观察：拉丝时头端是否上抬？若不回答，则按 id 的顺序，装置文件会注明是假定的。</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Nothing shows which way the shaft turns: wiggle it. With + its right side goes towards the camera. If the head bends to the wrong side when the steering is learnt, the other direction is taken.</source>
+        <translation>画面看不出轴的转动方向：请摆动它。按 + 时其右侧朝相机转动。若学习转向时头端弯向错误一侧，则采用相反方向。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4051,8 +3901,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Which port are the seven servos connected to? Switch their 12 V supply on. Searching asks every servo on the line for its number and model; nothing moves. Without servos the rig only looks.</source>
-        <translation>七个舵机接在哪个端口？请接通它们的 12 V 电源。搜索会询问线上每个舵机的编号和型号，不会有任何运动。没有舵机时，装置只观察。</translation>
+        <source>Which port are the servos connected to? Switch their 12 V supply on. Searching asks every servo on the line for its number and model; nothing moves. Without servos the rig only looks.</source>
+        <translation>舵机接在哪个端口？请接通它们的 12 V 电源。搜索会询问线上每个舵机的编号和型号，不会有任何运动。没有舵机时，装置只观察。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4091,8 +3941,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>From where the page before has left the wires each tendon pulls, 0.3 mm at first and 1.2 mm at most, until the head has shown its way. The robot must have room on both sides.</source>
-        <translation>从上一页所留的位置起，每根拉线拉动，先 0.3 mm，最多 1.2 mm，直到头端显示其方向。机器人两侧须有空间。</translation>
+        <source>From where the page before has left the wires the tendons bend the head to each side, up and down, by 0.3 mm at first and 1.2 mm at most, until it has shown its way. The robot must have room on both sides.</source>
+        <translation>从上一页留下的驱动丝位置出发，各驱动丝使头端向两侧及上下弯曲，先 0.3 mm，至多 1.2 mm，直到看出其方向。机器人两侧须留有空间。</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>rotation</source>
+        <translation>旋转</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4151,6 +4006,26 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Joint</source>
+        <translation>关节</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>ID</source>
+        <translation>ID</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Direction</source>
+        <translation>方向</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>Seen</source>
+        <translation>所见</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Joints and their servos</source>
         <translation>关节及其舵机</translation>
     </message>
@@ -4176,13 +4051,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>&amp;Yes, it rises</source>
-        <translation>是，它上抬(&amp;Y)</translation>
+        <source>&amp;Yes, it is so</source>
+        <translation>是的，确实如此(&amp;Y)</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Up and down are right as they stand in the table</source>
-        <translation>表中的上下正确</translation>
+        <source>What was assumed is right as it stands in the table</source>
+        <translation>表中所假定的内容是正确的</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4203,11 +4078,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Which way the servo turns to pull the wire, or to go forward: + as it counts, − against it</source>
         <translation>拉紧驱动丝或前进时舵机的转向：+ 为其计数方向，− 为相反方向</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Not told apart yet; what stands in the table is the configuration's.</source>
-        <translation>尚未区分；表中为配置的内容。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4256,8 +4126,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>moving tendon {name}</source>
-        <translation>正在移动驱动丝 {name}</translation>
+        <source>moving {joint}</source>
+        <translation>正在移动{joint}</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4301,11 +4171,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>ID</source>
-        <translation>ID</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Model</source>
         <translation>模型</translation>
     </message>
@@ -4336,23 +4201,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Before all three are known no servo is moved.</source>
-        <translation>三者均已知之前，舵机不会移动。</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Joint</source>
-        <translation>关节</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Direction</source>
-        <translation>方向</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Seen</source>
-        <translation>所见</translation>
+        <source>Before all of them are known no servo is moved.</source>
+        <translation>在全部识别之前，不会移动任何舵机。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4361,13 +4211,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>wiggling servo {servo_id}</source>
-        <translation>正在摆动舵机 {servo_id}</translation>
+        <source>Not told apart yet; what stands in the table is the configuration's.</source>
+        <translation>尚未区分；表中为配置的内容。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>tendon {name}</source>
-        <translation>驱动丝 {name}</translation>
+        <source>wiggling servo {servo_id}</source>
+        <translation>正在摆动舵机 {servo_id}</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -5819,8 +5669,48 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/opening.py"/>
+        <source>{done:.0f} of {total:.0f} {what}{left}</source>
+        <translation>{done:.0f} / {total:.0f} {what}{left}</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>Opening the player: {name}</source>
+        <translation>正在打开回放器：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>Opening the annotator: {name}</source>
+        <translation>正在打开标注窗口：{name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>Opening the library</source>
+        <translation>正在打开会话库</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>, {left:.0f} s left</source>
+        <translation>，剩余 {left:.0f} 秒</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>Stop it</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>Cancelled</source>
+        <translation>已取消</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
         <source>That window ended with exit code {code}</source>
         <translation>该窗口以退出码 {code} 结束</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>Ended with exit code {code}</source>
+        <translation>以退出码 {code} 结束</translation>
     </message>
     <message>
         <location filename="../../app/ui/opening.py"/>
@@ -6069,8 +5959,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>servos follow nobody</source>
-        <translation>舵机未受控</translation>
+        <source>servos not in use</source>
+        <translation>舵机未使用</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6134,8 +6024,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>the way decides, not state {state} ({rule})</source>
-        <translation>以路线为准，而非状态 {state}（{rule}）</translation>
+        <source>the route decides, not state {state}</source>
+        <translation>由路线决定，而非状态 {state}</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6399,16 +6289,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>No pose</source>
-        <translation>无位姿</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>The program sees that it cannot tell, and names why: better no answer than a wrong one.</source>
-        <translation>程序知道自己无法判断，并说明原因：没有结果胜过错误结果。</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>Room</source>
         <translation>余量</translation>
     </message>
@@ -6431,21 +6311,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>Sum of the contact forces of the robot on the vessel's wall. Known on the bench twin only.</source>
         <translation>机器人对血管壁的接触力之和。只有数字孪生台架能给出。</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>Destination</source>
-        <translation>目标点</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>px to go</source>
-        <translation>剩余 px</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
-        <source>Where you want to go: a click in the picture sets it, a right click or Esc clears it. The vessel's direction follows the way there, and the program drives to it.</source>
-        <translation>您要去的地方：在图像中单击设定，右击或按 Esc 清除。血管方向沿去路而定，程序驾驶到该点。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6544,11 +6409,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>Who drives: ADVISORY and ARMED you, AUTONOMOUS the program, HOLD and STOPPED nobody.</source>
-        <translation>由谁驾驶：建议模式和待命为您，自主模式为程序，保持和已停止无人驾驶。</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>Deadman</source>
         <translation>使能键</translation>
     </message>
@@ -6639,11 +6499,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>What no dial shows: frame, latency by stage, confidence, crossed, tendons, servo bus, faults.</source>
-        <translation>表盘不显示的内容：帧、各阶段延迟、置信度、越过、驱动丝、舵机总线、故障。</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/texts.py"/>
         <source>Length of robot and vessel that the two lines are fitted to: less than 40 + 40 is less sure.</source>
         <translation>拟合两条线所用的机器人和血管长度：少于 40 + 40 时不太可靠。</translation>
     </message>
@@ -6694,8 +6549,8 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>The servos follow nobody, but may still pull</source>
-        <translation>舵机未受控，但可能仍有拉力</translation>
+        <source>The servos are not in use, but may still pull</source>
+        <translation>舵机未使用，但可能仍在拉紧</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6746,6 +6601,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/texts.py"/>
         <source>assumed: {joints} by the order of their ids, since one camera cannot tell them apart; look at the head, and swap them in the rig wizard if it goes the other way</source>
         <translation>按 id 的顺序假定：{joints}，因为一台相机分不清；请观察头端，若方向相反，在装置向导中交换</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/texts.py"/>
+        <source>assumed: the direction of the rotation, which one camera cannot see; confirm it in the rig wizard</source>
+        <translation>假定：旋转方向，一台相机看不出；请在装置向导中确认</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
@@ -6879,16 +6739,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/command_panel.py"/>
-        <source>When</source>
-        <translation>时间</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/command_panel.py"/>
-        <source>What the gate did</source>
-        <translation>安全闸的处理</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/command_panel.py"/>
         <source>Gate: {clamped} goals limited, {rejected} commands rejected</source>
         <translation>安全闸：{clamped} 个目标被限幅，{rejected} 条指令被拒绝</translation>
     </message>
@@ -6944,18 +6794,13 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/widgets/command_panel.py"/>
-        <source>What the gate limited and rejected</source>
-        <translation>安全闸的限幅与拒绝</translation>
+        <source>What it did stands in the page Log</source>
+        <translation>其动作记录在“日志”页</translation>
     </message>
     <message>
         <location filename="../../app/widgets/command_panel.py"/>
         <source>does not drive</source>
         <translation>未驾驶</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/command_panel.py"/>
-        <source>stopped at the end of its envelope</source>
-        <translation>停在行程范围的末端</translation>
     </message>
     <message>
         <location filename="../../app/widgets/command_panel.py"/>
@@ -6966,6 +6811,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/widgets/command_panel.py"/>
         <source>limited by the gate</source>
         <translation>被安全闸限制</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/command_panel.py"/>
+        <source>stopped at the end of its envelope</source>
+        <translation>停在行程范围的末端</translation>
     </message>
     <message>
         <location filename="../../app/widgets/command_panel.py"/>
@@ -7948,11 +7798,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>Restart servo {id} ({joint})</source>
-        <translation>重启舵机 {id}（{joint}）</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
         <source>press STOP or Torque off first</source>
         <translation>请先停止或关闭力矩</translation>
     </message>
@@ -7983,11 +7828,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>Switch all torque off</source>
-        <translation>关闭所有力矩</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
         <source>the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)</source>
         <translation>舵机最多给出 {force:.0f} N（占空比 {duty:.0f} %）</translation>
     </message>
@@ -8005,11 +7845,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/shortcut_page.py"/>
         <source>Keys</source>
         <translation>按键</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/shortcut_page.py"/>
-        <source>F1 or Esc closes this page</source>
-        <translation>按 F1 或 Esc 关闭本页</translation>
     </message>
     <message>
         <location filename="../../app/widgets/shortcut_page.py"/>
@@ -8050,6 +7885,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/shortcut_page.py"/>
         <source>go to a control, press or open it</source>
         <translation>移到控件，按下或打开</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/shortcut_page.py"/>
+        <source>F1 or Esc closes this page</source>
+        <translation>按 F1 或 Esc 关闭本页</translation>
     </message>
     <message>
         <location filename="../../app/widgets/sim_banner.py"/>
@@ -8115,6 +7955,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/state_badge.py"/>
         <source>{percent} % sure</source>
         <translation>确定度 {percent} %</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/state_badge.py"/>
+        <source>No pose</source>
+        <translation>无位姿</translation>
     </message>
     <message>
         <location filename="../../app/widgets/tour_overlay.py"/>
@@ -8688,23 +8533,18 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/control/pursuit.py"/>
-        <source>{why}; a branch ahead may turn more sharply than the head bends</source>
-        <translation>{why}；前方分支的转角可能超过头部的弯曲能力</translation>
-    </message>
-    <message>
-        <location filename="../../core/control/pursuit.py"/>
         <source>missed the branch {a} times: take over, or choose another destination</source>
         <translation>已 {a} 次错过该分支：请接管，或另选目的地</translation>
     </message>
     <message>
         <location filename="../../core/control/pursuit.py"/>
-        <source>came no farther in {a} tries: take over, or choose another destination</source>
-        <translation>尝试 {a} 次仍未前进：请接管，或另选目的地</translation>
+        <source>{why}; a branch ahead may turn more sharply than the head bends</source>
+        <translation>{why}；前方分支的转角可能超过头部的弯曲能力</translation>
     </message>
     <message>
         <location filename="../../core/control/pursuit.py"/>
-        <source>the robot presses against the wall with {a} N</source>
-        <translation>机器人以 {a} N 压在管壁上</translation>
+        <source>came no farther in {a} tries: take over, or choose another destination</source>
+        <translation>尝试 {a} 次仍未前进：请接管，或另选目的地</translation>
     </message>
     <message>
         <location filename="../../core/control/servo_requests.py"/>
@@ -8863,13 +8703,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/calibration/rig_draft.py"/>
-        <source>servos at several speeds: {ids} at {a} baud; {others}; set all seven to one</source>
-        <translation>舵机波特率不一致：{ids} 为 {a} baud；{others}；请将七个舵机设为同一波特率</translation>
+        <source>servos at several speeds: {ids} at {a} baud; {others}; set all to one</source>
+        <translation>舵机波特率不一致：{ids} 为 {a} baud；{others}；请全部设为同一波特率</translation>
     </message>
     <message>
         <location filename="../../hardware/calibration/rig_draft.py"/>
-        <source>seven servos at {a} baud: {ids}</source>
-        <translation>{a} 波特，七个舵机：{ids}</translation>
+        <source>{count} servos at {a} baud: {ids}</source>
+        <translation>{a} 波特，{count} 个舵机：{ids}</translation>
     </message>
     <message>
         <location filename="../../hardware/calibration/rig_draft.py"/>
@@ -9488,11 +9328,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>rotation</source>
-        <translation>旋转</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
         <source>delivery_1</source>
         <translation>鞘管 1</translation>
     </message>
@@ -9630,16 +9465,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>the head must turn first</source>
         <translation>头端须先转向</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>the head is near the wall</source>
-        <translation>头端靠近管壁</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>the robot meets the wall</source>
-        <translation>机器人触及管壁</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -10375,6 +10200,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>sleep cannot be inhibited: systemd-inhibit is not there</source>
         <translation>无法禁止休眠：没有 systemd-inhibit</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>the computer is too busy; close other programs, and rehearse again</source>
+        <translation>计算机太忙；请关闭其他程序后重新预演</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11288,13 +11118,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>acts at the next start of the rig</source>
-        <translation>装置下次启动时生效</translation>
+        <source>from the next start of the rig</source>
+        <translation>装置下次启动起生效</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>acts at the next start of the program</source>
-        <translation>程序下次启动时生效</translation>
+        <source>from the next start of the program</source>
+        <translation>程序下次启动起生效</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11988,8 +11818,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>The servos follow nobody</source>
-        <translation>舵机未受控</translation>
+        <source>The servos are not in use</source>
+        <translation>舵机未使用</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -12358,8 +12188,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>as it stands in sessions and messages</source>
-        <translation>会话和消息中所用的名称</translation>
+        <source>what sessions and messages call this rig</source>
+        <translation>会话和消息中此装置的名称</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -13068,18 +12898,13 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>so much farther before a state is left again</source>
-        <translation>再远这么多才离开某个状态</translation>
+        <source>state A is left only this far beyond its limit</source>
+        <translation>超出其限值这么多之后才离开状态 A</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
         <source>Hysteresis, angle</source>
         <translation>滞回，角度</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>so much more angle before state A is left again</source>
-        <translation>再大这么多角度才离开状态 A</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -13428,8 +13253,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>after each miss of a branch its corner is rounded over so much more</source>
-        <translation>每错过一次分支，其拐角的圆滑长度增加这么多</translation>
+        <source>added to the rounding of a branch's corner after each miss</source>
+        <translation>每次错过后加到分支拐角圆角上的量</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -13443,28 +13268,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Follow arc</source>
-        <translation>跟随弧线</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>0 = point at the look-ahead point, 1 = lie along the route</source>
-        <translation>0 = 指向前视点，1 = 沿路线贴合</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
         <source>degrees of steering per degree of error</source>
         <translation>每度误差的转向度数</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>Min bend radius</source>
-        <translation>最小弯曲半径</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>tightest arc that is steered for</source>
-        <translation>转向所能跟随的最急弯</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -13513,56 +13318,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Wall share</source>
-        <translation>近壁比例</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>head's distance over the room it has: above, near the wall</source>
-        <translation>头端偏离与其余地之比：大于此为近壁</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>Contact slow</source>
-        <translation>接触慢行</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>rise of the contact force that slows the robot down</source>
-        <translation>接触力上升多少时机器人减速</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>Lean</source>
-        <translation>贴靠路程</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>way over which a contact force becomes the body's own lean</source>
-        <translation>接触力经过多长路程后视为机器人自身贴靠</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>Contact back off</source>
-        <translation>接触后退</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>contact force above which it backs off</source>
-        <translation>接触力大于此，机器人后退</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>Contact limit</source>
-        <translation>接触上限</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>never leans harder, however often it backed off</source>
-        <translation>无论后退多少次，压力绝不超过此值</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
         <source>Stuck</source>
         <translation>卡滞</translation>
     </message>
@@ -13588,8 +13343,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>way back when stuck; half of it from a wall</source>
-        <translation>卡滞时的后退距离；离开管壁时取一半</translation>
+        <source>way back when stuck, at least</source>
+        <translation>卡滞时的后退距离，至少</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -13773,8 +13528,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>what is on the port; direct: the twin without servos, a lighter load</source>
-        <translation>端口上连接的设备;direct:不带舵机的孪生台架,负载更轻</translation>
+        <source>what is on the port</source>
+        <translation>端口上接的设备</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>

@@ -210,7 +210,7 @@ def test_workers_find_what_one_process_finds(tmp_path: Path) -> None:
 
 
 def test_errors_are_one_line_and_exit_code_2() -> None:
-    for extra, text in ((["--policy", "magic"], "unknown policy 'magic'"), (["--model", "nowhere"], "nowhere")):
+    for extra, text in ((["--policy", "magic", "--no-wall-force"], "unknown policy 'magic'"), (["--model", "nowhere"], "nowhere")):
         done = run("trial", "--seeds", "0:1", *extra, "--json")
         assert done.returncode == 2
         assert done.stdout == ""
