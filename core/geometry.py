@@ -89,6 +89,8 @@ def outlines(values: NDArray[np.float64], level: float) -> list[Points]:
     lines = []
     for found in cast("list[Points]", contour_generator(z=values, line_type="Separate").lines(level)):
         line = found[np.append(True, np.any(np.diff(found, axis=0) != 0.0, axis=1))]
+        if len(line) < 2:
+            continue  # a corner that is above by a rounding error
         across, down = np.floor((line[:-1] + line[1:]) / 2).T
         last = int(np.lexsort((across, down))[-1])
         lines.append(np.vstack([line[last + 1 :], line[1 : last + 2]]))

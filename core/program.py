@@ -89,6 +89,7 @@ def program_commit() -> str | None:
 
 EXTRAS = {
     "torch": "train",
+    "skimage": "train",
     "onnx": "train",
     "distributed": "cluster",
     "dask": "cluster",

@@ -73,7 +73,8 @@ def benchmark(
         raise UserError("--store keeps the figures of one set: give one --accuracy SET")
     settings = load_config(config, preset, choose_model(model))
     if not accuracy:
-        need_package("torch")  # of the baseline
+        need_package("torch")  # of the baseline, as is scikit-image
+        need_package("skimage")
         # The window takes the configuration's model: start-up with another one is not measured.
         first_frame_s = _first_frame_s(config) if model is None and preset is None else None
         print_figures(measure_speed(settings, frames or _FRAMES, first_frame_s), json, "speed")

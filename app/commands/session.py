@@ -238,7 +238,7 @@ def _export(reader: SessionReader, out: Path, plain: bool, on_row: Callable[[], 
 
 
 def _places(reader: SessionReader, rows: str) -> tuple[int, int]:
-    """Of the rows from FIRST to LAST, which is included; raises UserError where there are none."""
+    """Of the rows from FIRST to LAST, which is included; raises UserError without any."""
     first, _, last = rows.partition("-")
     if not (first.isdecimal() and last.isdecimal()):
         raise UserError(f"--rows {rows}: must be the first and the last row, such as 12-40")

@@ -12,6 +12,7 @@ import typer
 
 from app.commands.options import BenchOption, SchedulerOption
 from app.commands.progress import console, progress_bar
+from core.program import need_package
 
 
 def synth(
@@ -69,6 +70,8 @@ def make_set(
     unknown = [name for name in families or () if name not in (*LOOKS, PAINTED_LOOK)]
     if unknown:
         raise SynthError(f"unknown look family {unknown[0]!r}; known: {', '.join((*LOOKS, PAINTED_LOOK))}")
+    if PAINTED_LOOK in (families or ()):
+        need_package("skimage")  # its photographs are boards
     if scenes and poses != 1:
         raise SynthError("--poses is for frames: a scene has several robots already; leave it out")
     if phantom is not None:

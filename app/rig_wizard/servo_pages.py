@@ -48,8 +48,8 @@ _UP_OR_DOWN = mark(
     "pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed."
 )
 _WHICH_WAY_ROUND = mark(
-    "Nothing shows which way the shaft turns: wiggle it. With + its right side goes towards the camera. If the head bends to the "
-    "wrong side when the steering is learnt, the other direction is taken."
+    "Nothing shows which way the shaft turns: wiggle it. With + its right side goes towards the camera. With tendons "
+    "up and down a wrong direction shows when the steering is learnt, and the other one is taken."
 )
 
 
@@ -355,7 +355,7 @@ class IdentifyPage(WizardPage):
             self.run_step(tr("wiggling servo {servo_id}", servo_id=servo_id), lambda draft: draft.wiggle(servo_id))
 
     def _swap(self) -> None:
-        if self.draft is None or not (names := alike(self.draft.config.servos)):
+        if self.draft is None or len(names := alike(self.draft.config.servos)) != 2:
             return
         up, down = map(self.draft.config.servos.names.index, names)
         for boxes in (self._ids, self._signs):

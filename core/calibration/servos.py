@@ -342,7 +342,7 @@ def function_of(joint: JointConfig) -> Function | None:
 
 
 def alike(servos: ServosConfig) -> tuple[JointName, ...]:
-    """The two tendons that one camera cannot tell apart: one rises and one falls; empty without such ones."""
+    """The tendons that one camera cannot tell apart, mostly two: one rises and one falls; empty without such ones."""
     functions = [function_of(joint) for joint in servos.tendons]
     return tuple(joint.name for joint, function in zip(servos.tendons, functions, strict=True) if functions.count(function) > 1)
 
@@ -352,7 +352,7 @@ def assign(found: Mapping[int, ServoFinding], servos: ServosConfig, ids_on_line:
 
     A rotation, of which nothing is seen, is the one of `ids_on_line` that is left, and its direction is that of `servos`.
 
-    Raises NotIdentified: a function is missing, or several servos have the same one.
+    Raises NotIdentified: a function is missing, several servos have the same one, or more than two tendons look alike.
     """
     named: dict[JointName, Assignment] = {}
     wrong = []
@@ -365,6 +365,8 @@ def assign(found: Mapping[int, ServoFinding], servos: ServosConfig, ids_on_line:
         else:
             wrong.append(f"1 of which nothing is seen, the rotation (found: {', '.join(map(str, left)) or 'none'})")
     indistinct = alike(servos)
+    if len(indistinct) > 2:
+        raise NotIdentified(f"one camera cannot tell {', '.join(indistinct)} apart: set ids and signs by hand")
     for function, names in wanted.items():
         ids = sorted(servo_id for servo_id, finding in found.items() if finding.function is function)
         if len(ids) != len(names):

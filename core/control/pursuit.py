@@ -43,6 +43,7 @@ class Pursuit:
         self._stall = StallMonitor(self._config)
         self._misses, self._stalls = TryCounter(), TryCounter()
         self._back_off: BackOff | None = None
+        self._is_miss_counted = False
 
     def __call__(self, scene: Scene, status: RobotStatus | None = None, *, followed: bool = True) -> Advice | None:
         """Advice for a scene; `status` adds the measured feed. None when there is no pose.
@@ -63,6 +64,7 @@ class Pursuit:
             self._behind_s = 0.0
         # counted down, not reset: where head and branch lie in a wide bifurcation, single frames still see the way ahead
         self._behind_s = max(0.0, self._behind_s + (elapsed_s if way.behind else -elapsed_s))
+        self._is_miss_counted = self._is_miss_counted and self._behind_s > 0.0
         keep = math.exp(-since_s / config.smoothing_s) if config.smoothing_s > 0.0 and since_s > 0.0 else 0.0
         self._error_deg = keep * self._error_deg + (1.0 - keep) * way.error_deg
         self._steer_deg = limited(config.gain * self._error_deg, self._words.max_steer_deg)
@@ -81,13 +83,16 @@ class Pursuit:
         config, back_off = self._config, self._back_off
         if back_off is not None and (back_off.is_done or (back_off.unfollowed_s > _UNFOLLOWED_S and not way.behind)):
             self._back_off = None
+            self._is_miss_counted = self._is_miss_counted and not back_off.is_done
             return None
         if back_off is not None and way.left_px is not None and way.target != back_off.target:
             back_off = None
         if back_off is None and way.behind:
             if self._behind_s < config.behind_s:
                 return self._advise(0.0, 0.0, "the way seems to lie behind the head: looking again")
-            self._misses.add(way)
+            if not self._is_miss_counted:  # the same miss, whichever source has driven meanwhile
+                self._misses.add(way)
+            self._is_miss_counted = True
             back_off = BackOff("the way to the target branches off behind the head", config.retry_mm, way.target)
         elif back_off is None and stuck:
             self._stalls.add(way)

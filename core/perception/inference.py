@@ -107,7 +107,7 @@ class OpenVinoSegmenter(Segmenter):
     Several threads may call it (the live view's, and one that examines a still again). They take turns, batch by batch.
     """
 
-    _MAX_SIZES = 6
+    _MAX_SIZES = 16
 
     def __init__(self, folder: Path, threads: int = 0, precision: str = "auto") -> None:
         self.info = read_model_info(folder, verify=())

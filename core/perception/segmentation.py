@@ -121,6 +121,10 @@ class LumenSizeAverage(Segmenter):
         seen = self._segment.segment_signed(images)
         return [(*self._with_other_size(image, (v, r)), signature) for image, (v, r, signature) in zip(images, seen, strict=True)]
 
+    def segment_robots(self, images: Sequence[Image]) -> list[Probability]:
+        """Of parts of pictures, as they are."""
+        return self._segment.segment_robots(images)
+
     def _with_other_size(self, image: Image, seen: tuple[Probability, Probability]) -> tuple[Probability, Probability]:
         size = size_to_see(seen[0])
         if size == 1.0:

@@ -60,9 +60,12 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
         if row.status is not None and row.status.wall_contact_n is not None:
             forces.append(row.status.wall_contact_n)
         head = row.scene.to_source(row.scene.path.head) if row.scene.path is not None else None
-        if head is not None and (beside := place_beside(result, head)) is not None:
+        feed_mm_s = row.sent.advance_mm_s if row.sent is not None else 0.0
+        beside = place_beside(result, head) if head is not None else None
+        if fed or beside is not None:  # what was fed while the head was not seen counts, too, and a hold then does not
+            fed.append((row.captured_s, beside.along_mm if beside is not None else fed[-1][1], feed_mm_s))
+        if head is not None and beside is not None:
             found.append((row.captured_s, beside, head))
-            fed.append((row.captured_s, beside.along_mm, row.sent.advance_mm_s if row.sent is not None else 0.0))
             if arrived := math.dist(head, result.target_xy) <= _ARRIVED_MM * px_per_mm:
                 break
     if not found:

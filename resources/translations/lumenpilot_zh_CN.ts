@@ -3856,8 +3856,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>Nothing shows which way the shaft turns: wiggle it. With + its right side goes towards the camera. If the head bends to the wrong side when the steering is learnt, the other direction is taken.</source>
-        <translation>画面看不出轴的转动方向：请摆动它。按 + 时其右侧朝相机转动。若学习转向时头端弯向错误一侧，则采用相反方向。</translation>
+        <source>Nothing shows which way the shaft turns: wiggle it. With + its right side goes towards the camera. With tendons up and down a wrong direction shows when the steering is learnt, and the other one is taken.</source>
+        <translation>画面看不出轴的转动方向：请摆动它。按 + 时其右侧朝相机转动。若有上下驱动丝，学习转向时会发现方向错误，并改用相反方向。</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>

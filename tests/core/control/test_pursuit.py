@@ -201,6 +201,17 @@ def test_an_operator_who_does_not_go_back_is_neither_stranded_nor_misses_anythin
     assert pursuit._misses.count == 1
 
 
+def test_a_miss_counts_once_though_single_frames_see_the_way_ahead() -> None:
+    pursuit, said = Pursuit(CONFIG, WORDS), []
+    for k in range(300):  # held at rest: nothing goes back, and every 40th frame has the head turned round
+        heading = 180.0 if k % 40 == 39 else 0.0
+        told = replace(status(None, 50.0), time_s=k / 30)
+        advice = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), heading, k / 30), told, followed=False)
+        said.append(advice.why)
+    assert pursuit._misses.count == 1
+    assert "take over" not in " ".join(said)
+
+
 def test_another_destination_is_another_matter_to_a_robot_that_could_not_go_back() -> None:
     pursuit, said = Pursuit(CONFIG, WORDS), []
     for k in range(100):
