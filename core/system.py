@@ -67,8 +67,13 @@ def keep_freed_memory() -> None:
 
 
 def release_memory() -> None:
-    """Collect garbage, 30 MB of cyclic references per closed rig, and return free memory of the heaps to the system."""
+    """Collect garbage, 30 MB of cycles per closed rig, and return the memory; only in the thread that owns the windows."""
     gc.collect()
+    return_free_memory()
+
+
+def return_free_memory() -> None:
+    """Return free memory of the heaps to the system."""
     trim = _c_function("malloc_trim")
     if trim is not None:
         trim(0)

@@ -18,7 +18,7 @@ from core.control.readiness import READY, RigRecords, read_records
 from core.perception.inference import cores
 from core.perception.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
-from core.system import lower_priority, release_memory
+from core.system import lower_priority, return_free_memory
 from core.types import Frame, Image, Point, Scene
 from hardware.rig import Rig, RigKind, open_rig
 from hardware.servos.bus_ipc import BusStatus
@@ -103,7 +103,7 @@ class EngineMaker:
         config = as_calibrated(config)
         if self._pilot is not None:  # nor does a rig that cannot be opened acknowledge anything
             self._left_over, self._pilot = self._pilot.left_over, None
-            release_memory()
+            return_free_memory()  # garbage is collected in the window's thread alone
         with ExitStack() as undo, ThreadPoolExecutor(1, "network", lower_priority) as beside:
             loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
             ahead, self._ahead = self._ahead, None
