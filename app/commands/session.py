@@ -160,6 +160,7 @@ def recover_session(
 
     if progress_json:
         report_progress()
+        end_like_an_interrupt()
     with progress_bar() as bar:
         on_bytes = partial(bar.advance, bar.add_task("bytes read", total=payload_bytes(session)))
         done = expected_loss(session, on_bytes) if only_look else recover(session, into, on_bytes)

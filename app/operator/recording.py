@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, QTimer, Signal, Slot
 from PySide6.QtWidgets import QWidget
 
+from app.ui.actions import plain
 from app.ui.description_form import DescriptionDialog
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.opening import FRAMES, OfferedCommand, Offers, OtherWindows, open_file
@@ -407,15 +408,20 @@ class RecoveryController(QObject):
         self._running = command
         command.start()
 
-    def _on_recovered(self, others: list[Path], told: dict[str, Any] | None, line: str, _is_fault: bool) -> None:
+    def _on_recovered(self, others: list[Path], told: dict[str, Any] | None, line: str, is_fault: bool) -> None:
         self._running = None
         if told is not None:
             words = loss_words(told["lost"])
             self.said.emit(tr("Recovered: {session}; {words}", session=told["session"], words=words), False)
             self.recovered.emit(Path(told["session"]), tr("Recovered; {words}", words=words))
-        else:
-            self.said.emit(tr("Not recovered: {why}", why=tr_text(line)), True)
+        elif is_fault:
+            menu = f"{plain(tr('&Session'))} > {plain(tr('Look for &cut sessions'))}"
+            self.said.emit(tr("Not recovered: {why}. To try again: {menu}", why=tr_text(line), menu=menu), True)
+        else:  # cancelled: so are the others
+            self.said.emit(line, False)
+            return
         if others:
+            self._offers.withdraw(_OFFER)  # of the copy before, which would hide how far this one is
             self._recover(others)
 
 

@@ -356,6 +356,7 @@ class PlayerWindow(WindowFrame):
         self._shown: Decoded | None = None
         self._note_s = 0.0
         self._refused_notes: deque[Event] = deque()
+        self._exports: set[Path] = set()
         self._description = reader.description
         self._decoder = FrameDecoder(reader, self)
         self._pictures = pictures_folder(config.window.pictures_folder)
@@ -579,11 +580,13 @@ class PlayerWindow(WindowFrame):
         if not len(self.course):
             self.show_message(tr("No clip: there are no frames"), is_fault=True)
             return
-        first_s, last_s = self.selection or (0.0, self.course.duration_s)
-        first, last = (self.course.rows[self.course.place_at(time_s)] for time_s in (first_s, last_s))
-        name = f"{name_of(self._reader.folder)}_{round(first_s * 1000)}-{round(last_s * 1000)}ms"
+        name, rows = name_of(self._reader.folder), list[str]()
+        if self.selection is not None:
+            first, last = (self.course.rows[self.course.place_at(time_s)] for time_s in self.selection)
+            name += "_{}-{}ms".format(*(round(time_s * 1000) for time_s in self.selection))
+            rows = ["--rows", f"{first}-{last}"]
         paths = (self._pictures / f"{name}{'' if k == 1 else f'_{k}'}.mp4" for k in count(1))
-        self._export(next(path for path in paths if not path.exists()), *(["--rows", f"{first}-{last}"] if self.selection else []))
+        self._export(next(path for path in paths if not path.exists()), *rows)
 
     @Slot()
     def save_snapshot(self) -> None:
@@ -607,6 +610,11 @@ class PlayerWindow(WindowFrame):
         dialog.selectFile(f"{folder.name}.mp4")
 
     def _export(self, out: Path, *options: str) -> None:
+        if out in self._exports:
+            self.show_message(tr("{name} is being written already", name=out.name), is_fault=False)
+            return
+        self._exports.add(out)
+        self.panels.offers.withdraw(_EXPORTED)  # which would hide how far this one is
         words, session = tr("Exporting {name}", name=out.name), str(self._reader.folder)
         arguments = ("session", "export", session, "--out", str(out), *options, "--progress-json", "--json")
         command = OfferedCommand(self, self.panels.offers, words, *arguments)
@@ -614,6 +622,7 @@ class PlayerWindow(WindowFrame):
         command.start()
 
     def _on_exported(self, out: Path, told: dict[str, Any] | None, line: str, is_fault: bool) -> None:
+        self._exports.remove(out)
         if told is None:
             self.show_message(tr_text(line), is_fault)
             return
@@ -759,7 +768,7 @@ class PlayerWindow(WindowFrame):
     def _let_go(self) -> None:
         self.after.close()
         for command in self.findChildren(OfferedCommand):
-            command.leave(end=True)
+            command.leave()  # an export ends by itself
         self._turn.stop()
         self.session.stop_polling()
         self.panels.notice.clear()

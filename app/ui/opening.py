@@ -100,13 +100,18 @@ class OfferedCommand(QObject):
         super().__init__(parent)
         self._offers, self._words, self._key = offers, words, f"command {id(self)}"
         self._told: dict[str, Any] = {}
+        self._is_cancelled = False
         self._child = ChildProcess(command_of(*arguments), self)
         self._child.told.connect(self._on_told)
         self._child.ended.connect(self._on_ended)
         self._show(-1.0, "")
 
     def start(self) -> None:
-        self._child.start()
+        """Start it, unless it was asked to end before that."""
+        if self._is_cancelled:
+            self._on_ended(-signal.SIGTERM, "")
+        else:
+            self._child.start()
 
     def cancel(self, why: str) -> None:
         """It is not started, and `why`."""
@@ -116,7 +121,11 @@ class OfferedCommand(QObject):
         """The window closes: nothing more is said of it; with `end` it is asked to end, too."""
         self._child.leave()
         if end:
-            self._child.ask_to_end()
+            self._end()
+
+    def _end(self) -> None:
+        self._is_cancelled = True
+        self._child.ask_to_end()
 
     def _on_told(self, record: dict[str, Any]) -> None:
         if record.get("done") is None:
@@ -128,8 +137,8 @@ class OfferedCommand(QObject):
         self._show(min(1.0, done / total) if total else -1.0, detail)
 
     def _show(self, share: float, detail: str) -> None:
-        cancel, end = OfferButton(tr("Cancel"), self._child.ask_to_end, tr("Stop it")), self._child.ask_to_end
-        self._offers.offer(Offer(self._key, self._words, detail, (cancel,), share=share, dismissed=end))
+        cancel = OfferButton(tr("Cancel"), self._end, tr("Stop it"))
+        self._offers.offer(Offer(self._key, self._words, detail, (cancel,), share=share, dismissed=self._end))
 
     def _on_ended(self, code: int, line: str) -> None:
         self._offers.withdraw(self._key)

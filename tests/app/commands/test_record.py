@@ -15,6 +15,7 @@ import pytest
 from mcap.reader import make_reader
 
 from app.commands import record as record_command
+from app.commands.progress import Interrupt
 from app.commands.session import describe
 from core.config.safety import AtClose
 from core.devices import DeviceError
@@ -134,6 +135,17 @@ def test_a_recording_that_was_killed_is_recovered_by_the_command(tmp_path: Path)
     result = json.loads(done.stdout)
     assert (result["frames"], result["lost"]["rows"]) == (8, 0)
     assert json.loads(run("session", "info", result["session"], "--json").stdout)["problems"] == []
+
+
+def test_a_recovery_that_a_window_ends_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = record_session(tmp_path, [tick_of(0, 1000.0)])
+    set_open(session)
+    monkeypatch.setattr("core.session.recovery._salvage", lambda *_: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr("app.commands.progress._writers", [])
+    with Interrupt():  # a request that the command does not take ends no test
+        done = run("session", "recover", session, "--progress-json")
+    assert done.returncode == 130, done.stderr
+    assert list(tmp_path.iterdir()) == [session]
 
 
 @pytest.mark.parametrize(

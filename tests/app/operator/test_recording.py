@@ -474,6 +474,7 @@ def test_cut_sessions_are_offered_and_recovered_into_copies(
     # 12 frames 0.1 s apart, one row gone: its picture is there, but nobody knows what it showed
     assert "0.1 s are lost (rows: 1, pictures: 0)" in said[0]
     assert "nothing left to recover" in said[1]
+    assert said[1].endswith("Session > Look for cut sessions")
     assert not strip.isVisible()
 
 
@@ -516,6 +517,30 @@ def test_a_process_that_cannot_be_started_is_said(
     qtbot.waitUntil(lambda: bool(said), timeout=LONG_MS)
     assert said[0].startswith("Not recovered: cannot be started")
     assert not strip.isVisible()
+
+
+def test_a_cancelled_recovery_is_no_fault_and_ends_the_others_too(
+    desk: RecoveryController, strip: OfferStrip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from app.ui.workers import ChildProcess  # what is started
+    from app.widgets.messages import Offer  # of the copy before
+
+    started: list[ChildProcess] = []
+
+    def start(child: ChildProcess) -> None:
+        started.append(child)
+
+    monkeypatch.setattr(ChildProcess, "start", start)
+    said: list[tuple[str, bool]] = []
+    desk.said.connect(lambda *line: said.append(line))
+    desk.recovered.connect(lambda _copy, words: strip.offer(Offer("session", words)))
+    desk._recover([tmp_path / name for name in "abc"])
+    started[0].told.emit({"session": "a_recovered", "lost": {"rows": 0, "pictures": 0, "seconds": 0.0}})
+    started[0].ended.emit(0, "")
+    assert strip.text == "Recovering a copy: b", "not hidden behind what was recovered"
+    started[1].ended.emit(130, "interrupted")
+    assert said[1:] == [("Cancelled", False)]
+    assert (len(started), strip.text) == (2, "")
 
 
 def test_a_folder_that_is_not_there_and_whole_sessions_offer_nothing(

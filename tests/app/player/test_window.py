@@ -437,6 +437,35 @@ def test_the_selection_becomes_a_video_with_the_banner_in_it(player: PlayerWindo
         assert sum(1 for _ in container.decode(video=0)) == 5
 
 
+EXPORT = """
+import pathlib, sys, time
+go, out = map(pathlib.Path, sys.argv[1:])
+while not go.exists():
+    time.sleep(0.01)
+out.parent.mkdir(exist_ok=True)
+out.touch()
+print('{"problems": []}')
+"""
+
+
+def test_a_file_is_exported_once_at_a_time_and_a_closed_player_ends_no_export(
+    player: PlayerWindow, session: Path, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go, out = tmp_path / "go", tmp_path / "kept" / f"{session.name}.mp4"
+    command = [sys.executable, "-c", EXPORT, str(go)]
+    monkeypatch.setattr("app.ui.opening.command_of", lambda *words: [*command, words[words.index("--out") + 1]])
+    press(player, Key.Key_E, Key.Key_E)
+    assert player.panels.toast.text() == f"{out.name} is being written already"
+    go.touch()
+    until(qtbot, lambda: player.panels.offers.text.startswith("Exported"))
+    go.unlink()
+    press(player, Key.Key_E)
+    assert player.panels.offers.text == f"Exporting {session.name}_2.mp4", "not hidden behind the one before"
+    player.close()
+    go.touch()
+    until(qtbot, out.with_name(f"{session.name}_2.mp4").exists)
+
+
 def test_a_clip_is_cancelled_without_a_trace(player: PlayerWindow, tmp_path: Path, qtbot: QtBot) -> None:
     press(player, Key.Key_E)
     player.panels.offers.answers["Cancel"].click()

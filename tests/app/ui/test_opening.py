@@ -1,4 +1,4 @@
-"""What was opened last, as the File menus of annotator and player list it."""
+"""What was opened last, as the File menus of annotator and player list it; commands beside a window."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from pytestqt.qtbot import QtBot
 
 from app.ui.actions import MenuEntry, plain
 from app.ui.layout_state import layout_settings
-from app.ui.opening import RecentMenu, note_recent, recent_paths
+from app.ui.opening import OfferedCommand, RecentMenu, note_recent, recent_paths
 from app.ui.window_base import WindowFrame
+from app.widgets.messages import OfferStrip
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 
@@ -53,3 +54,15 @@ def test_it_stands_behind_open(qtbot: QtBot) -> None:
     menu = window.menuBar().actions()[0].menu()
     assert [plain(action.text()) for action in menu.actions()][:2] == ["Open...", "Open recent"]
     assert isinstance(menu.actions()[1].menu(), RecentMenu)
+
+
+def test_a_command_that_is_cancelled_before_it_starts_never_runs(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    parent, ended = QWidget(), list[tuple[object, ...]]()
+    qtbot.addWidget(parent)
+    strip = OfferStrip(parent)
+    command = OfferedCommand(parent, strip, "Copying", "session", "info", "nothing")
+    command.ended.connect(lambda *told: ended.append(told))
+    monkeypatch.setattr(command._child, "start", lambda: ended.append(("started",)))
+    strip.answers["Cancel"].click()
+    command.start()
+    assert ended == [(None, "Cancelled", False)]
