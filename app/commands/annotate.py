@@ -196,12 +196,12 @@ def export_annotations(store_path: Path, paths: Sequence[Path], options: Annotat
 
 
 def _export_angles(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], out: Path) -> None:
-    """The angles over time as a table, and as a figure beside it. Raises AnnotationError."""
+    """The angles over time as a table, and as a figure beside it where one can be drawn. Raises AnnotationError."""
     from app.annotator.comparison import ANGLE_COLUMNS, angles_over_time
     from app.commands.evaluation_report import can_draw
 
-    figure = out.with_suffix(".svg")
-    for path in (out, figure):
+    figure = out.with_suffix(".svg") if can_draw() else None
+    for path in filter(None, (out, figure)):
         if path.exists():
             raise AnnotationError(f"{path}: is there already; choose another --out")
     rows = angles_over_time(annotations, images)
@@ -212,13 +212,13 @@ def _export_angles(annotations: Sequence[StoredAnnotation], images: Sequence[Fou
             table = csv.DictWriter(file, ANGLE_COLUMNS)
             table.writeheader()
             table.writerows(rows)
-        if can_draw():
+        if figure is not None:
             from app.commands.figures import draw_angles, save_figure
 
             save_figure(draw_angles(rows), figure)
     except OSError as error:
         raise AnnotationError(f"{error.filename or out}: cannot be written ({error.strerror}); choose another --out") from None
-    sys.stderr.write(f"{len(rows)} angles in {out}, their course in {figure}\n")
+    sys.stderr.write(f"{len(rows)} angles in {out}{f', their course in {figure}' if figure is not None else ''}\n")
 
 
 def import_annotations(store_path: Path, paths: Sequence[Path], options: AnnotateOptions, config: Config) -> int:

@@ -138,7 +138,7 @@ def _report(out: Path, found: _Study, metrics: dict[str, Any], as_json: bool) ->
         print_tables(metrics)
         if found.agreement is not None:
             print_agreement(found.agreement, within=False)  # stands among the angles
-        sys.stderr.write(f"report and figures are in {out}\n")
+        sys.stderr.write(f"{'report is' if missing('matplotlib') else 'report and figures are'} in {out}\n")
 
 
 def _insert_repeatability(metrics: dict[str, Any], within: dict[str, Any]) -> None:

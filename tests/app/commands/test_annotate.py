@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from app.annotator.sources import AnnotateOptions, StudyOptions
+from app.commands import evaluation_report
 from app.commands.annotate import queue_of, run_annotate
 from app.commands.evaluate import evaluate
 from core.annotation.model import Annotation, History, ImageView, MaskPolygon, MaskTarget, measure_lines
@@ -154,6 +155,18 @@ def test_angles_over_time_go_out_as_table_and_figure(folder: Path, tmp_path: Pat
     assert (tmp_path / "angles.svg").read_bytes().startswith(b"<?xml")
     with pytest.raises(UserError, match=r"angles\.csv: is there already"):
         run(folder, export="angles", out=tmp_path / "angles.csv")
+
+
+def test_without_matplotlib_angles_go_out_as_a_table_alone(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    annotate(folder, raters=("ann",))
+    monkeypatch.setattr(evaluation_report, "missing", lambda package: f"this needs the package {package}")
+    (tmp_path / "angles.svg").touch()
+    run(folder, export="angles", out=tmp_path / "angles.csv")
+    said = capsys.readouterr().err
+    assert said.endswith(f"no figures: this needs the package matplotlib\n3 angles in {tmp_path / 'angles.csv'}\n")
+    assert not (tmp_path / "angles.svg").read_bytes()
 
 
 def test_a_training_set_has_the_angles_of_one_study_and_masks_from_anywhere(folder: Path, tmp_path: Path) -> None:

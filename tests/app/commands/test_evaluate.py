@@ -124,10 +124,11 @@ def test_json_is_all_there_is_on_standard_output_and_the_same_input_gives_the_sa
 
 
 def test_without_matplotlib_the_report_says_how_to_get_its_figures(
-    paper_csv: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    paper_csv: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(command, "missing", lambda package: f"this needs the package {package}")
     metrics = evaluate(csv=paper_csv, out=tmp_path)
+    assert capsys.readouterr().err.endswith(f"report is in {tmp_path}\n")
     assert metrics["notes"][-1] == "No figures: this needs the package matplotlib"
     assert {path.name for path in tmp_path.iterdir()} == {"metrics.json", "measurements.csv", "report.html"}
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
