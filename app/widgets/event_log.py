@@ -103,12 +103,10 @@ class EventLog(QWidget):
         while self._recent and event.at - next(iter(self._recent.values()))[0].at > SAME_WITHIN:
             del self._recent[next(iter(self._recent))]
         if known is not None and abs(event.at - known[0].at) <= SAME_WITHIN:
-            item = known[1]
             event = replace(event, times=known[0].times + times)
-            _show_event(item, event)
+            self._recent[same] = event, self._view.put(event, known[1])
         else:
-            item = self._view.add(event)
-        self._recent[same] = event, item
+            self._recent[same] = event, self._view.put(event)
 
     def show_kind(self, kind: LogKind | None) -> None:
         """Show one kind only; None shows everything."""
@@ -145,14 +143,23 @@ class _EventList(QListWidget):
         self.setMinimumHeight(2 * _ROW_HEIGHT)
         self.setAccessibleName(tr("Events, newest first"))
 
-    def add(self, event: LoggedEvent) -> QListWidgetItem:
-        """Put `event` in front; above ``MOST_ROWS`` the oldest one is removed."""
-        item, bar = QListWidgetItem(), self.verticalScrollBar()
-        self.insertItem(0, item)
+    def put(self, event: LoggedEvent, item: QListWidgetItem | None = None) -> QListWidgetItem:
+        """Show `event` in front, or in the line `item` that it had while that is of this second; ``MOST_ROWS`` are kept.
+
+        So lines that are repeated by turns do not change places all the time.
+        """
+        item, bar = item or QListWidgetItem(), self.verticalScrollBar()
+        row = self.row(item)
         _show_event(item, event)
+        if row == 0 or (row > 0 and _second(self.item(row - 1)) == _second(item)):
+            return item
+        was_above = row > 0 and self.visualItemRect(item).top() < 0
+        if row > 0:
+            self.takeItem(row)
+        self.insertItem(0, item)
         item.setHidden(self._kind not in (None, event.kind))
         self.takeItem(MOST_ROWS)
-        if bar.value() > 0 and not item.isHidden():
+        if bar.value() > 0 and not item.isHidden() and not was_above:
             self.executeDelayedItemsLayout()
             bar.setValue(bar.value() + _ROW_HEIGHT)
         return item
@@ -169,6 +176,11 @@ def _show_event(item: QListWidgetItem, event: LoggedEvent) -> None:
     item.setText(event.line)
     item.setToolTip(event.text)
     item.setData(Qt.ItemDataRole.UserRole, event)
+
+
+def _second(item: QListWidgetItem) -> datetime:
+    at: datetime = item.data(Qt.ItemDataRole.UserRole).at
+    return at.replace(microsecond=0)
 
 
 class _EventPainter(QStyledItemDelegate):
