@@ -405,7 +405,7 @@ def _existing(path: Path) -> list[Path]:
 def listed_images(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
     """Enter the files into the store as images, with a warning for each unreadable one. Raises AnnotationError if all are."""
     with progress_bar() as bar:
-        task = bar.add_task("looking at the images", total=len(files))
+        task = bar.add_task("images looked at", total=len(files))
         images, problems = find_images(files, store, lambda: bar.advance(task))
     print_warnings(problems)
     if not images:

@@ -30,6 +30,7 @@ from app.commands.options import (
 )
 from app.commands.progress import end_like_an_interrupt, progress_bar, report_progress
 from app.ui.display import check_qt
+from app.ui.i18n import mark
 from core.config.files import own_config
 from core.config.models import Config, sessions_folder
 from core.control.modes import Mode
@@ -204,14 +205,14 @@ def export(
         with progress_bar() as bar:
             first, last = _places(reader, rows) if rows is not None else (0, len(reader))
             for path in out:
-                on_row = partial(bar.advance, bar.add_task(path.name, total=last - first))
+                on_row = partial(bar.advance, bar.add_task("rows" if progress_json else path.name, total=last - first))
                 written[str(path)] = _export(reader, path, plain, on_row, (first, last))
         lost = losses(reader, reader.events)  # reading the events adds to the problems
         problems = [*reader.problems, *lost]
         if _is_cut(reader):
             problems.append(f"it did not end properly: session recover {session} saves what can be had")
         elif is_being_written(session):
-            problems.append("it is still being recorded: what came later is not in what was written")
+            problems.append(mark("it is still being recorded: what came later is not in what was written"))
     if as_json:
         sys.stdout.write(json.dumps({"written": written, "problems": problems}) + "\n")
         return

@@ -376,7 +376,7 @@ class LibraryWindow(WindowFrame):
 
     def choose_folder(self) -> None:
         mode = QFileDialog.FileMode.Directory
-        ask_path(self, tr("A folder with sessions"), self._model.folder, self._open_folder, mode)
+        ask_path(self, tr("A folder with sessions"), self._model.folder, self._open_folder, mode, folders_only=True)
 
     def _open_folder(self, folder: Path) -> None:
         self._model.open_folder(folder)

@@ -86,7 +86,7 @@ class BrowseButton(QPushButton):
     def browse(self, *, folders: bool) -> None:
         mode = QFileDialog.FileMode.Directory if folders else QFileDialog.FileMode.ExistingFile
         filters = [] if folders else self._wanted.filter.split(";;")
-        ask_path(self.window(), tr(self._wanted.title), self._start(), self._on_chosen, mode, filters)
+        ask_path(self.window(), tr(self._wanted.title), self._start(), self._on_chosen, mode, filters, folders_only=folders)
 
     def _on_chosen(self, path: Path) -> None:
         self.chosen.emit(path.name if path.parent == _MODELS else str(path))  # a shipped model goes by its name

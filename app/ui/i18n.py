@@ -106,6 +106,7 @@ FIXED = (
     "switch screen lock and sleep off in the desktop's settings", "sleep cannot be inhibited: systemd-inhibit is not there",
     "the computer is too busy; close other programs, and rehearse again",
     "with DYNAMIXEL Wizard 2.0 set Baud Rate (8) of all seven to 1 Mbps, then servos.baud = 1000000",
+    "images", "images looked at", "rows",
 )  # fmt: skip
 
 # Texts that core and hardware compose without ``message``. A value called by one letter is a number, any other may be a known text.
@@ -138,7 +139,7 @@ TEMPLATES = (
     "take the algorithm's {what} mask", "{path}: has no video in it", "{path}: has a video of a kind that cannot be decoded here",
     "{path}: {key}: unknown key, kept but not used", "above {a} and at most {rest}", "above {a} and below {rest}",
     "at least {a} and below {rest}", "{a} to {end}, a multiple of {rest}", "at least {rest}", "above {rest}", "at most {rest}",
-    "below {rest}",
+    "below {rest}", "it did not end properly: session recover {path} saves what can be had", "frames of {name}",
 )  # fmt: skip
 
 

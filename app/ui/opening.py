@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
-from PySide6.QtCore import QMimeData, QObject, QUrl, Signal
+from PySide6.QtCore import QMimeData, QObject, Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFileDialog, QMenu, QWidget
 
@@ -131,10 +131,14 @@ class OfferedCommand(QObject):
         if record.get("done") is None:
             self._told.update(record)
             return
-        done, total, what = record["done"], record["total"], tr_text(record["what"])
+        done, total, what = record["done"], record["total"], record["what"]
+        share = min(1.0, done / total) if total else -1.0
         left = tr(", {left:.0f} s left", left=record["left_s"]) if record.get("left_s") else ""
-        detail = tr("{done:.0f} of {total:.0f} {what}{left}", done=done, total=total or 0, what=what, left=left)
-        self._show(min(1.0, done / total) if total else -1.0, detail)
+        if what == "bytes read":
+            self._show(share, f"{100 * max(0.0, share):.0f} %{left}")
+        else:
+            values = {"done": done, "total": total or 0, "what": tr_text(what), "left": left}
+            self._show(share, tr("{done:.0f} of {total:.0f} {what}{left}", **values))
 
     def _show(self, share: float, detail: str) -> None:
         cancel = OfferButton(tr("Cancel"), self._end, tr("Stop it"))
@@ -163,10 +167,23 @@ def ask_path(
     then: Callable[[Path], object],
     mode: QFileDialog.FileMode = QFileDialog.FileMode.ExistingFile,
     filters: Sequence[str] = (),
+    *,
+    folders_only: bool = False,
 ) -> QFileDialog:
-    """Ask for a file or folder; `then` gets each one that is chosen. The dialog blocks nothing: STOP stays within reach."""
+    """Ask for a file or folder; `then` gets each one that is chosen. The dialog blocks nothing: STOP stays within reach.
+
+    One that still asks for the same is raised, and returned. `folders_only` lists no files.
+    """
+    name = " ".join((title, mode.name, *filters))
+    there: QFileDialog | None = parent.findChild(QFileDialog, name, Qt.FindChildOption.FindDirectChildrenOnly)
+    if there is not None and there.isVisible():
+        there.raise_()
+        there.activateWindow()
+        return there
     dialog = QFileDialog(parent, title, str(folder), fileMode=mode)
+    dialog.setObjectName(name)
     dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
+    dialog.setOption(QFileDialog.Option.ShowDirsOnly, folders_only)
     if filters:
         dialog.setNameFilters(filters)
     if mode is QFileDialog.FileMode.AnyFile:

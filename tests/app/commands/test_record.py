@@ -120,6 +120,8 @@ def test_export_writes_all_formats(recorded: tuple[Path, dict[str, object]], tmp
     for out, topics in ((outs[2], {"/camera/video", "/measured_js"}), (outs[3], {"/camera/image/compressed", "/measured_js"})):
         with out.open("rb") as mcap:
             assert {channel.topic for _, channel, _ in make_reader(mcap).iter_messages()} >= topics
+    told = run("session", "export", session, "--out", tmp_path / "y.csv", "--progress-json")
+    assert {json.loads(line)["what"] for line in told.stdout.splitlines()} == {"rows"}
     again = run("session", "export", session, "--out", outs[0])
     assert again.returncode == 2
     assert "there already" in again.stderr

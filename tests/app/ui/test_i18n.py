@@ -99,6 +99,7 @@ def _texts_below() -> set[str]:
         *ROOT.glob("core/**/*.py"),
         *ROOT.glob("hardware/**/*.py"),
         *ROOT.glob("app/annotator/*.py"),
+        *ROOT.glob("app/commands/*.py"),
     ):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if path != own else ():
             if isinstance(node, ast.JoinedStr):

@@ -1,18 +1,19 @@
-"""What was opened last, as the File menus of annotator and player list it; commands beside a window."""
+"""What was opened last, as the File menus list it; dialogs that ask for a path; commands beside a window."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QFileDialog, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.ui.actions import MenuEntry, plain
 from app.ui.layout_state import layout_settings
-from app.ui.opening import OfferedCommand, RecentMenu, note_recent, recent_paths
+from app.ui.opening import OfferedCommand, RecentMenu, ask_path, note_recent, recent_paths
 from app.ui.window_base import WindowFrame
-from app.widgets.messages import OfferStrip
+from app.widgets.messages import Offer, OfferStrip
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 
@@ -66,3 +67,38 @@ def test_a_command_that_is_cancelled_before_it_starts_never_runs(qtbot: QtBot, m
     strip.answers["Cancel"].click()
     command.start()
     assert ended == [(None, "Cancelled", False)]
+
+
+def test_who_asks_twice_for_a_path_sees_the_same_dialog(qtbot: QtBot, tmp_path: Path) -> None:
+    chosen: list[Path] = []
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    folder = QFileDialog.FileMode.Directory
+    first = ask_path(parent, "A folder", tmp_path, chosen.append, folder, folders_only=True)
+    assert first.testOption(QFileDialog.Option.ShowDirsOnly)
+    assert ask_path(parent, "A folder", tmp_path, chosen.append, folder) is first
+    assert ask_path(parent, "A folder", tmp_path, chosen.append) is not first, "that one asks for a file"
+    first.reject()
+    assert ask_path(parent, "A folder", tmp_path, chosen.append, folder) is not first
+
+
+@pytest.mark.parametrize(
+    ("what", "total", "detail"),
+    [
+        ("bytes read", 104857600, "50 %, 3 s left"),
+        ("rows", 104857600, "52428800 of 104857600 rows, 3 s left"),
+        ("bytes read", 0, "0 %, 3 s left"),
+    ],
+)
+def test_an_offer_says_how_far_a_command_is(qtbot: QtBot, what: str, total: int, detail: str) -> None:
+    class Offers:
+        def offer(self, offer: Offer) -> None:
+            self.last = offer
+
+        def withdraw(self, key: str) -> None:
+            del self.last
+
+    offers, parent = Offers(), QObject()
+    command = OfferedCommand(parent, offers, "Recovering", "session", "recover", "x")
+    command._child.told.emit({"done": 52428800, "total": total, "what": what, "left_s": 3.0})
+    assert (offers.last.detail, offers.last.share) == (detail, 0.5 if total else -1.0)
