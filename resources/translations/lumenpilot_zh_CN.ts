@@ -1058,6 +1058,11 @@ destination, target: 目标点, 目标            route: 路线                 
         <translation>标注者 {rater}</translation>
     </message>
     <message>
+        <location filename="../../app/commands/session.py"/>
+        <source>it is still being recorded: what came later is not in what was written</source>
+        <translation>它仍在录制：之后的内容不在已写入的部分中</translation>
+    </message>
+    <message>
         <location filename="../../app/library/model.py"/>
         <source>Newest first</source>
         <translation>最新的在前</translation>
@@ -2048,11 +2053,6 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
-        <source>Not recovered: {why}</source>
-        <translation>未能恢复：{why}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/recording.py"/>
         <source>The player, with everything as it was understood</source>
         <translation>打开回放器，显示当时理解的全部内容</translation>
     </message>
@@ -2093,6 +2093,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/recording.py"/>
+        <source>Not recovered: {why}. To try again: {menu}</source>
+        <translation>未恢复：{why}。重试：{menu}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
         <source>Evaluated: {judged}. Report opened: {report}</source>
         <translation>评估完成：{judged}。报告已打开：{report}</translation>
     </message>
@@ -2105,6 +2110,11 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/recording.py"/>
         <source>Not evaluated: {why}</source>
         <translation>未能评估：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/recording.py"/>
+        <source>Look for &amp;cut sessions</source>
+        <translation>查找中断的会话(&amp;C)</translation>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
@@ -2548,11 +2558,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/operator/services.py"/>
         <source>&amp;Open another session...</source>
         <translation>打开其他会话(&amp;O)...</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/services.py"/>
-        <source>Look for &amp;cut sessions</source>
-        <translation>查找中断的会话(&amp;C)</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -3603,6 +3608,11 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/player/window.py"/>
         <source>No snapshot: there is no picture</source>
         <translation>没有截图：没有图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/player/window.py"/>
+        <source>{name} is being written already</source>
+        <translation>{name} 已在写入</translation>
     </message>
     <message>
         <location filename="../../app/player/window.py"/>
@@ -5669,11 +5679,6 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/opening.py"/>
-        <source>{done:.0f} of {total:.0f} {what}{left}</source>
-        <translation>{done:.0f} / {total:.0f} {what}{left}</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/opening.py"/>
         <source>Opening the player: {name}</source>
         <translation>正在打开回放器：{name}</translation>
     </message>
@@ -5696,6 +5701,11 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
         <location filename="../../app/ui/opening.py"/>
         <source>Stop it</source>
         <translation>停止</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/opening.py"/>
+        <source>{done:.0f} of {total:.0f} {what}{left}</source>
+        <translation>{done:.0f} / {total:.0f} {what}{left}</translation>
     </message>
     <message>
         <location filename="../../app/ui/opening.py"/>
@@ -10213,6 +10223,21 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>images</source>
+        <translation>图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>images looked at</source>
+        <translation>已查看的图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>rows</source>
+        <translation>行</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>{path}: cut short: {a} of {b} pictures</source>
         <translation>{path}：视频不完整：{b} 帧中只有 {a} 帧</translation>
     </message>
@@ -10485,6 +10510,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>below {rest}</source>
         <translation>小于 {rest}</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>it did not end properly: session recover {path} saves what can be had</source>
+        <translation>它未正常结束：session recover {path} 可挽救能得到的部分</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>frames of {name}</source>
+        <translation>{name} 的帧</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
