@@ -28,6 +28,7 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
         with (
             mock.patch.object(sys, "argv", command),
             mock.patch("faulthandler.enable"),  # pytest has it look after this process
+            mock.patch("app.commands.progress._writers", []),  # each command has its own answer to --progress-json
             contextlib.chdir(cwd or Path.cwd()),
             _instead_of(1, output),
             _instead_of(2, errors),

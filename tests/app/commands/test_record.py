@@ -143,7 +143,6 @@ def test_a_recovery_that_a_window_ends_leaves_nothing(tmp_path: Path, monkeypatc
     session = record_session(tmp_path, [tick_of(0, 1000.0)])
     set_open(session)
     monkeypatch.setattr("core.session.recovery._salvage", lambda *_: signal.raise_signal(signal.SIGTERM))
-    monkeypatch.setattr("app.commands.progress._writers", [])
     with Interrupt():  # a request that the command does not take ends no test
         done = run("session", "recover", session, "--progress-json")
     assert done.returncode == 130, done.stderr
