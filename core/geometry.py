@@ -98,7 +98,10 @@ def outlines(values: NDArray[np.float64], level: float) -> list[Points]:
 
 
 def thinned(points: Points, tolerance: float) -> Points:
-    """A polyline's points without those that are nearer than `tolerance` to the rest (Douglas and Peucker); both ends are kept."""
+    """A polyline's points without those that are nearer than `tolerance` to the rest (Douglas and Peucker); both ends are kept.
+
+    OpenCV's ``approxPolyDP`` rounds them to 32 bits.
+    """
     kept, pieces = np.zeros(len(points), np.bool_), [(0, len(points) - 1)]
     kept[[0, -1]] = True
     while pieces:

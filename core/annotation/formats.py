@@ -57,7 +57,7 @@ class Imported:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """Of another program, by its name in commands. ``write`` is None where it is only read; it writes a folder unless
+    """Of another program, by its name in commands. Without ``write`` it can only be read; that writes a folder unless
     ``writes_file``."""
 
     name: str

@@ -69,7 +69,10 @@ def fit(evidence: Sequence[Sequence[float]], right: Sequence[bool], fitted_on: d
 
 
 def _logistic(x: NDArray[np.float64], right: NDArray[np.float64], penalty: float = 1 / 0.3) -> NDArray[np.float64]:
-    """Weights of a logistic regression with a quadratic `penalty`, and its offset, which has none: (F + 1,), by Newton's steps."""
+    """Weights of a logistic regression with a quadratic `penalty`, and its offset, which has none: (F + 1,), by Newton's steps.
+
+    ``LogisticRegression(C=1 / penalty)`` of scikit-learn gives the same, for 50 MB more to install.
+    """
     x = np.column_stack([x, np.ones(len(x))])
     ridge, weights = np.diag([penalty] * (x.shape[1] - 1) + [0.0]), np.zeros(x.shape[1])
     for _ in range(100):
