@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from core import geometry
-from core.config.calibration import BehaviourConfig, Estimate
+from core.config.calibration import BehaviourConfig
 from core.control.joints import unit_vector
 from core.types import Command, Point, Points, RobotStatus, VesselGraph
 from hardware.twin.phantom import Phantom
@@ -434,23 +434,20 @@ class DriveProperties:
     delay_s: float = 0.0
 
     @staticmethod
-    def identified(known: BehaviourConfig, max_pull_mm: float, rng: np.random.Generator | None = None) -> DriveProperties:
-        """Those of a robot whose full pull is `max_pull_mm`; with `rng` drawn from the intervals, else the values."""
-
-        def of(one: Estimate, unit: float = 1.0) -> float:
-            drawn = one.value if rng is None else one.value + rng.normal() * (one.high - one.low) / 3.92
-            return unit * float(np.clip(drawn, one.low, one.high))
-
+    def identified(known: BehaviourConfig, max_pull_mm: float, deg_per_mm: float) -> DriveProperties:
+        """Those of a robot whose full pull is `max_pull_mm`, where the twin's one bends by `deg_per_mm` of pull."""
         real_mm = max_pull_mm / MAX_PULL_MM
-        right, left = (of(one, real_mm / NOMINAL_DEG_PER_MM) for one in (known.bend_right_deg_per_mm, known.bend_left_deg_per_mm))
         return DriveProperties(
-            backlash_mm=of(known.play_mm, 1.0 / real_mm),
-            dead_zone_mm=of(known.slack_right_mm, 1.0 / real_mm),
-            dead_zone_left_mm=of(known.slack_left_mm, 1.0 / real_mm),
-            gain=(right, left),
-            feed_share=of(known.feed_share),
-            feed_slip=of(known.feed_slip),
-            delay_s=of(known.delay_s),
+            backlash_mm=known.play_mm.value / real_mm,
+            dead_zone_mm=known.slack_right_mm.value / real_mm,
+            dead_zone_left_mm=known.slack_left_mm.value / real_mm,
+            gain=(
+                known.bend_right_deg_per_mm.value * real_mm / deg_per_mm,
+                known.bend_left_deg_per_mm.value * real_mm / deg_per_mm,
+            ),
+            feed_share=known.feed_share.value,
+            feed_slip=known.feed_slip.value,
+            delay_s=known.delay_s.value,
         )
 
 

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 
 from core import geometry
+from core.config.calibration import BehaviourConfig, Estimate
 from core.config.models import Config
 from core.control.look_ahead import sharp_branches
 from core.evaluation.metrics import wilson_95
@@ -79,10 +80,12 @@ class Rehearsal(Trial):
 
     def __init__(self, plan: RehearsalPlan, seed: int) -> None:
         rng = np.random.default_rng([FIRST_SEED + seed, 60013])
-        drive = DriveProperties(backlash_mm=float(rng.uniform(*PLAY_MM)), dead_zone_mm=float(rng.uniform(*SLACK_MM)))
-        if (known := plan.trial.config.twin.behaviour) is not None:
-            drive = DriveProperties.identified(known, plan.trial.config.servos.max_pull_mm, rng)
-        trial = replace(plan.trial, config=slowed(plan.trial.config, plan.speed))
+        config, drive = slowed(plan.trial.config, plan.speed), None
+        if (known := config.twin.behaviour) is not None:
+            config = config.model_copy(update={"twin": config.twin.model_copy(update={"behaviour": drawn(known, rng)})})
+        else:
+            drive = DriveProperties(backlash_mm=float(rng.uniform(*PLAY_MM)), dead_zone_mm=float(rng.uniform(*SLACK_MM)))
+        trial = replace(plan.trial, config=config)
         super().__init__(trial, seed, trial.config.policy.name, None, drive=drive)
         self._start_mm = max(5.0, self._start_mm + float(rng.uniform(-START_MM, START_MM)))
         self._eye, self._rng = plan, rng
@@ -152,6 +155,16 @@ def _vessel_masks(world: TwinWorld, scale: float) -> Masks:
     return Masks(seen >= 0.5, np.zeros(seen.shape, bool), seen, np.zeros(seen.shape, np.float32))
 
 
+def drawn(known: BehaviourConfig, rng: np.random.Generator) -> BehaviourConfig:
+    """A robot within the intervals of what was identified."""
+    estimates = {name: one for name, one in known if isinstance(one, Estimate)}
+    values = {
+        name: float(np.clip(rng.normal(one.value, (one.high - one.low) / 3.92), one.low, one.high))
+        for name, one in estimates.items()
+    }
+    return known.model_copy(update={name: one.model_copy(update={"value": values[name]}) for name, one in estimates.items()})
+
+
 def slowed(config: Config, share: float) -> Config:
     """The configuration with this share of all advised speeds."""
     names = ("slowest_mm_s", "slow_mm_s", "moderate_mm_s", "fast_mm_s")
@@ -201,9 +214,8 @@ class RehearsalPicture:
         """
         bend_deg = BEND_DEG_PER_MM * MAX_PULL_MM
         if (known := config.twin.behaviour) is not None:
-            drive = DriveProperties.identified(known, config.servos.max_pull_mm)
-            slack_mm = max(drive.dead_zone_mm, drive.dead_zone_left_mm or 0.0)
-            bend_deg = BEND_DEG_PER_MM * min(drive.gain) * (MAX_PULL_MM - slack_mm)
+            sides = (known.bend_right_deg_per_mm, known.slack_right_mm), (known.bend_left_deg_per_mm, known.slack_left_mm)
+            bend_deg = min(bend.value * (config.servos.max_pull_mm - slack.value) for bend, slack in sides)
         turns = sharp_branches(self.phantom.graph, self.target.route, ROBOT_RADIUS_MM, bend_deg, (0.0, self.target.at_mm))
         return [
             SharpBranch(xy=self.pixels([point_mm])[0], turn_deg=round(turn_deg, 1), limit_deg=round(limit_deg, 1))

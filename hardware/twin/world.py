@@ -72,8 +72,9 @@ class TwinWorld:
         self.view = make_view(self.appearance, size, self.phantom)
         known, specimen = config.behaviour, None
         if known is not None:
-            drive, specimen = drive or DriveProperties.identified(known, servos.max_pull_mm), Specimen.drawn(seed)
+            specimen = Specimen.drawn(seed)
             specimen = replace(specimen, shaft_ei=known.shaft_to_head.value * specimen.tip_ei)
+            drive = drive or DriveProperties.identified(known, servos.max_pull_mm, specimen.bend_deg_per_mm)
         tendons_deg = [joint.angle_deg or 0.0 for joint in servos.tendons]
         self.physics = TwinPhysics(self.phantom, seed, drive, tendons_deg, specimen)
         self.command = Command()

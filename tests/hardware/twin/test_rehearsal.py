@@ -85,6 +85,20 @@ def test_a_run_is_the_same_for_its_seed_and_perceives_with_errors(monkeypatch: p
     assert scene.masks is not None and scene.masks.vessel[240, 320] and not scene.masks.vessel[5, 5], "what lies in sight counts"
 
 
+def test_another_robot_of_each_run_is_within_what_was_identified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hardware.twin.trial.make_phantom", lambda _name: forked(50.0, 5.0))
+    known = behaviour()
+    config = Config(twin=TwinConfig(behaviour=known))
+    plan = RehearsalPlan(TrialPlan(config, look="bench", own=True, target_px=(320.0, 240.0)))
+    ratios, bends = [], []
+    for seed in range(3):
+        physics = Rehearsal(plan, seed)._world.physics
+        ratios.append(physics.specimen.shaft_ei / physics.specimen.tip_ei)
+        bends.append(physics._drive.gain[0] * physics.specimen.bend_deg_per_mm)
+    for values, one in ((ratios, known.shaft_to_head), (bends, known.bend_right_deg_per_mm)):
+        assert len(set(values)) == 3 and all(one.low <= value <= one.high for value in values)
+
+
 def test_slower_is_a_share_of_all_advised_speeds() -> None:
     config = Config()
     assert slowed(config, 0.5).advice.fast_mm_s == 0.5 * config.advice.fast_mm_s
