@@ -59,6 +59,8 @@ def supervise(
     before = state.active
     health, active = _collect_faults(state, reports, now_s, servos, safety)
     stop = [Fault(Cause.STOP_PRESSED)] if Act.STOP in acts else []
+    if stop:  # the hand that presses it leaves the deadman, which no longer matters
+        active = tuple(fault for fault in active if fault.cause is not Cause.DEADMAN)
     in_use = were_on or health.servos_ready
     state = _react(replace(state, health=health, active=(*stop, *clock, *active)), in_use, now_s, safety)
     refused = []
