@@ -55,7 +55,6 @@ from app.widgets.servo_table import ServoTable
 from core.annotation.masks import polygons_of
 from core.annotation.model import Annotation, ImageView, MaskTarget, measure_lines
 from core.annotation.store import DEFAULT_NAME, AnnotationStore, ItemKey, find_images
-from core.config.files import Profiles
 from core.config.models import Config, PerceptionConfig, load_config
 from core.config.safety import ServosConfig
 from core.control.drive_view import DriveView
@@ -374,8 +373,7 @@ _TRAINING_S = 1800.0
 
 def settings(job: PictureJob) -> None:
     """A section with a limit that was changed and is not saved."""
-    profiles = Profiles(job.folder / "profiles")
-    dialog = SettingsDialog(SettingsDraft(load_config()), Path("~/.config/LumenPilot/settings.toml"), profiles)
+    dialog = SettingsDialog(SettingsDraft(load_config()), Path("~/.config/LumenPilot/settings.toml"))
     dialog.show()
     key = "perception.pose.d_allow_px"
     dialog.go_to(key)

@@ -21,7 +21,7 @@ from app.ui.actions import LanguageMenu, MenuEntry, add_menu, next_start_text
 from app.ui.i18n import font_problem, tr, tr_text, wanted
 from app.ui.texts import OperatorStep
 from app.ui.workers import Worker
-from core.config.files import Profiles, SettingsFile, write_settings
+from core.config.files import SettingsFile, write_settings
 from core.config.models import Config, ConfigError, PerceptionConfig
 from core.config.rig_file import RigFileError, read_again
 from core.config.schema import Effect, with_value
@@ -43,16 +43,12 @@ class SettingsController(QObject):
     window : gets the menu entry, and what is changed.
     file : the settings that the window was opened with, and where they are saved.
     perceive_again : perceives the last frame of a rig that is over under other thresholds; slow.
-    profiles : the named ones, None: in the user's folder.
     """
 
-    def __init__(
-        self, window: OperatorWindow, file: SettingsFile, perceive_again: PerceiveAgain, profiles: Profiles | None = None
-    ) -> None:
+    def __init__(self, window: OperatorWindow, file: SettingsFile, perceive_again: PerceiveAgain) -> None:
         super().__init__(window)
         self._window, self._rig = window, window.rig
         self._file, self._perceive_again = file, perceive_again
-        self._profiles = profiles or Profiles()
         self._saved = self._at_rig_start = file.config
         self._saved_over: Config | None = None
         """What the window had when they were saved: a phantom or model that is chosen afterwards is the newer wish."""
@@ -87,7 +83,7 @@ class SettingsController(QObject):
     def open(self) -> None:
         if self.dialog is None:
             draft = SettingsDraft(self._saved)
-            dialog = SettingsDialog(draft, self._file.path, self._profiles, self._file.problems, self._window)
+            dialog = SettingsDialog(draft, self._file.path, self._file.problems, self._window)
             dialog.drafted.connect(self._on_drafted)
             dialog.save_asked.connect(self._save)
             dialog.finished.connect(self._on_finished)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QPoint, QSignalBlocker, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QDialog,
@@ -16,7 +15,6 @@ from PySide6.QtWidgets import (
     QPushButton,
     QScrollArea,
     QSplitter,
-    QStackedLayout,
     QTreeWidget,
     QTreeWidgetItem,
     QVBoxLayout,
@@ -26,10 +24,9 @@ from PySide6.QtWidgets import (
 from app.settings.draft import SettingsDraft, search
 from app.settings.fields import SettingField
 from app.ui import theme
-from app.ui.i18n import mark, tr, tr_text
-from app.widgets.basics import QuietCombo, card_title, column, holder, line, takes_enter
+from app.ui.i18n import tr, tr_text
+from app.widgets.basics import column, holder, line, takes_enter
 from app.widgets.messages import QuestionStrip
-from core.config.files import Profile, ProfileError, Profiles
 from core.config.models import Config
 from core.config.schema import Effect, Section, Setting, schema, settings_by_key
 
@@ -179,100 +176,6 @@ class SettingPage(QScrollArea):
         self._section_buttons[section.key] = (section, button)
 
 
-_OWN = mark("Own settings")
-
-
-class ProfileRow(QWidget):
-    """Chooses a profile, saves the settings under a name, deletes one; questions are asked in the row itself.
-
-    ``chosen`` carries a profile, ``save_asked`` a name, ``delete_asked`` the profile that was confirmed.
-    """
-
-    chosen = Signal(object)
-    save_asked = Signal(str)
-    delete_asked = Signal(object)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.combo = QuietCombo(tr("Profile"), keeps_focus=True)
-        self.combo.setMinimumWidth(190)
-        self.combo.setToolTip(tr("Takes all settings from a profile; nothing is kept before you save"))
-        self.save_button, self.delete_button = QPushButton(tr("Save as")), QPushButton(tr("Delete"))
-        self.name = QLineEdit(placeholderText=tr("Name of the profile; Enter saves, Esc does not"))
-        self.name.setAccessibleName(tr("Name of the profile"))
-        self.name.setMaxLength(60)
-        self.question = QuestionStrip()
-        self._profiles: tuple[Profile, ...] = ()
-        self._lay_out()
-        self.combo.activated.connect(self._on_activated)
-        self.save_button.clicked.connect(self.begin_naming)
-        self.delete_button.clicked.connect(self._ask_delete)
-        self.name.returnPressed.connect(self._on_named)
-        self.question.closed.connect(self.end_asking)
-
-    def show_profiles(self, profiles: tuple[Profile, ...], current: Profile | None) -> None:
-        """List the profiles, and mark the one that equals what is edited, if any."""
-        self._profiles = profiles
-        with QSignalBlocker(self.combo):
-            self.combo.clear()
-            self.combo.addItem(tr(_OWN), None)
-            for profile in profiles:
-                self.combo.addItem(tr("{name} (preset)", name=profile.name) if profile.is_preset else profile.name, profile.name)
-        self.show_current(current)
-
-    def show_current(self, current: Profile | None) -> None:
-        with QSignalBlocker(self.combo):
-            self.combo.setCurrentIndex(self._profiles.index(current) + 1 if current in self._profiles else 0)
-        profile = self.profile
-        self.delete_button.setEnabled(profile is not None and not profile.is_preset)
-        self.delete_button.setToolTip("" if self.delete_button.isEnabled() else tr("Choose one of your own profiles first"))
-
-    @property
-    def profile(self) -> Profile | None:
-        place = self.combo.currentIndex()
-        return self._profiles[place - 1] if place > 0 else None
-
-    @property
-    def is_asking(self) -> bool:
-        return self._stack.currentIndex() != 0
-
-    def begin_naming(self) -> None:
-        profile = self.profile
-        self.name.setText(profile.name if profile is not None and not profile.is_preset else "")
-        self._stack.setCurrentWidget(self.name)
-        self.name.setFocus()
-        self.name.selectAll()
-
-    def ask(self, question: str, answer: str, action: object) -> None:
-        """A question in place of the row."""
-        self._stack.setCurrentWidget(self.question)
-        self.question.ask(question, answer, action)  # type: ignore[arg-type]
-
-    def end_asking(self) -> None:
-        self._stack.setCurrentIndex(0)
-
-    def _on_activated(self, place: int) -> None:
-        if place > 0:
-            self.chosen.emit(self._profiles[place - 1])
-
-    def _on_named(self) -> None:
-        name = self.name.text()
-        self.end_asking()
-        self.save_asked.emit(name)
-
-    def _ask_delete(self) -> None:
-        profile = self.profile
-        if profile is not None:
-            self.ask(tr("Delete the profile {name}?", name=profile.name), tr("Delete"), lambda: self.delete_asked.emit(profile))
-
-    def _lay_out(self) -> None:
-        choice = line(card_title(tr("Profile")), (self.combo, 1), self.save_button, self.delete_button, spacing=6)
-        self._stack = QStackedLayout(self)
-        for widget in (holder(choice), self.name, self.question):
-            self._stack.addWidget(widget)
-        self.setFixedHeight(36)
-
-
 _SIZE = (900, 660)
 _LEAST = (700, 420)
 _SEARCH_AFTER_MS = 150
@@ -283,7 +186,7 @@ _KEY_ROLE = Qt.ItemDataRole.UserRole
 
 
 class SettingsDialog(QDialog):
-    """Edits a draft, and profiles; the settings file is written by its owner.
+    """Edits a draft; the settings file is written by its owner.
 
     ``drafted`` carries the configuration whenever it changes and is allowed, for the preview, ``save_asked`` whether the rig is to
     be started again. Esc with unsaved changes asks before it closes, since it is often meant for a field; Cancel does not ask.
@@ -292,7 +195,6 @@ class SettingsDialog(QDialog):
     ----------
     draft : what is edited.
     path : of the settings file, to be shown.
-    profiles : the named ones.
     problems : what was wrong with the file, one line each.
     """
 
@@ -303,22 +205,20 @@ class SettingsDialog(QDialog):
         self,
         draft: SettingsDraft,
         path: Path,
-        profiles: Profiles,
         problems: tuple[str, ...] = (),
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self.draft, self._path, self._profiles = draft, path, profiles
+        self.draft, self._path = draft, path
         self._locked = ""
         self._running: Config | None = None
         self._section: Section = schema().sections[0]
         self.search = QLineEdit()
         self.tree = QTreeWidget()
         self.page = SettingPage(draft)
-        self.profile_row = ProfileRow()
         self.status, self.notice = QLabel(), QLabel()
         self.question = QuestionStrip()
-        """Of leaving, in place of the state of the settings."""
+        """Of leaving or resetting, in place of the state of the settings."""
         self.reset_all, self.cancel = QPushButton(tr("Reset all")), QPushButton(tr("Cancel"))
         self.save, self.save_and_restart = QPushButton(tr("Save")), QPushButton(tr("Save, and start the rig again"))
         self._items: dict[str, QTreeWidgetItem] = {}
@@ -329,7 +229,6 @@ class SettingsDialog(QDialog):
         self._lay_out()
         self._fill_tree()
         self._wire()
-        self._show_profiles()
         self.show_notice("\n".join(map(tr_text, problems)), is_fault=True)
         self.show_section(self._section)
         self.setMinimumSize(*_LEAST)
@@ -384,7 +283,7 @@ class SettingsDialog(QDialog):
         """Allow no changes for this reason; empty: allow them."""
         if why != self._locked:
             self._locked = why
-            for widget in (self.page, self.profile_row, self.reset_all):
+            for widget in (self.page, self.reset_all):
                 widget.setEnabled(not why)
             self._update()
 
@@ -406,7 +305,7 @@ class SettingsDialog(QDialog):
         self._changed()
 
     def _ask_reset_all(self) -> None:
-        self.profile_row.ask(tr("Put all settings back to their defaults?"), tr("Reset all"), self._reset_everything)
+        self._ask(tr("Put all settings back to their defaults?"), tr("Reset all"), self._reset_everything)
 
     def _reset_everything(self) -> None:
         self.draft.load(self.draft.default)
@@ -414,7 +313,6 @@ class SettingsDialog(QDialog):
 
     def _changed(self) -> None:
         self._update()
-        self.profile_row.show_current(self._profiles.matching(self.draft.config) if self.draft.config is not None else None)
         if self.draft.config is not None:
             self.drafted.emit(self.draft.config)
 
@@ -486,53 +384,6 @@ class SettingsDialog(QDialog):
         self.search.clear()
         self._search_soon.stop()
 
-    # ---- profiles
-
-    def _show_profiles(self) -> None:
-        config = self.draft.config
-        self.profile_row.show_profiles(self._profiles.all(), self._profiles.matching(config) if config is not None else None)
-
-    def _choose_profile(self, profile: Profile) -> None:
-        try:
-            file = self._profiles.load(profile)
-        except ProfileError as error:
-            self.show_notice(tr_text(str(error)), is_fault=True)
-        else:
-            self.draft.load(file.config)
-            self.show_notice("\n".join(map(tr_text, file.problems)), is_fault=True)
-        self._show_profiles()
-        self._changed()
-
-    def _ask_save_profile(self, name: str) -> None:
-        if self._profiles.exists(name):
-            self.profile_row.ask(
-                tr("There is a profile {name} already. Replace it?", name=name), tr("Replace"), partial(self._save_profile, name)
-            )
-        else:
-            self._save_profile(name)
-
-    def _save_profile(self, name: str) -> None:
-        config = self.draft.config
-        if config is None:
-            self.show_notice(tr("First mend what is not allowed"), is_fault=True)
-            return
-        self._change_profiles(lambda: self._profiles.save(name, config)[1] or tr("Saved as profile {name}", name=name))
-
-    def _delete_profile(self, profile: Profile) -> None:
-        def delete() -> str:
-            self._profiles.delete(profile)
-            return tr("Profile {name} deleted", name=profile.name)
-
-        self._change_profiles(delete)
-
-    def _change_profiles(self, change: Callable[[], str]) -> None:
-        """Change the profiles, and show the line that this returns."""
-        try:
-            self.show_notice(tr_text(change()))
-        except ProfileError as error:
-            self.show_notice(tr_text(str(error)), is_fault=True)
-        self._show_profiles()
-
     # ---- keys
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -552,20 +403,20 @@ class SettingsDialog(QDialog):
         if not self.draft.is_dirty:
             self.reject()
         elif not self.question.text:
-            self._show_question(True)
-            self.question.ask(tr("Leave without saving the changes?"), tr("Leave"), self.reject)
+            self._ask(tr("Leave without saving the changes?"), tr("Leave"), self.reject)
 
     def _on_escape(self) -> None:
         """Back by one step: a question, the search, the dialog."""
         if self.question.text:
             self.question.cancel()
-        elif self.profile_row.is_asking:
-            self.profile_row.question.cancel()
-            self.profile_row.end_asking()
         elif self.search.text():
             self.search.clear()
         else:
             self.ask_to_leave()
+
+    def _ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
+        self._show_question(True)
+        self.question.ask(question, answer, action)
 
     def _show_question(self, on: bool) -> None:
         """In place of the state and of Cancel: the question has a Cancel of its own, which keeps the dialog open."""
@@ -581,9 +432,6 @@ class SettingsDialog(QDialog):
         self.tree.itemSelectionChanged.connect(self._on_tree)
         self.page.edited.connect(self._on_edited)
         self.page.reset_asked.connect(self._on_reset)
-        self.profile_row.chosen.connect(self._choose_profile)
-        self.profile_row.save_asked.connect(self._ask_save_profile)
-        self.profile_row.delete_asked.connect(self._delete_profile)
         self.status.linkActivated.connect(self.go_to)
         self.question.closed.connect(lambda: self._show_question(False))
         self.reset_all.clicked.connect(lambda _on=False: self._ask_reset_all())
@@ -631,10 +479,9 @@ class SettingsDialog(QDialog):
         self.splitter.setSizes([_TREE_PX, _SIZE[0] - _TREE_PX])
         self.question.hide()
         self.save.setObjectName("main_button")
-        top = line((self.search, 2), (self.profile_row, 3), spacing=20)
         buttons = self.reset_all, self.cancel, self.save, self.save_and_restart
         bottom = line((self.status, 1), (self.question, 1), *buttons, spacing=8)
-        self.setLayout(column(top, self.notice, (self.splitter, 1), bottom, spacing=8, margins=(theme.GAP,) * 4))
+        self.setLayout(column(self.search, self.notice, (self.splitter, 1), bottom, spacing=8, margins=(theme.GAP,) * 4))
         for button in self.findChildren(QPushButton):
             button.setAutoDefault(False)
 

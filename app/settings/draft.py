@@ -156,7 +156,7 @@ class SettingsDraft:
         self._check_sections()
 
     def load(self, config: Config) -> None:
-        """Replace the whole configuration by that of a profile."""
+        """Replace the whole configuration."""
         self._entries.clear()
         self._errors.clear()
         self._set_data(config.model_dump(mode="json"), kept=self._data)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 FIXED = (
     "ADVISORY", "ARMED", "AUTONOMOUS", "HOLD", "STOPPED", "stop", "acknowledge", "arm", "hand over", "take back", "disarm",
     "port closed", "disarmed", "armed", "stopped", "quiet",
-    "a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit", "was no TOML",
+    "was no TOML",
     "was changed meanwhile", "had values that are not allowed", "too much is wrong", "right", "left", "up", "down", "advance",
     "rotation", "delivery_1", "delivery_2", "total", "prepare", "network", "masks", "skeletons", "gaps", "graph", "path",
     "pose", "sensitivity",

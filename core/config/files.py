@@ -1,4 +1,4 @@
-"""Settings files and profiles: what differs from the defaults, as TOML in the user's configuration folder. No user data is lost.
+"""Settings files: what differs from the defaults, as TOML in the user's configuration folder. No user data is lost.
 
 Reading uses what is valid and reports the rest. Writing keeps comments and unknown keys where they are; before anything else would
 be lost (a file that is no TOML, a value that is not allowed, a change made meanwhile) the old file is kept as ``NAME.bad-<time>``.
@@ -7,7 +7,6 @@ be lost (a file that is no TOML, a value that is not allowed, a change made mean
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import time
 import tomllib
@@ -22,10 +21,9 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Table
 from tomlkit.toml_document import TOMLDocument
 
-from core.config.models import RESOURCES, Config, ConfigError, load_config, merge
+from core.config.models import Config, ConfigError, load_config, merge
 from core.config.schema import JOINTS, FieldKind, setting_at, settings_by_key, value_at
 from core.config.section import plain_message
-from core.devices import UserError
 from core.files import write_atomic
 from core.messages import message
 
@@ -306,14 +304,6 @@ def _put_joints(document: TOMLDocument, joints: list[dict[str, Any]]) -> None:
     servos["joints"] = tables
 
 
-_NAME = re.compile(r"^[\w][\w .()+-]{0,59}$")
-_ENDING = ".toml"
-
-
-class ProfileError(UserError):
-    """A profile cannot be saved, found or deleted; one line says what to do."""
-
-
 def settings_folder() -> Path:
     """The user's configuration folder; it need not exist."""
     return Path(platformdirs.user_config_dir("LumenPilot", appauthor=False))
@@ -337,90 +327,3 @@ def settings_of_windows(named: Path | None = None) -> SettingsFile:
 def own_config() -> Config:
     """The user's own configuration, for a window that cannot change it; no file is touched."""
     return read_settings(own_settings_path(), may_move=False).config
-
-
-@dataclass(frozen=True, slots=True)
-class Profile:
-    """A named set of settings. Presets come with the program and cannot be changed."""
-
-    name: str
-    path: Path
-    is_preset: bool = False
-
-
-class Profiles:
-    """The profiles in a folder, and the presets that come with the program."""
-
-    def __init__(self, folder: Path | None = None) -> None:
-        self._folder = folder if folder is not None else settings_folder() / "profiles"
-
-    @property
-    def folder(self) -> Path:
-        """Where the user's profiles are."""
-        return self._folder
-
-    def all(self) -> tuple[Profile, ...]:
-        """Presets first, then the user's by name; a folder that cannot be read has none."""
-        presets = sorted((RESOURCES / "config").glob(f"preset_*{_ENDING}"))
-        try:
-            own = sorted((p for p in self._folder.glob(f"*{_ENDING}") if p.is_file()), key=lambda p: p.stem.casefold())
-        except OSError:
-            own = []
-        shipped = [Profile(path.stem.removeprefix("preset_"), path, is_preset=True) for path in presets]
-        return (*shipped, *(Profile(path.stem, path) for path in own if _NAME.match(path.stem)))
-
-    def load(self, profile: Profile) -> SettingsFile:
-        """Its settings. Raises ProfileError when the file is gone; other problems are among ``SettingsFile.problems``."""
-        if not profile.path.is_file():
-            raise ProfileError("profile {name}: it is no longer there ({path})", name=profile.name, path=profile.path)
-        return read_settings(profile.path)
-
-    def save(self, name: str, config: Config) -> tuple[Profile, str]:
-        """Save under a name, over an older one of that name. Raises ProfileError.
-
-        Returns
-        -------
-        profile : as saved.
-        note : empty, or one line about where a damaged older file is kept.
-        """
-        name = check_name(name)
-        if any(profile.is_preset and profile.name.casefold() == name.casefold() for profile in self.all()):
-            raise ProfileError("profile {name}: a preset has this name; choose another one", name=name)
-        profile = Profile(name, self._folder / f"{name}{_ENDING}")
-        try:
-            return profile, write_settings(profile.path, config)
-        except ConfigError as error:
-            raise ProfileError(str(error)) from None
-
-    def delete(self, profile: Profile) -> None:
-        """Delete one of the user's. Raises ProfileError."""
-        if profile.is_preset:
-            raise ProfileError("profile {name}: it comes with the program and cannot be deleted", name=profile.name)
-        try:
-            profile.path.unlink()
-        except FileNotFoundError:
-            pass
-        except OSError as error:
-            raise ProfileError("profile {name}: cannot be deleted ({why})", name=profile.name, why=error.strerror) from None
-
-    def exists(self, name: str) -> bool:
-        """Whether the user has one of this name."""
-        return (self._folder / f"{name.strip()}{_ENDING}").is_file()
-
-    def matching(self, config: Config) -> Profile | None:
-        """The first profile with exactly this configuration, or None."""
-        for profile in self.all():
-            try:
-                if load_config(profile.path) == config:
-                    return profile
-            except ConfigError:  # reported when it is chosen
-                continue
-        return None
-
-
-def check_name(name: str) -> str:
-    """The name without blanks around it. Raises ProfileError for one that makes no good file name."""
-    name = name.strip()
-    if not _NAME.match(name):
-        raise ProfileError("a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit")
-    return name

@@ -15,7 +15,7 @@ from app.operator.window import OperatorWindow
 from app.settings.apply import SettingsController
 from app.ui import theme
 from app.ui.texts import OperatorStep
-from core.config.files import Profiles, read_settings
+from core.config.files import read_settings
 from core.config.models import Config, PerceptionConfig, load_config
 from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
 from core.control.modes import Act, Mode
@@ -46,7 +46,7 @@ class Bench:
         file = read_settings(self.path)
         config = file.config.model_copy(update={"record": file.config.record.model_copy(update={"ring_s": 0.0})})
         self.window: OperatorWindow = make_window(open_engine, config)
-        self.desk = SettingsController(self.window, file, self._perceive_again, Profiles(folder / "profiles"))
+        self.desk = SettingsController(self.window, file, self._perceive_again)
         self.window.start()
         self.desk.start()
 

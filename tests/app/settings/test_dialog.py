@@ -1,4 +1,4 @@
-"""The dialog: fields from the schema, search, marks, resets, profiles; it works by keyboard and Space is left to STOP."""
+"""The dialog: fields from the schema, search, marks, resets; it works by keyboard and Space is left to STOP."""
 
 from pathlib import Path
 
@@ -11,7 +11,6 @@ from pytestqt.qtbot import QtBot
 from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
 from app.settings.fields import NumberEdit, SettingField
-from core.config.files import Profiles
 from core.config.models import RESOURCES, Config, load_config
 from core.config.schema import schema, settings_by_key
 from tests.core.robots import TURNED
@@ -21,13 +20,8 @@ Key = Qt.Key
 
 
 @pytest.fixture
-def profiles(tmp_path: Path) -> Profiles:
-    return Profiles(tmp_path / "profiles")
-
-
-@pytest.fixture
-def dialog(qtbot: QtBot, themed: None, profiles: Profiles) -> SettingsDialog:
-    made = SettingsDialog(SettingsDraft(load_config()), Path("settings.toml"), profiles)
+def dialog(qtbot: QtBot, themed: None) -> SettingsDialog:
+    made = SettingsDialog(SettingsDraft(load_config()), Path("settings.toml"))
     made.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose, False)
     qtbot.addWidget(made)
     made.show()
@@ -165,9 +159,9 @@ def test_resets_of_section_and_of_all(dialog: SettingsDialog) -> None:
     assert dialog.draft.value("advice.fast_mm_s") == 8.0
     assert dialog.draft.value(D_ALLOW) == 9.0
     dialog.reset_all.click()
-    assert dialog.profile_row.question.text == "Put all settings back to their defaults?"
+    assert dialog.question.text == "Put all settings back to their defaults?"
     assert dialog.draft.value(D_ALLOW) == 9.0, "asked first"
-    dialog.profile_row.question._on_yes()
+    dialog.question._on_yes()
     assert dialog.draft.config == load_config()
 
 
@@ -232,47 +226,8 @@ def test_up_and_down_step_by_what_fits_the_number(qtbot: QtBot, text: str, is_wh
     assert edit.text() == after
 
 
-def test_profiles_are_saved_chosen_and_deleted_in_the_row(dialog: SettingsDialog, profiles: Profiles) -> None:
-    row = dialog.profile_row
-    type_into(dialog, D_ALLOW, "9")
-    row.save_button.click()
-    QTest.keyClicks(row.name, "bench")
-    QTest.keyClick(row.name, Key.Key_Return)
-    assert [profile.name for profile in profiles.all()] == ["paper", "bench"]
-    assert row.combo.currentText() == "bench"
-    dialog.draft.load(load_config())
-    dialog._changed()
-    assert row.combo.currentText() == "Own settings"
-    row.chosen.emit(profiles.all()[1])
-    assert dialog.draft.value(D_ALLOW) == 9.0
-    assert row.combo.currentText() == "bench"
-    row.delete_button.click()
-    assert row.question.text == "Delete the profile bench?"
-    assert len(profiles.all()) == 2, "asked first"
-    row.question._on_yes()
-    assert [profile.name for profile in profiles.all()] == ["paper"]
-
-
-def test_the_paper_preset_is_a_profile_that_cannot_be_deleted(dialog: SettingsDialog, profiles: Profiles) -> None:
-    dialog.profile_row.chosen.emit(profiles.all()[0])
-    assert dialog.draft.config == load_config(preset="paper")
-    assert dialog.profile_row.combo.currentText() == "paper (preset)"
-    assert not dialog.profile_row.delete_button.isEnabled()
-
-
-def test_a_name_that_is_taken_is_asked_about(dialog: SettingsDialog, profiles: Profiles) -> None:
-    profiles.save("bench", load_config())
-    type_into(dialog, D_ALLOW, "9")
-    dialog.profile_row.save_asked.emit("bench")
-    assert "already" in dialog.profile_row.question.text
-    dialog.profile_row.question.cancel()
-    assert profiles.load(profiles.all()[1]).config == load_config()
-    dialog.profile_row.save_asked.emit("../x")
-    assert "1 to 60 letters" in dialog.notice.text()
-
-
-def test_what_was_wrong_with_the_file_is_shown(qtbot: QtBot, themed: None, profiles: Profiles) -> None:
-    made = SettingsDialog(SettingsDraft(load_config()), Path("x.toml"), profiles, ("x.toml: future: unknown key",))
+def test_what_was_wrong_with_the_file_is_shown(qtbot: QtBot, themed: None) -> None:
+    made = SettingsDialog(SettingsDraft(load_config()), Path("x.toml"), ("x.toml: future: unknown key",))
     made.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose, False)
     qtbot.addWidget(made)
     made.show()

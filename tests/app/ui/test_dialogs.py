@@ -32,7 +32,6 @@ from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
 from app.training.dialog import TrainingDialog
 from app.training.model import TrainingPhase, TrainingState
-from core.config.files import Profiles
 from core.config.models import Config, load_config
 from core.control.drive_view import DriveView
 from hardware.calibration.bench import CalibrationBench
@@ -63,8 +62,8 @@ def wizard(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 
 
 @pytest.fixture
-def settings(qtbot: QtBot, tmp_path: Path) -> SettingsDialog:
-    made = SettingsDialog(SettingsDraft(load_config()), Path("settings.toml"), Profiles(tmp_path))
+def settings(qtbot: QtBot) -> SettingsDialog:
+    made = SettingsDialog(SettingsDraft(load_config()), Path("settings.toml"))
     made.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose, False)
     qtbot.addWidget(made)
     made.show()

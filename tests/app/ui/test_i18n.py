@@ -25,7 +25,7 @@ from app.ui.actions import LanguageMenu, plain
 from app.ui.i18n import AUTO, CHINESE, ENGLISH, LOCALE, english_texts, language_in_use, tr, tr_text, use_language
 from app.ui.texts import QUANTITY, advice_headline, tip
 from core.annotation.model import Annotation, Status
-from core.config.files import Profiles, read_settings
+from core.config.files import read_settings
 from core.config.models import Config, QualityConfig
 from core.config.schema import Bounds
 from core.control.alerts import ALERTS
@@ -334,7 +334,7 @@ def test_the_choice_is_kept_and_said_in_both_languages(make_window: MakeWindow, 
     path = tmp_path / "settings.toml"
     path.write_text("# mine\n[advice]\nfast_mm_s = 7.0\n", encoding="utf-8")
     window = make_window()
-    desk = SettingsController(window, read_settings(path), lambda *_asked: None, Profiles(tmp_path / "profiles"))
+    desk = SettingsController(window, read_settings(path), lambda *_asked: None)
     menu = _language_menu(window)
     assert [action.text() for action in menu.actions()] == ["As the &system says", "English", "中文"]
     assert [action.isChecked() for action in menu.actions()] == [True, False, False]
@@ -355,9 +355,7 @@ def test_a_choice_that_cannot_be_kept_is_said_and_taken_back(make_window: MakeWi
     folder = tmp_path / "file"
     folder.write_text("no folder", encoding="utf-8")
     window = make_window()
-    desk = SettingsController(
-        window, read_settings(folder / "settings.toml"), lambda *_asked: None, Profiles(tmp_path / "profiles")
-    )
+    desk = SettingsController(window, read_settings(folder / "settings.toml"), lambda *_asked: None)
     menu = _language_menu(window)
     menu.actions()[1].trigger()
     assert "cannot be written" in window.panels.toast.text()
