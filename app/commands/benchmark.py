@@ -255,7 +255,6 @@ def _accuracy_of(folder: Path, config: Config, bench: Bench | None, *, true_mask
     from core.evaluation.accuracy import TrueMasks, score_set, summarise, summarise_looks
     from core.evaluation.confidence import describe_confidence, describe_gates
     from core.learning.dataset import POSE_KEYS, find_labelled
-    from core.perception.model_file import model_folder, trained_without
     from core.perception.pipeline import Pipeline, open_pipeline
 
     samples, truth = find_labelled(folder, POSE_KEYS)
@@ -281,8 +280,7 @@ def _accuracy_of(folder: Path, config: Config, bench: Bench | None, *, true_mask
         figures |= {"interrupted": True, "frames_of_set": len(samples)}
     looks = {stem: str(row["family"]) for stem, row in truth.items() if row.get("family") is not None}
     if scores and all(score.stem in looks for score in scores):
-        without = [] if true_masks else trained_without(model_folder(config.perception.segmentation.model))
-        figures |= summarise_looks(scores, looks, without, confident_from)
+        figures |= summarise_looks(scores, looks, confident_from)
     return figures, interrupted
 
 

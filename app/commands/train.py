@@ -46,21 +46,18 @@ class TrainOptions:
     out : folder of the new model.
     data : labelled folders.
     synthetic : frames to make besides.
-    without : families of looks that are left out of both.
     held_out : labelled frames that stay out of training and say whether it helped.
     scenes : folders of scenes, from which crops are painted.
-    init : the model to begin with; None: a new network, plain of width ``base``, or as the shipped one, or ``shallow``.
+    init : the model to begin with; None: a new network, plain of width ``base``, or as the shipped one.
     tip : train the network of the tip refinement of ``init``.
     """
 
     out: Path
     data: Sequence[Path] = ()
     synthetic: int = 0
-    without: Sequence[str] = ()
     held_out: Path | None = None
     init: str | None = None
     base: int | None = None
-    shallow: bool = False
     tip: bool = False
     scenes: Sequence[Path] = ()
 
@@ -79,10 +76,6 @@ def train(
     remember: Annotated[
         int, typer.Option(min=0, help="for few frames of a new look: as often show so many of the twin, that nothing is forgotten")
     ] = 0,
-    shallow: Annotated[bool, typer.Option("--shallow", help="a new network of two convolutions on every level")] = False,
-    without: Annotated[
-        list[str] | None, typer.Option(help="leave out frames of this family of looks, to be tested on; may be repeated")
-    ] = None,
     second_look: Annotated[
         bool, typer.Option("--second-look", help="train the network of the --init model's second look, near the robot's ends")
     ] = False,
@@ -90,15 +83,10 @@ def train(
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="train for so long; the rate falls with the time, and --steps is the most")
     ] = None,
-    stop_after: Annotated[int | None, typer.Option(min=1, help="end after so many of the steps, to go on with --init")] = None,
     batch: Annotated[int, typer.Option(min=1, max=512)] = 12,
     rate: Annotated[float, typer.Option(min=1e-6, max=0.1, help="peak learning rate")] = 1e-2,
     crop: Annotated[int, typer.Option(min=64, max=2048, help="side of the training crops, working pixels")] = 256,
     look_share: Annotated[float, typer.Option(min=0, max=1, help="share of the crops whose look is changed at random")] = 1.0,
-    strips: Annotated[float, typer.Option(min=0, max=1, help="share of the crops in which clips are laid over the robot")] = 0.0,
-    focus: Annotated[
-        float, typer.Option(min=0, max=0.9, help="share of the crops that show what the --init model finds hard")
-    ] = 0.0,
     end_weight: Annotated[
         float, typer.Option(min=0, max=20, help="how much more than elsewhere a pixel counts near the robot's ends")
     ] = 0.0,
@@ -118,8 +106,8 @@ def train(
     """Train or fine-tune the network; Ctrl-C keeps what was learnt."""
     if remember and (synthetic or not data or init is None):
         raise UserError("--remember N is for --data DIR and --init MODEL, without --synthetic")
-    if minutes is not None and (remember or stop_after is not None):
-        raise UserError(f"--minutes is for a training without {'--remember' if remember else '--stop-after'}; give --steps")
+    if minutes is not None and remember:
+        raise UserError("--minutes is for a training without --remember; give --steps")
     steps = steps or (_STEPS if minutes is None else _MOST_STEPS)
     plan = TrainingPlan(
         steps=steps,
@@ -128,13 +116,10 @@ def train(
         warmup_steps=min(100, max(1, steps // 10)),
         crop=(crop, crop),
         look_share=look_share,
-        strip_share=strips,
-        focus_share=focus,
         end_weight=end_weight,
         robot_weight=robot_weight,
         keeps_statistics=remember > 0,
         scene_share=scene_share,
-        stop_after=stop_after,
         seconds=None if minutes is None else 60 * minutes,
         seed=seed,
         threads=threads,
@@ -142,7 +127,7 @@ def train(
     if progress_json:
         report_progress()
     frames = synthetic or remember
-    run_train(TrainOptions(out, data or (), frames, without or (), held_out, init, base, shallow, second_look, scenes or ()), plan)
+    run_train(TrainOptions(out, data or (), frames, held_out, init, base, second_look, scenes or ()), plan)
 
 
 def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
@@ -150,17 +135,16 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
 
     Where the plan keeps the normalisation, ``data`` is shown as often as the frames made now, and the tip refinement is trained.
     """
-    from core.learning.dataset import DatasetError, without_masks
+    from core.learning.dataset import DatasetError, find_samples, without_masks
+    from core.learning.scenes import find_scenes
 
     need_package("torch")
     init = options.init
-    looks = _looks_to_make(options)
     end_like_an_interrupt()
     _check_choices(options, plan)
-    out, began_with = _check_places(options)
+    out = _check_places(options)
     folders = list(options.data)
-    samples = [sample for folder in folders for sample in _samples_of(folder, options.without)]
-    scenes = [path for folder in options.scenes for path in _scenes_of(folder, options.without)]
+    samples, scenes = find_samples(folders), find_scenes(options.scenes)
     if left_out := without_masks(folders):
         first = left_out[0]
         masks = f"masks/{first.stem}_vessel.png and masks/{first.stem}_robot.png"
@@ -172,24 +156,18 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
     from core.learning.training import LoaderLost
 
     if options.synthetic:
-        folder, made = _make_frames(out, options, looks, plan)
+        folder, made = _make_frames(out, options, plan)
         if plan.keeps_statistics:  # few frames of a new look, shown as often as all that is to be remembered
             samples *= max(1, round(options.synthetic / len(samples)))
         folders.append(folder)
         samples += made
     torch.manual_seed(plan.seed)
-    task: TrainingTask = (
-        TipTraining(samples, init)
-        if options.tip
-        else FrameTraining(samples, init, options.base, shallow=options.shallow, scenes=scenes)
-    )
+    task: TrainingTask = TipTraining(samples, init) if options.tip else FrameTraining(samples, init, options.base, scenes=scenes)
     plan = replace(plan, crop=task.crop_size(plan.crop))
     then = None if options.tip else tip_plan(plan, init)
     notes: dict[str, Any] = {"init": init, "frames": len(samples), "sets": [_described(folder) for folder in folders]}
     if scenes:
         notes |= {"scenes": len(scenes), "scene_sets": [_described(folder) for folder in options.scenes]}
-    if without := _never_seen(options.without, began_with):
-        notes |= {"without": without}
     with disk_errors(DatasetError, out.parent, "cannot be written", "; choose another --out"):
         log = out.with_name(out.name + ".log").open("a", encoding="utf-8", buffering=1)
     writer = progress_writer()
@@ -221,48 +199,26 @@ def run_train(options: TrainOptions, plan: TrainingPlan) -> None:
     console.print(f"model written to {out}{ending}", soft_wrap=True)
 
 
-def _looks_to_make(options: TrainOptions) -> tuple[str, ...] | None:
-    """Families of the frames made now; None: all. Raises DatasetError when ``without`` names an unknown one, or leaves none."""
-    from core.learning.dataset import DatasetError
-    from hardware.twin.catalog import LOOKS
-    from hardware.twin.rendering.presets import LOOK_FAMILIES
-
-    unknown = next((look for look in options.without if look not in LOOKS), None)
-    if unknown is not None:
-        raise DatasetError(f"unknown look family {unknown!r} in --without; known: {', '.join(LOOKS)}")
-    looks = tuple(look for look in LOOK_FAMILIES if look not in options.without)
-    if options.synthetic and not looks:
-        raise DatasetError("--without leaves no family of looks to make frames of; name fewer")
-    return looks if options.without else None
-
-
 def _check_choices(options: TrainOptions, plan: TrainingPlan) -> None:
     """Raise DatasetError for options that could have no effect beside the others."""
     from core.learning.dataset import DatasetError
 
     init, tip = options.init, options.tip
-    shapes = [name for name, given in {"--base": options.base is not None, "--shallow": options.shallow}.items() if given]
-    first, default = next(iter(shapes), ""), TrainingPlan()
+    first, default = "--base" if options.base is not None else "", TrainingPlan()
     windows = "--crop is for whole pictures: the second look has windows of its own size; leave it out"
-    late = f"--stop-after {plan.stop_after} is no earlier than the end, --steps {plan.steps}; leave it out"
     problems = (
-        (len(shapes) > 1, f"{' and '.join(shapes)} contradict each other; give one of them"),
         (tip and first, f"{first} is for the first look; with --second-look leave it out"),
         (init and first, f"{first} shapes a new network; the one of --init {init} has its shape: leave one of them out"),
-        (init is None and plan.focus_share > 0, "--focus needs --init MODEL, which tells what is hard"),
-        (plan.focus_share > 0 and not (options.data or options.synthetic), "--focus is for labelled frames; give --data DIR, too"),
         (tip and options.scenes, "--scenes is for whole pictures; with --second-look leave it out"),
-        (tip and plan.strip_share > 0, "--strips is for whole pictures; with --second-look leave it out"),
         (tip and plan.crop != default.crop, windows),
-        (plan.stop_after is not None and plan.stop_after >= plan.steps, late),
     )
     for applies, problem in problems:
         if applies:
             raise DatasetError(problem)
 
 
-def _check_places(options: TrainOptions) -> tuple[Path, Path | None]:
-    """Where the model goes, and the folder of the one that is trained on; raises DatasetError, ModelError."""
+def _check_places(options: TrainOptions) -> Path:
+    """Where the model goes; raises DatasetError, ModelError."""
     from core.learning.dataset import DatasetError, find_samples
     from core.learning.model_writer import check_can_write, check_outside
     from core.perception.model_file import INFO, model_folder
@@ -285,47 +241,22 @@ def _check_places(options: TrainOptions) -> tuple[Path, Path | None]:
             raise DatasetError(f"{read}: lies within --out, which is replaced now and then; choose another --out")
     if held_out is not None:
         find_samples([held_out])  # raises without any
-    return out, began_with
+    return out
 
 
-def _make_frames(out: Path, options: TrainOptions, looks: tuple[str, ...] | None, plan: TrainingPlan) -> tuple[Path, list[Sample]]:
-    """Frames of these `looks` in a folder beside the model's; raises DatasetError."""
+def _make_frames(out: Path, options: TrainOptions, plan: TrainingPlan) -> tuple[Path, list[Sample]]:
+    """Frames of the twin in a folder beside the model's; raises DatasetError."""
     from core.learning.dataset import DatasetError, find_samples
     from hardware.twin.dataset import SynthFolderError
 
     folder = out.with_name(out.name + "_frames")
     first = 1_000_000 + plan.seed % 10 * 100_000  # trials have the seeds from 2000000 on
     try:
-        make_set(folder, options.synthetic, first, families=looks)
+        make_set(folder, options.synthetic, first)
     except SynthFolderError as error:  # the folder goes with --out, and the set in it with these options
-        made = "frames are made there: give --seed, --without and their number as before, or choose another --out"
+        made = "frames are made there: give --seed and their number as before, or choose another --out"
         raise DatasetError(f"{error.problem}; {made}") from None
     return folder, find_samples([folder])
-
-
-def _never_seen(without: Sequence[str], init: Path | None) -> list[str]:
-    """Looks that neither this training sees nor the one that it begins with has seen; the others are reported."""
-    from core.perception.model_file import trained_without
-
-    unseen = [look for look in without if init is None or look in trained_without(init)]
-    if known := [look for look in without if look not in unseen]:
-        sys.stderr.write(f"note: {', '.join(known)} are left out now, but {init} may have been trained with them\n")
-    return unseen
-
-
-def _samples_of(folder: Path, without: Sequence[str]) -> list[Sample]:
-    from core.learning.dataset import find_samples, leave_out_looks
-
-    found = find_samples([folder])
-    return leave_out_looks(folder, found, without) if without else found
-
-
-def _scenes_of(folder: Path, without: Sequence[str]) -> list[Path]:
-    from core.learning.dataset import leave_out_looks
-    from core.learning.scenes import find_scenes
-
-    found = find_scenes([folder])
-    return leave_out_looks(folder, found, without) if without else found
 
 
 def _described(folder: Path) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from app.commands.progress import Interrupt, ProgressWriter
 from app.ui import palette
 from core.config.models import SegmentationConfig
 from core.devices import UserError
-from core.evaluation.accuracy import difficulty
 from core.learning.augmentation import Crop, CropDataset, FrameCrops, PriorViews, TipCrops
 from core.learning.dataset import WORKING_SIZE_PX, DatasetError, Sample, find_samples, write_png
 from core.learning.model_writer import save_model, save_with_second_look
@@ -75,7 +74,6 @@ class FrameTraining:
         init: str | None,
         base: int | None = None,
         *,
-        shallow: bool = False,
         examples: int | None = None,
         scenes: Sequence[Path] = (),
     ) -> None:
@@ -83,7 +81,7 @@ class FrameTraining:
         self._tip_model: Path | None = None
         self._crops: Dataset[Crop] | None = None
         if init is None:
-            self.network = DualUNet(UNetShape.of_base(base) if base else default_shape(deep=not shallow))
+            self.network = DualUNet(UNetShape.of_base(base) if base else default_shape())
         else:
             check_model(init)  # a damaged tip refinement is refused before hours of training, too
             self.network = load_network(model_folder(init))[0]
@@ -97,16 +95,7 @@ class FrameTraining:
         if not self._samples:
             self._crops = SceneCrops(self._scenes, plan)
             return self._crops
-        weights: np.ndarray | None = None
-        if self._init is not None and plan.focus_share > 0:
-            segment = open_segmenter(_segmentation(self._init, plan))
-            found = []
-            for sample in bar.track(self._samples, description="finding hard frames"):
-                if interrupt.asked:
-                    return None
-                found.append(difficulty(sample, segment))
-            weights = np.array(found)
-        frames = FrameCrops(self._samples, plan, weights)
+        frames = FrameCrops(self._samples, plan)
         self._crops = MixedCrops(self._scenes, frames, plan) if self._scenes else frames
         return self._crops
 
@@ -172,9 +161,9 @@ class TipTraining:
 TrainingTask = FrameTraining | TipTraining
 
 
-def default_shape(*, deep: bool = True) -> UNetShape:
+def default_shape() -> UNetShape:
     """The shipped network: chosen in docs/method.md by accuracy against time on two cores without bf16."""
-    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4) if deep else (2, 2, 2, 2, 2))
+    return UNetShape((16, 32, 64, 128, 192), (16, 24, 48, 64), 1, 2, (2, 2, 3, 4, 4))
 
 
 def _segmentation(model: str, plan: TrainingPlan) -> SegmentationConfig:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from core.config.models import PoseConfig, QualityConfig, VectorConfig
 from core.evaluation.metrics import kappa
-from core.learning.dataset import UNMEASURED, WORKING_SIZE_PX, DatasetError, Sample
+from core.learning.dataset import UNMEASURED, DatasetError, Sample
 from core.perception.pipeline import Pipeline
 from core.perception.pose import room_px
 from core.perception.segmentation import Segmenter
@@ -22,7 +22,6 @@ WRONG_DEG, WRONG_PX = 10.0, 15.0  # an answer whose theta or head is off by more
 TOSS_UP_PX = 0.25  # a pose that is so near to another state is a toss-up
 _CONFIDENT_FROM = QualityConfig().confident_from
 _STATES, _LENGTH_PX = PoseConfig(), VectorConfig().robot_length_px  # that the truth's states are made with
-_LEAST_DIFFICULTY = 0.02  # of a frame that is known by heart: it may still be drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,28 +237,23 @@ _PER_LOOK = (
 def summarise_looks(
     scores: Sequence[FrameScore],
     looks: Mapping[str, str],
-    unseen: Collection[str] = (),
     confident_from: float = _CONFIDENT_FROM,
 ) -> dict[str, Any]:
     """The main figures of every family of looks, errors as medians, and their means over the looks.
 
-    Returns ``looks`` (figures by family), ``mean_over_looks`` and, where some were left out, ``mean_over_looks_left_out``.
+    Returns ``looks`` (figures by family) and ``mean_over_looks``.
 
     Parameters
     ----------
     scores : of the frames.
     looks : family of every frame, by its stem.
-    unseen : families that training has left out; their mean is separate.
     confident_from : as ``summarise`` has it.
     """
     rows: dict[str, dict[str, Any]] = {}
     for look in sorted({looks[score.stem] for score in scores}):
         sums = summarise([score for score in scores if looks[score.stem] == look], confident_from)
         rows[look] = {key: sums[key]["median"] if isinstance(sums[key], dict) else sums[key] for key in _PER_LOOK}
-    left_out = [row for look, row in rows.items() if look in unseen]
-    trained = [row for look, row in rows.items() if look not in unseen]
-    means = {"mean_over_looks": _means(trained)} if trained else {}
-    return {"looks": rows} | means | ({"mean_over_looks_left_out": _means(left_out)} if left_out else {})
+    return {"looks": rows, "mean_over_looks": _means(list(rows.values()))}
 
 
 def _means(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -276,14 +270,3 @@ def _pearson(pairs: Sequence[tuple[float, float]]) -> float | None:
     if len(pairs) < 3 or np.ptp(columns, axis=1).min() == 0.0:
         return None
     return float(np.corrcoef(columns)[0, 1])
-
-
-def difficulty(sample: Sample, segment: Segmenter) -> float:
-    """1 - Dice of the robot plus half of 1 - Dice of the vessel, at least ``_LEAST_DIFFICULTY``; raises DatasetError.
-
-    The vessel counts half: it is seen in nearly every frame, and where the robot is lost nothing can be answered.
-    """
-    image, vessel, robot = sample.load(WORKING_SIZE_PX)
-    vessel_probability, robot_probability = segment(image)
-    lost = 1 - dice(robot_probability >= 0.5, robot) + 0.5 * (1 - dice(vessel_probability >= 0.5, vessel))
-    return max(_LEAST_DIFFICULTY, lost)

@@ -176,16 +176,6 @@ LAST_SHARE = 0.5
 """Share of the tip windows that come with the masks after refinement: a refinement may be followed by another one."""
 JITTER_PX = 10.0
 """Standard deviation of a window's centre around the place that it shows."""
-WRONG_JITTER_PX = 30.0
-"""The same for windows that show a piece that was missed or invented."""
-EDGE_PX = 4
-"""Pixels that are wrong at a larger distance than this from the robot's outline are no blur of it."""
-WALL_PX = 3
-"""The same for a vessel's wall, where the line between the walls may lie more than a pixel aside."""
-WALL_REACH_PX = 60.0
-"""Distance from the robot's ends within which walls count: the vessel's vector is fitted to 20 px to each side of the head."""
-_WRONG_PLACES = 32
-"""About so many places are kept of the pixels that were wrong."""
 END_REACH_PX = 20.0
 """Standard deviation of what counts as near to a robot's end: half of the 40 px that its vector and the vessel's are fitted to."""
 BORDER_PX = 8.0
@@ -233,14 +223,7 @@ class CropDataset(Dataset[Crop]):
 
 
 class FrameCrops(CropDataset):
-    """Crops for the network of whole pictures: of ``plan.crop``, turned, scaled and mirrored, most of them near the robot.
-
-    `difficulty`, one weight > 0 per sample, says where ``plan.focus_share`` of the crops come from.
-    """
-
-    def __init__(self, samples: list[Sample], plan: TrainingPlan, difficulty: NDArray[np.float64] | None = None) -> None:
-        super().__init__(samples, plan)
-        self._chances = None if difficulty is None else np.cumsum(difficulty) / np.sum(difficulty)
+    """Crops for the network of whole pictures: of ``plan.crop``, turned, scaled and mirrored, most of them near the robot."""
 
     def __getitem__(self, index: int) -> Crop:
         rng = np.random.default_rng((self._plan.seed, index))
@@ -249,13 +232,9 @@ class FrameCrops(CropDataset):
             image, (vessel, robot, doubtful) = random_clutter(size, rng), np.zeros((3, *size), bool)
         else:
             place = self.place_of(index)
-            if self._chances is not None and rng.random() < self._plan.focus_share:
-                place = int(np.searchsorted(self._chances, rng.random(), side="right"))
             whole, *masks = self._kept.frame(self._samples[place])
             masks.append(self._kept.doubtful(self._samples[place], whole.shape))
             image, (vessel, robot, doubtful) = random_crop(whole, masks, size, rng)
-            if self._plan.strip_share > 0 and rng.random() < self._plan.strip_share:
-                image = with_strips(image, vessel, robot, rng)
         if rng.random() < self._plan.look_share:
             image = random_look(image, rng)
         return self.tensors(image, vessel, robot, doubtful)
@@ -283,49 +262,37 @@ class PriorView:
 
 @dataclass(frozen=True, slots=True)
 class PriorViews:
-    """Probabilities of a frame after the first pass, and the last ones: after tip refinement, where the model has one.
-
-    ``wrong`` are places on pieces of robot, and of vessel beside the robot's ends, that the last ones miss or invent.
-    """
+    """Probabilities of a frame after the first pass, and the last ones: after tip refinement, where the model has one."""
 
     first: PriorView
     last: PriorView
-    wrong: tuple[Point, ...] = ()
 
     @classmethod
     def at(cls, sample: Sample, segment: Segmenter, near: Segmenter | None = None) -> PriorViews:
         """Segment a frame, and refine it with `near`; raises DatasetError."""
-        image, vessel, robot = sample.load(WORKING_SIZE_PX)
+        image = sample.load(WORKING_SIZE_PX)[0]
         probabilities = segment(image)
         first = last = PriorView.of(*probabilities)
         if near is not None:
-            probabilities = refine_tips(image, probabilities, near)
-            last = PriorView.of(*probabilities)
-        found_vessel, found_robot = (probability >= np.float32(0.5) for probability in probabilities)
-        shifted = _wrong(found_vessel, vessel, WALL_PX) & (_distances(_true_ends(robot), robot.shape) <= WALL_REACH_PX)
-        return cls(first, last, tuple(_some_of(_wrong(found_robot, robot, EDGE_PX)) + _some_of(shifted)))
+            last = PriorView.of(*refine_tips(image, probabilities, near))
+        return cls(first, last)
 
 
 class TipCrops(CropDataset):
-    """Windows for the network of the tip refinement, with the probabilities there; `views` has one entry per sample.
-
-    ``plan.focus_share`` of them show a piece that was missed or invented, of any frame with one.
-    """
+    """Windows for the network of the tip refinement, with the probabilities there; `views` has one entry per sample."""
 
     def __init__(self, samples: list[Sample], views: list[PriorViews], plan: TrainingPlan) -> None:
         super().__init__(samples, plan)
         self._views = views
-        self._failed = [place for place, view in enumerate(views) if view.wrong]
 
     def __getitem__(self, index: int) -> Crop:
         rng = np.random.default_rng((self._plan.seed, index))
-        focused = self._plan.focus_share > 0 and bool(self._failed) and rng.random() < self._plan.focus_share
-        place = self._failed[int(rng.integers(len(self._failed)))] if focused else self.place_of(index)
+        place = self.place_of(index)
         sample, views = self._samples[place], self._views[place]
         image, vessel, robot = self._kept.frame(sample)
         seen = views.last if rng.random() < LAST_SHARE else views.first
         seen_vessel, seen_robot = self._kept.get((sample.image, seen is not views.first), seen.probabilities)
-        center = _beside(views.wrong, WRONG_JITTER_PX, robot, rng) if focused else _place(seen_robot, robot, seen.places, rng)
+        center = _place(seen_robot, robot, seen.places, rng)
         x, y, width, height = window_around(center, (image.shape[1], image.shape[0]), WINDOW_PX)
         part = np.s_[y : y + height, x : x + width]
         doubtful = self._kept.doubtful(sample, image.shape)
@@ -358,20 +325,6 @@ def _beside(places: tuple[Point, ...], jitter_px: float, robot: Mask, rng: Gener
     x, y = places[int(rng.integers(len(places)))] if places else (rng.uniform(0, width), rng.uniform(0, height))
     across, down = rng.normal(0, jitter_px, 2)
     return min(max(x + across, 0.0), width - 1.0), min(max(y + down, 0.0), height - 1.0)
-
-
-def _wrong(found: Mask, true: Mask, edge_px: int) -> Mask:
-    """Pixels missed at more than `edge_px` from all that was found, or invented at more than that from all that is true."""
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * edge_px + 1, 2 * edge_px + 1))
-    near_found, near_true = (cv2.dilate(mask.view(np.uint8), disc) > 0 for mask in (found, true))
-    return np.asarray((true & ~near_found) | (found & ~near_true))
-
-
-def _some_of(mask: Mask) -> list[Point]:
-    """Places (x, y) evenly over a mask, ``_WRONG_PLACES`` or some more."""
-    rows, columns = np.nonzero(mask)
-    step = max(1, len(rows) // _WRONG_PLACES)
-    return list(zip(columns[::step].astype(float).tolist(), rows[::step].astype(float).tolist(), strict=True))
 
 
 def end_nearness(robot: Mask) -> NDArray[np.uint8]:

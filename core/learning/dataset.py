@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
@@ -218,27 +218,6 @@ def find_labelled(folder: Path, needed: Sequence[str] = ()) -> tuple[list[Sample
         if missing:
             raise DatasetError(f"{folder}: truth of frame {row['stem']} lacks {missing[0]}; write the set again with synth")
     return samples, truth
-
-
-_Named = TypeVar("_Named", Sample, Path)
-
-
-def leave_out_looks(folder: Path, samples: Sequence[_Named], looks: Sequence[str]) -> list[_Named]:
-    """The samples, or scenes' files, of a folder whose truth names none of these families of looks.
-
-    Raises DatasetError when nothing is left, or when a frame's truth does not say which look it has.
-    """
-    try:
-        truth = read_truth(folder)
-    except DatasetError as error:
-        raise DatasetError(f"{error} (--without needs the looks that it names)") from None
-    unknown = next((sample.stem for sample in samples if truth.get(sample.stem, {}).get("family") is None), None)
-    if unknown is not None:
-        raise DatasetError(f"{folder}: truth.jsonl names no family of looks for frame {unknown}; leave --without out")
-    kept = [sample for sample in samples if truth[sample.stem]["family"] not in looks]
-    if not kept:
-        raise DatasetError(f"{folder}: every frame is of a look that is left out ({', '.join(looks)}); name fewer with --without")
-    return kept
 
 
 def write_mask(path: Path, mask: Mask) -> None:

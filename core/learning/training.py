@@ -223,7 +223,7 @@ def train(
         if done % checkpoint_every == 0 and share < 1.0:
             # A network on a GPU is copied: the original learns on there.
             on_checkpoint(average if device.type == "cpu" else copy.deepcopy(average).to("cpu"), done)
-        if should_stop() or share == 1.0 or done == plan.stop_after:
+        if should_stop() or share == 1.0:
             on_last(average.to("cpu"), done)
             break
     if failed:

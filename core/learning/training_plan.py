@@ -15,13 +15,10 @@ class TrainingPlan:
     crop : (height, width) in working pixels.
     clutter_share : share of the crops that show neither vessel nor robot.
     look_share : share of the crops that are changed in exposure, colour, sharpness and noise.
-    strip_share : share of the whole frames' crops in which clips lie over the robot.
-    focus_share : share of the crops that are drawn by difficulty.
     scene_share : share of the crops that are painted from scenes, where there are labelled frames, too.
     robot_weight : weight of the robot's loss beside the vessel's.
     end_weight : around the robot's true ends a pixel counts ``1 + end_weight`` times: theta and state are measured there.
     keeps_statistics : the normalisation stays as it was learnt: statistics of a few frames alike would ruin it for all others.
-    stop_after : step at which to end, before the learning rate has come down, for a run that another one continues.
     seconds : time that the training takes, whatever the machine: the learning rate falls with the time, and `steps` is the most.
     workers : processes that make the crops; 0: this one. For a GPU it is as many as there are cores, up to eight.
     """
@@ -36,12 +33,9 @@ class TrainingPlan:
     average_decay: float = 0.998
     robot_weight: float = 1.5
     look_share: float = 1.0
-    strip_share: float = 0.0
-    focus_share: float = 0.0
     scene_share: float = 0.5
     end_weight: float = 0.0
     keeps_statistics: bool = False
-    stop_after: int | None = None
     seconds: float | None = None
     seed: int = 0
     workers: int = 1

@@ -150,14 +150,6 @@ def check_files(info: ModelInfo, folder: Path, names: Sequence[str]) -> None:
             raise ModelError(f"{file}: SHA-256 differs from {INFO}: the file is cut or damaged; restore the model folder")
 
 
-def trained_without(folder: Path) -> tuple[str, ...]:
-    """The families of looks that none of its networks was trained with, as their ``model.json`` say. Raises ModelError."""
-    networks = [folder, *([near] if (near := second_look_of(folder)) is not None else [])]
-    without = [read_model_info(one, verify=()).training.get("without") for one in networks]
-    left_out = [[str(look) for look in looks] if isinstance(looks, list) else [] for looks in without]
-    return tuple(look for look in left_out[0] if all(look in others for others in left_out))
-
-
 def second_look_of(folder: Path) -> Path | None:
     """The folder of a model's tip refinement, None when it has none; ModelError when it is gone or of another model."""
     expected = read_model_info(folder, verify=()).second_look_sha256

@@ -151,7 +151,7 @@ def test_frames_made_for_a_training_name_the_options_that_they_hang_on(tmp_path:
     (tmp_path / "m_frames" / "plan.json").write_text("{}")
     with pytest.raises(SynthError, match=r"other settings .*; choose another folder"):
         write_set(plan)
-    with pytest.raises(UserError, match=r"m_frames: holds a set with other .*: give --seed, .*, or choose another --out$"):
+    with pytest.raises(UserError, match=r"m_frames: holds a set with other .*: give --seed and .*, or choose another --out$"):
         run_train(TrainOptions(tmp_path / "m", synthetic=4, base=4), TrainingPlan(steps=1, seed=3))
 
 
@@ -192,13 +192,9 @@ def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        (("--base", "8", "--shallow"), "--base and --shallow contradict each other"),
-        (("--init", "default", "--shallow"), "--shallow shapes a new network; the one of --init default has its shape"),
-        (("--init", "default", "--second-look", "--shallow"), "--shallow is for the first look"),
-        (("--focus", "0.5"), "--focus needs --init MODEL"),
-        (("--init", "default", "--second-look", "--strips", "0.2"), "--strips is for whole pictures"),
+        (("--init", "default", "--base", "8"), "--base shapes a new network; the one of --init default has its shape"),
+        (("--init", "default", "--second-look", "--base", "8"), "--base is for the first look"),
         (("--init", "default", "--second-look", "--crop", "384"), "--crop is for whole pictures"),
-        (("--steps", "10", "--stop-after", "10"), "--stop-after 10 is no earlier than the end, --steps 10"),
         (("--held-out", "{set}"), "is trained on, so that it cannot judge"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core.learning.augmentation import FrameCrops, end_nearness, random_clutter, random_crop, random_look, with_strips
-from core.learning.dataset import Sample, find_samples
+from core.learning.dataset import find_samples
 from core.learning.training_plan import TrainingPlan
 from tests.core.learning.toy_set import toy_set
 
@@ -95,21 +95,3 @@ def test_a_robot_does_not_end_where_it_is_cut_off(width: int) -> None:
     robot[60:76, 0] = True
     assert not end_nearness(robot).any(), "a sliver at the border"
     assert not end_nearness(np.zeros((160, 160), bool)).any()
-
-
-def test_hard_frames_are_shown_more_often(tmp_path: Path) -> None:
-    samples = find_samples([toy_set(tmp_path / "set", 4)])
-    plan = TrainingPlan(steps=100, batch=4, crop=(64, 64), clutter_share=0.0, look_share=0.0, focus_share=0.5)
-    crops = FrameCrops(samples, plan, np.array([0.01, 0.01, 0.01, 0.97]))
-    drawn: list[str] = []
-    frame = crops._kept.frame
-
-    def watched(sample: Sample) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        drawn.append(sample.stem)
-        return frame(sample)
-
-    crops._kept.frame = watched
-    for index in range(400):
-        crops[index]
-    # Half evenly over four frames, half nearly always the hard one: 1/8 + 0.49.
-    assert drawn.count(samples[3].stem) / 400 == pytest.approx(0.61, abs=0.06)

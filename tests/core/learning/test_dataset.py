@@ -14,7 +14,6 @@ from core.learning.dataset import (
     Sample,
     find_labelled,
     find_samples,
-    leave_out_looks,
     read_truth,
     without_masks,
     write_mask,
@@ -163,19 +162,6 @@ def test_what_else_a_row_says_and_frames_without_a_pose_are_welcome(tmp_path: Pa
     ]
     (tmp_path / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     assert list(read_truth(tmp_path).values()) == rows
-
-
-def test_looks_are_left_out_by_what_the_truth_says(tmp_path: Path) -> None:
-    folder = toy_set(tmp_path / "set", 3)
-    samples = find_samples([folder])
-    rows = [{"stem": sample.stem, "family": look} for sample, look in zip(samples, ("red", "x-ray", "red"), strict=True)]
-    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert leave_out_looks(folder, samples, ["x-ray"]) == [samples[0], samples[2]]
-    with pytest.raises(DatasetError, match="every frame is of a look that is left out"):
-        leave_out_looks(folder, samples, ["x-ray", "red"])
-    (folder / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows[:2]))
-    with pytest.raises(DatasetError, match=f"names no family of looks for frame {samples[2].stem}"):
-        leave_out_looks(folder, samples, ["x-ray"])
 
 
 def test_a_pose_has_what_it_is_to_be_measured_by(tmp_path: Path) -> None:
