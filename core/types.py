@@ -106,7 +106,7 @@ class VesselGraph:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """The way along the vessel graph to the operator's destination: ``points`` (N, 2) from the robot's place to the target."""
+    """The way along the vessel graph to the operator's target: ``points`` (N, 2) from the robot's place to the target."""
 
     points: Points
     length_px: float

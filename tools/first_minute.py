@@ -1,7 +1,7 @@
 """The first minute of a user on the bench twin: the real window on a screen of its own (Xvfb), real keys and clicks (xdotool),
 and a window manager (openbox), which gives the keys to the list of checks when it opens.
 
-``python -m tools.first_minute --times 5`` starts it so often, clicks a destination, arms, holds Shift, hands over with F7, and says
+``python -m tools.first_minute --times 5`` starts it so often, clicks a target, arms, holds Shift, hands over with F7, and says
 of each time how long the first understood picture took, and whether the program arrived without a HOLD. The user's own settings are
 not touched: the first start is that of a new user.
 """
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _STATE_EVERY_MS = 50
 """How often the window's state is written."""
 _AHEAD_MM = 40.0
-"""The destination lies so far before the robot, along the longest route."""
+"""The target lies so far before the robot, along the longest route."""
 _START_WITHIN_S, _ARM_WITHIN_S, _ARRIVE_WITHIN_S = 120.0, 240.0, 240.0
 _ASK_EVERY_S = 3.0
 """Between two presses of F6."""
@@ -175,7 +175,7 @@ def _watch(window: OperatorWindow) -> None:
 
     from core.control.modes import Mode
 
-    target = _destination(window.rig.config.twin)
+    target = _target(window.rig.config.twin)
     modes: list[str] = []
     alerts: list[str] = []
 
@@ -208,7 +208,7 @@ def _watch(window: OperatorWindow) -> None:
     timer.start()
 
 
-def _destination(config: TwinConfig) -> tuple[float, float]:
+def _target(config: TwinConfig) -> tuple[float, float]:
     """A place on the longest route, in source pixels."""
     from hardware.rig import START_INSERTION_MM
     from hardware.twin.phantoms import make_phantom

@@ -175,7 +175,7 @@ class LockStepEngine:
         self.until(lambda view: view.servos_on, "servos on")
 
     def hand_over(self, target: Point) -> None:
-        """Let the program drive to a destination."""
+        """Let the program drive to a target."""
         self.set_target(target)
         self.until(lambda view: not view.against_arming, "well enough to arm")
         self.pilot.ask(Act.ARM)
@@ -517,7 +517,7 @@ _MOST_FRAMES = 1500
 
 
 def operator_window(job: PictureJob) -> None:
-    """By hand, with a destination."""
+    """By hand, with a target."""
     with OperatorScene(job, SIZE) as scene:
         scene.window.choose_target(*_TARGET)
         for jog, frames in ((Jog(bend=0.25, advance=0.7), 60), (_FEED, 40), (AT_REST, 2)):
@@ -537,7 +537,7 @@ def operator_driving(job: PictureJob) -> None:
 
 
 def operator_arrived(job: PictureJob) -> None:
-    """The program has driven to the destination, and given the robot back."""
+    """The program has driven to the target, and given the robot back."""
     with OperatorScene(job) as scene:
         scene.window.choose_target(*_TARGET)
         scene.play(10)
@@ -547,7 +547,7 @@ def operator_arrived(job: PictureJob) -> None:
             if scene.engine.pilot.view.mode is not Mode.AUTONOMOUS:
                 break
         if scene.engine.pilot.view.mode is not Mode.ARMED:
-            raise UserError("the twin did not get there: the destination was not reached")
+            raise UserError("the twin did not get there: the target was not reached")
         scene.play(5)
         scene.save("operator_arrived")
 

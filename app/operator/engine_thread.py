@@ -138,7 +138,7 @@ class EngineThread(QThread):
         return engine.bus_status() if engine is not None else None
 
     def set_target(self, target_px: Point | None) -> bool:
-        """Set or clear the destination, in source pixels; False when there is no engine."""
+        """Set or clear the target, in source pixels; False when there is no engine."""
         engine = self._engine
         if engine is None:
             return False

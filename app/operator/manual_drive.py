@@ -303,7 +303,7 @@ class DriveController(QObject):
     ----------
     window : whose keys are listened to.
     panels : what shows driving; without a pilot (a recording) that there is nothing to drive.
-    recorder : keeps alerts and destinations with the session.
+    recorder : keeps alerts and targets with the session.
     """
 
     reported = Signal(object)

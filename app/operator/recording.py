@@ -196,7 +196,7 @@ class Recorder(QObject):
         return ""
 
     def keep_target(self, target: Point | None, rehearsal: dict[str, Any] | None = None) -> None:
-        """Keep the operator's destination, source pixels, and what its rehearsal found."""
+        """Keep the operator's target, source pixels, and what its rehearsal found."""
         self._target = event_of_target(target, self._now_s(), rehearsal)
         self._keep(self._target)
 

@@ -69,7 +69,7 @@ class RehearsalCard(QFrame):
         return ". ".join(label.text() for label in labels if not label.isHidden() and label.text())
 
     def offer(self) -> None:
-        """The destination can be rehearsed."""
+        """The target can be rehearsed."""
         self._show(tr("Rehearse  ({key})", key=KEY), "", None)
 
     def show_running(self, done: int, total: int, result: RehearsalResult | None, speed: float = 1.0) -> None:
@@ -142,7 +142,7 @@ def advice_of(result: RehearsalResult) -> tuple[str, str]:
     if speed is None and result.runs < FEWEST_RUNS:
         return tr("Too few runs ended to recommend a speed: close other programs, and rehearse again"), _INK.ORANGE
     if speed is None:
-        return tr("No speed that was tried is good: choose another destination, or steer yourself"), _INK.FAULT
+        return tr("No speed that was tried is good: choose another target, or steer yourself"), _INK.FAULT
     if speed >= result.speed_mm_s:
         return tr("The set speed is good"), _INK.ROUTE
     share = 100 * speed / result.speed_mm_s

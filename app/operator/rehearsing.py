@@ -1,4 +1,4 @@
-"""Rehearse the way to the destination: ``rehearse`` in processes beside the window, its result over the picture and on a card."""
+"""Rehearse the way to the target: ``rehearse`` in processes beside the window, its result over the picture and on a card."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from hardware.rig import RigKind
 RUNS, MINUTES = 50, 2
 _WATCH_MS = 1000
 """Settings change without a signal."""
-_LACKING = mark("this destination was not rehearsed")
+_LACKING = mark("this target was not rehearsed")
 _NO_PHANTOM = mark("no phantom of this bench for the twin: teach the bench, or python main.py phantom BENCH")
 
 
 class RehearsalController(QObject):
-    """Lives as long as the window. What was found holds for one destination on one phantom, and goes with them.
+    """Lives as long as the window. What was found holds for one target on one phantom, and goes with them.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ class RehearsalController(QObject):
         self._done, self._speed = 0, 1.0
         self._so_far: RehearsalResult | None = None
         self.result: RehearsalResult | None = None
-        """Of the present destination; None: it was not rehearsed."""
-        add_menu(window, tr("&Robot"), [MenuEntry(tr("Re&hearse this destination"), self.toggle, (KEY, f"Shift+{KEY}"))])
+        """Of the present target; None: it was not rehearsed."""
+        add_menu(window, tr("&Robot"), [MenuEntry(tr("Re&hearse this target"), self.toggle, (KEY, f"Shift+{KEY}"))])
         window.target_changed.connect(self.forget)
         window.rig.preparing.connect(self.forget)
         window.rig.phase_changed.connect(self._offer)
@@ -77,7 +77,7 @@ class RehearsalController(QObject):
 
     @Slot()
     def _offer(self) -> None:
-        """Show that the destination can be rehearsed, if it can."""
+        """Show that the target can be rehearsed, if it can."""
         window, self._bench = self._window, self._known_bench()
         can_begin = window.target is not None and window.last_tick is not None and window.rig.phase is EnginePhase.RUNNING
         if can_begin and self._bench is not None:
@@ -88,7 +88,7 @@ class RehearsalController(QObject):
 
     @Slot()
     def forget(self) -> None:
-        """Nothing is known of a destination; a rehearsal that goes on is given up."""
+        """Nothing is known of a target; a rehearsal that goes on is given up."""
         self._end()
         self.result = None
         self._window.recorder.forget_rehearsal()
@@ -121,7 +121,7 @@ class RehearsalController(QObject):
             window.say(tr("Not rehearsed: {why}", why=tr(_NO_PHANTOM)), is_fault=True)
             return
         if target is None or tick is None:
-            window.say(tr("First click the destination, then rehearse"), is_fault=True)
+            window.say(tr("First click the target, then rehearse"), is_fault=True)
             return
         height, width = tick.frame.image.shape[:2]
         config = window.rig.calibrated(window.rig.config).model_dump(mode="json")
@@ -190,7 +190,7 @@ class RehearsalController(QObject):
         if self._bench is None:
             return PreflightFinding(name, Level.WARNING, tr("the hand-over needs one"), tr(_NO_PHANTOM))
         if self._window.target is None:
-            return PreflightFinding(name, Level.WARNING, tr("no destination yet"), tr("click it, and press {key}", key=KEY))
+            return PreflightFinding(name, Level.WARNING, tr("no target yet"), tr("click it, and press {key}", key=KEY))
         return PreflightFinding(name, Level.WARNING, tr(_LACKING), tr("press {key}: two minutes beside the window", key=KEY))
 
     def _lack(self) -> tuple[str, str] | None:

@@ -17,7 +17,7 @@ def operator_stops(panels: OperatorPanels, *, has_robot: bool) -> tuple[TourStop
             tr("The picture"),
             tr(
                 "The robot comes in from the edge. The white ring is its head, the yellow arrow its direction, the blue line the "
-                "vessel's centerline. Click into a branch: that is your destination, Esc clears it. 1 to 9 and G switch what is "
+                "vessel's centerline. Click into a branch: that is your target, Esc clears it. 1 to 9 and G switch what is "
                 "drawn."
             ),
             (panels.live,),

@@ -1,6 +1,6 @@
 """Triggers from other programs: one JSON object a line on a Unix socket, each answered by one (docs/operating.md).
 
-They record, mark, note, take snapshots, ask for the status, and set the destination while the program is not armed; nothing here
+They record, mark, note, take snapshots, ask for the status, and set the target while the program is not armed; nothing here
 moves the robot, arms or hands over.
 """
 

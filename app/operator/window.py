@@ -107,7 +107,7 @@ class OperatorWindow(WindowFrame):
         self._problem: str | None = None
         self._is_stale = False
         self.target: Point | None = None
-        """The operator's destination, source pixels."""
+        """The operator's target, source pixels."""
         self._on_place: Callable[[Point], object] | None = None
         self.rig = RigSession(config, open_engine, kind, self)
         self._snapshots = SnapshotWriter(pictures_folder(config.window.pictures_folder), self)
@@ -176,7 +176,7 @@ class OperatorWindow(WindowFrame):
                 None,
                 *(MenuEntry(tr(step.value.name), partial(self.ask_step, step), _keys_of(step)) for step in OperatorStep),
                 None,
-                MenuEntry(tr("&Clear destination"), self.clear_target, hint="Esc"),
+                MenuEntry(tr("&Clear target"), self.clear_target, hint="Esc"),
                 None,
                 MenuEntry(tr("Start the &rig again"), self.ask_restart, ("F5",)),
             ],
@@ -349,7 +349,7 @@ class OperatorWindow(WindowFrame):
 
     @Slot(float, float)
     def choose_target(self, x: float, y: float) -> None:
-        """The operator's destination, in source pixels; or the place that ``ask_for_place`` waits for."""
+        """The operator's target, in source pixels; or the place that ``ask_for_place`` waits for."""
         self.panels.live.setFocus()
         if self._on_place is not None:
             on_place, self._on_place = self._on_place, None
@@ -359,11 +359,11 @@ class OperatorWindow(WindowFrame):
 
     @property
     def waits_for_place(self) -> bool:
-        """Whether the next click into the picture is no destination."""
+        """Whether the next click into the picture is no target."""
         return self._on_place is not None
 
     def set_target(self, target: Point | None) -> bool:
-        """Set or clear the destination, source pixels; False when no rig is open."""
+        """Set or clear the target, source pixels; False when no rig is open."""
         is_set = self.rig.engine.set_target(target)
         if is_set or target is None:
             self.target = target
@@ -373,12 +373,12 @@ class OperatorWindow(WindowFrame):
         return is_set
 
     def ask_for_place(self, on_place: Callable[[Point], object] | None) -> None:
-        """The next click into the picture is for `on_place`, in source pixels, and no destination; None: it is one again."""
+        """The next click into the picture is for `on_place`, in source pixels, and no target; None: it is one again."""
         self._on_place = on_place
 
     @Slot()
     def clear_target(self) -> None:
-        """No destination; and a click into the picture is for one again."""
+        """No target; and a click into the picture is for one again."""
         self._on_place = None
         if self.target is not None:
             self.set_target(None)

@@ -163,7 +163,7 @@ def neighbour(places: NDArray[np.int64], place: int, step: int) -> int | None:
 
 
 def target_at(events: Sequence[Event], scene: Scene, time_s: float) -> Point | None:
-    """The operator's destination in source pixels: where the route ends, without one what was chosen last until then."""
+    """The operator's target in source pixels: where the route ends, without one what was chosen last until then."""
     if scene.route is not None:
         return scene.to_source(scene.route.target)
     chosen = chosen_at(events, time_s)
@@ -171,7 +171,7 @@ def target_at(events: Sequence[Event], scene: Scene, time_s: float) -> Point | N
 
 
 def chosen_at(events: Sequence[Event], time_s: float) -> Event | None:
-    """The newest choice of a destination at a time on the recorded clock."""
+    """The newest choice of a target at a time on the recorded clock."""
     return next((event for event in reversed(events) if event.kind is EventKind.TARGET and event.time_s <= time_s), None)
 
 

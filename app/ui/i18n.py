@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from core.config.models import RESOURCES
 from core.config.schema import Effect, schema
 from core.control.alerts import ALERTS, alert_of
+from core.control.camera_monitor import RouteState
 from core.control.faults import Cause
 from core.control.gate import RejectReason
 from core.control.joints import Limit
@@ -119,7 +120,7 @@ TEMPLATES = (
     "highest vessel probability {a}", "highest robot probability {a}",
     "what looks like it covers {a} % of the image (at most {b} %); it does not know such pictures: {why}",
     "what looks like one has walls beside the head that are blurred over {a} px (at most {b} px)",
-    "the robot cannot go back any farther: take over, or choose another destination", "newest frame {a} ms old", "{a} ms old",
+    "the robot cannot go back any farther: take over, or choose another target", "newest frame {a} ms old", "{a} ms old",
     "{a} ms (at most {b} ms)", "outside its envelope: {where}: switch the torque off and move it back by hand, or zero it again",
     "{engine}, first frame in {a} ms: state {state} (true {truth}), theta off by {b} deg, head by {c} px",
     "not configured; none is plugged in", "{a} cores, {b} GB of memory, {c} GB free", "{a} core, {b} GB of memory, {c} GB free",
@@ -145,7 +146,7 @@ TEMPLATES = (
 
 def texts_of_tables() -> Iterator[str]:
     """Texts that stand in tables of the core: reasons, every alert, every setting with its section and when it acts."""
-    for words in (Reason, Cause, Hindrance, RejectReason, Limit, Effect):
+    for words in (Reason, Cause, Hindrance, RouteState, RejectReason, Limit, Effect):
         yield from words
     for key, spec in ALERTS.items():
         yield from (spec.text, spec.what_to_do, alert_of(key, simulated=True).what_to_do)

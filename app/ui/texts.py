@@ -39,7 +39,7 @@ class OperatorStep(Enum):
     )
     ACKNOWLEDGE = StepWords(mark("Acknowledge"), "F4", mark("I have read why the program stopped; nothing moves by this"))
     ARM = StepWords(mark("Arm"), "F6", mark("Allow the program to be handed over to; nothing moves by this"))
-    HAND_OVER = StepWords(mark("Hand over"), "F7", mark("The program drives to the destination for as long as the deadman is held"))
+    HAND_OVER = StepWords(mark("Hand over"), "F7", mark("The program drives to the target for as long as the deadman is held"))
     TAKE_BACK = StepWords(mark("Take back"), "F8", mark("You steer again, at once; moving the controls does the same"))
     DISARM = StepWords(
         mark("Disarm"), "Shift+F6", mark("The program may not be handed over to any more; you go on steering by hand")
@@ -249,7 +249,7 @@ REASON_TEXT = {
     Reason.AMBIGUOUS_PATH: ReasonText(
         mark("The robot's path is not clear"), mark("retract a little so that it does not cross itself")
     ),
-    Reason.AMBIGUOUS_BRANCH: ReasonText(mark("Two branches fit"), mark("click the destination in the picture")),
+    Reason.AMBIGUOUS_BRANCH: ReasonText(mark("Two branches fit"), mark("click the target in the picture")),
     Reason.LOW_CONFIDENCE: ReasonText(mark("Not sure enough to answer"), mark("better light or focus helps")),
     Reason.UNLIKE_TRAINING: ReasonText(mark("Picture of an unknown kind"), mark("teach this bench (menu Model)")),
     Reason.HEAD_JUMP: ReasonText(mark("The head jumped"), mark("wait for the next frames")),
@@ -502,7 +502,7 @@ QUANTITY = {
         mark("Timeline"),
         "s",
         mark(
-            "The whole session: states as a band, theta, gaps, and marks of alerts, steps, destinations and notes. Click or drag "
+            "The whole session: states as a band, theta, gaps, and marks of alerts, steps, targets and notes. Click or drag "
             "goes there, the wheel zooms, Shift and drag selects."
         ),
     ),

@@ -87,7 +87,7 @@ class AlertRow(PaintedWidget):
         self.setVisible(entry is not None)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Taken here, so that no destination is set behind it."""
+        """Taken here, so that no target is set behind it."""
         self._is_pressed = True
         event.accept()
 

@@ -134,7 +134,7 @@ _DRIVING = (
 _ELSE = (
     mark("Mouse and focus"),
     (
-        (mark("Click"), mark("destination; right click clears it")),
+        (mark("Click"), mark("target; right click clears it")),
         (mark("Wheel, drag"), mark("zoom the picture, move it")),
         (mark("Tab, Enter"), mark("go to a control, press or open it")),
     ),

@@ -419,7 +419,7 @@ class WindowConfig(ConfigSection):
         "auto", description="of all windows; auto = the system's, en = English, zh = Chinese (simplified)"
     )
     pictures_folder: str | None = Field(None, min_length=1, description="where snapshots go; empty: LumenPilot in Pictures")
-    needs_rehearsal: bool = Field(False, description="hand-over needs a rehearsal of this destination (menu Robot)")
+    needs_rehearsal: bool = Field(False, description="hand-over needs a rehearsal of this target (menu Robot)")
 
 
 class Config(ConfigSection):

@@ -64,8 +64,8 @@ _STYLE: dict[Reaction, tuple[Priority, str | None, float]] = {
 """Priority, sound and cooldown of a fault by its reaction."""
 
 _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
-    Note.REACHED: ("Destination reached", "you drive again: choose the next one, or go on by hand"),
-    Note.NEW_TARGET: ("Another destination: you drive again", "hand over again to go there"),
+    Note.REACHED: ("Target reached", "you drive again: choose the next one, or go on by hand"),
+    Note.NEW_TARGET: ("Another target: you drive again", "hand over again to go there"),
     Note.TORQUE_OFF: ("The torque is off: all servos have said so", "the wires hang loose; switch the servos on to drive"),
     Note.LET_OUT: ("The wires were let out slowly", "find the cause before you pull them again"),
     Note.STILL_TIGHT: ("Wires may still be tight", "look at them; let them go by Torque off (page Servos)"),
@@ -77,15 +77,15 @@ _HINTS: dict[Hindrance | RejectReason | Note, tuple[str, str]] = {
     ),
     Hindrance.IS_STOPPED: ("Stopped", "acknowledge the stop first"),
     Hindrance.UNACKNOWLEDGED: ("A fault is not acknowledged", "read it and acknowledge it"),
-    Hindrance.ALREADY_ARMED: ("Armed", "hand over to a destination; disarm first for anything else"),
+    Hindrance.ALREADY_ARMED: ("Armed", "hand over to a target; disarm first for anything else"),
     Hindrance.CAMERA_SETTLING: ("Waiting for steady pictures (1 s)", "the camera must be well for a second"),
     Hindrance.PERCEPTION_SETTLING: ("Waiting for a steady pose (1 s)", "keep the robot in view: it must be seen well for a second"),
     Hindrance.SERVOS_UNCHECKED: ("The servos are not in use", "switch them on; that checks them, too"),
     Hindrance.SERVOS_BUSY: ("The servos are busy", "ask again when that has ended"),
     Hindrance.NOT_YET_ARMED: ("Not armed", "arm first"),
     Hindrance.ALREADY_AUTONOMOUS: ("Already handed over", "touch the controls to take back"),
-    Hindrance.NO_DESTINATION: ("No destination chosen", "click the destination in the picture"),
-    Hindrance.DESTINATION_BEHIND: ("The destination is behind the robot", "choose one ahead, or retract by hand first"),
+    Hindrance.NO_TARGET: ("No target chosen", "click the target in the picture"),
+    Hindrance.TARGET_BEHIND: ("The target is behind the robot", "choose one ahead, or retract by hand first"),
     Hindrance.DEADMAN_NOT_HELD: ("The deadman is not held", "press and hold it (let it go first if it is down), then hand over"),
     Hindrance.DEADMAN_HELD_BEFORE: ("The deadman was down before arming", "let it go and press it again"),
     Hindrance.DEADMAN_ON_KEYBOARD: (

@@ -19,10 +19,10 @@ from core.types import Reason
 
 
 class RouteState(StrEnum):
-    """Is there a way to the operator's destination?"""
+    """Is there a way to the operator's target?"""
 
-    NONE = "no destination"
-    BEHIND = "destination behind the robot"
+    NONE = "no target"
+    BEHIND = "target behind the robot"
     READY = "ready"
 
 

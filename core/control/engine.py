@@ -18,7 +18,7 @@ from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene
 
 
 class Perceive(Protocol):
-    """Turns a frame into a scene; ``target`` is the operator's destination in source pixels."""
+    """Turns a frame into a scene; ``target`` is the operator's target in source pixels."""
 
     def __call__(self, frame: Frame, target: Point | None = None) -> Scene: ...
 
@@ -92,7 +92,7 @@ class Engine:
         scene = self._perceive(frame, target)
         status = self._status()
         with self._lock:
-            # a scene that was perceived with another destination has no route to this one
+            # a scene that was perceived with another target has no route to this one
             has_target = target is not None and target == self._target
         if self.pilot is None:
             advice, sent = self._policy(scene), None
@@ -130,7 +130,7 @@ class Engine:
             return None
 
     def set_target(self, point: Point | None) -> None:
-        """The operator's destination in source pixels; None clears it. A change ends a hand-over that is under way."""
+        """The operator's target in source pixels; None clears it. A change ends a hand-over that is under way."""
         with self._lock:
             changed, self._target = point != self._target, point
         if changed and self.pilot is not None:

@@ -154,7 +154,7 @@ class Cause(StrEnum):
     HEAD_JUMP = ("pose jumped", Area.PERCEPTION, Reaction.HOLD,
         "The head jumped in the picture", "wait for the next pictures")
     BRANCH_UNCLEAR = ("two branches fit", Area.PERCEPTION, Reaction.HOLD,
-        "Two branches fit", "click the destination in the picture")
+        "Two branches fit", "click the target in the picture")
     POOR_VIEW = ("robot or vessel not clear", Area.PERCEPTION, Reaction.HOLD,
         "Robot or vessel not clearly seen", "improve light and focus, remove what covers them")
     CONFIDENCE_LOW = ("confidence too low", Area.PERCEPTION, Reaction.HOLD,
@@ -164,7 +164,7 @@ class Cause(StrEnum):
     POSE_STALE = ("pose stale", Area.PERCEPTION, Reaction.HOLD,
         "The pose is too old", "wait a moment; close other programs if it stays")
     NO_TARGET = ("no way to a destination", Area.OPERATOR, Reaction.HOLD,
-        "No way to a destination", "click a destination ahead of the robot")
+        "No way to a target", "click a target ahead of the robot")
     DEADMAN = ("deadman released", Area.OPERATOR, Reaction.HOLD,
         "Deadman released", "press it again at once, or hand over again")
     FRAMES_DROPPED = ("frames dropped", Area.CAMERA, Reaction.WARN,

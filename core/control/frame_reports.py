@@ -225,9 +225,9 @@ class FrameReports:
 
 
 class _Direction:
-    """Whether the destination lies behind the robot, debounced: at a bifurcation single frames may see the way turn back.
+    """Whether the target lies behind the robot, debounced: at a bifurcation single frames may see the way turn back.
 
-    The first result for a destination counts at once; a different one after it has lasted for as long as a policy needs to back
+    The first result for a target counts at once; a different one after it has lasted for as long as a policy needs to back
     off.
     """
 

@@ -21,7 +21,7 @@ class Mode(StrEnum):
 
 
 class Act(StrEnum):
-    """Acts of the operator. INPUT is a movement of the controls; TAKE_BACK ends autonomy without one, also at the destination."""
+    """Acts of the operator. INPUT is a movement of the controls; TAKE_BACK ends autonomy without one, also at the target."""
 
     STOP = "stop"
     ACKNOWLEDGE = "acknowledge"
@@ -33,7 +33,7 @@ class Act(StrEnum):
 
 
 class Hindrance(StrEnum):
-    """Why a request is refused, apart from active faults."""
+    """Why a request is refused, apart from active faults; the values stand in sessions of all versions."""
 
     IS_STOPPED = "stopped"
     UNACKNOWLEDGED = "fault not acknowledged"
@@ -44,8 +44,8 @@ class Hindrance(StrEnum):
     SERVOS_BUSY = "servos busy"
     NOT_YET_ARMED = "arm first"
     ALREADY_AUTONOMOUS = "already handed over"
-    NO_DESTINATION = "no destination chosen"
-    DESTINATION_BEHIND = "destination behind the robot"
+    NO_TARGET = "no destination chosen"
+    TARGET_BEHIND = "destination behind the robot"
     DEADMAN_NOT_HELD = "deadman not held"
     DEADMAN_HELD_BEFORE = "deadman was down before arming"
     DEADMAN_ON_KEYBOARD = "deadman on the keyboard only"

@@ -44,7 +44,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LatestAdvice:
-    """The newest perceived frame: its capture, the advice for it, whether the destination is reached."""
+    """The newest perceived frame: its capture, the advice for it, whether the target is reached."""
 
     captured_s: float
     advice: Advice | None
@@ -113,7 +113,7 @@ _TURNS_AHEAD = 4
 _SHARE_OF_AGE = 2 / 3
 """Nor does it go on beyond this share of the age at which pose and positions are too old; the rest is for the way to the gate."""
 _ARRIVED_S = 0.5
-"""The program hands the robot back after resting so long at the destination."""
+"""The program hands the robot back after resting so long at the target."""
 _MOST_CHANGES = 200
 """Changes of the view that are kept until the window takes them."""
 _SETTLED_S = 1.0
@@ -266,7 +266,7 @@ class Pilot:
         return LeftOver(view.latched, view.mode is Mode.STOPPED) if view.latched is not None else None
 
     def target_changed(self) -> None:
-        """Another destination, or none: control returns to the operator, and advice for the old one is followed no longer."""
+        """Another target, or none: control returns to the operator, and advice for the old one is followed no longer."""
         self._inputs.set_advice(None, Act.TAKE_BACK)  # in any mode: a hand-over may have been asked for since the last turn
         if self.view.mode in DRIVING_MODES:
             self._alerts.report([(Note.NEW_TARGET, "")], self._clock())
@@ -478,7 +478,7 @@ class Pilot:
         return self._robot.failure is not None or any(fault.cause is Cause.BUS_DEAD for fault in active)
 
     def _has_arrived(self, latest: LatestAdvice | None, now_s: float) -> bool:
-        """The program drove to the destination and has rested there for a moment."""
+        """The program drove to the target and has rested there for a moment."""
         if self._state.mode is not Mode.AUTONOMOUS or latest is None or not latest.arrived:
             self._arrived_since_s = None
             return False

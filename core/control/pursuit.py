@@ -103,7 +103,7 @@ class Pursuit:
         if back_off is None:
             return None
         if back_off.is_stranded:
-            return self._advise(0.0, 0.0, "the robot cannot go back any farther: take over, or choose another destination")
+            return self._advise(0.0, 0.0, "the robot cannot go back any farther: take over, or choose another target")
         # the way back is free, since the head follows its own body: going slow would only let the body lean longer
         return self._advise(
             -self._words.fast_mm_s, 0.0 if way.behind else self._steer_deg, message("backing off: {why}", why=back_off.why)
@@ -112,9 +112,9 @@ class Pursuit:
     def _give_up_advice(self, way: LookAhead, moved_s: float) -> Advice | None:
         """Stop after too many misses or tries, until the operator has gone on by hand; `moved_s`: of this frame's time."""
         if (count := self._misses.count_at(way)) >= self._config.most_misses:
-            why = message("missed the branch {a} times: take over, or choose another destination", a=count)
+            why = message("missed the branch {a} times: take over, or choose another target", a=count)
         elif (count := self._stalls.count_at(way)) >= self._config.most_tries:
-            why = message("came no farther in {a} tries: take over, or choose another destination", a=count)
+            why = message("came no farther in {a} tries: take over, or choose another target", a=count)
         else:
             return None
         self._by_hand_s = self._by_hand_s + moved_s if moved_s else 0.0

@@ -230,9 +230,9 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
         reasons.append(Hindrance.SERVOS_UNCHECKED)
     reasons += [fault.cause for fault in state.active if fault.holds and fault.cause.area is not Area.OPERATOR]
     if state.health.frames.route is RouteState.NONE:
-        reasons.append(Hindrance.NO_DESTINATION)
+        reasons.append(Hindrance.NO_TARGET)
     if state.health.frames.route is RouteState.BEHIND:
-        reasons.append(Hindrance.DESTINATION_BEHIND)
+        reasons.append(Hindrance.TARGET_BEHIND)
     if state.health.only_weak_held(now_s, safety):
         reasons.append(Hindrance.DEADMAN_ON_KEYBOARD)
     elif not state.health.deadman_held(now_s, safety):

@@ -1,4 +1,4 @@
-"""What a rehearsal found: ``rehearse --json`` writes it, the window shows it, a session keeps it with the destination's event.
+"""What a rehearsal found: ``rehearse --json`` writes it, the window shows it, a session keeps it with the target's event.
 
 Places are pixels of the picture.
 """
@@ -106,7 +106,7 @@ class RehearsalResult(_Part):
 
 
 def rehearsal_of(event: Event) -> RehearsalResult | None:
-    """Of the destination's event; None where it was not rehearsed."""
+    """Of the target's event; None where it was not rehearsed."""
     try:
         return RehearsalResult.model_validate(event.data[REHEARSAL]) if REHEARSAL in event.data else None
     except ValidationError:  # of another version

@@ -90,7 +90,7 @@ def frame_result(scene: Scene) -> FrameResult:
 
 
 class RecordedTargets:
-    """The operator's destination of each recorded frame, in source pixels.
+    """The operator's target of each recorded frame, in source pixels.
 
     A route ends there; where a row has no route, the newest event says what was chosen. ``of`` takes the rows in their order.
     """
@@ -113,7 +113,7 @@ class RecordedTargets:
 
 
 def event_target(event: Event) -> Point | None:
-    """The destination that a target event tells, in source pixels; None: it was cleared, or it is damaged."""
+    """The target that a target event tells, in source pixels; None: it was cleared, or it is damaged."""
     place = event.data.get("xy")
     is_point = isinstance(place, list) and len(place) == 2 and all(type(value) in (int, float) for value in place)
     return (float(place[0]), float(place[1])) if is_point and place is not None else None

@@ -132,7 +132,7 @@ class _FoundRoute:
 
 
 class RouteMemory:
-    """The last route that was found, for as long as the destination stays the same.
+    """The last route that was found, for as long as the target stays the same.
 
     A fitting or a reflection can cut the mask of the vessel in two, in one frame and not in the next, or join two vessels. The
     known route still holds if it has lasted for ``memory_s``, the head is beside it, and the vessel is still where it leads, but
@@ -144,7 +144,7 @@ class RouteMemory:
         self.reset()
 
     def reset(self) -> None:
-        """Another stream, or no destination any more."""
+        """Another stream, or no target any more."""
         self._known: _FoundRoute | None = None
         self._other: _FoundRoute | None = None
         self._settled: tuple[_FoundRoute | None, _FoundRoute | None] = (None, None)

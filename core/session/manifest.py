@@ -407,11 +407,11 @@ def event_of_alert(alert: Alert, time_s: float) -> Event:
 
 
 REHEARSAL = "rehearsal"
-"""Key of what a rehearsal of the destination found, in its event (``core/evaluation/rehearsal.py``)."""
+"""Key of what a rehearsal of the target found, in its event (``core/evaluation/rehearsal.py``)."""
 
 
 def event_of_target(point: Point | None, time_s: float, rehearsal: dict[str, Any] | None = None) -> Event:
-    """The destination was chosen (source pixels) or cleared, or it was rehearsed."""
+    """The target was chosen (source pixels) or cleared, or it was rehearsed."""
     if point is None:
         return Event(time_s, EventKind.TARGET, "cleared")
     text, data = f"{point[0]:.0f}, {point[1]:.0f}", {"xy": [round(point[0], 2), round(point[1], 2)]}
@@ -456,7 +456,7 @@ _TEXT_OF_TARGET = re.compile(r"(-?\d+\.\d), (-?\d+\.\d)")
 
 
 def _upgraded(event: Event) -> Event:
-    """An event of any earlier version as this one writes it: up to November 2026 a destination was text alone, "x, y"."""
+    """An event of any earlier version as this one writes it: up to November 2026 a target was text alone, "x, y"."""
     if event.kind is EventKind.TARGET and "xy" not in event.data and (written := _TEXT_OF_TARGET.fullmatch(event.text)):
         return replace(event, data=event.data | {"xy": [float(value) for value in written.groups()]})
     return event

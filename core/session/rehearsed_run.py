@@ -1,4 +1,4 @@
-"""The runs of a session beside the rehearsals of their destinations: time, path, wall force and states."""
+"""The runs of a session beside the rehearsals of their targets: time, path, wall force and states."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _LEFT_S = 0.5
 _FEED_SHARE = 0.03
 """So far outside the rehearsed ones the way per feed is another: commands and pictures are not of one moment."""
 _ARRIVED_MM = 5.0
-"""Of the destination: the rehearsed way may end before it."""
+"""Of the target: the rehearsed way may end before it."""
 
 
 def runs_beside(reader: SessionReader) -> list[dict[str, Any]]:
-    """Each run of a session to a rehearsed destination beside its rehearsal, as ``session info --json`` has it.
+    """Each run of a session to a rehearsed target beside its rehearsal, as ``session info --json`` has it.
 
-    A run begins with the hand-over, without one when the destination was rehearsed; it ends at the destination, or with it.
+    A run begins with the hand-over, without one when the target was rehearsed; it ends at the target, or with it.
     """
     line, chosen = reader.timeline(), [event for event in reader.events if event.kind is EventKind.TARGET]
     driven, runs = line.mode == list(Mode).index(Mode.AUTONOMOUS), []

@@ -178,7 +178,7 @@ class Ring:
             self.nbytes -= sum(old.nbytes for old in self._groups.popleft())
 
     def add_event(self, event: Event) -> None:
-        """Add an event and drop the oldest; the newest dropped destination stays in force."""
+        """Add an event and drop the oldest; the newest dropped target stays in force."""
         self._events.append(event)
         while len(self._events) > _RING_EVENTS:
             old = self._events.popleft()
@@ -186,7 +186,7 @@ class Ring:
                 self._target = old
 
     def content(self) -> tuple[list[EncodedFrame], list[Event]]:
-        """A copy: the frames in order, and the events since the first of them, with the destination that was chosen before."""
+        """A copy: the frames in order, and the events since the first of them, with the target that was chosen before."""
         frames = [frame for group in self._groups for frame in group]
         if not frames:
             return [], []
@@ -495,7 +495,7 @@ class Recording:
         if self._ring is not None:
             self._ring.clear()
             self._status.update(ring_s=0.0)
-            if self._target is not None:  # under other thresholds the rig and its destination are the same
+            if self._target is not None:  # under other thresholds the rig and its target are the same
                 self._ring.add_event(self._target)
 
     def describe(self, description: Description) -> None:
@@ -610,7 +610,7 @@ class SessionWriter:
         return self._enqueue(lambda: self._recording.write_drive(view), most=_MAX_EVENTS)
 
     def event(self, kind: EventKind, text: str = "", data: dict[str, Any] | None = None, time_s: float | None = None) -> bool:
-        """Add an event (a note, a destination, an alert); modes, faults and acknowledgements are found in the drive views."""
+        """Add an event (a note, a target, an alert); modes, faults and acknowledgements are found in the drive views."""
         return self.add_event(Event(self._clock() if time_s is None else time_s, kind, text, data or {}))
 
     def add_event(self, event: Event) -> bool:

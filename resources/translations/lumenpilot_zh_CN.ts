@@ -17,7 +17,7 @@ bend, pitch, roll: 弯曲, 俯仰, 滚转          insertion: 进深            
 zero, pretension, slack: 归零, 预紧, 松弛    torque: 力矩                                watchdog: 看门狗
 session, recording: 会话, 录制               playback, player: 回放, 回放器              snapshot, clip: 截图, 片段
 annotation, rater: 标注, 标注者              mask: 掩膜                                  calibration: 标定
-destination, target: 目标点, 目标            route: 路线                                 overlay: 叠加层
+target: 目标点                               route: 路线                                 overlay: 叠加层
 -->
 <TS version="2.1" language="zh_CN" sourcelanguage="en">
 <context>
@@ -2188,7 +2188,7 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
-        <source>No speed that was tried is good: choose another destination, or steer yourself</source>
+        <source>No speed that was tried is good: choose another target, or steer yourself</source>
         <translation>试过的速度都不合适：请选择其他目标点，或自行操纵</translation>
     </message>
     <message>
@@ -2203,7 +2203,7 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsing.py"/>
-        <source>this destination was not rehearsed</source>
+        <source>this target was not rehearsed</source>
         <translation>此目标点尚未预演</translation>
     </message>
     <message>
@@ -2233,7 +2233,7 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsing.py"/>
-        <source>First click the destination, then rehearse</source>
+        <source>First click the target, then rehearse</source>
         <translation>请先单击目标点，再预演</translation>
     </message>
     <message>
@@ -2253,7 +2253,7 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsing.py"/>
-        <source>no destination yet</source>
+        <source>no target yet</source>
         <translation>尚无目标点</translation>
     </message>
     <message>
@@ -2268,7 +2268,7 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsing.py"/>
-        <source>Re&amp;hearse this destination</source>
+        <source>Re&amp;hearse this target</source>
         <translation>预演此目标点(&amp;H)</translation>
     </message>
     <message>
@@ -2621,7 +2621,7 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/tour.py"/>
-        <source>The robot comes in from the edge. The white ring is its head, the yellow arrow its direction, the blue line the vessel's centerline. Click into a branch: that is your destination, Esc clears it. 1 to 9 and G switch what is drawn.</source>
+        <source>The robot comes in from the edge. The white ring is its head, the yellow arrow its direction, the blue line the vessel's centerline. Click into a branch: that is your target, Esc clears it. 1 to 9 and G switch what is drawn.</source>
         <translation>机器人从边缘进入。白圈是头端，黄箭头是其方向，蓝线是血管中心线。单击某个分支：那就是目标点，Esc 清除。1 至 9 和 G 切换所绘内容。</translation>
     </message>
     <message>
@@ -2801,7 +2801,7 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/operator/window.py"/>
-        <source>&amp;Clear destination</source>
+        <source>&amp;Clear target</source>
         <translation>清除目标(&amp;C)</translation>
     </message>
     <message>
@@ -3736,8 +3736,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/camera_pages.py"/>
-        <source>Begin &amp;anew</source>
-        <translation>重新开始(&amp;A)</translation>
+        <source>Start &amp;over</source>
+        <translation>重新开始(&amp;O)</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/camera_pages.py"/>
@@ -3751,8 +3751,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/camera_pages.py"/>
-        <source>Two clic&amp;ks</source>
-        <translation>两点单击(&amp;K)</translation>
+        <source>Click both en&amp;ds</source>
+        <translation>单击两端(&amp;D)</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/camera_pages.py"/>
@@ -5276,11 +5276,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/window.py"/>
-        <source>Start &amp;over</source>
-        <translation>重新开始(&amp;O)</translation>
-    </message>
-    <message>
-        <location filename="../../app/teaching/window.py"/>
         <source>Forget what was taken of this bench</source>
         <translation>删除为此台架取得的内容</translation>
     </message>
@@ -5889,7 +5884,7 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>The program drives to the destination for as long as the deadman is held</source>
+        <source>The program drives to the target for as long as the deadman is held</source>
         <translation>按住使能键期间，程序驾驶到目标点</translation>
     </message>
     <message>
@@ -6164,7 +6159,7 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>click the destination in the picture</source>
+        <source>click the target in the picture</source>
         <translation>在图像中单击目标点</translation>
     </message>
     <message>
@@ -6504,7 +6499,7 @@ MIT 许可证。字体：Inter，SIL 开放字体许可证。</translation>
     </message>
     <message>
         <location filename="../../app/ui/texts.py"/>
-        <source>The whole session: states as a band, theta, gaps, and marks of alerts, steps, destinations and notes. Click or drag goes there, the wheel zooms, Shift and drag selects.</source>
+        <source>The whole session: states as a band, theta, gaps, and marks of alerts, steps, targets and notes. Click or drag goes there, the wheel zooms, Shift and drag selects.</source>
         <translation>整个会话：状态色带、θ、缺口，以及警报、操作、目标点和备注的标记。单击或拖动跳到该处，滚轮缩放，Shift 加拖动选择。</translation>
     </message>
     <message>
@@ -7878,7 +7873,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/shortcut_page.py"/>
-        <source>destination; right click clears it</source>
+        <source>target; right click clears it</source>
         <translation>设目标点；右击清除</translation>
     </message>
     <message>
@@ -8543,8 +8538,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/control/pursuit.py"/>
-        <source>missed the branch {a} times: take over, or choose another destination</source>
-        <translation>已 {a} 次错过该分支：请接管，或另选目的地</translation>
+        <source>missed the branch {a} times: take over, or choose another target</source>
+        <translation>已 {a} 次错过该分支：请接管，或另选目标点</translation>
     </message>
     <message>
         <location filename="../../core/control/pursuit.py"/>
@@ -8553,8 +8548,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/control/pursuit.py"/>
-        <source>came no farther in {a} tries: take over, or choose another destination</source>
-        <translation>尝试 {a} 次仍未前进：请接管，或另选目的地</translation>
+        <source>came no farther in {a} tries: take over, or choose another target</source>
+        <translation>尝试 {a} 次仍未前进：请接管，或另选目标点</translation>
     </message>
     <message>
         <location filename="../../core/control/servo_requests.py"/>
@@ -10298,8 +10293,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>the robot cannot go back any farther: take over, or choose another destination</source>
-        <translation>机器人无法再后退：请接管，或另选目的地</translation>
+        <source>the robot cannot go back any farther: take over, or choose another target</source>
+        <translation>机器人无法再后退：请接管，或另选目标点</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -11028,6 +11023,21 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
+        <source>no target</source>
+        <translation>没有目标点</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>target behind the robot</source>
+        <translation>目标点在机器人后方</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>ready</source>
+        <translation>就绪</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
         <source>number not finite</source>
         <translation>数值非有限</translation>
     </message>
@@ -11633,12 +11643,12 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>No way to a destination</source>
+        <source>No way to a target</source>
         <translation>没有通往目标点的路</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>click a destination ahead of the robot</source>
+        <source>click a target ahead of the robot</source>
         <translation>单击机器人前方的目标点</translation>
     </message>
     <message>
@@ -11728,7 +11738,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Destination reached</source>
+        <source>Target reached</source>
         <translation>已到达目标点</translation>
     </message>
     <message>
@@ -11738,7 +11748,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Another destination: you drive again</source>
+        <source>Another target: you drive again</source>
         <translation>目标已换：由您驾驶</translation>
     </message>
     <message>
@@ -11828,7 +11838,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>hand over to a destination; disarm first for anything else</source>
+        <source>hand over to a target; disarm first for anything else</source>
         <translation>移交到某个目标点；其他操作请先解除待命</translation>
     </message>
     <message>
@@ -11888,12 +11898,12 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>No destination chosen</source>
+        <source>No target chosen</source>
         <translation>未选择目标点</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>The destination is behind the robot</source>
+        <source>The target is behind the robot</source>
         <translation>目标点在机器人后方</translation>
     </message>
     <message>
@@ -14323,7 +14333,7 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>hand-over needs a rehearsal of this destination (menu Robot)</source>
+        <source>hand-over needs a rehearsal of this target (menu Robot)</source>
         <translation>移交需要先预演此目标点（“机器人”菜单）</translation>
     </message>
     <message>

@@ -45,7 +45,7 @@ from tools.lockstep import LockStepServos
 
 Probability = NDArray[np.float32]
 Masks = tuple[Probability, Probability]
-TARGET: Point = (560.0, 195.0)  # the destination of the program, in source pixels
+TARGET: Point = (560.0, 195.0)  # the target of the program, in source pixels
 _START_MM, _START_NETWORK_MM = 45.0, 70.0  # insertion at the start, with the twin's masks and with the network
 _FRAMES_PER_S, _FRAMES_PER_S_LIVE = 12.5, 22.0
 _PATIENCE_S, _PATIENCE_LIVE_S = 8.0, 20.0  # for a state of the pilot, in the bench's time

@@ -284,8 +284,8 @@ def ambiguous(kit: Kit) -> Observation:
         bench.hand_over(target=(560.0, 103.0)).mark()
         bench.hooks.masks = lambda v, r: (cut, robot)
         bench.run(0.3)
-        asks = "destination" in ALERTS[Cause.BRANCH_UNCLEAR].what_to_do
-        return judge(bench, _expect(_HELD, Cause.BRANCH_UNCLEAR), *check((asks, "the alert does not ask for a destination")))
+        asks = "target" in ALERTS[Cause.BRANCH_UNCLEAR].what_to_do
+        return judge(bench, _expect(_HELD, Cause.BRANCH_UNCLEAR), *check((asks, "the alert does not ask for a target")))
 
 
 def _tube(start: Point, end: Point, radius_px: float) -> Probability:

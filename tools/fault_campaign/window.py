@@ -128,7 +128,7 @@ def until(wanted: Callable[[], bool], patience_s: float = _PATIENCE_S) -> bool:
 
 
 def bring_to(window: OperatorWindow, wanted: Mode) -> bool:
-    """Do what an operator does to get there: servos on (the twin's are), destination, arm, deadman, hand over."""
+    """Do what an operator does to get there: servos on (the twin's are), target, arm, deadman, hand over."""
     controls = window.controls
 
     def is_in(*modes: Mode) -> bool:

@@ -90,7 +90,7 @@ def card_of(controller: RehearsalController) -> RehearsalCard:
     return controller._window.panels.rehearsal
 
 
-def test_a_destination_is_rehearsed_and_forgotten_with_it(make: MakeController, given: Path, qtbot: QtBot) -> None:
+def test_a_target_is_rehearsed_and_forgotten_with_it(make: MakeController, given: Path, qtbot: QtBot) -> None:
     so_far = FOUND | {"runs": 12}
     controller = make(said({"done": 12, "total": 50}, {"so_far": so_far}, FOUND))
     window, card = controller._window, card_of(controller)
@@ -147,7 +147,7 @@ def test_what_prevents_it_is_one_line(make: MakeController, given: Path, qtbot: 
     controller = make(["/bin/sh", "-c", "echo error: the target is not in the vessel >&2; exit 1"])
     window = controller._window
     controller.toggle()
-    assert window.panels.toast.text() == "First click the destination, then rehearse"
+    assert window.panels.toast.text() == "First click the target, then rehearse"
     window.set_target(TARGET)
     controller.toggle()
     until(qtbot, lambda: controller._child is None)
@@ -164,14 +164,12 @@ def test_a_hand_over_may_need_one(make: MakeController, given: Path, qtbot: QtBo
     assert make(said(FOUND)).finding is None
     controller = make(said(FOUND), is_needed=True)
     rig, window = controller._window.rig, controller._window
-    assert controller.finding is not None and controller.finding.detail == "no destination yet"
+    assert controller.finding is not None and controller.finding.detail == "no target yet"
     window.set_target(TARGET)
     finding = controller.finding
-    assert finding is not None and (finding.level, finding.detail) == (Level.WARNING, "this destination was not rehearsed")
+    assert finding is not None and (finding.level, finding.detail) == (Level.WARNING, "this target was not rehearsed")
     assert rig.may_ask(OperatorStep.ARM) and not rig.may_ask(OperatorStep.HAND_OVER)
-    assert window.panels.toast.text() == (
-        "Not handed over: this destination was not rehearsed. Press T: two minutes beside the window."
-    )
+    assert window.panels.toast.text() == ("Not handed over: this target was not rehearsed. Press T: two minutes beside the window.")
     controller.toggle()
     until(qtbot, lambda: controller.result is not None and controller._child is None)
     assert rig.may_ask(OperatorStep.HAND_OVER)

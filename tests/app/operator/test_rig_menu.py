@@ -189,7 +189,7 @@ def test_a_click_says_where_the_robot_is_inserted(
     desk.ask_port()
     assert "Click where the robot is inserted" in window.panels.toast.text()
     window.choose_target(639.0, 120.0)
-    assert engine.targets[-1:] != [(639.0, 120.0)], "no destination this time"
+    assert engine.targets[-1:] != [(639.0, 120.0)], "no target this time"
     known = read_rig(path).calibration
     assert known is not None and known.port is not None
     assert (known.port.x_share, known.port.y_share) == (1.0, pytest.approx(120 / 479))

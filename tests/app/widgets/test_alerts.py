@@ -43,12 +43,12 @@ def test_alerts_say_what_is_the_matter_how_much_how_often_and_what_to_do(strip: 
 
 
 def test_the_most_urgent_three_are_shown_newest_first_among_equals(strip: AlertStrip) -> None:
-    keys = [Hindrance.NO_DESTINATION, Cause.HOT, Cause.WARM, Cause.CONFIDENCE_LOW, Cause.STOP_PRESSED, Cause.VOLTAGE_LOW]
+    keys = [Hindrance.NO_TARGET, Cause.HOT, Cause.WARM, Cause.CONFIDENCE_LOW, Cause.STOP_PRESSED, Cause.VOLTAGE_LOW]
     strip.show_alerts([alert(key) for key in keys])
     assert strip.texts == [words(key) for key in (Cause.STOP_PRESSED, Cause.VOLTAGE_LOW, Cause.HOT)]
 
 
-@pytest.mark.parametrize("key", [Hindrance.NO_DESTINATION, RejectReason.OVER_RATE, Cause.WARM])
+@pytest.mark.parametrize("key", [Hindrance.NO_TARGET, RejectReason.OVER_RATE, Cause.WARM])
 def test_hints_and_warnings_go_away_by_themselves(strip: AlertStrip, clock: Clock, key: AlertKey) -> None:
     strip.show_alerts([alert(key)])
     clock.now_s += BRIEF_S[ALERTS[key].priority] - 0.1
@@ -112,7 +112,7 @@ def test_a_double_click_dismisses_one_alert_and_not_the_next(qtbot: QtBot, strip
     assert strip.texts == []
 
 
-def test_a_click_on_an_alert_sets_no_destination_behind_it(own: Own, qtbot: QtBot, clock: Clock) -> None:
+def test_a_click_on_an_alert_sets_no_target_behind_it(own: Own, qtbot: QtBot, clock: Clock) -> None:
     class Picture(QWidget):
         pressed = 0
 

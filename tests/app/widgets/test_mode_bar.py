@@ -136,10 +136,10 @@ def test_modes_differ_without_colour_and_without_words(own: Own) -> None:
             f"{words(Hindrance.SERVOS_UNCHECKED)} (+2 more)",
         ),
         (
-            DriveView(0.0, Mode.ARMED, servos_on=True, against_hand_over=(Hindrance.NO_DESTINATION,)),
+            DriveView(0.0, Mode.ARMED, servos_on=True, against_hand_over=(Hindrance.NO_TARGET,)),
             OperatorStep.HAND_OVER,
             False,
-            words(Hindrance.NO_DESTINATION),
+            words(Hindrance.NO_TARGET),
         ),
     ],
 )

@@ -172,7 +172,7 @@ def test_a_picture_that_is_none_is_told_and_not_looked_at(image: np.ndarray) -> 
     engine.close()
 
 
-def test_what_was_understood_for_another_destination_is_no_way_to_this_one() -> None:
+def test_what_was_understood_for_another_target_is_no_way_to_this_one() -> None:
     bench = Bench()
 
     def perceive(frame: Frame, target: Point | None = None) -> Scene:
@@ -183,7 +183,7 @@ def test_what_was_understood_for_another_destination_is_no_way_to_this_one() -> 
     engine = Engine(camera, perceive, lambda _: None, lambda: None, bench.pilot, bench.robot, turns_pilot=False)
     engine.set_target((200.0, 60.0))
     engine.step(0.0)
-    assert bench.pilot.tick().against_hand_over.count(Hindrance.NO_DESTINATION) == 1
+    assert bench.pilot.tick().against_hand_over.count(Hindrance.NO_TARGET) == 1
     engine.step(0.0)
-    assert Hindrance.NO_DESTINATION not in bench.pilot.tick().against_hand_over
+    assert Hindrance.NO_TARGET not in bench.pilot.tick().against_hand_over
     engine.close()

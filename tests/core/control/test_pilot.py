@@ -304,7 +304,7 @@ def test_the_frame_that_ends_a_silence_brings_its_advice(bench: Bench) -> None:
     assert bench.shown is ADVICE
 
 
-def test_at_the_destination_the_operator_has_the_hand_again(bench: Bench) -> None:
+def test_at_the_target_the_operator_has_the_hand_again(bench: Bench) -> None:
     bench.handed_over()
     bench.scene = lambda scene: scene_at(scene.frame_index, scene.captured_s, left_px=5.0)
     bench.seconds(0.8)
@@ -315,11 +315,11 @@ def test_at_the_destination_the_operator_has_the_hand_again(bench: Bench) -> Non
 def test_a_hand_over_without_a_way_is_refused_with_its_reason(bench: Bench) -> None:
     bench.scene = lambda scene: replace(scene, route=None)
     bench.armed().held = True
-    assert bench.pilot.view.against_hand_over == (Hindrance.NO_DESTINATION,)
+    assert bench.pilot.view.against_hand_over == (Hindrance.NO_TARGET,)
     bench.turn(2).pilot.ask(Act.HAND_OVER)
     bench.turn()
     assert bench.mode is Mode.ARMED
-    assert Hindrance.NO_DESTINATION in bench.alerts()
+    assert Hindrance.NO_TARGET in bench.alerts()
 
 
 def test_commands_that_the_gate_rejects_again_and_again_end_autonomy(bench: Bench) -> None:
@@ -575,7 +575,7 @@ def test_closing_holds_and_permits_nobody(bench: Bench) -> None:
 # ---- what outlives a rig, and what ends a hand-over
 
 
-def test_another_destination_ends_the_hand_over_and_the_old_advice_is_not_followed(bench: Bench) -> None:
+def test_another_target_ends_the_hand_over_and_the_old_advice_is_not_followed(bench: Bench) -> None:
     bench.handed_over().alerts()
     bench.seeing = False
     sent = len(bench.robot.sent)
@@ -703,7 +703,7 @@ def test_the_deadmans_silence_counts_from_when_it_was_said(bench: Bench, said_af
     assert bench.now_s - said_s <= 0.1 + 1e-9
 
 
-def test_another_destination_in_the_turn_of_the_hand_over_ends_it(bench: Bench) -> None:
+def test_another_target_in_the_turn_of_the_hand_over_ends_it(bench: Bench) -> None:
     bench.armed().held = True
     bench.turn(2)
     bench.pilot.ask(Act.HAND_OVER)
@@ -718,19 +718,19 @@ def _behind(scene: Scene) -> Scene:
     return replace(scene, route=Route(way, 180.0, (20.0, 60.0)))
 
 
-def test_an_expired_hold_does_not_excuse_a_destination_behind_the_robot(bench: Bench) -> None:
+def test_an_expired_hold_does_not_excuse_a_target_behind_the_robot(bench: Bench) -> None:
     bench.handed_over().held = False
     bench.seconds(0.3)
     bench.scene = _behind
     bench.seconds(3.0)
     assert bench.mode is Mode.HOLD
-    assert Hindrance.DESTINATION_BEHIND in bench.pilot.view.against_hand_over
+    assert Hindrance.TARGET_BEHIND in bench.pilot.view.against_hand_over
     bench.alerts()
     bench.held = True
     bench.turn(2).pilot.ask(Act.HAND_OVER)
     bench.turn(2)
     assert bench.mode is Mode.HOLD
-    assert Hindrance.DESTINATION_BEHIND in bench.alerts()
+    assert Hindrance.TARGET_BEHIND in bench.alerts()
 
 
 @pytest.mark.parametrize("handed_over", [True, False])

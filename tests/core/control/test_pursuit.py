@@ -104,8 +104,8 @@ def test_a_branch_that_is_missed_again_and_again_is_given_up_with_a_word() -> No
     pursuit = Pursuit(CONFIG, WORDS)
     assert "take over" not in " ".join(_missing(pursuit, CONFIG.most_misses - 1))
     last = _missing(pursuit, 1)[-1]
-    assert last == f"missed the branch {CONFIG.most_misses} times: take over, or choose another destination"
-    assert "take over" not in " ".join(_missing(pursuit, 1, target=(30, 100))), "another destination is another way"
+    assert last == f"missed the branch {CONFIG.most_misses} times: take over, or choose another target"
+    assert "take over" not in " ".join(_missing(pursuit, 1, target=(30, 100))), "another target is another way"
     pursuit.reset()
     assert "take over" not in " ".join(_missing(pursuit, 1)), "taken over, it may try again"
 
@@ -159,7 +159,7 @@ def _blocked(pursuit: Pursuit, seconds: float, fps: float = 30.0) -> tuple[list[
 @pytest.mark.parametrize("fps", [20.0, 90.0])
 def test_a_head_that_is_blocked_is_not_fed_on_for_ever(fps: float) -> None:
     said, fed_mm = _blocked(Pursuit(CONFIG, WORDS), 60.0, fps=fps)
-    assert said[-1] == f"came no farther in {CONFIG.most_tries} tries: take over, or choose another destination"
+    assert said[-1] == f"came no farther in {CONFIG.most_tries} tries: take over, or choose another target"
     assert max(fed_mm) < 1.5 * WORDS.fast_mm_s * CONFIG.stuck_s
     assert abs(fed_mm[-1]) < 0.5 * WORDS.fast_mm_s * CONFIG.stuck_s, "what was fed in vain is taken back"
 
@@ -174,7 +174,7 @@ def test_a_route_that_is_missing_in_single_frames_hides_no_blocked_head(every_s:
         advice = pursuit(scene, replace(status(None, insertion_mm), time_s=10.0 + k / fps))
         insertion_mm += advice.advance_mm_s / fps
         said.append(advice.why)
-    assert said[-1] == f"came no farther in {CONFIG.most_tries} tries: take over, or choose another destination"
+    assert said[-1] == f"came no farther in {CONFIG.most_tries} tries: take over, or choose another target"
 
 
 def test_a_robot_that_cannot_go_back_is_said_to_be_until_it_moves() -> None:
@@ -184,7 +184,7 @@ def test_a_robot_that_cannot_go_back_is_said_to_be_until_it_moves() -> None:
         told = replace(status(None, 50.0 if k < 150 else 50.0 - 0.4 * (k - 149)), time_s=0.1 * k)
         advice = pursuit(scene_at(STRAIGHT, (200, 100), (20, 100), time_s=0.1 * k), told)
         said.append((advice.advance_mm_s, advice.why))
-    stranded = (0.0, "the robot cannot go back any farther: take over, or choose another destination")
+    stranded = (0.0, "the robot cannot go back any farther: take over, or choose another target")
     assert stranded not in said[:25]
     assert said[60:150] == [stranded] * 90
     assert said[-1][0] < 0.0
@@ -212,7 +212,7 @@ def test_a_miss_counts_once_though_single_frames_see_the_way_ahead() -> None:
     assert "take over" not in " ".join(said)
 
 
-def test_another_destination_is_another_matter_to_a_robot_that_could_not_go_back() -> None:
+def test_another_target_is_another_matter_to_a_robot_that_could_not_go_back() -> None:
     pursuit, said = Pursuit(CONFIG, WORDS), []
     for k in range(100):
         target = (20, 100) if k < 80 else (60, 100)
@@ -328,7 +328,7 @@ def _routes_reported(headings: list[tuple[float, float]], target: Point = (380, 
     return found
 
 
-def test_a_destination_is_behind_or_ahead_at_the_first_look() -> None:
+def test_a_target_is_behind_or_ahead_at_the_first_look() -> None:
     assert _routes_reported([(0.0, 180)]) == [RouteState.BEHIND]
     assert _routes_reported([(0.0, 0)]) == [RouteState.READY]
 
@@ -342,7 +342,7 @@ def test_a_flicker_of_the_way_changes_nothing_and_a_lasting_change_does(first: i
     assert routes == [before] * 6 + [after]
 
 
-def test_another_destination_is_looked_at_anew() -> None:
+def test_another_target_is_looked_at_anew() -> None:
     reports = FrameReports(PursuitConfig(behind_s=0.3))
     image = np.zeros((480, 640, 3), np.uint8)
     routes = [
@@ -352,7 +352,7 @@ def test_another_destination_is_looked_at_anew() -> None:
     assert routes == [RouteState.READY, RouteState.BEHIND, RouteState.READY]
 
 
-def test_a_frame_that_is_refused_says_nothing_of_where_the_destination_lies() -> None:
+def test_a_frame_that_is_refused_says_nothing_of_where_the_target_lies() -> None:
     """With a way, but without an answer: as the first look at it, or for as long as another one would need to count."""
     reports = FrameReports(PursuitConfig(behind_s=0.3))
     image = np.zeros((480, 640, 3), np.uint8)

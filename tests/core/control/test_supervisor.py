@@ -447,9 +447,9 @@ def test_a_hand_over_with_all_in_place_is_granted() -> None:
 
 @pytest.mark.parametrize(
     ("route", "reason"),
-    [(RouteState.NONE, Hindrance.NO_DESTINATION), (RouteState.BEHIND, Hindrance.DESTINATION_BEHIND)],
+    [(RouteState.NONE, Hindrance.NO_TARGET), (RouteState.BEHIND, Hindrance.TARGET_BEHIND)],
 )
-def test_a_hand_over_needs_a_destination_ahead(route: RouteState, reason: Hindrance) -> None:
+def test_a_hand_over_needs_a_target_ahead(route: RouteState, reason: Hindrance) -> None:
     bench = _ready_to_hand_over()
     bench.bad_frame(route=route)
     decision = bench.tick(Act.HAND_OVER)

@@ -257,7 +257,7 @@ def test_a_head_that_is_elsewhere_has_no_way(memory: RouteMemory) -> None:
     assert memory.update(WHY, (120.0, 135.0), TARGET, _vessel((200, 230)), 0.0) == WHY
 
 
-def test_another_destination_has_to_be_found_itself(memory: RouteMemory) -> None:
+def test_another_target_has_to_be_found_itself(memory: RouteMemory) -> None:
     assert memory.update(WHY, (120.0, 100.0), (300.0, 100.0), _vessel(), 0.0) == WHY
     assert memory.update(WHY, (120.0, 100.0), TARGET, _vessel(), 0.0) == WHY, "and the old one is forgotten with it"
 

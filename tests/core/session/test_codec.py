@@ -201,7 +201,7 @@ def test_half_a_character_in_a_text_is_written_out() -> None:
     assert event.text.encode()
 
 
-def test_a_destination_written_as_text_alone_gets_its_place() -> None:
+def test_a_target_written_as_text_alone_gets_its_place() -> None:
     assert event_from_json(b'{"time_s": 1.0, "kind": "target", "text": "12.0, -3.5"}').data == {"xy": [12.0, -3.5]}
     assert event_from_json(b'{"time_s": 1.0, "kind": "target", "text": "cleared"}').data == {}
 

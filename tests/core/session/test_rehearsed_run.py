@@ -1,4 +1,4 @@
-"""A run of a session beside the rehearsal of its destination."""
+"""A run of a session beside the rehearsal of its target."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_another_feed_explains_its_share_of_the_time(fed_mm_s: float, explains_s
     assert ("the feed slips or is another" in beside_line(run)) is (explains_s is not None)
 
 
-def test_the_end_of_the_rehearsed_way_is_no_destination() -> None:
+def test_the_end_of_the_rehearsed_way_is_no_target() -> None:
     stuck = FOUND.model_copy(update={"target_xy": (180.0, 200.0)})  # no run came there
     rehearsed = event_of_target((180.0, 200.0), 9.0, stuck.model_dump(mode="json"))
     for last_px, arrived in ((150.0, False), (180.0, True)):
@@ -103,7 +103,7 @@ def test_the_end_of_the_rehearsed_way_is_no_destination() -> None:
         assert [run["arrived"] for run in runs_beside(reader_of(heads, [rehearsed], 0))] == [arrived]
 
 
-def test_a_destination_without_a_rehearsal_has_no_run() -> None:
+def test_a_target_without_a_rehearsal_has_no_run() -> None:
     chosen = event_of_target((140.0, 200.0), 9.0)
     assert rehearsal_of(chosen) is None and runs_beside(reader_of([(120.0, 200.0)], [chosen], 0)) == []
     damaged = Event(9.0, EventKind.TARGET, "", {"rehearsal": {"runs": 3}})

@@ -296,7 +296,7 @@ def test_nothing_is_written_before_start_and_after_stop(tmp_path: Path) -> None:
     assert not writer.put(tick_of(4, 1000.4))
 
 
-def test_the_destination_that_was_chosen_before_is_told_at_the_start(tmp_path: Path) -> None:
+def test_the_target_that_was_chosen_before_is_told_at_the_start(tmp_path: Path) -> None:
     def targets_of() -> list[tuple[float, object]]:
         return [(event.time_s, event_target(event)) for event in events_of(saved(writer), EventKind.TARGET)]
 
@@ -528,7 +528,7 @@ def test_the_ring_is_bounded_by_bytes_and_begins_at_a_key_picture() -> None:
     assert frames[0].packet.is_key
     assert frames[-1].captured_s == pytest.approx(99 / 30)
     assert ring.nbytes == sum(frame.nbytes for frame in frames) <= 1000
-    # a destination stays in force, whatever number of events came after it
+    # a target stays in force, whatever number of events came after it
     ring.add_event(event_of_target((10.0, 20.0), -1.0))
     for _ in range(5000):
         ring.add_event(Event(-0.5, EventKind.ALERT, "again"))
