@@ -211,9 +211,9 @@ class ScalePage(WizardPage):
         self.length.valueChanged.connect(self._on_length)
         self.main = self.take_button = button(tr("&Take a picture"), self._take)
         self.solve_button = button(tr("&Calculate"), self._solve)
-        self.restart_button = button(tr("Begin &anew"), self._restart)
+        self.restart_button = button(tr("Start &over"), self._restart)
         self.print_button = button(tr("&Print..."), self._print, tr("Save the board as PDF or PNG"))
-        self.clicks_button = button(tr("Two clic&ks"), self._begin_clicks)
+        self.clicks_button = button(tr("Click both en&ds"), self._begin_clicks)
         self.clicks_button.setCheckable(True)
         self.count = QLabel()
         self.result = note("")
@@ -239,8 +239,8 @@ class ScalePage(WizardPage):
 
     def refresh(self) -> None:
         views, is_ready = len(self.draft.views) if self.draft is not None else 0, self.draft is not None and not self.model.is_busy
-        enable(is_ready, self.take_button, self.restart_button, self.clicks_button)
-        self.solve_button.setEnabled(is_ready and views > 0)
+        enable(is_ready, self.take_button, self.clicks_button)
+        enable(is_ready and views > 0, self.solve_button, self.restart_button)
         self.square.setEnabled(is_ready and views == 0)
         self.main = self.solve_button if views >= _ENOUGH else self.take_button
         for one in (self.take_button, self.solve_button):

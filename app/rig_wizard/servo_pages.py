@@ -66,7 +66,7 @@ def joint_text(joint: JointConfig) -> str:
     return text if joint.angle_deg is None else f"{text} ({joint.angle_deg:g}°)"
 
 
-_ID_PX, _DIRECTION_PX = 66, 80
+_ID_PX, _DIRECTION_PX, _WAY_PX = 66, 80, 108
 _DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
 
 
@@ -185,6 +185,7 @@ class DrumsPage(WizardPage):
         field.setSuffix(" mm")
         field.setSpecialValueText(tr("not measured"))
         field.setKeyboardTracking(False)
+        field.setMinimumWidth(_WAY_PX)
         return field
 
     @property

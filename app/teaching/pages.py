@@ -452,7 +452,8 @@ class MovePage(TeachingPage):
         self.places.show_share(view.share, tr("{done} of {count}", done=sum(one.is_done for one in ends), count=len(ends)))
         bends = tr("{done} of {count}", done=min(view.bends, ENOUGH_BENDS), count=ENOUGH_BENDS)
         self.bends.show_share(view.bends / ENOUGH_BENDS, bends)
-        self.frames.show_share(view.used / ENOUGH_FRAMES, str(view.used))
+        frames = tr("{done} of {count}", done=view.used, count=ENOUGH_FRAMES) if view.used < ENOUGH_FRAMES else str(view.used)
+        self.frames.show_share(view.used / ENOUGH_FRAMES, frames)
         self.lacks.setText(lacks_line(view))
         newest = tuple(taken.stem for taken in view.frames[-_STRIP:])
         if newest != self._shown:
@@ -485,7 +486,7 @@ def lacks_line(view: TeachingView) -> str:
     names = list(dict.fromkeys(tr(_SIDE_TEXT[branch.side]) for branch in view.missing))
     if view.bends < ENOUGH_BENDS:
         names.append(tr("a bend of the head"))
-    if not names:
+    if view.used < ENOUGH_FRAMES:
         names.append(tr("{count} more frames", count=ENOUGH_FRAMES - view.used))
     return tr("Missing: {what}", what=", ".join(names[:4]))
 

@@ -267,6 +267,8 @@ class TeachingWindow(QDialog):
         self.over_button.setEnabled(not model.is_busy and not model.is_training)
         self.close_button.setText(tr("&Close, go on training") if model.is_training else tr("&Close"))
         show_main(self._page, self.next_button)
+        if not model.is_busy and self.focusWidget() is self.stop_button:  # Qt moved the focus there while the buttons were off
+            (self.next_button if self.next_button.isEnabled() else self).setFocus()
         if model.is_busy:
             work = tr_text(model.busy)
             self.say(f"{work[0].upper()}{work[1:]} ...")
