@@ -419,8 +419,8 @@ class LibraryWindow(WindowFrame):
         if (summary := self.summary) is not None:
             folder, mode = summary.folder, QFileDialog.FileMode.AnyFile
             export = partial(self._export, folder, ending)
-            dialog = ask_path(self, tr("Export {name}", name=folder.name), folder.parent, export, mode, [f"*.{ending}"])
-            dialog.selectFile(f"{folder.name}.{ending}")
+            start = folder.with_name(f"{folder.name}.{ending}")
+            ask_path(self, tr("Export {name}", name=folder.name), start, export, mode, [f"*.{ending}"])
 
     def _export(self, session: Path, ending: str, chosen: Path) -> None:
         out = chosen if chosen.name.lower().endswith(f".{ending.lower()}") else chosen.with_name(f"{chosen.name}.{ending}")

@@ -237,11 +237,9 @@ class WindowServices(QObject):
         session = self.after.session
         folder = sessions_folder(self._window.rig.config.record.folder)
         store = default_store([session]) if session is not None else folder / DEFAULT_NAME
-        start = next(place for place in store.parents if place.is_dir())
+        start = next(place for place in (store, *store.parents) if place.exists())
         filters = [tr("Annotations (*.sqlite)")]
-        dialog = ask_path(self._window, tr("Annotations to train on"), start, self.open_training, filters=filters)
-        if store.is_file():
-            dialog.selectFile(str(store))
+        ask_path(self._window, tr("Annotations to train on"), start, self.open_training, filters=filters)
 
     def open_training(self, store: Path) -> None:
         """The dialog for an annotation file."""

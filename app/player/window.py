@@ -236,7 +236,7 @@ class PlayerPanels(ScenePanels):
             self._show_values(row)
 
     def show_rehearsal_at(self, events: Sequence[Event], time_s: float) -> None:
-        """What the rehearsal of the destination at this time found, beside the run."""
+        """What the rehearsal of the target at this time found, beside the run."""
         chosen = chosen_at(events, time_s)
         if chosen is not self._chosen:
             self._chosen, self._rehearsal = chosen, rehearsal_of(chosen) if chosen is not None else None
@@ -605,9 +605,8 @@ class PlayerWindow(WindowFrame):
     def ask_export(self) -> None:
         """The whole session in another form, by the ending of the file's name."""
         folder, endings = self._reader.folder, " ".join(f"*.{ending}" for ending in PLUGINS.names)
-        mode = QFileDialog.FileMode.AnyFile
-        dialog = ask_path(self, tr("Export the session as"), folder.parent, self._export, mode, [endings])
-        dialog.selectFile(f"{folder.name}.mp4")
+        start, mode = folder.with_name(f"{folder.name}.mp4"), QFileDialog.FileMode.AnyFile
+        ask_path(self, tr("Export the session as"), start, self._export, mode, [endings])
 
     def _export(self, out: Path, *options: str) -> None:
         if out in self._exports:

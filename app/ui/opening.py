@@ -163,7 +163,7 @@ def open_file(path: Path) -> bool:
 def ask_path(
     parent: QWidget,
     title: str,
-    folder: Path,
+    start: Path,
     then: Callable[[Path], object],
     mode: QFileDialog.FileMode = QFileDialog.FileMode.ExistingFile,
     filters: Sequence[str] = (),
@@ -172,7 +172,8 @@ def ask_path(
 ) -> QFileDialog:
     """Ask for a file or folder; `then` gets each one that is chosen. The dialog blocks nothing: STOP stays within reach.
 
-    One that still asks for the same is raised, and returned. `folders_only` lists no files.
+    It opens at `start`: a folder, or a file whose name is proposed. One that still asks for the same is raised and returned, with
+    what was typed. `folders_only` lists no files.
     """
     name = " ".join((title, mode.name, *filters))
     there: QFileDialog | None = parent.findChild(QFileDialog, name, Qt.FindChildOption.FindDirectChildrenOnly)
@@ -180,7 +181,7 @@ def ask_path(
         there.raise_()
         there.activateWindow()
         return there
-    dialog = QFileDialog(parent, title, str(folder), fileMode=mode)
+    dialog = QFileDialog(parent, title, str(start), fileMode=mode)
     dialog.setObjectName(name)
     dialog.setOption(QFileDialog.Option.DontUseNativeDialog)
     dialog.setOption(QFileDialog.Option.ShowDirsOnly, folders_only)
