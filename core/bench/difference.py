@@ -354,7 +354,8 @@ def disagreement(network: Probability, difference: Difference, robot: Mask) -> M
     beside = cv2.blur(robot.view(np.uint8).astype(np.float32), (side, side))
     is_beyond = ~robot & (beside < np.float32(_BEYOND)) & (beside > 0.0)
     unsure = np.abs(network - difference.evidence) > np.float32(_CONTRADICT)
-    unsure |= is_beyond & (network + difference.evidence > np.float32(_WEAK_SIGN))
+    signs = (network > np.float32(_WEAK_SIGN)) | (cv2.blur(difference.evidence, (5, 5)) > np.float32(_WEAK_EVIDENCE))
+    unsure |= is_beyond & signs
     unsure &= cv2.dilate(robot.view(np.uint8), _square(2 * round(width) + 1)) > 0
     overlooked = robot & (network < np.float32(0.5))
     wide = cv2.morphologyEx(overlooked.view(np.uint8), cv2.MORPH_OPEN, _disc(max(3, 2 * round(width / 4.0) + 1)))
@@ -363,8 +364,9 @@ def disagreement(network: Probability, difference: Difference, robot: Mask) -> M
 
 _CONTRADICT = 0.5
 """Difference of the network's probability and the difference's evidence above which they contradict each other."""
-_BEYOND, _WEAK_SIGN = 0.22, 0.1
-"""Beyond an end of the robot a lesser share of the surroundings is robot than beside it; there a greater sum of both is a sign."""
+_BEYOND, _WEAK_SIGN, _WEAK_EVIDENCE = 0.22, 0.05, 0.2
+"""Beyond an end of the robot a lesser share of the surroundings is robot than beside it; there a greater probability, or mean
+evidence around it, is a sign. A camera's noise mostly stays below that: the background around the robot is learnt."""
 _BESIDE_PX = 9
 """Side of the square around what differs within which the network adds to the robot: a part that looks like the bench."""
 _NEAR_PX = 41
