@@ -41,9 +41,9 @@ from hardware.rig import RigKind, kind_of
 from hardware.twin.catalog import look_of
 
 if TYPE_CHECKING:
-    from app.teaching.folder import Segment
     from app.teaching.window import TeachingWindow
     from core.config.models import Config, PerceptionConfig
+    from core.learning.teaching import Segment
 
 _SEARCH_AFTER_MS = 1500
 """The rig is opened first; a search must not delay that."""

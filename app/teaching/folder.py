@@ -26,14 +26,11 @@ from core.devices import UserError
 from core.files import read_image, write_atomic
 from core.learning import teaching
 from core.learning.dataset import WORKING_SIZE_PX, mask_png, png, read_mask
-from core.learning.teaching import TeachingFrame, TeachingPicture
+from core.learning.teaching import Segment, TeachingFrame, TeachingPicture
 from core.locks import FolderLock
 from core.messages import message
-from core.perception.segmentation import Probability, clean_mask, to_working
+from core.perception.segmentation import clean_mask, to_working
 from core.types import Image, Mask, Point, Reason
-
-Segment = Callable[[Image], tuple[Probability, Probability]]
-"""A network: vessel and robot probability of a picture (h, w, 3)."""
 
 FORMAT = 1
 WANTED = 24
@@ -534,9 +531,16 @@ class TeachingFolder:
         assert self._bench is not None
         self._check(raises=True)
         frames = [replace(taken.frame, reason=taken.frame.reason or _left_out(taken)) for taken in self._frames]
-        chosen = teaching.choose(frames, WANTED)
+        corrected = {taken.stem for taken in self._frames if taken.is_corrected}
+        chosen = [one if one.picture.stem in corrected else self._completed(one) for one in teaching.choose(frames, WANTED)]
         teaching.write_teaching_set(self.folder / _SET, self._bench, chosen, [one for one in frames if one.reason], len(frames))
         return self.folder / _SET
+
+    def _completed(self, frame: TeachingFrame) -> TeachingFrame:
+        """The frame with what the network adds to its mask; while the robot moves there is no time for that."""
+        assert self._bench is not None
+        proposed = teaching.propose(frame.picture, self._bench, self._network())
+        return frame if proposed.reason else replace(frame, robot=proposed.robot, doubtful=proposed.doubtful)
 
     def _checked(self, frames: Sequence[TeachingFrame]) -> list[TeachingFrame]:
         """A computed bench is not known where the robot always lay: no empty picture shows it there."""

@@ -12,12 +12,13 @@ from typing import Any
 import platformdirs
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from app.teaching.folder import LookKind, Segment, TakenLook, TeachingFolder, TeachingStep, TeachingView
+from app.teaching.folder import LookKind, TakenLook, TeachingFolder, TeachingStep, TeachingView
 from app.training.model import TrainingPhase, TrainingState, name_problem, with_record
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import sentence
 from app.ui.workers import ChildProcess, Worker, command_of
 from core.config.calibration import CalibrationConfig
+from core.learning.teaching import Segment
 from core.perception.model_file import BENCH, own_models
 from core.types import Frame, Image, Mask
 from hardware.twin.own_phantom import phantom_for_bench

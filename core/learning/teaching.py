@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,9 +26,11 @@ from core.devices import UserError
 from core.files import write_atomic
 from core.learning.dataset import IMAGE_ENDINGS, DatasetError, Sample, png, sample_at, write_mask, write_png
 from core.messages import message
-from core.perception.segmentation import Segmenter
+from core.perception.segmentation import Probability
 from core.types import Image, Mask, Refusal
 
+Segment = Callable[[Image], tuple[Probability, Probability]]
+"""Vessel and robot probabilities, float32 (h, w) each, of a picture (h, w, 3)."""
 FEWEST = 8
 """Frames that a bench is taught with, at least: six to learn from and two held out."""
 HELD_OUT_SHARE = 4
@@ -237,7 +239,7 @@ def _rejected(picture: TeachingPicture, reason: str) -> TeachingFrame:
     return TeachingFrame(picture, blank, blank, blank, reason=reason)
 
 
-def propose(picture: TeachingPicture, bench: Bench, segment: Segmenter | None = None) -> TeachingFrame:
+def propose(picture: TeachingPicture, bench: Bench, segment: Segment | None = None) -> TeachingFrame:
     """A frame with masks by difference; one that is of another bench, is blurred, shows a hand or no robot is rejected.
 
     `segment`: a network that completes what differs little, such as a grey robot on grey.

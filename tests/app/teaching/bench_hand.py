@@ -10,10 +10,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.teaching.folder import Segment
 from app.teaching.model import TeachingModel
 from app.teaching.window import TeachingDriver, TeachingWindow
 from app.ui.texts import OperatorStep
+from core.learning.teaching import Segment
 from core.types import Frame, Image
 
 LONG_MS = 120_000

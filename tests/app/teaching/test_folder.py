@@ -16,6 +16,7 @@ from app.teaching import folder as folder_module
 from app.teaching.folder import LookKind, TakenLook, TeachingFolder, TeachingStep
 from core.bench.bench import BenchError
 from core.learning import teaching
+from core.learning.dataset import read_mask
 from core.learning.teaching import TeachingError, read_teaching_set
 from core.perception.segmentation import Probability
 from core.types import Image, Mask
@@ -118,6 +119,21 @@ def test_frames_become_a_set_that_teach_reads(work: TeachingFolder) -> None:
     made = read_teaching_set(work.teaching_set())
     assert len(made.train) + len(made.held_out) == work.view().used
     assert made.bench.is_dir()
+
+
+def test_the_network_completes_the_masks_by_difference_and_not_those_drawn_by_hand(tmp_path: Path) -> None:
+    vessel, whole = segment(robot_picture(0, 0.5))[0], large(toy_robot(0, 0.95))
+    work = TeachingFolder(tmp_path / "teaching", "toy", lambda: lambda _image: (vessel, whole.astype(np.float32)))
+    work.load()
+    work.add_empty(empties())
+    work.set_vessel(vessel >= 0.5)
+    drive(work)
+    stem = work.view().frames[0].stem
+    work.correct(stem, large(toy_robot(0, 0.25)))
+    made = read_teaching_set(work.teaching_set())
+    doubtful = {one.stem: one.doubtful is not None and read_mask(one.doubtful) for one in (*made.train, *made.held_out)}
+    assert not np.any(doubtful.pop(stem))
+    assert all(np.any(mask & whole) for mask in doubtful.values()), "beyond its end the network sees more robot"
 
 
 # ---- taken up again
