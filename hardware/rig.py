@@ -115,7 +115,7 @@ def _open_playback(config: Config) -> Rig:
     if play is None:
         raise DeviceError(f"rig {rig.name}: a {rig.camera} plays no files: leave rig.source out, or set rig.camera to video_file")
     source = Path(rig.source)
-    camera = play(source, rig)
+    camera = play(source)
     camera.open()
     return Rig(source.name, RigKind.PLAYBACK, camera, None)
 

@@ -17,7 +17,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator, model_v
 
 from core.config.calibration import BehaviourConfig
 from core.config.safety import SafetyConfig, ServosConfig
-from core.config.section import ConfigSection, plain_message
+from core.config.section import ConfigSection, ignored, plain_message
 from core.devices import UserError, disk_errors
 from core.plugins import PluginKind
 
@@ -79,13 +79,12 @@ CAMERAS = PluginKind("cameras", ("twin", "realsense", "webcam", "basler", *RECOR
 CameraName = Annotated[str, CAMERAS]
 
 
-_UNUSED = ("contact_slow_n", "lean_mm", "contact_back_off_n", "contact_limit_n", "wall_share", "follow_arc", "min_bend_radius_px")
-"""Settings of earlier versions."""
-
-
 class PursuitConfig(ConfigSection):
     """Look-ahead along the route."""
 
+    _ignored = ignored(
+        *("contact_slow_n", "lean_mm", "contact_back_off_n", "contact_limit_n", "wall_share", "follow_arc", "min_bend_radius_px")
+    )
     pixels_per_mm: float = Field(3.0, gt=0.1, le=50.0, description="of the view, roughly; a calibrated rig has its own scale")
     look_ahead_px: float = Field(10.0, ge=4.0, le=200.0, description="distance of the look-ahead point from a resting head")
     look_ahead_s: float = Field(0.15, ge=0.0, le=5.0, description="so much way at the present speed is added to it")
@@ -105,12 +104,6 @@ class PursuitConfig(ConfigSection):
     arrive_px: float = Field(8.0, ge=1.0, le=100.0, description="way left at which the target counts as reached")
     most_misses: int = Field(2, ge=1, le=100, description="after missing a branch so often it gives up and stops")
     most_tries: int = Field(4, ge=1, le=100, description="backed off so often without coming farther: it gives up and stops")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _upgrade(cls, values: Any) -> Any:
-        """Files of earlier versions have settings that are not used any more."""
-        return {key: value for key, value in values.items() if key not in _UNUSED} if isinstance(values, dict) else values
 
     @model_validator(mode="after")
     def _check_limits(self) -> Self:
@@ -363,6 +356,7 @@ class AdviceConfig(ConfigSection):
 class TwinConfig(ConfigSection):
     """The bench twin: a simulated robot, phantom and camera."""
 
+    _ignored = ignored("own_process")
     phantom: str = Field("s_curve", min_length=1, description="a named phantom, or random:<seed>")
     look: str | None = Field(None, min_length=1, description="a family of looks, as in synth --family; empty: by appearance_seed")
     appearance_seed: int = Field(
@@ -383,16 +377,11 @@ class TwinConfig(ConfigSection):
     lens_distortion: float = Field(0.0, ge=-0.14, le=0.3, description="of its camera's lens; negative: barrel, 0: none")
     behaviour: BehaviourConfig | None = Field(None, description="of its robot; empty: the nominal one's")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _upgrade(cls, values: Any) -> Any:
-        """Files of earlier versions say where the simulation runs."""
-        return {key: value for key, value in values.items() if key != "own_process"} if isinstance(values, dict) else values
-
 
 class RigConfig(ConfigSection):
     """Which camera and robot are used."""
 
+    _ignored = ignored("watch_folder")
     name: str = Field("twin", min_length=1, description="what sessions and messages call this rig")
     camera: CameraName = Field("twin", description="where pictures come from")
     robot: Literal["twin", "servos", "none"] = Field("twin", description="what moves; servos = real ones, see section Servos")
@@ -400,7 +389,6 @@ class RigConfig(ConfigSection):
     file: str | None = Field(
         None, min_length=1, description="rig file, made by the rig wizard, whose calibration is used; empty: not calibrated"
     )
-    watch_folder: bool = Field(False, description="image_folder: wait for new pictures, instead of playing those that are there")
 
 
 class StreamConfig(ConfigSection):

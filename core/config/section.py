@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 
 class ConfigSection(BaseModel):
     """Frozen; unknown keys, NaN and infinity are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def ignored(*keys: str) -> Any:
+    """Settings of earlier versions, which files may still have, as a validator of their section."""
+
+    def drop(cls: type, values: Any) -> Any:
+        return {key: value for key, value in values.items() if key not in keys} if isinstance(values, dict) else values
+
+    return model_validator(mode="before")(drop)
 
 
 def plain_message(error: dict[str, Any] | Any) -> str:

@@ -1,9 +1,7 @@
-"""Files as a camera: a folder of pictures (shown one after another, or watched for new ones) and a recorded video."""
+"""Files as a camera: a folder of pictures, shown one after another, and a recorded video."""
 
 from __future__ import annotations
 
-import contextlib
-import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,75 +11,19 @@ import av
 import av.error
 import numpy as np
 
-from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream, disk_errors
+from core.devices import DamagedPicture, DamagedStream, DeviceError, EndOfStream
 from core.files import ImageError, read_image
 from core.learning.dataset import IMAGE_ENDINGS
 from core.session.video import NoPictures, UndecodablePicture, decoded, open_video, pictures_of, upright
 from core.types import Frame, Image
 
-_SCAN_EVERY_S = 0.05
-
-_Print = tuple[int, int]
-"""Size and time of change of a file."""
-
-
-class FolderWatch:
-    """Finds the newest picture that was written since the last one. A file counts once its size and time have come to rest."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._known: dict[str, _Print] = {}
-        self._growing: dict[str, _Print] = {}
-
-    def begin(self) -> None:
-        """What is there now is not new. DeviceError: it cannot be watched."""
-        self._known, self._growing = self._list(), {}
-
-    def next(self, timeout_s: float) -> Image | None:
-        """The newest new picture; older new ones are skipped. None when none came in time."""
-        until_s = time.monotonic() + timeout_s
-        while True:
-            image = self._scan()
-            left_s = until_s - time.monotonic()
-            if image is not None or left_s <= 0.0:
-                return image
-            time.sleep(min(left_s, _SCAN_EVERY_S))
-
-    def _scan(self) -> Image | None:
-        there = self._list()
-        new = {name: stamp for name, stamp in there.items() if self._known.get(name) != stamp}
-        whole = [name for name, stamp in new.items() if self._growing.get(name) == stamp]
-        self._growing = new
-        for name in sorted(whole, key=lambda name: (new[name][1], name), reverse=True):
-            self._known |= {older: new[older] for older in whole if new[older][1] <= new[name][1]}
-            try:
-                return read_image(self._folder / name)
-            except ImageError:
-                continue  # not a picture, or gone again
-        return None
-
-    def _list(self) -> dict[str, _Print]:
-        found = {}
-        with disk_errors(DeviceError, self._folder, "cannot be watched", ": check the folder"):
-            with os.scandir(self._folder) as entries:
-                for entry in entries:
-                    if entry.name.lower().endswith(IMAGE_ENDINGS) and not entry.name.startswith("."):
-                        with contextlib.suppress(FileNotFoundError):  # gone again meanwhile
-                            stat = entry.stat()
-                            found[entry.name] = (stat.st_size, stat.st_mtime_ns)
-        return found
-
 
 class ImageFolder:
-    """A ``Camera`` over pictures, in name order. Unreadable ones are skipped; none readable is an error at ``open``.
+    """A ``Camera`` over pictures, in name order. Unreadable ones are skipped; none readable is an error at ``open``."""
 
-    With `watch` only pictures that come later are shown, the newest first in line and each once; there need not be any at ``open``.
-    """
-
-    def __init__(self, path: Path, *, period_s: float = 0.5, watch: bool = False) -> None:
+    def __init__(self, path: Path, *, period_s: float = 0.5) -> None:
         self._path = path
         self._period_s = period_s
-        self._watch = FolderWatch(path) if watch else None
         self._files: list[Path] = []
         self._image: Image | None = None
         self._next = 0
@@ -93,9 +35,6 @@ class ImageFolder:
         return self._path.name
 
     def open(self) -> None:
-        if self._watch is not None:
-            self._watch.begin()
-            return
         if self._path.is_dir():
             self._files = sorted(p for p in self._path.iterdir() if p.suffix.lower() in IMAGE_ENDINGS)
         elif self._path.exists():
@@ -107,10 +46,6 @@ class ImageFolder:
             raise DeviceError(f"{self._path}: none of {len(self._files)} pictures can be read")
 
     def read(self, timeout_s: float) -> Frame | None:
-        if self._watch is not None:
-            image = self._watch.next(timeout_s)
-            self._index += image is not None
-            return None if image is None else Frame(self._index, time.monotonic(), image)
         wait = self._due_s - time.monotonic()
         if wait > timeout_s:
             time.sleep(timeout_s)

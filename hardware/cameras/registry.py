@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from core.config.models import CAMERAS, CameraConfig, RigConfig
+from core.config.models import CAMERAS, CameraConfig
 from core.devices import Camera, DeviceError
 from core.messages import message
 from core.program import how_to_install
@@ -50,7 +50,7 @@ class CameraKind:
 
     title: str
     live: Callable[[CameraConfig], Camera] | None = None
-    recorded: Callable[[Path, RigConfig], Camera] | None = None
+    recorded: Callable[[Path], Camera] | None = None
     find: Callable[[], Sequence[FoundCamera]] = lambda: ()
     check: Callable[[CameraConfig], Check] | None = None
     check_library: Callable[[], None] = lambda: None
@@ -72,7 +72,7 @@ def _realsense_live(config: CameraConfig) -> Camera:
     return realsense_camera(config)
 
 
-def _realsense_recording(source: Path, _: RigConfig) -> Camera:
+def _realsense_recording(source: Path) -> Camera:
     _need_realsense()
     from hardware.cameras.realsense import RealSenseRecording
 
@@ -216,16 +216,16 @@ def _check_basler(config: CameraConfig) -> Check:
     return Check("camera", False, message("no Basler camera"), fix)
 
 
-def _video_file(source: Path, _: RigConfig) -> Camera:
+def _video_file(source: Path) -> Camera:
     from hardware.cameras.files import VideoFile
 
     return VideoFile(source)
 
 
-def _image_folder(source: Path, rig: RigConfig) -> Camera:
+def _image_folder(source: Path) -> Camera:
     from hardware.cameras.files import ImageFolder
 
-    return ImageFolder(source, watch=rig.watch_folder)
+    return ImageFolder(source)
 
 
 CAMERA_KINDS: dict[str, CameraKind] = {

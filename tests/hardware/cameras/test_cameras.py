@@ -1,8 +1,6 @@
 """One contract for every camera that needs no device, and what is special to each."""
 
 import contextlib
-import itertools
-import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from fractions import Fraction
@@ -15,7 +13,7 @@ import pytest
 
 from core.config.models import TwinConfig
 from core.devices import Camera, DamagedPicture, DamagedStream, DeviceError, EndOfStream
-from core.types import Frame, Image
+from core.types import Image
 from hardware.cameras import files
 from hardware.cameras.files import ImageFolder, VideoFile
 from hardware.cameras.live import LiveCamera
@@ -48,19 +46,6 @@ def _twin(_: Path, __: ExitStack) -> Camera:
     return TwinCamera(TwinWorld(TwinConfig(phantom="s_curve", image_width_px=160, image_height_px=120)), lock_step=True)
 
 
-def _watched(folder: Path, _: ExitStack) -> Camera:
-    """A watched folder that a new picture comes into all the time."""
-    camera = ImageFolder(_pictures(folder / "pictures"), watch=True)
-    read, numbers = camera.read, itertools.count(10)
-
-    def read_after_writing(timeout_s: float) -> Frame | None:
-        cv2.imwrite(str(folder / "pictures" / f"{next(numbers)}.png"), np.zeros((48, 64, 3), np.uint8))
-        return read(timeout_s)
-
-    camera.read = read_after_writing
-    return camera
-
-
 def _realsense(_: Path, undo: ExitStack) -> Camera:
     return realsense_camera(SOFT, undo.enter_context(SoftRealSense()).context)
 
@@ -74,7 +59,6 @@ MAKERS: dict[str, Callable[[Path, ExitStack], Camera]] = {
     "video paced": lambda folder, _: VideoFile(_video(folder / "v.mp4")),
     "video unpaced": lambda folder, _: VideoFile(_video(folder / "v.mp4"), paced=False),
     "image folder": lambda folder, _: ImageFolder(_pictures(folder / "pictures"), period_s=0.01),
-    "watched folder": _watched,
     "RealSense": _realsense,
     "RealSense recording paced": lambda folder, _: RealSenseRecording(write_bag(folder / "r.bag", list(range(12)))),
     "RealSense recording unpaced": lambda folder, _: RealSenseRecording(write_bag(folder / "r.bag", list(range(12))), paced=False),
@@ -364,23 +348,3 @@ def test_a_folder_without_pictures_says_so(tmp_path: Path) -> None:
     (tmp_path / "x.png").write_bytes(b"broken")
     with pytest.raises(DeviceError, match="none of 1 pictures can be read"):
         ImageFolder(tmp_path).open()
-
-
-def test_a_watched_folder_shows_new_pictures_only_the_newest_first_in_line(tmp_path: Path) -> None:
-    folder = _pictures(tmp_path / "pictures")
-    camera = ImageFolder(folder, watch=True)
-    camera.open()
-    assert camera.read(0.15) is None
-    cv2.imwrite(str(folder / "z.png"), np.full((48, 64, 3), 10, np.uint8))
-    os.utime(folder / "z.png", (1e9, 1e9))
-    cv2.imwrite(str(folder / "a.png"), np.full((48, 64, 3), 20, np.uint8))
-    frame = camera.read(1.0)
-    assert (frame.index, int(frame.image[0, 0, 0])) == (0, 20)
-    assert camera.read(0.15) is None  # the older one was passed over, and nothing is shown twice
-    cv2.imwrite(str(folder / "0.png"), np.full((48, 64, 3), 30, np.uint8))  # written anew
-    (folder / "half.png").write_bytes(b"broken")
-    frame = camera.read(1.0)
-    assert (frame.index, int(frame.image[0, 0, 0])) == (1, 30)
-    camera.close()
-    with pytest.raises(DeviceError, match="cannot be watched"):
-        ImageFolder(tmp_path / "gone", watch=True).open()
