@@ -1,8 +1,7 @@
 """Ablation: what each step of the method is worth, from the paper taken literally to ours: ``python -m tools.ablation SET``.
 
 A variant is a configuration: the preset ``paper`` with the settings of the first steps as ours has them. All variants see the same
-masks of the same frames. Each difference has a 95 % interval (paired percentile bootstrap over whole phantoms). ``--sequence`` also
-measures streams of the twin: errors, swaps of head and tail, jumps of the head, jitter of theta.
+masks of the same frames. Each difference has a 95 % interval (paired percentile bootstrap over whole phantoms).
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -21,13 +20,13 @@ import typer
 
 from app.commands.options import ConfigOption, JsonOption, ModelOption, check_masks
 from app.commands.progress import progress_bar
-from core.config.models import PerceptionConfig, TwinConfig, choose_model, load_config
+from core.config.models import PerceptionConfig, choose_model, load_config
 from core.devices import UserError
 from core.evaluation.accuracy import WRONG_DEG, WRONG_PX, FrameScore, TrueMasks, score_frame
 from core.evaluation.metrics import Floats, are_too_few, bootstrap_rows, members
 from core.files import name_as_text
 from core.perception.segmentation import Probability, Segmentation, Segmenter
-from core.types import Frame, Image, Mask, Point, Scene
+from core.types import Frame, Image, Mask
 from tools.run import run_tool
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
 
 
 PAPER = "paper, literally"
-OURS = "ours"
 TRACKING = "tracking"
 
 
@@ -147,187 +145,6 @@ class SameMasks(Segmenter):
         return [self._kept]
 
 
-JUMP_PX = 20.0
-
-
-@dataclass(frozen=True, slots=True)
-class StreamFrame:
-    """One frame of a stream: what was found (None: no answer) and what is true (None: no pose). Points in source px."""
-
-    head: Point | None
-    tail: Point | None
-    theta_signed_deg: float | None
-    state: str | None
-    true_head: Point | None
-    true_tail: Point | None
-    true_theta_signed_deg: float | None
-    true_state: str | None
-
-    @property
-    def is_swapped(self) -> bool:
-        """Whether the answer took the tail for the head."""
-        if self.head is None or self.tail is None or self.true_head is None or self.true_tail is None:
-            return False
-        right = math.dist(self.head, self.true_head) + math.dist(self.tail, self.true_tail)
-        return math.dist(self.head, self.true_tail) + math.dist(self.tail, self.true_head) < right
-
-
-def stream_frame(scene: Scene, truth: dict[str, Any]) -> StreamFrame:
-    """What `scene` answered beside a truth row as ``synth`` writes it."""
-    pose, path = scene.pose, scene.path
-    has_pose = truth.get("state") is not None
-    answered = pose is not None and path is not None
-    return StreamFrame(
-        head=scene.to_source(path.head) if answered and path is not None else None,
-        tail=scene.to_source(path.tail) if answered and path is not None else None,
-        theta_signed_deg=pose.theta_signed_deg if pose is not None else None,
-        state=pose.state.value if pose is not None else None,
-        true_head=_pair(truth["head_xy"]) if has_pose else None,
-        true_tail=_pair(truth["tail_xy"]) if has_pose else None,
-        true_theta_signed_deg=float(truth["theta_signed_deg"]) if has_pose else None,
-        true_state=truth["state"] if has_pose else None,
-    )
-
-
-def stream_figures(streams: Sequence[Sequence[StreamFrame]]) -> dict[str, float | int | None]:
-    """The sums over several streams of consecutive frames.
-
-    Returns
-    -------
-    ``frames`` with a true pose; ``answered_share``; ``state_agreement`` with the true state, which knows no hysteresis;
-    ``theta_median_deg``, ``theta_mean_deg``, ``head_median_px`` of the absolute errors; ``wrong_share`` of the answers, by more
-    than 10 degrees or 15 px; ``swapped_frames``, answers that took the tail for the head; ``jumps``, answers whose head moved by
-    more than ``JUMP_PX`` other than the true head did since the answer before; ``theta_jitter_deg`` and ``head_jitter_px``, the
-    robust standard deviation of the error's change from frame to frame; ``state_changes`` and ``true_state_changes``.
-    """
-    frames = [frame for stream in streams for frame in stream if frame.true_state is not None]
-    answered = [frame for frame in frames if frame.state is not None]
-    errors = [(_theta_errors(stream), _head_errors(stream)) for stream in streams]
-    theta = np.abs(np.concatenate([of_theta for of_theta, _ in errors]))
-    head = np.hypot(*np.concatenate([of_head for _, of_head in errors]).T)
-    known = np.isfinite(theta) & np.isfinite(head)
-    theta, head = theta[known], head[known]
-    theta_moves = np.concatenate([_wrapped(np.diff(of_theta)) for of_theta, _ in errors])
-    # of the head from each answer to the next one, whatever lies between
-    head_moves = np.concatenate([np.hypot(*np.diff(of_head[np.isfinite(of_head[:, 0])], axis=0).T) for _, of_head in errors])
-    return {
-        "frames": len(frames),
-        "answered_share": len(answered) / len(frames) if frames else None,
-        "state_agreement": sum(f.state == f.true_state for f in answered) / len(answered) if answered else None,
-        "theta_median_deg": float(np.median(theta)) if len(theta) else None,
-        "theta_mean_deg": float(theta.mean()) if len(theta) else None,
-        "head_median_px": float(np.median(head)) if len(theta) else None,
-        "wrong_share": float(((theta > WRONG_DEG) | (head > WRONG_PX)).mean()) if len(theta) else None,
-        "swapped_frames": sum(frame.is_swapped for frame in answered),
-        "jumps": int((head_moves > JUMP_PX).sum()),
-        "theta_jitter_deg": _spread(theta_moves[np.isfinite(theta_moves)], 1.4826),
-        "head_jitter_px": _spread(head_moves[head_moves <= JUMP_PX], 1.0 / 1.1774),
-        "state_changes": sum(_changes([f.state for f in stream]) for stream in streams),
-        "true_state_changes": sum(_changes([f.true_state for f in stream]) for stream in streams),
-    }
-
-
-def _pair(values: Sequence[float]) -> Point:
-    return float(values[0]), float(values[1])
-
-
-def _wrapped(degrees: Floats) -> Floats:
-    return (degrees + 180.0) % 360.0 - 180.0
-
-
-def _theta_errors(stream: Sequence[StreamFrame]) -> Floats:
-    """Degrees, shape (N,); NaN where there is no answer."""
-    pairs = [(frame.theta_signed_deg, frame.true_theta_signed_deg) for frame in stream]
-    found, true = np.array(pairs, np.float64).reshape(-1, 2).T
-    return _wrapped(found - true)
-
-
-def _head_errors(stream: Sequence[StreamFrame]) -> Floats:
-    """From the true head to the one that was found, px, shape (N, 2); NaN where there is no answer."""
-    nowhere = (np.nan, np.nan)
-    return np.array([np.subtract(frame.head or nowhere, frame.true_head or nowhere) for frame in stream]).reshape(-1, 2)
-
-
-def _spread(changes: Floats, scale: float) -> float | None:
-    """Standard deviation from the median size of changes: `scale` is 1.4826 for a number, 1/1.1774 for the length of a 2-D step."""
-    return scale * float(np.median(np.abs(changes))) if len(changes) else None
-
-
-def _changes(states: Sequence[str | None]) -> int:
-    return sum(a != b for a, b in pairwise(state for state in states if state is not None))
-
-
-_FEED_MM_S = 12.0
-_START_MM = 35.0
-_WANDER = 0.6
-"""Of the driven stream: feed, insertion of its first frame, and how much the robot wanders about its route."""
-LIVE = f"{OURS}, as the window has it"
-
-
-def measure_streams(
-    configs: Mapping[str, PerceptionConfig],
-    pipeline_of: Callable[[PerceptionConfig], Pipeline],
-    masks: SameMasks,
-    *,
-    live: Pipeline | None,
-    frames: int,
-    phantoms: Sequence[str],
-    seed: int,
-) -> dict[str, Any]:
-    """Run the same consecutive frames of the twin through a pipeline of each configuration.
-
-    Parameters
-    ----------
-    configs : by the variant's name, ``OURS`` among them: its settings give the truth.
-    pipeline_of : makes a new pipeline on `masks`, which all of them share.
-    live : a pipeline as the window has it, with a network of its own and a region of interest; None: it is left out.
-    frames : divided among the `phantoms`.
-    seed : of the twin.
-
-    Returns
-    -------
-    ``phantoms``, ``frames_each`` and ``rows`` with ``stream_figures`` by variant.
-    """
-    each = -(-frames // len(phantoms))
-    streams: dict[str, list[list[StreamFrame]]] = {name: [] for name in (*configs, *([LIVE] if live is not None else []))}
-    with progress_bar() as bar:
-        task = bar.add_task("frames of the twin", total=each * len(phantoms))
-        for look, phantom in enumerate(phantoms):
-            pipelines = {name: pipeline_of(config) for name, config in configs.items()}
-            if live is not None:
-                live.reset()
-                pipelines[LIVE] = live
-            for name in pipelines:
-                streams[name].append([])
-            for frame, row in _stream(phantom, look, each, seed, configs[OURS], masks):
-                for name, pipeline in pipelines.items():
-                    streams[name][-1].append(stream_frame(pipeline(frame), row))
-                bar.advance(task)
-    rows = [{"name": name, "figures": stream_figures(parts)} for name, parts in streams.items()]
-    return {"phantoms": list(phantoms), "frames_each": each, "rows": rows}
-
-
-def _stream(
-    phantom: str, look: int, frames: int, seed: int, config: PerceptionConfig, masks: SameMasks
-) -> Iterator[tuple[Frame, dict[str, Any]]]:
-    """Consecutive frames of a robot that is driven along its longest route with a slow wander, and their truth."""
-    from hardware.twin.truth import RouteFollower
-    from hardware.twin.world import TwinWorld
-
-    world = TwinWorld(TwinConfig(phantom=phantom, appearance_seed=look), perception=config, seed=seed)
-    routes = (RouteFollower(world.phantom, node, wander=_WANDER, seed=seed) for node in world.phantom.targets)
-    follower = max(routes, key=lambda route: route.length_mm)
-    world.insert(_START_MM)
-    period_s = 1.0 / world.config.frames_per_second
-    for _ in range(frames):
-        world.send(follower.command(world.physics.robot_points_mm(), _FEED_MM_S, period_s))
-        world.advance(period_s)
-        frame = world.frame()
-        picture = world.picture(world.physics.robot_points_mm(), world.physics.delivery_mm)
-        masks.next_frame(picture.vessel, picture.robot)
-        yield frame, world.truth().to_json()
-
-
 @dataclass(frozen=True, slots=True)
 class AblationColumn:
     """A column of the table: the mean or a quantile of one value per frame."""
@@ -420,40 +237,16 @@ def _value(score: FrameScore, of: str) -> float:
 
 
 _MINUS = "\N{MINUS SIGN}"
-_STREAM_COLUMNS = (
-    ("frames", "frames"),
-    ("answered_share", "answered"),
-    ("state_agreement", "state agrees"),
-    ("theta_median_deg", "theta median, deg"),
-    ("theta_mean_deg", "theta mean, deg"),
-    ("head_median_px", "head median, px"),
-    ("wrong_share", "wrong"),
-    ("swapped_frames", "head-tail swaps"),
-    ("jumps", f"jumps > {JUMP_PX:.0f} px"),
-    ("theta_jitter_deg", "theta jitter, deg"),
-    ("head_jitter_px", "head jitter, px"),
-    ("state_changes", "state changes"),
-    ("true_state_changes", "true changes"),
-)
 
 
 def markdown(result: dict[str, Any]) -> str:
-    """All tables, for a document or a terminal."""
-    parts = []
-    if "rows" in result:
-        brackets = f"the difference to the row before and its 95 % bootstrap interval over {result['drawn']}"
-        parts.append(
-            f"{result['set']}: {result['expected']} frames with a pose; the same masks for all rows ({result['masks']}); "
-            f"in brackets {brackets}; * zero lies outside it.\n"
-        )
-        headings = ["variant", *(column.title + (", %" if column.is_share else "") for column in MEASURES), "ms after network"]
-        parts.append(_markdown_table(headings, [_row_cells(row) for row in result["rows"]]))
-    if stream := result.get("stream"):
-        phantoms = ", ".join(stream["phantoms"])
-        parts.append(f"Streams of the twin, {stream['frames_each']} frames in each of: {phantoms} ({result['masks']}).\n")
-        rows = [[row["name"], *_stream_cells(row["figures"])] for row in stream["rows"]]
-        parts.append(_markdown_table(["variant", *(title for _, title in _STREAM_COLUMNS)], rows))
-    return "\n".join(parts)
+    """The table, for a document or a terminal."""
+    brackets = f"the difference to the row before and its 95 % bootstrap interval over {result['drawn']}"
+    headings = ["variant", *(column.title + (", %" if column.is_share else "") for column in MEASURES), "ms after network"]
+    return (
+        f"{result['set']}: {result['expected']} frames with a pose; the same masks for all rows ({result['masks']}); "
+        f"in brackets {brackets}; * zero lies outside it.\n\n"
+    ) + _markdown_table(headings, [_row_cells(row) for row in result["rows"]])
 
 
 def _row_cells(row: dict[str, Any]) -> list[str]:
@@ -482,72 +275,34 @@ def _difference(figure: Figure, measure: AblationColumn) -> str:
     return f" ({_number(figure.difference, measure, signed=True)}{star}, {low} to {high})"
 
 
-def _stream_cells(figures: dict[str, Any]) -> list[str]:
-    cells = []
-    for key, _ in _STREAM_COLUMNS:
-        value = figures[key]
-        if value is None:
-            cells.append("-")
-        elif key in ("answered_share", "state_agreement", "wrong_share"):
-            cells.append(f"{100.0 * value:.1f} %")
-        else:
-            cells.append(f"{value:.2f}".replace("-", _MINUS) if isinstance(value, float) else str(value))
-    return cells
-
-
 def run_ablation(
-    folder: Path | None,
+    folder: Path,
     *,
     model: str | None = None,
     config_path: Path | None = None,
     true_masks: bool = False,
-    sequence: int = 0,
-    phantoms: Sequence[str] = (),
     seed: int = 0,
     out: Path | None = None,
 ) -> dict[str, Any]:
-    """Measure on a labelled set, on `sequence` frames of the twin, or on both; write ``ablation.json`` and ``.md`` to `out`.
-
-    Parameters
-    ----------
-    phantoms : named phantoms of the stream; empty: all of them.
+    """Measure on a labelled set; write ``ablation.json`` and ``.md`` to `out`.
 
     Raises
     ------
     UserError
         In one line, where there is nothing to measure on or the results cannot be written.
     """
-    from core.perception.pipeline import open_pipeline
-    from hardware.twin.phantom import PHANTOM_TITLES
-
-    if folder is None and not sequence:
-        raise UserError("nothing to measure on: give a labelled set (as synth writes it), --sequence N, or both")
-    if unknown := [name for name in phantoms if name not in PHANTOM_TITLES]:
-        raise UserError(f"unknown phantom {unknown[0]!r}; known: {', '.join(PHANTOM_TITLES)}")
     overrides = choose_model(model)
     ours = load_config(config_path, None, overrides).perception
     paper = load_config(config_path, "paper", overrides).perception
-    samples, truth = _labelled(folder) if folder is not None else ([], {})
+    samples, truth = _labelled(folder)
     try:
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
         masks, pipeline_of = _open_masks(ours, true_masks)
         source = "true masks" if true_masks else f"model {ours.segmentation.model}, {masks.engine}"
-        result: dict[str, Any] = {"set": name_as_text(folder) if folder else None, "masks": source, "seed": seed}
-        if samples:
-            variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
-            result |= _measure_set(samples, truth, variants, pipeline_of, masks, ours.working_size_px, seed)
-        if sequence:
-            literal, *_, untracked, _ = make_variants(paper, ours)
-            result["stream"] = measure_streams(
-                {PAPER: literal.config, f"{OURS} without {TRACKING}": untracked.config, OURS: ours},
-                pipeline_of,
-                masks,
-                live=None if true_masks else open_pipeline(ours),
-                frames=sequence,
-                phantoms=phantoms or tuple(PHANTOM_TITLES),
-                seed=seed,
-            )
+        result: dict[str, Any] = {"set": name_as_text(folder), "masks": source, "seed": seed}
+        variants = make_variants(paper, ours, [step for step in STEPS if step.name != TRACKING])
+        result |= _measure_set(samples, truth, variants, pipeline_of, masks, ours.working_size_px, seed)
         if out is not None:
             (out / "ablation.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
             (out / "ablation.md").write_text(markdown(result), encoding="utf-8")
@@ -617,28 +372,17 @@ def _measure_set(
 
 
 def ablation(
-    labelled: Annotated[Path | None, typer.Argument(metavar="SET", help="labelled set as synth writes it")] = None,
+    labelled: Annotated[Path, typer.Argument(metavar="SET", help="labelled set as synth writes it")],
     as_json: JsonOption = False,
     out: Annotated[Path | None, typer.Option(help="folder for ablation.json and ablation.md")] = None,
     true_masks: Annotated[bool, typer.Option("--true-masks", help="the true masks instead of the network's")] = False,
-    sequence: Annotated[int, typer.Option(min=0, max=100_000, help="also measure streams, of so many frames of the twin")] = 0,
-    phantom: Annotated[list[str] | None, typer.Option(help="named phantom of these frames; default: all, in turn")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="of the bootstrap and of the twin")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="of the bootstrap")] = 0,
     model: ModelOption = None,
     config: ConfigOption = None,
 ) -> None:
-    """Measure what each step is worth, on the same masks of the same frames, and in streams of the twin."""
+    """Measure what each step is worth, on the same masks of the same frames."""
     check_masks(model, true_masks=true_masks)
-    result = run_ablation(
-        labelled,
-        model=model,
-        config_path=config,
-        true_masks=true_masks,
-        sequence=sequence,
-        phantoms=phantom or (),
-        seed=seed,
-        out=out,
-    )
+    result = run_ablation(labelled, model=model, config_path=config, true_masks=true_masks, seed=seed, out=out)
     sys.stdout.write(json.dumps(result, allow_nan=False) + "\n" if as_json else markdown(result))
 
 

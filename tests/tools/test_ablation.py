@@ -1,4 +1,4 @@
-"""The ablation: its variants, figures with values counted by hand, stability in a stream, and a run on a set and on the twin."""
+"""The ablation: its variants, figures with values counted by hand, and a run on a set."""
 
 from __future__ import annotations
 
@@ -16,15 +16,11 @@ from core.devices import UserError
 from core.evaluation.accuracy import FrameScore
 from core.types import Reason
 from tools.ablation import (
-    OURS,
     PAPER,
     STEPS,
-    StreamFrame,
     figures,
     make_variants,
-    markdown,
     run_ablation,
-    stream_figures,
 )
 
 LITERAL = load_config(preset="paper").perception
@@ -143,53 +139,6 @@ def test_intervals_hold_the_difference_and_say_when_it_is_clear() -> None:
     assert again == table, "the same seed gives the same intervals"
 
 
-# ---- streams ----
-
-
-def seen(
-    theta: float | None, true_theta: float, head: tuple[float, float] = (100.0, 0.0), state: str = "C", swapped: bool = False
-) -> StreamFrame:
-    """A robot from (0, 0) to (100, 0); without theta there is no answer."""
-    if theta is None:
-        return StreamFrame(None, None, None, None, (100.0, 0.0), (0.0, 0.0), true_theta, "C")
-    found = (head, (0.0, 0.0)) if not swapped else ((0.0, 0.0), head)
-    return StreamFrame(*found, theta, state, (100.0, 0.0), (0.0, 0.0), true_theta, "C")
-
-
-def test_swaps_jumps_and_changes_are_counted() -> None:
-    stream = [
-        seen(5.0, 5.0),
-        seen(5.0, 5.0, head=(110.0, 0.0), state="B"),  # 10 px is no jump
-        seen(None, 5.0),
-        seen(5.0, 5.0, head=(131.0, 0.0)),  # 21 px since the last answer is one
-        seen(-175.0, 5.0, swapped=True),  # and so is the way to the other end
-        seen(5.0, 5.0),  # and back
-    ]
-    found = stream_figures([stream, [seen(5.0, 5.0, state="A")]])
-    assert found["frames"] == 7
-    assert found["answered_share"] == 6 / 7
-    assert found["state_agreement"] == 4 / 6
-    assert (found["theta_median_deg"], found["theta_mean_deg"]) == (0.0, 180.0 / 6)
-    assert found["head_median_px"] == 5.0  # of 0, 10, 31, 100, 0 and 0
-    assert found["wrong_share"] == 2 / 6, "the one that jumped, and the one that is turned round"
-    assert found["swapped_frames"] == 1
-    assert found["jumps"] == 3
-    assert found["state_changes"] == 2  # C B C within the first stream; the second stands alone
-    assert found["true_state_changes"] == 0
-    assert stream_figures([[seen(-178.0, 179.0)]])["theta_mean_deg"] == 3.0, "the short way round"
-
-
-def test_jitter_is_the_spread_of_the_errors_change() -> None:
-    rng = np.random.default_rng(2)
-    stream = [seen(10.0 + rng.normal(0.0, 2.0), 10.0, head=(100.0 + rng.normal(0, 1.0), rng.normal(0, 1.0))) for _ in range(2000)]
-    found = stream_figures([stream])
-    # The difference of two independent errors has the square root of two times their spread.
-    assert found["theta_jitter_deg"] == pytest.approx(2.0 * np.sqrt(2.0), rel=0.06)
-    assert found["head_jitter_px"] == pytest.approx(np.sqrt(2.0), rel=0.06)
-    still = stream_figures([[seen(12.0, 10.0)] * 5])
-    assert still["theta_jitter_deg"] == still["head_jitter_px"] == 0.0, "a steady error is no jitter"
-
-
 # ---- a whole run ----
 
 
@@ -221,16 +170,6 @@ def test_there_is_a_row_for_each_step(done: dict[str, Any], frames: Path) -> Non
     assert len({line.count("|") for line in table}) == 1
 
 
-def test_streams_of_the_twin_are_measured_with_and_without_tracking() -> None:
-    stream = run_ablation(None, true_masks=True, sequence=4, phantoms=("s_curve", "tree"))["stream"]
-    assert (stream["phantoms"], stream["frames_each"]) == (["s_curve", "tree"], 2)
-    assert [row["name"] for row in stream["rows"]] == [PAPER, f"{OURS} without tracking", OURS]
-    for row in stream["rows"]:
-        assert row["figures"]["frames"] == 4
-        assert row["figures"]["swapped_frames"] == row["figures"]["jumps"] == 0
-    assert "head-tail swaps" in markdown({"stream": stream, "masks": "true masks"})
-
-
 def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
     poseless, file = tmp_path / "poseless", tmp_path / "file"
     shutil.copytree(frames, poseless)
@@ -238,11 +177,9 @@ def test_bad_input_is_one_clear_line(frames: Path, tmp_path: Path) -> None:
     (poseless / "truth.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     file.write_text("")
     for folder, options, words in (
-        (None, {}, "nothing to measure on"),
         (tmp_path / "missing", {}, "no labelled frames"),
         (poseless, {}, "no frame of truth.jsonl has a pose"),
         (frames, {"out": file}, "cannot be written"),
-        (None, {"sequence": 5, "phantoms": ("nowhere",)}, "unknown phantom 'nowhere'"),
         (frames, {"model": str(tmp_path / "none")}, "none"),
     ):
         with pytest.raises(UserError) as failed:
