@@ -17,13 +17,9 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, TypeVar
-from unittest.mock import patch
 
-import cv2
-import numpy as np
 import PIL.Image
 import typer
 from PySide6.QtCore import QEvent, QRectF, Qt
@@ -46,15 +42,12 @@ from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
 from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
-from app.training.dialog import TrainingDialog
-from app.training.model import TrainingRequest, collect_from_file
 from app.ui import theme
 from app.ui.window_base import make_application
 from app.widgets.basics import Card
 from app.widgets.servo_table import ServoTable
-from core.annotation.masks import polygons_of
-from core.annotation.model import Annotation, ImageView, MaskTarget, measure_lines
-from core.annotation.store import DEFAULT_NAME, AnnotationStore, ItemKey, find_images
+from core.annotation.model import ImageView
+from core.annotation.store import AnnotationStore, ItemKey, find_images
 from core.config.models import Config, PerceptionConfig, load_config
 from core.config.safety import ServosConfig
 from core.control.drive_view import DriveView
@@ -114,7 +107,6 @@ class LockStepEngine:
         self._engine = Engine(_Camera(self.render), pipeline, policy, lambda: None, self.pilot, robot, turns_pilot=False)
         self.jog: Jog = AT_REST
         self.deadman = False
-        self.blur_px = 0.0
         self.writer: SessionWriter | None = None
         self.problem: str | None = None
         self._lock = threading.Lock()
@@ -237,10 +229,7 @@ class LockStepEngine:
     def render(self) -> Frame:
         """The world one frame later."""
         self.world.advance(1.0 / _FRAMES_PER_S)
-        frame = self.world.frame(self.now_s)
-        if self.blur_px <= 0.0:
-            return frame
-        return replace(frame, image=np.asarray(cv2.GaussianBlur(frame.image, (0, 0), self.blur_px), np.uint8))
+        return self.world.frame(self.now_s)
 
 
 class _TwinServos(LockStepServos):
@@ -366,9 +355,6 @@ class OperatorScene:
 
 _SHOWN_FOLDER = "/data/LumenPilot"  # instead of a folder of this machine
 _BOARDS = 5
-_PHANTOMS = ("tree", "y_branch", "s_curve", "aortic_arch", "tortuous", "tree")
-_STEPS, _SHOWN_STEP, _SHOWN_CHECKS, _REMEMBERED = 40, 12, 4, 2
-_TRAINING_S = 1800.0
 
 
 def settings(job: PictureJob) -> None:
@@ -395,52 +381,6 @@ def preflight(job: PictureJob) -> None:
     finally:
         model.close()
         job.close(checks)
-
-
-def training(job: PictureJob) -> None:
-    """A training on frames of the twin in false colours, under way."""
-    folder = job.folder / "own"
-    folder.mkdir()
-    store = _masks_by_hand(folder, job.config)
-    with patch.dict(os.environ, XDG_DATA_HOME=str(job.folder / "data")):  # the model must not stay in the user's folder
-        dialog = TrainingDialog(partial(collect_from_file, store), f"{_SHOWN_FOLDER}/{DEFAULT_NAME}")
-        dialog.steps.setValue(_STEPS)
-        dialog.show()
-        try:
-            dialog.job.start(TrainingRequest(dialog.name.text(), steps=_STEPS, remember=_REMEMBERED))
-
-            def far_enough() -> bool:
-                state = dialog.job.state
-                if not state.is_busy:
-                    raise UserError(dialog.line)
-                return state.step >= _SHOWN_STEP and len(state.held_out) >= _SHOWN_CHECKS
-
-            job.until(far_enough, "the training", _TRAINING_S)
-            job.save(dialog, "training")
-            dialog.job.stop()
-            job.until(lambda: not dialog.is_busy, "the end of the training", _TRAINING_S)
-        finally:
-            dialog.end()
-            job.close(dialog)
-
-
-def _masks_by_hand(folder: Path, config: Config) -> Path:
-    """Write pictures in false colours, annotated with the true masks; returns the annotation file."""
-    masks = []
-    for k, phantom in enumerate(_PHANTOMS):
-        world = TwinWorld(config.twin.model_copy(update={"phantom": phantom}), perception=config.perception, seed=k)
-        world.insert(50.0 + 6.0 * k)
-        seen = world.picture(world.physics.robot_points_mm())
-        write_png(folder / f"{k:02d}_{phantom}.png", np.ascontiguousarray(255 - seen.image[..., ::-1]))
-        masks.append(polygons_of(seen.vessel, MaskTarget.VESSEL) + polygons_of(seen.robot, MaskTarget.ROBOT))
-    path = folder / DEFAULT_NAME
-    with AnnotationStore(path) as store:
-        for image, drawn in zip(find_images(sorted(folder.glob("*.png")), store)[0], masks, strict=True):
-            content, key = Annotation(masks=drawn), ItemKey(image.sha256, "", "anna", 1)
-            entry = store.history(key).edit("drawn", content)
-            assert entry is not None
-            store.save(key, ImageView.AS_IS, entry, content, measure_lines(content, image.record.size, config.perception), 1.0)
-    return path
 
 
 def rig_wizard(job: PictureJob) -> None:
@@ -512,7 +452,6 @@ def servo_table(job: PictureJob) -> None:
 
 _TARGET: Point = (560.0, 318.0)
 _FEED = Jog(advance=0.5)
-_OUT_OF_FOCUS_PX = 9.0
 _MOST_FRAMES = 1500
 
 
@@ -564,23 +503,6 @@ def operator_stopped(job: PictureJob) -> None:
         pages = scene.window.panels.pages
         pages.setCurrentIndex(next(k for k in range(pages.count()) if pages.tabText(k) == "Log"))
         scene.save("operator_stopped")
-
-
-def operator_no_answer(job: PictureJob) -> None:
-    """A picture that is refused: the reason stands where the letter would."""
-    with OperatorScene(job) as scene:
-        scene.play(25)
-        scene.engine.blur_px = _OUT_OF_FOCUS_PX
-        scene.play(12)
-        scene.save("operator_no_answer")
-
-
-def operator_keys(job: PictureJob) -> None:
-    """The page of keys."""
-    with OperatorScene(job) as scene:
-        scene.play(5)
-        scene.window.panels.help.toggle()
-        scene.save("operator_keys")
 
 
 def operator_tour(job: PictureJob) -> None:
@@ -731,8 +653,8 @@ PICTURES = {
     make.__name__: make
     for make in (
         *(operator_window, operator_driving, operator_arrived, operator_stopped),
-        *(operator_no_answer, operator_keys, operator_tour, operator_light),
-        *(player, annotator, study_figures, settings, preflight, training, rig_wizard, servo_table),
+        *(operator_tour, operator_light, player, annotator, study_figures),
+        *(settings, preflight, rig_wizard, servo_table),
     )
 }
 """What makes a picture, by the name of its file without ending."""
