@@ -4,8 +4,9 @@ In a vessel the head does not simply turn as it is bent: a wall holds or turns i
 where the vessel turns away, theta grows without a turn of the head. So a turn counts as wrong where the head turned against the
 command in the picture and also against the vessel's direction, or did not follow a large command there, beyond what feeding a
 bent head and the poses' noise explain. A head that springs free turns by what was commanded before and had no effect: that is no
-wrong turn either. The same holds for the way of the head along itself against the feed. Robots wired right stay far below the
-limits, swapped tendons and a reversed feed reach them within a second.
+wrong turn either. The same holds for the feed and the robot's length in the picture, which no bend changes (the way of the head
+along itself does: a head that straightens goes back while it is fed). Robots wired right stay far below the limits, swapped tendons
+and a reversed feed reach them within a second.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from core.control.faults import Cause, Fault
 from core.messages import message
 from core.perception.vectors import fit_robot_vector
-from core.types import Point, Scene
+from core.types import Scene
 
 WRONG_TURN_DEG = 4.0
 """Turn against the command that disarms."""
@@ -35,6 +38,8 @@ _BENDING_MM = 15.0
 _FOLLOWED, _FOLLOWED_LEAST = 1.5, (0.5, 0.5, 0.1)
 """Heading (deg), theta (deg) and way (mm) are followed from frame to frame by so many times the commanded motion and so much more:
 a pose that flickers hardly moves them."""
+_CUT_MM = 2.0
+"""A length that changes by so much more than that from one frame to the next is no way: the robot was covered or cut."""
 _RIGHT_TURN_DEG, _RIGHT_FEED_MM = 3.0, 1.0
 """Motion with the command that shows its direction to be right."""
 _ENOUGH_DEG, _ENOUGH_MM, _LITTLE = 10.0, 3.0, 0.25
@@ -54,13 +59,13 @@ class HeadSeen:
     Attributes
     ----------
     heading_deg, theta_deg : direction in the picture, and against the vessel's.
-    place_mm : in the picture.
+    length_mm : of the robot in the picture.
     """
 
     captured_s: float
     heading_deg: float
     theta_deg: float
-    place_mm: Point
+    length_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +85,8 @@ def head_seen(scene: Scene, pixels_per_mm: float) -> HeadSeen | None:
     if line is None:
         return None
     heading_deg, vessel_deg = (math.degrees(math.atan2(y, x)) for x, y in (line.direction, scene.vessel_vector.direction))
-    place = scene.path.head[0] / pixels_per_mm, scene.path.head[1] / pixels_per_mm
-    return HeadSeen(scene.captured_s, heading_deg, _wrapped(heading_deg - vessel_deg), place)
+    length_px = float(np.linalg.norm(np.diff(scene.path.points, axis=0), axis=1).sum())
+    return HeadSeen(scene.captured_s, heading_deg, _wrapped(heading_deg - vessel_deg), length_px / pixels_per_mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +101,7 @@ class _Sent:
 
 
 _Motion = tuple[float, float, float]
-"""Heading (deg), theta (deg), and way along the head (mm)."""
+"""Heading (deg), theta (deg), and length (mm)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,7 +238,12 @@ def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent]) -> 
     before = earlier[-1]
     turned_deg = max(abs(a - b) for a, b in zip(turns_deg, before.turns_deg, strict=True))
     fed_mm = max(abs(a - b) for a, b in zip(feds_mm, before.feds_mm, strict=True))
-    step = _step(before.head, head)
+    way_mm = head.length_mm - before.head.length_mm
+    step = (
+        _wrapped(head.heading_deg - before.head.heading_deg),
+        _wrapped(head.theta_deg - before.head.theta_deg),
+        way_mm if abs(way_mm) <= _CUT_MM + _FOLLOWED * fed_mm else 0.0,
+    )
     raw = _each(lambda a, b: a + b, before.raw, step)
     most = _each(lambda least, commanded: least + _FOLLOWED * commanded, _FOLLOWED_LEAST, (turned_deg, turned_deg, fed_mm))
     way = _each(lambda to, at: to - at, raw, before.moved)
@@ -244,13 +254,6 @@ def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent]) -> 
 def _each(function: Callable[[float, float], float], one: _Motion, other: _Motion) -> _Motion:
     """A function of each of three pairs of numbers."""
     return function(one[0], other[0]), function(one[1], other[1]), function(one[2], other[2])
-
-
-def _step(before: HeadSeen, now: HeadSeen) -> _Motion:
-    turned_deg = _wrapped(now.heading_deg - before.heading_deg)
-    x, y = (a - b for a, b in zip(now.place_mm, before.place_mm, strict=True))
-    along = math.radians(before.heading_deg + turned_deg / 2.0)
-    return turned_deg, _wrapped(now.theta_deg - before.theta_deg), x * math.cos(along) + y * math.sin(along)
 
 
 def _noise(seen: list[_Seen], which: int) -> float:
