@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -29,10 +31,12 @@ from app.commands.options import (
     TaskOption,
 )
 from app.commands.progress import end_like_an_interrupt, progress_bar, report_progress
+from app.commands.workers import over_processes
 from app.ui.display import check_qt
 from app.ui.i18n import mark
 from core.config.files import own_config
 from core.config.models import Config, sessions_folder
+from core.config.rig_file import find_rig, has_rig
 from core.control.modes import Mode
 from core.devices import UserError
 from core.session.exporters import export_session, exporter_name, items_of
@@ -54,11 +58,19 @@ session = typer.Typer(help="Recorded sessions: look at them, describe them, reco
 
 
 @session.command()
-def info(session: SessionArgument, as_json: JsonOption = False) -> None:
+def info(
+    session: SessionArgument,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="replay its rehearsed runs in the identified twin: which parameter is another now?")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
     """What a session is, what is in it, and what is wrong with it."""
     with SessionReader(session) as reader:
         reader.wait()
         result, is_cut = describe(reader), _is_cut(reader)
+        if explain:
+            _explain(reader, result["rehearsals"])
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
         return
@@ -76,6 +88,35 @@ def info(session: SessionArgument, as_json: JsonOption = False) -> None:
     Console(markup=False, emoji=False).print(table)
     if is_cut:
         sys.stderr.write(f"note: it did not end properly; repair it with: session recover {session}\n")
+
+
+def _explain(reader: SessionReader, runs: list[dict[str, Any]]) -> None:
+    """Add to each run beside its rehearsal how far its replay is off, and which parameter would explain that."""
+    from hardware.twin.identification import RUNS, JogError, bench_of_session, explained, motion_of_session
+
+    if reader.manifest is None or not runs:
+        raise UserError("no run of this session was rehearsed; rehearse the way (T) before the hand-over")
+    name, config = reader.manifest.rig, Config.model_validate(reader.manifest.config)
+    known = find_rig(name)[1].behaviour if has_rig(name) else config.twin.behaviour
+    if known is None:
+        raise UserError("its robot was not identified; record a jog, and run: rig identify SESSION --rig NAME")
+    bench = bench_of_session(reader)
+    motion, zero_s = motion_of_session(reader, bench), float(reader.timeline().time_s[0])
+    with progress_bar() as bar:
+        task = bar.add_task("runs of the twin", total=RUNS * len(runs))
+
+        def spread(function: Any, tasks: Any) -> Iterator[Any]:
+            for one in over_processes(min(2, os.cpu_count() or 1), function, tasks):
+                bar.advance(task)
+                yield one
+
+        for run in runs:
+            began_s = zero_s + run["began_s"]
+            part = motion.between(began_s, began_s + run["seconds"])
+            try:
+                run["explained"] = asdict(explained(bench.phantom, part, known, config.servos, spread))
+            except JogError as error:
+                sys.stderr.write(f"note: {error}\n")
 
 
 def _is_cut(reader: SessionReader) -> bool:

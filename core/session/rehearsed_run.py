@@ -93,6 +93,7 @@ def _run_beside(reader: SessionReader, result: RehearsalResult, places: Sequence
         "runs": result.runs,
         "arrived_share": result.arrived.share,
         "arrived": arrived,
+        "began_s": round(began_s - zero_s, 2),
         "seconds": round(seconds, 2),
         "rehearsed_seconds": [round(value - first.time_s[1], 2) for value in last.time_s],
         "inside_share": round(1.0 - len(outside) / len(found), 4),
@@ -124,4 +125,8 @@ def beside_line(run: dict[str, Any]) -> str:
     if run["feed_explains_s"] is not None:
         way = f"{run['way_per_feed']:.2f} mm of way per mm fed (rehearsed {run['rehearsed_way_per_feed'][1]:.2f})"
         parts.append(f"the feed slips or is another: {way}, which explains {run['feed_explains_s']:+.1f} s")
+    if (told := run.get("explained")) is not None:
+        named = " or ".join(f"{name} = {value:g}" for name, value in told["values"].items())
+        why = f"would explain it ({told['left_mm']:.1f} mm left)" if named else "no single parameter explains more"
+        parts.append(f"its replay in the identified twin is {told['away_mm']:.1f} mm off: {f'{named} ' * bool(named)}{why}")
     return "; ".join(parts)

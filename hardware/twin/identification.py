@@ -1,4 +1,4 @@
-"""The robot's behaviour from a recorded jog of a minute: what of it pictures and servo positions tell.
+"""The robot's behaviour from a recorded jog of a minute: what of it pictures and servo positions tell; what changed in a later run.
 
 First each parameter where it shows by itself: the feed from the length of robot in the picture; delay, play, slack and bend per
 pull from the head's turn against the pull. Then all together through the twin's physics, which know the walls. The first half is
@@ -66,6 +66,16 @@ _WITHIN = 5.3
 since what perception always sees alike is not in them."""
 _MOST_RUNS = 7
 """Of the twin for the fit, besides those for the slopes."""
+_LEAST_PICTURES = 30
+"""Of a run that is explained."""
+_LOST_MM = 6.0
+"""From where on the replay's head is so far off, it may be in another branch: only what was before is explained."""
+_ALIKE = 30.0
+"""So many of the compared numbers count as one: those of ten pictures a second, and of places side by side, err alike."""
+_CLEARLY, _ALONE, _AS_WELL, _MOST, _NAMED = 12.0, 0.7, 0.9, 0.5, 2
+"""Twice the logarithm of a likelihood's ratio from which a parameter is named; its least share of what all parameters together
+explain; the share of the best one's from which another one explains as well; the share of the head's distance that has to vanish;
+and how many may be named as equals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,9 +136,9 @@ class JogRecord:
     bend_mm: Floats
     feed_mm: Floats
 
-    def until(self, end_s: float) -> JogRecord:
-        """The pictures before this time."""
-        keep = self.time_s < end_s
+    def between(self, start_s: float, end_s: float) -> JogRecord:
+        """The pictures from one time to before the other."""
+        keep = (self.time_s >= start_s) & (self.time_s < end_s)
         return replace(self, time_s=self.time_s[keep], body_mm=self.body_mm[keep], length_mm=self.length_mm[keep])
 
 
@@ -173,6 +183,15 @@ def bench_of_session(reader: SessionReader, rig: str | None = None) -> Identifie
 
 def jog_of_session(reader: SessionReader, bench: IdentifiedBench) -> JogRecord:
     """What a recorded jog showed. Raises JogError."""
+    jog = motion_of_session(reader, bench)
+    if (seconds := float(jog.time_s[-1] - jog.time_s[0]) if len(jog.time_s) else 0.0) < LEAST_S:
+        raise JogError(f"{reader.folder}: the robot is seen for {seconds:.0f} s; a jog has a minute")
+    check_jog(jog, str(reader.folder))
+    return jog
+
+
+def motion_of_session(reader: SessionReader, bench: IdentifiedBench) -> JogRecord:
+    """What a session showed of the robot and its servos. Raises JogError."""
     reader.wait()
     assert reader.manifest is not None
     servos = ServosConfig.model_validate(reader.manifest.config["servos"])
@@ -200,12 +219,8 @@ def jog_of_session(reader: SessionReader, bench: IdentifiedBench) -> JogRecord:
         raise JogError(f"{reader.folder}: has no positions of the servos: record while you drive the robot")
     joint_s = np.array(sorted(joints))
     bend_mm, feed_mm = np.array([joints[time_s] for time_s in joint_s]).T
-    if (seconds := pictures[-1][0] - pictures[0][0] if pictures else 0.0) < LEAST_S:
-        raise JogError(f"{reader.folder}: the robot is seen for {seconds:.0f} s; a jog has a minute")
-    time_s, body_mm, length_mm = (np.array(column) for column in zip(*pictures, strict=True))
-    jog = JogRecord(time_s, body_mm, length_mm, joint_s, bend_mm, feed_mm)
-    check_jog(jog, str(reader.folder))
-    return jog
+    time_s, body_mm, length_mm = (np.array([one[place] for one in pictures]) for place in range(3))
+    return JogRecord(time_s, body_mm, length_mm, joint_s, bend_mm, feed_mm)
 
 
 def check_jog(jog: JogRecord, name: str) -> None:
@@ -339,7 +354,7 @@ def _predict_task(phantom: Phantom, target: int, jog: JogRecord, task: tuple[int
 def identify(phantom: Phantom, jog: JogRecord, session: str, servos: ServosConfig, spread: Spread = map) -> BehaviourConfig:
     """Fit the first half of a jog; the second one tells how well it predicts. Raises FloatingPointError as the physics does."""
     middle_s = float(jog.time_s[0] + jog.time_s[-1]) / 2
-    half, target = jog.until(middle_s), target_of(phantom, jog)
+    half, target = jog.between(-np.inf, middle_s), target_of(phantom, jog)
     values, errors = refined(phantom, target, half, first_guess(half), spread)
     error, later = predicted(phantom, target, jog, values) - jog.body_mm, jog.time_s >= middle_s
     away = np.linalg.norm(error[later, 0] - error[~later].mean(axis=(0, 1)), axis=1)
@@ -348,8 +363,7 @@ def identify(phantom: Phantom, jog: JogRecord, session: str, servos: ServosConfi
 
 def refined(phantom: Phantom, target: int, jog: JogRecord, start: Floats, spread: Spread = map) -> tuple[Floats, Floats]:
     """Parameters (P,) that fit the whole jog better than `start`, and their standard errors (P,)."""
-    tasks = [(place, start + _STEPS * (np.arange(len(start)) == place)) for place in range(-1, len(start))]
-    found = dict(spread(partial(_predict_task, phantom, target, jog), tasks))
+    found = _varied(phantom, target, jog, start, spread)
     errors = np.linalg.norm(found[-1] - jog.body_mm, axis=2)
     weights = 1.0 / np.maximum(_LEAST_NOISE_MM, np.median(errors, axis=0))[:, None]
 
@@ -377,6 +391,12 @@ def refined(phantom: Phantom, target: int, jog: JogRecord, start: Floats, spread
     return fit.x * _STEPS, errors_of * _STEPS
 
 
+def _varied(phantom: Phantom, target: int, jog: JogRecord, start: Floats, spread: Spread) -> dict[int, Floats]:
+    """What is ``predicted`` by `start` (-1), and with each parameter one step larger."""
+    tasks = [(place, start + _STEPS * (np.arange(len(start)) == place)) for place in range(-1, len(start))]
+    return dict(spread(partial(_predict_task, phantom, target, jog), tasks))
+
+
 def _standard_errors(slope: Floats, errors: Floats, time_s: Floats, known: Floats) -> Floats:
     """Of the parameters (P,), by slopes (N, P), errors (N,) that are alike within a second, and what was known before (P, P)."""
     inverse = np.linalg.pinv(slope.T @ slope + known)
@@ -390,8 +410,83 @@ def _behaviour(values: Floats, spread: Floats, away_mm: Floats, session: str, re
     """As it is kept, in mm of the joints (`real_mm` to one of the twin)."""
     parts: dict[str, Any] = {}
     for name, value, half, low, high in zip(_TOLD, values, spread, _LOW, _HIGH, strict=False):
-        unit = 1.0 / real_mm if name.endswith("deg_per_mm") else real_mm if name.endswith("_mm") else 1.0
+        unit = _unit(name, real_mm)
         ends = (max(low, value - half), min(high, value + half))
         parts[name] = Estimate(value=round(value * unit, 5), low=round(ends[0] * unit, 5), high=round(ends[1] * unit, 5))
     p50_mm, p95_mm = np.percentile(away_mm, [50, 95]).round(3).tolist()
     return BehaviourConfig(session=session, head_p50_mm=p50_mm, head_p95_mm=p95_mm, **parts)
+
+
+def _unit(name: str, real_mm: float) -> float:
+    """Of a parameter, in mm of joints of which `real_mm` are one of the twin's."""
+    return 1.0 / real_mm if name.endswith("deg_per_mm") else real_mm if name.endswith("_mm") else 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Of a run whose head was ``away_mm`` (median) from that of its replay in the identified twin.
+
+    ``values`` : of the parameter that would explain it, or of two of which either one would; {}: no single one does. ``left_mm`` is
+    what is left of the distance with that.
+    """
+
+    away_mm: float
+    left_mm: float
+    values: dict[str, float]
+
+
+def explained(phantom: Phantom, run: JogRecord, known: BehaviourConfig, servos: ServosConfig, spread: Spread = map) -> Explanation:
+    """Which parameter, if it were another than `known`, explains how a run went.
+
+    The joints' motion is replayed in the twin, and again with each parameter changed. A likelihood with all parameters within what
+    is known of them is compared with those where one of them is free; the best one is named where it is clearly better than that
+    and than the others, and a replay with it comes clearly nearer. Raises JogError for too short a run, and FloatingPointError.
+    """
+    if len(run.time_s) < _LEAST_PICTURES:
+        raise JogError("the robot is seen for too short a time to explain the run")
+    real_mm, target = servos.max_pull_mm / MAX_PULL_MM, target_of(phantom, run)
+    start = np.array([one.start for one in PARAMETERS.values()])
+    start[_NAMES.index("start_mm")] = run.length_mm[0] - ROBOT_RADIUS_MM
+    deviation = _SPREAD.copy()
+    for place, name in enumerate(_TOLD):
+        one: Estimate = getattr(known, name)
+        start[place] = one.value / _unit(name, real_mm)
+        deviation[place] = max((one.high - one.low) / 3.92 / _unit(name, real_mm), 0.02 * _STEPS[place])
+    found = _varied(phantom, target, run, start, spread)
+    away = np.linalg.norm(found[-1][:, 0] - run.body_mm[:, 0], axis=1)
+    lost = np.flatnonzero(away > _LOST_MM)
+    seen = slice(0, max(_LEAST_PICTURES, int(lost[0])) if len(lost) else len(away))
+    scale = 1.0 / (max(2 * _LEAST_NOISE_MM, known.head_p50_mm) * np.sqrt(_ALIKE))
+
+    def scaled(change_mm: Floats) -> Floats:
+        return np.asarray(scale * (change_mm[seen] - change_mm[seen].mean(axis=0)).ravel())
+
+    misses = scaled(run.body_mm - found[-1])
+    slopes = np.column_stack([scaled(found[place] - found[-1]) for place in range(len(start))])
+    within = (_STEPS / deviation) ** 2
+    nothing, _ = _likelihood(misses, slopes, within)
+    freed = [_likelihood(misses, slopes, np.where(np.arange(len(start)) == place, 0.0, within)) for place in range(len(_TOLD))]
+    most = nothing - _likelihood(misses, slopes, np.where(_HIDDEN, within, 0.0))[0]
+    gains = nothing - np.array([cost for cost, _ in freed])
+    best, away_mm = int(np.argmax(gains)), float(np.median(away[seen]))
+    equals = [place for place in np.argsort(-gains).tolist() if gains[place] >= _AS_WELL * gains[best]]
+    if gains[best] < max(_CLEARLY, _ALONE * most) or len(equals) > _NAMED:
+        return Explanation(round(away_mm, 2), round(away_mm, 2), {})
+    changed = np.clip(start + freed[best][1] * _STEPS, _LOW, _HIGH)
+    left = np.linalg.norm(predicted(phantom, target, run, changed)[:, 0] - run.body_mm[:, 0], axis=1)
+    left_mm = float(np.median(left[seen]))
+    values = {_TOLD[k]: round(float((start + freed[k][1] * _STEPS)[k] * _unit(_TOLD[k], real_mm)), 4) for k in equals}
+    return Explanation(round(away_mm, 2), round(left_mm, 2), values if left_mm <= (1.0 - _MOST) * away_mm else {})
+
+
+def _likelihood(misses: Floats, slopes: Floats, within: Floats) -> tuple[float, Floats]:
+    """Minus twice the logarithm of the likelihood (Huber's), and the parameters (P,) in steps, where they are known `within`."""
+    steps: Floats = np.zeros(len(within))
+    weight: Floats = np.ones(len(misses))
+    limit = 3.0 / np.sqrt(_ALIKE)
+    for _ in range(10):
+        normal = (slopes * weight[:, None]).T
+        steps = np.asarray(np.linalg.lstsq(normal @ slopes + np.diag(within), normal @ misses)[0])
+        left = np.abs(misses - slopes @ steps)
+        weight = np.asarray(limit / np.maximum(limit, left))
+    return float(np.where(left < limit, left**2, 2 * limit * left - limit**2).sum() + (within * steps**2).sum()), steps

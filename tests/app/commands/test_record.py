@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import av
 import pytest
@@ -16,19 +18,22 @@ from mcap.reader import make_reader
 
 from app.commands import record as record_command
 from app.commands.progress import Interrupt
-from app.commands.session import describe
+from app.commands.session import describe, info
 from core.config.safety import AtClose
-from core.devices import DeviceError
+from core.devices import DeviceError, UserError
 from core.program import program_line
-from core.session.manifest import read_manifest
+from core.session.manifest import event_of_target, read_manifest
 from core.session.reader import SessionReader
 from core.types import Tick
 from hardware.servos.bus_ipc import BusStatus
+from hardware.twin.identification import Explanation
 from tests.app.bus_status import bus, servo
 from tests.app.fakes import FakePilot
 from tests.app.program import run
+from tests.core.session.test_rehearsed_run import FOUND
 from tests.core.session_data import record as record_session
 from tests.core.session_data import set_open, tick_of
+from tests.hardware.twin.test_identification import behaviour
 
 # a small picture and one thread: the machine that runs the tests may be busy
 CONFIG = """
@@ -84,6 +89,31 @@ def test_info_is_one_object_and_a_table(recorded: tuple[Path, dict[str, object]]
     assert table.returncode == 0
     assert "all recorded" in table.stdout
     assert "ADVISORY" in table.stdout
+
+
+def test_info_explains_a_rehearsed_run_by_what_was_identified(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    way = {name: tuple((x, 32.0) for x in (10.0, 20.0, 30.0, 40.0, 48.0)) for name in ("xy", "low_xy", "high_xy")}
+    found = FOUND.model_copy(update={"target_xy": (49.0, 32.0), "way": FOUND.way.model_copy(update=way)})
+    chosen = event_of_target((49.0, 32.0), 9.0, found.model_dump(mode="json"))
+    ticks = [tick_of(place, 10.0 + 0.1 * place, full=True) for place in range(3)]
+    with pytest.raises(UserError, match="no run of this session was rehearsed"):
+        info(record_session(tmp_path / "none", ticks), explain=True)
+    session = record_session(tmp_path / "one", ticks, events=[chosen])
+    with pytest.raises(UserError, match="its robot was not identified"):
+        info(session, explain=True)
+    monkeypatch.setattr("app.commands.session.has_rig", lambda _name: True)
+    monkeypatch.setattr("app.commands.session.find_rig", lambda name: (Path(name), SimpleNamespace(behaviour=behaviour())))
+    for name in ("bench_of_session", "motion_of_session"):
+        monkeypatch.setattr(f"hardware.twin.identification.{name}", lambda *_: MagicMock())
+    for values, told in (({"play_mm": 0.3}, "play_mm = 0.3 would explain it (0.2 mm left)"), ({}, "no single parameter explains")):
+        explanation = Explanation(1.5, 0.2, values)
+        monkeypatch.setattr("hardware.twin.identification.explained", lambda *_, found=explanation: found)
+        info(session, explain=True)
+        assert f"its replay in the identified twin is 1.5 mm off: {told}" in " ".join(
+            capsys.readouterr().out.replace("│", "").split()
+        )
 
 
 def test_what_a_session_is_about_is_given_and_changed(recorded: tuple[Path, dict[str, object]]) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from core.config.calibration import BehaviourConfig, Estimate
 from core.config.models import Config
+from core.config.safety import ServosConfig
 from core.session.manifest import Manifest
 from core.session.reader import SessionReader
 from core.types import Pose, PoseState, Reason, Refusal, RobotPath, Scene
@@ -23,6 +24,7 @@ from hardware.twin.identification import (
     bench_of_session,
     carried_mm,
     check_jog,
+    explained,
     first_guess,
     jog_of_session,
     predicted,
@@ -112,6 +114,38 @@ def test_what_was_identified_drives_the_twin_in_its_own_millimetres() -> None:
     assert drive.gain == pytest.approx((2.0 * 50.0 / 45.0, 2.0 * 40.0 / 45.0))
     assert (drive.backlash_mm, drive.dead_zone_mm, drive.dead_zone_left_mm) == pytest.approx((0.06, 0.05, 0.025))
     assert (drive.feed_share, drive.feed_slip, drive.delay_s) == (1.08, 0.05, 0.12)
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({}, set()),
+        ({"play_mm": 0.01}, set()),  # within what is known
+        ({"bend_left_deg_per_mm": -12.0}, {"bend_left_deg_per_mm"}),
+        ({"feed_slip": 0.2}, {"feed_slip", "feed_share"}),  # alike where the robot is never drawn back
+        ({"slack_right_mm": 0.1, "delay_s": 0.1}, set()),  # neither one alone
+    ],
+)
+def test_a_run_is_explained_by_the_parameter_that_is_another_now(
+    monkeypatch: pytest.MonkeyPatch, changed: dict[str, float], named: set[str]
+) -> None:
+    time_s, rng = np.arange(0.0, 10.0, 0.1), np.random.default_rng(0)
+    moves = {name: np.cumsum(rng.normal(0.0, 0.03, (100, 6, 2)), axis=0) for name in NAMES}
+    moves["feed_share"] = -moves["feed_slip"]
+    moves["friction"] = moves["set_deg"] = moves["start_mm"] = np.zeros((100, 6, 2))
+    lengths, joints = np.full(100, TRUE["start_mm"] + 1.25), (time_s, time_s, time_s)
+
+    def linear(_phantom: object, _target: int, _jog: JogRecord, values: Any) -> Any:
+        steps = (values - [TRUE[name] for name in NAMES]) / [PARAMETERS[name].step for name in NAMES]
+        return np.asarray(50.0 + sum(step * moves[name] for step, name in zip(steps, NAMES, strict=True)))
+
+    monkeypatch.setattr("hardware.twin.identification.predicted", linear)
+    seen = linear(None, 0, JogRecord(*[time_s] * 6), np.array([TRUE[name] + changed.get(name, 0.0) for name in NAMES]))
+    run = JogRecord(time_s, seen + rng.normal(0.0, 0.1, seen.shape), lengths, *joints)
+    found = explained(make_phantom("s_curve"), run, behaviour(), ServosConfig())
+    assert set(found.values) == named
+    for name in set(changed) & named:
+        assert found.values[name] == pytest.approx(TRUE[name] + changed[name], rel=0.1) and found.left_mm < 0.3 * found.away_mm
 
 
 class Session:
