@@ -284,6 +284,15 @@ def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
     return made
 
 
+def focus_after_work(began: QWidget | None, stop: QWidget, onward: QPushButton, *, is_done: bool) -> None:
+    """Where the keyboard goes after a job: on, or back to what began it. Qt moved it to another button while these were off."""
+    for one in (onward, began) if is_done else (began, onward):
+        if one is not None and one is not stop and one.isEnabled() and one.isVisible():
+            one.setFocus()
+            return
+    stop.window().setFocus()
+
+
 def set_main_button(which: QPushButton, is_main: bool) -> None:
     """Whether a button is the next step, and stands out."""
     name = "main_button" if is_main else ""

@@ -66,7 +66,7 @@ def joint_text(joint: JointConfig) -> str:
     return text if joint.angle_deg is None else f"{text} ({joint.angle_deg:g}°)"
 
 
-_ID_PX, _DIRECTION_PX, _WAY_PX = 66, 80, 108
+_ID_PX, _DIRECTION_PX, _WAY_PX = 66, 80, 116
 _DIRECTIONS = (("+", 1), ("\N{MINUS SIGN}", -1))
 
 
@@ -161,6 +161,7 @@ class DrumsPage(WizardPage):
         self.ways: list[QDoubleSpinBox] = []
         self._cells: list[tuple[QWidget, ...]] = []
         grid = QGridLayout()
+        grid.setHorizontalSpacing(5)
         for title in (mark("Tendons"), mark("Robot forward"), mark("Catheter")):
             diameter, way = self._field(1.0), self._field(math.pi)
             diameter.setAccessibleName(tr("Diameter, {what}", what=tr(title)))

@@ -69,6 +69,7 @@ _TITLES = {  # of sections, and of settings whose name says little without its u
     "record.ring_s": "Ring length",
     "record.ring_mb": "Ring size",
     "servos.bus_hz": "Bus rate",
+    "safety.min_confidence": "Min confidence to drive",
     "perception.pose.d_allow_px": "Allowed distance",
     "perception.pose.theta_allow_deg": "Allowed angle",
     "perception.pose.hysteresis_px": "Hysteresis, distance",

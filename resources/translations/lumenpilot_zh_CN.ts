@@ -4376,11 +4376,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
-        <source>Own settings</source>
-        <translation>自有设置</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
         <source>Settings of the section</source>
         <translation>本节的设置</translation>
     </message>
@@ -4393,21 +4388,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/settings/dialog.py"/>
         <source>Reset section {title}</source>
         <translation>重置分节 {title}</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Profile</source>
-        <translation>配置方案</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Takes all settings from a profile; nothing is kept before you save</source>
-        <translation>从配置方案取用全部设置；保存前不会保留</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Name of the profile</source>
-        <translation>配置方案名称</translation>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
@@ -4441,11 +4421,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
-        <source>Profile {name} deleted</source>
-        <translation>配置方案 {name} 已删除</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
         <source>Search (Ctrl+F); Space may be STOP</source>
         <translation>搜索 (Ctrl+F)；空格键可能是 STOP</translation>
     </message>
@@ -4476,31 +4451,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
-        <source>Save as</source>
-        <translation>另存为</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Delete</source>
-        <translation>删除</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Name of the profile; Enter saves, Esc does not</source>
-        <translation>配置方案名称；Enter 保存，Esc 取消</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Choose one of your own profiles first</source>
-        <translation>请先选择一个自己的配置方案</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Delete the profile {name}?</source>
-        <translation>删除配置方案 {name}？</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
         <source>Save, and start the rig again</source>
         <translation>保存并重新启动装置</translation>
     </message>
@@ -4518,21 +4468,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/settings/dialog.py"/>
         <source>some when the program is started again</source>
         <translation>部分在程序重新启动后生效</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>There is a profile {name} already. Replace it?</source>
-        <translation>已有配置方案 {name}。替换它？</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>Replace</source>
-        <translation>替换</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>First mend what is not allowed</source>
-        <translation>请先改正不允许的内容</translation>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
@@ -4561,18 +4496,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/settings/dialog.py"/>
-        <source>Saved as profile {name}</source>
-        <translation>已另存为配置方案 {name}</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
         <source>Leave without saving the changes?</source>
         <translation>不保存更改就离开吗？</translation>
-    </message>
-    <message>
-        <location filename="../../app/settings/dialog.py"/>
-        <source>{name} (preset)</source>
-        <translation>{name}（预设）</translation>
     </message>
     <message>
         <location filename="../../app/settings/draft.py"/>
@@ -8348,26 +8273,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../core/config/files.py"/>
-        <source>profile {name}: it is no longer there ({path})</source>
-        <translation>配置方案 {name}：已不存在（{path}）</translation>
-    </message>
-    <message>
-        <location filename="../../core/config/files.py"/>
-        <source>profile {name}: a preset has this name; choose another one</source>
-        <translation>配置方案 {name}：与预设同名；请换一个名称</translation>
-    </message>
-    <message>
-        <location filename="../../core/config/files.py"/>
-        <source>profile {name}: it comes with the program and cannot be deleted</source>
-        <translation>配置方案 {name}：随程序提供，不能删除</translation>
-    </message>
-    <message>
-        <location filename="../../core/config/files.py"/>
-        <source>profile {name}: cannot be deleted ({why})</source>
-        <translation>配置方案 {name}：无法删除（{why}）</translation>
-    </message>
-    <message>
-        <location filename="../../core/config/files.py"/>
         <source>{path}: cannot be read ({why}); the defaults are used</source>
         <translation>{path}：无法读取（{why}）；使用默认值</translation>
     </message>
@@ -9305,11 +9210,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>quiet</source>
         <translation>静默</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>a profile's name has 1 to 60 letters, digits, or - _ . ( ) +, and begins with a letter or digit</source>
-        <translation>配置方案名称由 1 至 60 个字母、数字或 - _ . ( ) + 组成，并以字母或数字开头</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -12268,16 +12168,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>Watch folder</source>
-        <translation>监视文件夹</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>image_folder: wait for new pictures, instead of playing those that are there</source>
-        <translation>image_folder：等待新图像，而不是播放已有的</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
         <source>Camera (real)</source>
         <translation>相机（真实）</translation>
     </message>
@@ -14105,6 +13995,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>loss above the hold share for so long disarms</source>
         <translation>丢帧超过保持比例这么久则解除待命</translation>
+    </message>
+    <message>
+        <location filename="../../app/ui/i18n.py"/>
+        <source>Min confidence to drive</source>
+        <translation>驾驶所需最低置信度</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>

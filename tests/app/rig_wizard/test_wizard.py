@@ -143,6 +143,7 @@ def test_the_board_gives_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
     for _ in range(2):
         qtbot.mouseClick(page.take_button, Qt.MouseButton.LeftButton)
         _idle(opened, qtbot)
+        assert opened.focusWidget() is page.take_button, "Enter takes the next one"
     assert page.count.text() == "2 pictures of the board taken"
     assert len(page.shapes()) > 30
     assert not page.square.isEnabled()

@@ -93,6 +93,7 @@ def to_the_robot(hand: BenchHand) -> None:
     """Empty picture and vessel, to the page on which the robot is moved."""
     window = hand.window
     hand.click(window.empty_page.take)
+    assert window.focusWidget() is window.next_button, "Enter goes on"
     hand.click(window.next_button)
     hand.click(window.next_button)
     assert window.page is window.move_page
