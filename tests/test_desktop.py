@@ -57,16 +57,6 @@ def test_a_home_is_as_it_was_after_uninstall(home: Path) -> None:
     assert tree(home) == before
 
 
-def test_an_empty_home_is_empty_again_also_after_installing_twice(home: Path) -> None:
-    first = run("install", home)
-    once = tree(home)
-    second = run("install", home)
-    assert (first.returncode, second.returncode) == (0, 0), second.stderr
-    assert tree(home) == once
-    assert run("uninstall", home).returncode == 0
-    assert tree(home) == {}
-
-
 def test_the_desktop_finds_launcher_and_icon(home: Path) -> None:
     assert run("install", home).returncode == 0
     launcher = home / ".local" / "bin" / "lumenpilot"
@@ -115,15 +105,6 @@ def test_a_package_brings_its_own_launcher(home: Path) -> None:
     assert tree(home) == before
 
 
-def test_data_goes_where_xdg_says(tmp_path: Path) -> None:
-    done = run("install", tmp_path, XDG_DATA_HOME=str(tmp_path / "data"))
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "data" / "applications" / "lumenpilot.desktop").is_file()
-    assert not (tmp_path / ".local" / "share").exists()
-    run("uninstall", tmp_path, XDG_DATA_HOME=str(tmp_path / "data"))
-    assert tree(tmp_path) == {}
-
-
 def test_what_is_not_ours_is_left_alone(tmp_path: Path) -> None:
     launcher = tmp_path / ".local" / "bin" / "lumenpilot"
     launcher.parent.mkdir(parents=True)
@@ -135,17 +116,3 @@ def test_what_is_not_ours_is_left_alone(tmp_path: Path) -> None:
     assert tree(tmp_path) == before, "nothing was begun"
     assert "left" in run("uninstall", tmp_path).stdout
     assert tree(tmp_path) == before
-
-
-def test_folders_that_others_use_meanwhile_stay(tmp_path: Path) -> None:
-    run("install", tmp_path)
-    (tmp_path / ".local" / "bin" / "other").write_text("")
-    run("uninstall", tmp_path)
-    assert [name for name in tree(tmp_path) if (tmp_path / name).is_file()] == [".local/bin/other"]
-
-
-@pytest.mark.parametrize("what", ["", "remove"])
-def test_a_wrong_call_is_one_line(tmp_path: Path, what: str) -> None:
-    done = run(what, tmp_path)
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1

@@ -123,10 +123,6 @@ def test_a_chosen_python_is_the_only_candidate(checkout: Path) -> None:
     assert "my python/python3.10 is not one" in done.stderr
 
 
-def path_with(*folders: Path) -> str:
-    return os.pathsep.join([*map(str, folders), os.environ["PATH"]])
-
-
 def test_what_the_lock_does_not_list_is_taken_out(checkout: Path) -> None:
     """The stand-in asks the tests' own interpreter, in which nothing is changed, what is installed."""
     (checkout / "record").touch()
@@ -146,45 +142,7 @@ def test_what_the_lock_does_not_list_is_taken_out(checkout: Path) -> None:
     assert (checkout / "record").read_text() == "", "nothing is asked when nothing has changed"
 
 
-def test_a_half_made_venv_that_is_activated_makes_no_other_one(checkout: Path) -> None:
-    """Its interpreter comes first then, and is deleted with it."""
-    assert renew(checkout, offline=True) == 1
-    own = checkout / ".venv" / "bin"
-    shutil.copy(own / "python", own / "python3.11")
-    (checkout / "offline").unlink()
-    done = set_up(checkout, PYTHON="", PATH=path_with(own, checkout / "my python"))
-    assert done.returncode == 0, done.stderr
-    assert f"making .venv with {checkout / 'my python' / 'python3.11'} " in done.stderr
-    (checkout / ".venv" / ".ready").rename(checkout / ".venv" / ".half")
-    done = set_up(checkout, PYTHON=str(own / "python"))
-    assert done.returncode == 1
-    assert "is not one outside .venv" in done.stderr
-    assert (own / "python").exists()
-
-
 def test_a_venv_that_works_is_renewed_without_another_python(checkout: Path) -> None:
     assert set_up(checkout).returncode == 0
     shutil.rmtree(checkout / "my python")
     assert renew(checkout, offline=False) == 0
-
-
-def test_installing_for_the_user_alone_is_left_to_others(checkout: Path) -> None:
-    done = set_up(checkout, PIP_USER="1")
-    assert done.returncode == 0, done.stderr
-
-
-def test_what_a_ros_set_up_exports_reaches_neither_script_nor_program(checkout: Path) -> None:
-    ros = {"PYTHONPATH": "/opt/ros/lib", "PYTHONHOME": "/opt/ros"}
-    done = set_up(checkout, **ros)
-    assert done.returncode == 0, done.stderr
-    env = {"PATH": os.environ["PATH"], **ros, "PYTHONSAFEPATH": "1"}
-    ran = subprocess.run(["make", "-C", checkout, "run"], env=env, capture_output=True, text=True, check=False, timeout=60)
-    assert ran.returncode == 0, ran.stderr
-
-
-@pytest.mark.parametrize("how", [{"PYTHONSAFEPATH": "1"}, {}], ids=["PYTHONSAFEPATH", "-P"])
-def test_a_python_that_leaves_the_programs_folder_out_finds_it_all_the_same(how: dict[str, str], tmp_path: Path) -> None:
-    command = [sys.executable, *([] if how else ["-P"]), str(ROOT / "main.py"), "trial", "--help"]
-    done = subprocess.run(command, env={**os.environ, **how}, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "Closed-loop trials" in done.stdout

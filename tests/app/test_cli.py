@@ -15,11 +15,9 @@ from app.cli import app, main
 from app.commands import synth
 from app.commands.options import bare_stream, with_outputs
 from core.config.models import Config
-from core.session.manifest import read_manifest
 from hardware.twin.catalog import BENCH_LOOK, OWN_LOOK
 from hardware.twin.dataset import PAINTED_LOOK
 from hardware.twin.rendering.presets import RARE_FAMILIES
-from tests.core.session_data import record, tick_of
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = (
@@ -133,25 +131,6 @@ def test_a_memory_fault_says_where() -> None:
     assert done.returncode < 0
     assert "Segmentation fault" in done.stderr
     assert "string_at" in done.stderr
-
-
-@pytest.mark.parametrize("errors", ["2>&-", "2>/dev/full"])
-def test_without_a_standard_error_the_exit_code_is_the_same(tmp_path: Path, errors: str) -> None:
-    command = f'exec "{sys.executable}" "{ROOT / "main.py"}" session info "{tmp_path / "nothing"}" {errors}'
-    assert subprocess.run(["sh", "-c", command], check=False).returncode == 2
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
-def test_a_name_that_the_output_cannot_hold_is_no_traceback(tmp_path: Path, encoding: str) -> None:
-    session = record(tmp_path, [tick_of(0, 1000.0)])
-    named = session.rename(tmp_path / os.fsdecode(b"session_20260101T000000Z_caf\xc3\xa9\xff"))
-    environment = os.environ | {"PYTHONIOENCODING": f"{encoding}:strict"}
-    for arguments in (("session", "info", named), ("session", "recover", named, "--only-look"), ("session", "recover", named)):
-        done = subprocess.run([sys.executable, "main.py", *arguments], capture_output=True, check=False, cwd=ROOT, env=environment)
-        assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
-        assert b"\\udcff" in done.stdout
-    recovered = read_manifest(named.with_name(named.name + "_recovered")).recovered
-    assert recovered.origin.endswith("\\xff")
 
 
 def test_the_help_of_synth_names_every_look_beside_the_ten() -> None:

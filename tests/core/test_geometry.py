@@ -37,17 +37,6 @@ def test_the_ends_of_a_bend_and_short_bends_are_kept_better_than_by_a_gaussian(c
     assert kept <= drawn + 1e-9
 
 
-@pytest.mark.parametrize("values", [[3.0], [4.0, 1.0], [5.0, 2.0, 9.0], [1.0, 8.0, 2.0, 4.0]])
-def test_the_median_of_a_few_numbers(values: list[float]) -> None:
-    assert geometry.median(np.array(values)) == np.median(values)
-
-
-def test_a_known_arc_length_need_not_be_given_again_and_changes_nothing() -> None:
-    along = geometry.arc_length(CORNER)
-    assert geometry.cut(CORNER, 20.0, 35.0, along).tolist() == geometry.cut(CORNER, 20.0, 35.0).tolist()
-    assert geometry.nearest(CORNER, (33.0, 44.0), along) == geometry.nearest(CORNER, (33.0, 44.0))
-
-
 @pytest.mark.parametrize("over_px", [20.0, 30.0, 60.0])
 def test_a_short_line_goes_on_with_half_the_bend_that_it_has(over_px: float) -> None:
     """A circle of 40 px radius, of which 20 px are known."""
@@ -67,11 +56,6 @@ LINES = [
     np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 40.0]]),
 ]
 ALL = Bundle.of(LINES)
-
-
-def test_lines_come_back_as_they_went_in() -> None:
-    for line, again in zip(LINES, ALL.split(ALL.points), strict=True):
-        assert again.tolist() == line.tolist()
 
 
 @pytest.mark.parametrize("step_px", [1.0, 2.0, 7.5])

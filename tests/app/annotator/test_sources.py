@@ -2,47 +2,22 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import av
 import cv2
-import numpy as np
 import pytest
 
 from app.annotator.comparison import groups_of
 from app.annotator.sources import default_store, image_files, recorded_angles, session_rows
 from core.annotation.store import DEFAULT_NAME
 from core.devices import UserError
-from core.learning.dataset import write_png
 from tests.core.drawing import film, greys
 from tests.core.session_data import QUICK, record, tick_of
 
 
-def test_a_link_that_leads_nowhere_keeps_nobody_from_the_rest(tmp_path: Path) -> None:
-    some, labelled = tmp_path / "some", tmp_path / "labelled"
-    some.mkdir()
-    write_png(some / "a.png", np.zeros((4, 4, 3), np.uint8))
-    for name in ("clip.mp4", "b.png"):
-        (some / name).symlink_to(tmp_path / "gone")
-    assert image_files([some], 4) == [some / "a.png"]
-    shutil.copytree(some, labelled / "images", symlinks=True)
-    (labelled / "c.png").symlink_to(tmp_path / "gone")
-    assert image_files([labelled], 4) == [labelled / "images" / "a.png"]
-    with pytest.raises(UserError, match="no such file or folder"):
-        image_files([some / "b.png"], 4)
-
-
 def grey_of(path: Path) -> float:
     return float(cv2.imread(str(path)).mean())
-
-
-def test_videos_whose_names_differ_in_their_endings_have_pictures_of_their_own(tmp_path: Path) -> None:
-    film(tmp_path / "run.mkv", greys([40] * 5), "libx264")
-    film(tmp_path / "run.mp4", greys([200] * 5), "libx264")
-    files = image_files([tmp_path], 2)
-    assert [path.parent.name for path in files] == ["run.mkv_frames"] * 2 + ["run.mp4_frames"] * 2
-    assert [round(grey_of(path), -1) for path in files] == [40, 40, 200, 200]
 
 
 def test_a_video_that_pictures_were_taken_of_is_gone_on_with_those(tmp_path: Path) -> None:
@@ -102,11 +77,6 @@ def test_a_video_becomes_pictures_evenly_over_time(tmp_path: Path) -> None:
     for path in files:
         path.unlink()
     assert image_files([video], 4, reuse=True) == files
-
-
-def test_folders_inside_sessions_that_have_equal_names_are_told_apart() -> None:
-    one, other = Path("data/run_1/images/a.png"), Path("data/run_2/images/a.png")
-    assert groups_of([one, other]) == {one: "run_1/images", other: "run_2/images"}
 
 
 def test_pictures_of_one_recording_are_one_group(tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent, QKeyEvent
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -50,9 +50,6 @@ Key = Qt.Key
 SIZE = (640, 480)
 ROBOT = ((200.0, 180.0), (260.0, 190.0), (320.0, 210.0))
 VESSEL = ((260.0, 215.0), (400.0, 215.0))
-
-
-_DIAGONAL = tuple((float(at), float(at)) for at in (80, 120, 200, 290, 350, 420))
 
 
 class Rater:
@@ -300,21 +297,6 @@ def test_the_next_rater_is_asked_for_and_this_window_closes(rater: Rater) -> Non
     assert (rater.window.isVisible(), rater.window.next_rater) == (False, "bob")
 
 
-def test_an_enter_that_is_held_ends_one_thing(rater: Rater) -> None:
-    rater.click(*ROBOT)
-    rater.press(Key.Key_Return)
-    rater.click(*VESSEL)
-    for is_repeat in (False, True, True, True):
-        for key in (Key.Key_Return, Key.Key_Enter) if is_repeat else (Key.Key_Return,):
-            press = QKeyEvent(QEvent.Type.KeyPress, key, Qt.KeyboardModifier.NoModifier, "\r", is_repeat)
-            QApplication.sendEvent(rater.canvas, press)
-    assert len(rater.drawn.vessel) == 2
-    assert rater.drawn.state is None, "the line is ended; nobody has chosen a state"
-    assert rater.model.index == 0
-    rater.press(Key.Key_Return)
-    assert rater.drawn.state is not None
-
-
 def test_the_readout_is_live_and_says_what_is_missing(rater: Rater) -> None:
     readout = rater.window.panels.readout
     assert readout.angle_text == "–"
@@ -379,21 +361,6 @@ def test_undo_and_redo_reach_over_a_restart(make: MakeRater) -> None:
     assert again.message == "Nothing to undo"
 
 
-def _both_lines(rater: Rater) -> None:
-    rater.click(*ROBOT)
-    rater.press(Key.Key_Return)
-    rater.click(*VESSEL)
-    rater.press(Key.Key_Return)
-
-
-def test_a_right_click_that_misses_answers_nothing(rater: Rater) -> None:
-    _both_lines(rater)
-    beside = rater.at(ROBOT[1]) + QPoint(0, 14)
-    for _ in range(2):
-        QTest.mouseClick(rater.canvas, Qt.MouseButton.RightButton, pos=beside)
-    assert (rater.drawn.state, rater.model.index, len(rater.drawn.robot)) == (None, 0, 3)
-
-
 OUTLINE: tuple[Point, ...] = ((300.0, 300.0), (400.0, 300.0), (400.0, 400.0), (300.0, 400.0))
 
 
@@ -409,15 +376,6 @@ def test_an_outline_is_not_lost_by_what_comes_next(rater: Rater, key: Qt.Key) ->
     rater.press(Key.Key_3)
     rater.click(*((x + 150.0, y) for x, y in OUTLINE))
     assert len(rater.kept()[0].content.masks) == 2, "closing the window completes it, too"
-
-
-def test_undo_takes_back_the_outline_that_is_being_drawn_first(rater: Rater) -> None:
-    _both_lines(rater)
-    rater.press(Key.Key_3)
-    rater.click(*OUTLINE)
-    rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
-    assert len(rater.canvas.editor.drawing.draft) == 3
-    assert len(rater.drawn.vessel) == len(VESSEL)
 
 
 def test_a_key_while_the_button_is_down_loses_no_point(rater: Rater) -> None:
@@ -587,28 +545,6 @@ def test_a_tube_snaps_to_the_walls(vessel_rater: Rater) -> None:
     assert vessel_rater.message == "Undone: add a tube to the vessel mask"
 
 
-def test_a_tube_is_kept_by_the_key_that_goes_on_before_it_is_computed(vessel_rater: Rater) -> None:
-    vessel_rater.press(Key.Key_Y)
-    vessel_rater.canvas.editor.radius_px = 18.0
-    vessel_rater.drag((100.0, 240.0), (400.0, 240.0))
-    vessel_rater.press(Key.Key_N)
-    vessel_rater.press(Key.Key_P)
-    assert height_at(vessel_rater, 250) > VESSEL_RADIUS
-    assert vessel_rater.canvas.mask_mode is MaskMode.POINTS
-
-
-def test_two_quick_gestures_are_both_kept(vessel_rater: Rater) -> None:
-    vessel_rater.press(Key.Key_R)
-    vessel_rater.canvas.editor.radius_px = 15.0
-    vessel_rater.click((100.0, 240.0), (500.0, 240.0))
-    vessel_rater.qtbot.waitUntil(lambda: len(vessel_rater.drawn.masks) == 2)
-    for column in (100, 500):
-        assert abs(height_at(vessel_rater, column) - 2 * VESSEL_RADIUS) <= 4
-    vessel_rater.click((100.0, 240.0), button=Qt.MouseButton.RightButton)
-    vessel_rater.qtbot.waitUntil(lambda: height_at(vessel_rater, 100) == 0)
-    assert height_at(vessel_rater, 500) > 0
-
-
 def test_the_wheel_is_the_circles_size_and_with_ctrl_the_zoom(vessel_rater: Rater) -> None:
     canvas = vessel_rater.canvas
     zoom, radius_px = canvas.view.zoom, canvas.editor.radius_px
@@ -669,19 +605,6 @@ def test_masks_of_the_image_before_are_proposed_hidden_and_taken(moving_rater: R
     assert robot[240, 290] and not robot[240, 310] and not robot[200].any()
     moving_rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
     assert not moving_rater.drawn.masks
-
-
-def test_a_hole_in_a_mask_stays_open_on_the_screen(rater: Rater) -> None:
-    def box(low: float, high: float, *, is_hole: bool) -> MaskPolygon:
-        return MaskPolygon(MaskTarget.VESSEL, ((low, low), (high, low), (high, high), (low, high)), is_hole)
-
-    bare = rater.canvas.grab().toImage()
-    rater.model.edit(
-        "masks", Annotation(masks=(box(100, 300, is_hole=False), box(150, 250, is_hole=True), box(280, 400, is_hole=False)))
-    )
-    shown = rater.canvas.grab().toImage()
-    tinted = [shown.pixelColor(rater.at(point)) != bare.pixelColor(rater.at(point)) for point in _DIAGONAL]
-    assert tinted == [False, True, False, True, True, False], "outside, mask, hole, overlap, mask, outside"
 
 
 def test_letters_go_into_a_note_and_not_into_the_state(rater: Rater) -> None:
@@ -764,15 +687,6 @@ def test_an_image_that_vanished_is_named_and_the_others_go_on(rater: Rater) -> N
     rater.window.open(0)
     rater.qtbot.waitUntil(lambda: rater.model.is_open)
     assert rater.kept() == []
-
-
-def test_contrast_changes_the_picture_only(rater: Rater) -> None:
-    middle = rater.at((320.0, 400.0))
-    before = rater.canvas.grab().toImage().pixelColor(middle).red()
-    rater.window.panels.light.step(0, 3)
-    assert rater.canvas.grab().toImage().pixelColor(middle).red() == before + 30
-    QTest.keyClick(rater.canvas, Key.Key_Slash)
-    assert rater.canvas.grab().toImage().pixelColor(middle).red() == before
 
 
 def test_lines_are_followed_through_the_clip_and_begin_again_from_a_correction(qtbot: QtBot, tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from app.annotator.sources import AnnotateOptions, StudyOptions
@@ -29,7 +28,6 @@ from tests.app.program import run as main
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
 
-MAIN = Path(__file__).resolve().parents[3] / "main.py"
 BOXES = (
     MaskPolygon(MaskTarget.VESSEL, ((10.0, 10.0), (200.0, 10.0), (200.0, 200.0), (10.0, 200.0))),
     MaskPolygon(MaskTarget.ROBOT, ((10.0, 10.0), (200.0, 10.0), (200.0, 50.0), (10.0, 50.0))),
@@ -188,20 +186,6 @@ def test_a_training_set_has_the_angles_of_one_study_and_masks_from_anywhere(fold
         run(folder, export="dataset", out=tmp_path / "misspelt", study=StudyOptions("fisrt"))
 
 
-def test_pictures_that_nobody_answered_say_nothing_of_the_groups(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A look at another folder took all intervals away, and nothing said why."""
-    annotate(folder)
-    elsewhere = folder / "elsewhere"
-    elsewhere.mkdir()
-    write_png(elsewhere / "other.png", np.full((480, 640, 3), 90, np.uint8))
-    with AnnotationStore(folder / DEFAULT_NAME) as store:
-        find_images([elsewhere / "other.png"], store)
-    assert run(folder, report=True, as_json=True) == 0
-    told = capsys.readouterr()
-    assert json.loads(told.out)["pairs"][0]["angle"]["ci95"]["mean_difference_deg"] is not None
-    assert "No intervals" not in told.err
-
-
 def test_an_import_goes_on_from_the_journal_where_the_answer_itself_is_damaged(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -255,13 +239,6 @@ def test_an_annotated_folder_is_evaluated_as_its_table_is(folder: Path, tmp_path
     assert second["source"]["kind"] == "annotated by hand"
     looked = "Of the manual answers 1 were given, or changed, after the algorithm's lines had been shown (key H)"
     assert any(note.startswith(looked) for note in second["notes"])
-
-
-def test_annotated_images_that_are_elsewhere_are_counted(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    annotate(folder)
-    (folder / "2.png").unlink()
-    run(folder, export="csv", out=tmp_path / "table.csv")
-    assert f"1 of 3 annotated images are not in {folder}: left out" in capsys.readouterr().err
 
 
 def test_a_study_is_gone_on_with_as_it_was_begun(folder: Path) -> None:
@@ -324,17 +301,6 @@ def test_two_raters_files_are_joined(folder: Path, pictures: Path, tmp_path: Pat
     assert "0 answers are new" in capsys.readouterr().err
     run(folder, report=True, as_json=True)
     assert set(json.loads(capsys.readouterr().out)["raters"]) == {"ann", "bob", "robert"}
-
-
-def test_raters_files_may_be_joined_into_a_new_one(folder: Path, tmp_path: Path) -> None:
-    annotate(folder, "pilot")
-    new = tmp_path / "all.sqlite"
-    with pytest.raises(UserError, match="has no answer of study 'other'"):
-        run(folder, store=new, joins=(folder,), study=StudyOptions("other"))
-    assert not new.exists(), "what was refused leaves nothing behind"
-    run(folder, store=new, joins=(folder,))
-    with AnnotationStore(new, read_only=True) as store:
-        assert len(store.annotations()) == 12
 
 
 @pytest.mark.parametrize(

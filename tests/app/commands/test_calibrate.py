@@ -19,7 +19,6 @@ from core.evaluation import confidence as fitting
 from core.evaluation import confidence as knowing
 from core.evaluation.confidence import CalibrationError
 from core.files import read_image
-from core.learning.dataset import DatasetError
 from core.perception.inference import OpenVinoSegmenter
 from core.perception.model_file import INFO, MODELS, ONNX, ONNX_INT8, SECOND_LOOK, ModelError, read_model_info, sha256_of
 from core.perception.pipeline import open_calibrated
@@ -118,11 +117,6 @@ def test_what_cannot_be_enough_is_said_before_the_work(
     assert not looked_at
 
 
-def test_a_folder_without_pictures_is_said_before_anything_else(frames: Path, model: Path, tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="no pictures"):
-        calibrate(frames, str(model), knows=[tmp_path])
-
-
 def test_too_few_frames_leave_the_model_as_it_is(frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also its networks: new ones would be believed as the old ones were."""
 
@@ -142,32 +136,9 @@ def test_too_few_frames_leave_the_model_as_it_is(frames: Path, model: Path, monk
     assert _files(model) == before
 
 
-@pytest.mark.slow
-def test_too_few_pictures_of_a_vessel_leave_the_model_as_it_is(frames: Path, model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Which only looking at them tells, after everything else is done."""
-    monkeypatch.setattr(fitting, "_LEAST", 1)
-    monkeypatch.setattr(knowing, "check_known", lambda _: None)
-    before = _files(model)
-    with pytest.raises(knowing.OutOfDistributionError, match="pictures show a vessel; 40 are needed"):
-        calibrate(frames, str(model))
-    assert _files(model) == before
-
-
 def _files(folder: Path) -> dict[Path, str]:
     """Every file beside and in the folder, by its hash."""
     return {path: sha256_of(path) for path in folder.parent.rglob("*") if path.is_file()}
-
-
-@pytest.mark.parametrize("name", [ONNX, ONNX_INT8, f"{SECOND_LOOK}/{ONNX}"])
-def test_any_damaged_file_is_said_before_the_work(frames: Path, model: Path, name: str, looked_at: list[object]) -> None:
-    """It would be said in the end otherwise, when the manifest is written."""
-    (model / name).write_bytes(b"cut")
-    told = rf"older/{name}: SHA-256 differs"
-    with pytest.raises(ModelError, match=told):
-        calibrate(frames, str(model), eight_bit=name == ONNX)
-    with pytest.raises(ModelError, match=told):
-        benchmark(accuracy=[frames], model=str(model), store=True)
-    assert not looked_at
 
 
 def test_a_model_that_cannot_be_written_is_said_before_the_work(

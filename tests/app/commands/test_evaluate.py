@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from math import atan, degrees
 from pathlib import Path
 
@@ -148,18 +146,6 @@ def test_the_report_is_one_page_that_needs_nothing_else(drawn: Path) -> None:
         assert words in text
 
 
-def test_the_report_says_that_whole_sessions_are_drawn(paper_csv: Path, tmp_path: Path) -> None:
-    evaluate(csv=paper_csv, out=tmp_path / "alone")
-    assert "Images are taken as independent" in (tmp_path / "alone" / "report.html").read_text(encoding="utf-8")
-    rows = [replace(row, group=f"session {place % 11}") for place, row in enumerate(read_measurements(paper_csv))]
-    write_measurements(tmp_path / "grouped.csv", rows)
-    evaluate(csv=tmp_path / "grouped.csv", out=tmp_path / "out")
-    assert "Whole groups (sessions or phantoms; 11 of them) are drawn" in (tmp_path / "out" / "report.html").read_text(
-        encoding="utf-8"
-    )
-    assert read_measurements(tmp_path / "out" / "measurements.csv") == rows
-
-
 def test_the_report_has_a_session_s_runs_beside_their_rehearsals(paper_csv: Path, tmp_path: Path) -> None:
     xs = (10.0, 20.0, 30.0, 40.0, 48.0)
     sides = {name: tuple((x, y) for x in xs) for name, y in (("xy", 32.0), ("low_xy", 36.0), ("high_xy", 28.0))}
@@ -171,31 +157,6 @@ def test_the_report_has_a_session_s_runs_beside_their_rehearsals(paper_csv: Path
     metrics = evaluate(csv=paper_csv, out=tmp_path / "out")
     page = render_report(metrics | {"source": metrics["source"] | about}, {})
     assert "A run beside its rehearsal: to (49, 32) arrived; 0.0 s (rehearsed 0.0, -1.0 to 1.0); 100% in the band" in page
-
-
-def test_a_figure_of_an_earlier_evaluation_does_not_stay(drawn: Path, tmp_path: Path) -> None:
-    out = Path(shutil.copytree(drawn, tmp_path / "out"))
-    write_measurements(tmp_path / "states.csv", [Measurement("a", None, None, "B", None, "B")])
-    found = evaluate(csv=tmp_path / "states.csv", out=out)
-    assert found["angle"]["mean_error_deg"] is None
-    assert {path.stem for path in out.glob("*.svg")} == {"confusion"}
-
-
-@pytest.mark.usefixtures("drawing")
-@pytest.mark.parametrize(
-    "rows",
-    [
-        [Measurement("a", 10.0, None, "B", 12.0, "B")],
-        [Measurement(name, 10.0, 10.0, "B", 10.0, "B") for name in "abc"],
-        [Measurement(name, 0.0, 0.0, None, 0.0, None) for name in "ab"],
-        [Measurement("a", 5.0, 6.0, "D", 179.0, "A"), Measurement("b", -170.0, None, "A", 180.0, "D")],
-    ],
-)
-def test_small_and_constant_tables_still_make_a_report(rows: list[Measurement], tmp_path: Path) -> None:
-    write_measurements(tmp_path / "t.csv", rows)
-    found = evaluate(csv=tmp_path / "t.csv", out=tmp_path / "out")
-    assert found["notes"]
-    assert (tmp_path / "out" / "report.html").is_file()
 
 
 def test_names_in_a_table_cannot_change_the_report(tmp_path: Path) -> None:
@@ -453,30 +414,3 @@ def test_a_study_goes_before_the_truth_of_its_set(tmp_path: Path) -> None:
     assert result["notes"][0] == "Of the annotated images 1 are not where they were; they are in none of the figures."
     with pytest.raises(UserError, match="not a labelled set"):
         evaluate(tmp_path, out=tmp_path / "out")
-
-
-def test_names_that_are_no_utf8_are_shown_as_bytes(paper_csv: Path, labelled: Path, tmp_path: Path) -> None:
-    """As archives from old systems have them."""
-    name = os.fsdecode(b"caf\xe9")
-    table = tmp_path / f"{name}.csv"
-    shutil.copy(paper_csv, table)
-    assert evaluate(csv=table, out=tmp_path / "out")["source"]["name"] == r"caf\xe9.csv"
-    folder = Path(shutil.copytree(labelled, tmp_path / name))
-    for path in (*folder.glob("*/000000*.png"),):
-        path.rename(path.with_name(path.name.replace("000000", name)))
-    truth = folder / "truth.jsonl"
-    truth.write_text(truth.read_text().replace('"000000"', json.dumps(name)))
-    assert evaluate(folder, out=tmp_path / "of_set")["source"]["name"] == r"caf\xe9"
-    assert read_measurements(tmp_path / "of_set" / "measurements.csv")[-1].image == r"caf\xe9"
-
-
-def test_an_interrupted_evaluation_of_annotated_images_keeps_what_was_perceived(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    measure(tmp_path / "annotations.lumenpilot.sqlite", tubes(tmp_path, 3), [0.0, 10.0, 5.0], study="main", rater="al")
-    interrupt_at_the_third_picture(monkeypatch)
-    with pytest.raises(KeyboardInterrupt):
-        evaluate(tmp_path, out=tmp_path / "out")
-    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
-    assert "Interrupted after 2 of 3 images." in metrics["notes"]
-    assert len(read_measurements(tmp_path / "out" / "measurements.csv")) == 2

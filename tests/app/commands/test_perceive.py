@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +17,7 @@ from core.config.models import TwinConfig
 from core.devices import UserError
 from core.files import read_image
 from hardware.twin.world import TwinWorld
-from tests.app.program import MAIN, run, run_apart
+from tests.app.program import MAIN, run
 from tests.core.drawing import film
 
 pytestmark = pytest.mark.usefixtures("looked_at_once")
@@ -165,24 +164,6 @@ def test_a_dash_is_standard_output(picture: Path, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "-").read_text())["state"] == json.loads(done.stdout)["state"]
 
 
-def test_a_small_file_that_says_it_is_huge_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
-    side = 30_000
-    values = {256: side, 257: side, 258: 8, 259: 1, 262: 1, 273: 8, 277: 1, 278: side, 279: 4}  # width, height, bits, ...
-    entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in values.items())
-    (tmp_path / "huge.tif").write_bytes(struct.pack("<2sHIIH", b"II", 42, 12, 0, len(values)) + entries + bytes(4))
-    done = run_apart("perceive", tmp_path / "huge.tif")  # the limit is read when OpenCV is loaded
-    assert done.returncode == 2
-    assert done.stderr.rstrip().endswith("huge.tif: is larger than 120 million pixels")
-
-
-@pytest.mark.parametrize("place", ["1" + "0" * 400, "NaN", "null"])
-def test_a_target_in_no_picture_on_earth_is_refused(picture: Path, tmp_path: Path, place: str) -> None:
-    (tmp_path / "t.json").write_text(f'{{"photo": [{place}, 1]}}')
-    done = run("perceive", picture, "--targets", tmp_path / "t.json")
-    assert done.returncode == 2
-    assert "photo: needs an object" in done.stderr.splitlines()[-1]
-
-
 def test_pictures_of_the_same_name_do_not_overwrite_each_other(picture: Path, tmp_path: Path) -> None:
     for name in ("x/a.png", "y/a.png", "y/a_2.png"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -190,16 +171,6 @@ def test_pictures_of_the_same_name_do_not_overwrite_each_other(picture: Path, tm
     arguments = [tmp_path / name for name in ("x/a.png", "y/a.png", "y/a_2.png")]
     assert run("perceive", *arguments, "--jsonl", tmp_path / "o.jsonl", "--masks", tmp_path / "m").returncode == 0
     assert sorted(p.name for p in (tmp_path / "m").glob("*_robot.png")) == ["a_2_robot.png", "a_3_robot.png", "a_robot.png"]
-
-
-def test_pictures_of_the_same_name_have_targets_of_their_own(picture: Path, tmp_path: Path) -> None:
-    for name in ("x/a.png", "y/a.png"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_bytes(picture.read_bytes())
-    (tmp_path / "t.json").write_text(json.dumps({"a": [320, 240], "a_2": [300, 200], "phoot": [1, 2]}))
-    done = run("perceive", tmp_path / "x/a.png", tmp_path / "y/a.png", "--targets", tmp_path / "t.json")
-    assert done.returncode == 0, done.stderr
-    assert "targets of no picture: phoot\n" in done.stderr
 
 
 def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_path: Path) -> None:
@@ -212,21 +183,6 @@ def test_what_cannot_be_written_is_told_and_the_rest_goes_on(picture: Path, tmp_
     assert "1 pictures could not be written" in done.stderr
     assert len(rows(tmp_path / "o.jsonl")) == 2
     assert (tmp_path / "m" / "other_robot.png").is_file()
-
-
-def test_a_folder_of_folders_says_in_which_there_are_pictures(picture: Path, tmp_path: Path) -> None:
-    for name in ("monday", "tuesday", "notes"):
-        (tmp_path / "set" / name).mkdir(parents=True)
-    where = tmp_path / "set"
-    for name, words in (
-        ("monday", f"{where / 'monday'} has some: name that"),
-        ("tuesday", "and others in it (2 folders) have some"),
-    ):
-        (where / name / "a.png").write_bytes(picture.read_bytes())
-        done = run("perceive", where)
-        assert done.returncode == 2
-        assert done.stderr.startswith(f"error: {where}: no pictures or videos there; ")
-        assert words in done.stderr
 
 
 def test_with_an_empty_picture_and_the_vessel_the_bench_is_known(picture: Path, world: TwinWorld, tmp_path: Path) -> None:

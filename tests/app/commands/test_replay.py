@@ -17,27 +17,18 @@ from typing import Any
 import pytest
 
 from app.commands import replay
-from app.commands.figures import draw_replay
 from app.commands.replay import (
     ReplayOptions,
-    change_to_json,
-    model_note,
-    prepare_out,
     replay_config,
-    replay_frames,
     run_replay,
     run_replays,
     sessions_in,
 )
-from app.player.replayed import Replayed
-from core.config.models import Config, RigConfig
+from core.config.models import Config
 from core.devices import UserError
-from core.evaluation.replay import Change, FrameResult, ReplayTally
-from core.files import name_of
 from core.session.codec import scene_to_json
-from core.session.manifest import MANIFEST, read_manifest
-from core.session.reader import SessionReader, check_is_session
-from core.types import Frame, Point, PoseState, Reason, Refusal, Scene
+from core.session.manifest import read_manifest
+from core.types import Scene
 from tests.app.golden_session import COUNT, GOLDEN, TRUTH
 from tests.app.program import run as main
 from tests.core.session_data import record, tick_of
@@ -91,25 +82,6 @@ def test_all_files_tell_the_same(replayed: tuple[dict[str, object], Path]) -> No
     assert [frame["after"]["theta_signed_deg"] for frame in frames] == [line["theta_signed_deg"] for line in lines]
     assert (out / "out" / "replay.svg").read_text().startswith("<?xml")
     assert (out / "out" / "replay.pdf").read_bytes().startswith(b"%PDF")
-
-
-def test_what_a_replay_has_written_may_be_written_over_and_is_no_session(
-    replayed: tuple[dict[str, object], Path], tmp_path: Path
-) -> None:
-    """Its frames had the name of a session's: the same command was refused the second time."""
-    again = Path(shutil.copytree(replayed[1] / "out", tmp_path / "again"))
-    prepare_out(again)
-    with pytest.raises(UserError):
-        check_is_session(again)
-    (again / "frames.jsonl").write_text("{}\n")  # as earlier versions called it
-    prepare_out(again)
-    with pytest.raises(UserError):
-        check_is_session(again)
-    session = Path(shutil.copytree(GOLDEN, tmp_path / "session"))
-    (session / "replay.json").write_text("{}\n")
-    with pytest.raises(UserError, match="is a recorded session"):
-        prepare_out(session)
-    assert (session / "frames.jsonl").is_file()
 
 
 def options(session: Path, **changes: object) -> ReplayOptions:
@@ -182,44 +154,6 @@ def test_lost_pictures_are_counted_and_the_rest_goes_on(tmp_path: Path, capsys: 
     assert any("line 2" in problem for problem in told["problems"])
 
 
-class _Asked:
-    """A pipeline that counts how it was asked."""
-
-    def __init__(self) -> None:
-        self.as_stream = self.alone = 0
-
-    def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
-        self.as_stream += 1
-        return Scene(frame.index, frame.captured_s, (1, 1), 1.0, refusal=Refusal(Reason.NO_ROBOT))
-
-    def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
-        scene = self(frame, target)
-        self.as_stream, self.alone = self.as_stream - 1, self.alone + 1
-        return scene
-
-    def warm_up(self) -> None: ...
-
-    def reset(self) -> None: ...
-
-
-@pytest.mark.parametrize(("camera", "is_stream"), [("webcam", True), ("image_folder", False)])
-def test_pictures_that_had_nothing_to_do_with_each_other_are_perceived_so_again(
-    tmp_path: Path, camera: str, is_stream: bool
-) -> None:
-    """As a stream, a picture's robot would be judged by that of the picture before: its head, its state, whether it jumped."""
-    session = record(tmp_path, [tick_of(k, 1000.0 + k / 10) for k in range(3)])
-    path = session / MANIFEST
-    manifest = json.loads(path.read_text())
-    manifest["config"] = Config(rig=RigConfig(camera=camera, source="pictures")).model_dump(mode="json")
-    path.write_text(json.dumps(manifest))
-    pipeline = _Asked()
-    with SessionReader(session) as reader:
-        reader.wait()
-        assert len(replay_frames(reader, pipeline).changes) == 3
-    warm_up = 1
-    assert (pipeline.as_stream, pipeline.alone) == ((3 + warm_up, 0) if is_stream else (0, 3 + warm_up))
-
-
 def test_a_session_without_pictures_is_refused_by_name(tmp_path: Path) -> None:
     session = record(tmp_path, [tick_of(0, 1000.0)])
     (session / "video_0000.mkv").unlink()
@@ -241,34 +175,6 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     result = json.loads(done.stdout)
     assert (result["ended"], result["frames"]) == ("interrupted after 3 of 5 frames", 3)
     assert len(out.read_text().splitlines()) == 3
-
-
-def test_one_frame_can_be_drawn_and_written() -> None:
-    change = Change(0, 7, 0.0, FrameResult(1.0, (2.0, 3.0), PoseState.A, 0.9), FrameResult(reason=Reason.BLACK))
-    told = change_to_json(change)
-    assert (told["change"], told["before"]["head_xy"], told["after"]["reason"]) == ("pose lost", [2.0, 3.0], "image black")
-    assert len(draw_replay([change], ReplayTally.of([change]).to_json()["states"]["matrix"], "x").axes) == 5
-
-
-def test_another_second_look_is_another_model() -> None:
-    """Its network is trained on while the first one stays as it is."""
-    now = {"name": "default", "sha256": "a" * 64, "second_look_sha256": "b" * 64}
-    manifest = read_manifest(GOLDEN).model_copy(update={"model": now})
-    assert "weights differ" not in " ".join(model_note(manifest, Config(), now))
-    assert "weights differ" in model_note(manifest, Config(), now | {"second_look_sha256": "c" * 64})[0]
-    older = manifest.model_copy(update={"model": {"name": "default", "sha256": "a" * 64}})
-    assert "weights differ" not in " ".join(model_note(older, Config(), now)), "it is not known"
-
-
-def test_a_session_that_is_given_as_here_keeps_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    session = record(tmp_path, (tick_of(index, 1000.0 + index / 30) for index in range(3)))
-    monkeypatch.chdir(session)
-    run_replay(options(Path("."), jsonl=tmp_path / "r.jsonl"))
-    assert [json.loads(line)["image"] for line in (tmp_path / "r.jsonl").read_text().splitlines()] == [
-        f"{session.name}#{row}" for row in range(3)
-    ]
-    for given in (Path("."), session):
-        assert Replayed(tmp_path / "r.jsonl", name_of(given)).skipped == 0
 
 
 @pytest.fixture(scope="module")
@@ -349,14 +255,6 @@ def test_over_processes_it_is_the_same(folder: Path, told: tuple[list[dict[str, 
     assert [untimed(json.loads(line)) for line in done.stdout.splitlines()] == [untimed(line) for line in told[0]]
 
 
-def test_as_tables(folder: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    run_replays(sessions_in([folder / "small"]), ReplayOptions(folder, diff=True), None, workers=1, scheduler=None, as_json=False)
-    said, _ = capsys.readouterr()
-    assert "1 session perceived again" in said
-    assert "3 frames perceived again, all sessions" in said
-    assert said.count("small") == 4, "in its row, and beside the three frames that changed"
-
-
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
@@ -369,20 +267,6 @@ def test_bad_input_is_one_line_before_the_work_begins(folder: Path, arguments: l
     assert (done.returncode, done.stdout) == (2, "")
     assert why in done.stderr
     assert len(done.stderr.splitlines()) == 1
-
-
-def test_two_sessions_of_one_name_have_no_folder_each(folder: Path, tmp_path: Path) -> None:
-    shutil.copytree(folder / "small", tmp_path / "small")
-    both = [folder / "small", tmp_path / "small"]
-    with pytest.raises(UserError, match="2 sessions are called small"):
-        run_replays(both, ReplayOptions(folder), tmp_path / "out", workers=1, scheduler=None, as_json=True)
-    assert not (tmp_path / "out").exists()
-
-
-def test_none_that_can_be_perceived_is_an_error(folder: Path, tmp_path: Path) -> None:
-    shutil.copytree(folder / "blind", tmp_path / "blind2")
-    with pytest.raises(UserError, match=r"none of 2 sessions could be perceived again; the first: .*blind: no frame"):
-        run_replays([folder / "blind", tmp_path / "blind2"], ReplayOptions(folder), None, workers=1, scheduler=None, as_json=True)
 
 
 def test_ctrl_c_tells_what_is_done(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

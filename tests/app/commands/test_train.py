@@ -10,7 +10,6 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from ctypes.util import find_library
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,7 @@ from typing import Any
 import pytest
 
 from app.commands.benchmark import benchmark
-from app.ui.display import check_display
 from core.bench.bench import bench_from_pictures, write_bench
-from core.devices import UserError
 from core.evaluation.accuracy import FrameScore, score_set
 from core.learning import training
 from core.learning.augmentation import FrameCrops
@@ -207,13 +204,6 @@ def test_sets_stand_side_by_side_each_also_with_its_bench(model: Path, frames: P
     assert "--store keeps the figures of one set" in done.stderr
 
 
-def test_a_folders_name_is_shown_as_it_is(tmp_path: Path) -> None:
-    out = tmp_path / "q[" / "red]x"  # what the terminal's library takes for a change of colour
-    done = run("synth", "--out", out, "--count", 1, "--width", 160, "--height", 120)
-    assert done.returncode == 0, done.stderr
-    assert "q[/red]x" in done.stderr.replace("\n", "")
-
-
 @pytest.mark.parametrize(
     "command",
     [
@@ -260,17 +250,6 @@ def test_without_a_display_the_window_says_so() -> None:
     done = subprocess.run([sys.executable, str(MAIN)], capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 2
     assert done.stderr.startswith("error: no display")
-
-
-@pytest.mark.skipif(find_library("xcb") is None, reason="no X libraries here: Qt has its own say")
-def test_a_display_that_has_gone_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("DISPLAY", ":4711")
-    with pytest.raises(UserError, match=r"the display :4711 \(DISPLAY\) does not answer"):
-        check_display()
-    monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")  # which needs no display
-    check_display()
 
 
 def test_scenes_are_trained_on_beside_frames_for_a_given_time(frames: Path, tmp_path: Path) -> None:

@@ -104,17 +104,6 @@ def test_a_checkpoint_that_cannot_be_written_does_not_end_the_training(tmp_path:
     assert [line for line in log if "step 7 could not be kept: " in line and "cannot be written (no space)" in line]
 
 
-def test_the_bar_moves_in_a_short_training_and_says_that_it_saves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    task, shown = _Task(), list[tuple[int, str]]()
-    monkeypatch.setattr(task, "save", lambda *_, **__: None)
-    with Progress(disable=True) as bar:
-        monkeypatch.setattr(bar, "update", lambda _, completed, description, **__: shown.append((completed, description)))
-        _run(task, tmp_path / "out", [], bar)
-    *moves, last = shown
-    assert [step for step, _ in moves] == [*range(2, STEPS, 2), STEPS]
-    assert last == (STEPS, "saving ...")
-
-
 @pytest.fixture
 def options(tmp_path: Path) -> TrainOptions:
     for name in ("images", "masks"):

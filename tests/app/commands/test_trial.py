@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import pickle
 from functools import partial
 from pathlib import Path
@@ -17,7 +15,6 @@ from app.commands.trial import TrialError, parse_policies, parse_seeds, run_one,
 from core.config.models import RESOURCES, Config
 from core.devices import UserError
 from core.evaluation.trial import Row, TrialLog, TrialSample, summarise, trial_row
-from core.perception.model_file import model_folder
 from hardware.twin.trial import TrialPlan
 from tests.app.program import run, run_apart
 
@@ -149,17 +146,6 @@ def test_a_rig_file_gives_the_robot_its_joints(monkeypatch: pytest.MonkeyPatch, 
         call("3", rig="bench 7")
 
 
-def test_a_plan_is_written_as_a_whole_or_not_at_all(faked: list[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(self: Path, _: Path) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
-
-    with monkeypatch.context() as patch, pytest.raises(TrialError, match=r"cannot be used \(No space left"):
-        patch.setattr(Path, "replace", full)
-        call("0:1", out=tmp_path)
-    assert list(tmp_path.iterdir()) == []
-    call("0:1", out=tmp_path)
-
-
 def test_a_folder_that_cannot_be_made_is_one_line(faked: list[Any], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(TrialError, match="choose another --out"):
@@ -216,17 +202,3 @@ def test_errors_are_one_line_and_exit_code_2() -> None:
         assert done.stdout == ""
         assert text in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1
-
-
-def test_figures_that_are_stored_meanwhile_change_no_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`benchmark --accuracy --store` between two calls must not cut a campaign of hours off."""
-    manifest = tmp_path / "model.json"
-    manifest.write_bytes((model_folder("default") / "model.json").read_bytes())
-    monkeypatch.setattr("core.perception.model_file.model_folder", lambda _name: tmp_path)
-    plan = TrialPlan(Config())
-    before = trial._described(plan)
-    told = json.loads(manifest.read_text())
-    manifest.write_text(json.dumps(told | {"figures": {"frames": 1}}))
-    assert trial._described(plan) == before
-    manifest.write_text(json.dumps(told | {"weights_sha256": "0" * 64}))
-    assert trial._described(plan) != before

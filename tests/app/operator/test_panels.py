@@ -35,15 +35,6 @@ def test_neither_advice_nor_ghost_outlives_its_frame(qtbot: QtBot) -> None:
     bench.pilot.close()
 
 
-def test_another_rig_brings_the_speeds_of_its_keys(qtbot: QtBot) -> None:
-    panels = OperatorPanels(Config(), RigKind.SIM, [])
-    qtbot.addWidget(panels)
-    assert panels.jog.speeds == "speeds: feed 10, sheath 10, tendons 2.4 mm/s"
-    slow = Config().hand.model_copy(update={"advance_mm_s": 3.0})
-    panels.set_config(Config().model_copy(update={"hand": slow}))
-    assert panels.jog.speeds == "speeds: feed 3, sheath 10, tendons 2.4 mm/s"
-
-
 def test_positions_of_a_twin_that_waits_for_the_computer_are_known_ones(qtbot: QtBot) -> None:
     """Its clock is behind the wall's, further and further; a bus counts as silent by that clock."""
     panels = OperatorPanels(Config(), RigKind.SIM, [])

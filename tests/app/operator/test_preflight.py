@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import pytest
-from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
@@ -231,14 +231,6 @@ def test_a_process_that_hangs_is_given_up(qtbot: QtBot) -> None:
     assert "no answer" in desk.preflight.problem
 
 
-def test_lines_that_are_no_checks_are_left_out(qtbot: QtBot) -> None:
-    bench = Bench()
-    desk = bench.desk(says({"name": "half"}, {}, GOOD))
-    desk.begin()
-    done(desk, qtbot)
-    assert [finding.name for finding in desk.preflight.findings] == ["camera's pictures", "servos' answers", "model"]
-
-
 def test_what_the_open_rig_says_of_itself() -> None:
     assert live_findings(None) == ()
     assert all(finding.level is Level.GOOD for finding in live_findings(DriveView(0.0)))
@@ -278,21 +270,6 @@ def test_the_list_shows_words_not_only_colours_and_the_worst_first(window: QWidg
     assert not shown.isModal()
     shown.leave.click()
     assert not shown.isVisible()
-    desk.close()
-
-
-@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900)])
-def test_the_list_that_opens_by_itself_does_not_lie_over_stop(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
-    running.resize(*size)
-    qtbot.wait(30)
-    stop = running.panels.mode_bar.stop
-    desk = PreflightModel(lambda: running.rig.config, lambda: running.controls.view, running, command=says(GOOD))
-    shown = PreflightList(desk, running, stop)
-    shown.open_list()
-    with_title = shown.geometry().adjusted(0, -30, 0, 0)
-    assert not with_title.intersects(QRect(stop.mapToGlobal(QPoint(0, 0)), stop.size()))
-    assert shown.height() >= 300
-    shown.close()
     desk.close()
 
 

@@ -10,12 +10,11 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.annotator.sources import image_files
-from app.operator.record_bar import RecordBar
 from app.operator.recording import AfterSession, RecoveryController, declined_names
 from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
@@ -29,7 +28,6 @@ from core.control.faults import Cause
 from core.control.modes import Act
 from core.evaluation.replay import event_target
 from core.session import writer as session_writer
-from core.session.files import is_being_written
 from core.session.manifest import (
     MANIFEST,
     Description,
@@ -243,18 +241,6 @@ def test_no_picture_of_the_old_rig_is_kept_as_one_of_the_new(
     assert engines[1].pilot.acts == [Act.STOP]
 
 
-def test_a_double_click_is_one_click(qtbot: QtBot) -> None:
-    bar, asked = RecordBar(), list[bool]()
-    qtbot.addWidget(bar)
-    bar.show()
-    bar.clicked.connect(lambda: asked.append(True))
-    qtbot.mouseClick(bar, Qt.MouseButton.LeftButton)
-    qtbot.mouseDClick(bar, Qt.MouseButton.LeftButton)
-    assert asked == [True], "the second would end what the first has begun"
-    qtbot.mouseClick(bar, Qt.MouseButton.LeftButton)
-    assert asked == [True, True]
-
-
 LONG_MS = 120_000
 
 
@@ -390,42 +376,6 @@ def test_the_window_offers_it_when_a_recording_ends_and_takes_it_back_when_the_n
     side.close()
 
 
-def test_a_double_click_answers_one_offer_and_not_the_next_that_nobody_has_read(strip: OfferStrip, qtbot: QtBot) -> None:
-    from app.widgets.messages import Offer, OfferButton  # what is offered
-
-    done: list[str] = []
-    for key in "ab":
-        strip.offer(Offer(key, f"Session {key}", answers=(OfferButton("Never ask again", lambda key=key: done.append(key)),)))
-    left = Qt.MouseButton.LeftButton
-    qtbot.mouseClick(strip.answers["Never ask again"], left)
-    assert strip.text == "Session b"
-    button = strip.answers["Never ask again"]
-    qtbot.mouseDClick(button, left)
-    qtbot.mouseRelease(button, left)
-    assert done == ["a"]
-    qtbot.mouseClick(button, left)
-    assert done == ["a", "b"]
-
-
-def test_the_strip_shows_one_offer_at_a_time_and_fits_a_small_picture(strip: OfferStrip, qtbot: QtBot, tmp_path: Path) -> None:
-    from app.widgets.messages import Offer, OfferButton  # what is offered
-
-    done: list[str] = []
-    strip.offer(
-        Offer("a", "First", "detail " * 40, (OfferButton("Do it", lambda: done.append("a")),), dismissed=lambda: done.append("x"))
-    )
-    strip.offer(Offer("b", "Second", answers=(OfferButton("Do that", lambda: done.append("b")),)))
-    parent = strip.parentWidget()
-    parent.resize(QSize(460, 300))
-    assert parent.rect().contains(strip.geometry())
-    assert strip.text.startswith("First")
-    strip.answers["\N{MULTIPLICATION SIGN}"].click()
-    assert strip.text == "Second"
-    strip.answers["Do that"].click()
-    assert done == ["x", "b"]
-    assert not strip.isVisible()
-
-
 def cut(folder: Path, frames: int = 12) -> Path:
     """A session as a power failure leaves it: not closed, its last row half written."""
     session = record(folder, (tick_of(index, 100.0 + index / 10) for index in range(frames)))
@@ -541,25 +491,3 @@ def test_a_cancelled_recovery_is_no_fault_and_ends_the_others_too(
     started[1].ended.emit(130, "interrupted")
     assert said[1:] == [("Cancelled", False)]
     assert (len(started), strip.text) == (2, "")
-
-
-def test_a_folder_that_is_not_there_and_whole_sessions_offer_nothing(
-    desk: RecoveryController, strip: OfferStrip, qtbot: QtBot, tmp_path: Path
-) -> None:
-    said: list[str] = []
-    desk.said.connect(lambda line, _: said.append(line))
-    desk.search()
-    qtbot.waitUntil(lambda: desk._work.pending == 0)
-    whole = record(tmp_path / "sessions", (tick_of(index, 100.0 + index / 10) for index in range(3)))
-    assert not is_being_written(whole)
-    desk.search(again=True)
-    qtbot.waitUntil(lambda: bool(said))
-    assert "No cut session" in said[0]
-    assert strip.text == ""
-
-
-@pytest.mark.parametrize("text", ["", '{"a": 1}'])
-def test_a_damaged_list_of_declined_ones_declines_nothing(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "declined.json"
-    path.write_text(text)
-    assert declined_names(path) == set()

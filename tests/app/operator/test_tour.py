@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -16,7 +15,7 @@ from app.operator.services import tour_at_start, was_seen
 from app.operator.window import OperatorWindow
 from app.ui.theme import MIN_WINDOW
 from app.widgets.mode_bar import StopButton
-from app.widgets.tour_overlay import TourOverlay, place_card
+from app.widgets.tour_overlay import TourOverlay
 from core.config.models import Config
 from core.control.modes import Act
 from hardware.rig import RigKind
@@ -39,20 +38,6 @@ def _stops(tour: TourOverlay) -> Iterator[int]:
 
 
 # ---- places
-
-
-def test_the_card_stands_beside_the_light() -> None:
-    room, light = QRect(0, 0, 1000, 600), QRect(100, 100, 300, 200)
-    card = place_card(QSize(380, 150), room, light, [])
-    assert not card.intersects(light)
-    assert room.contains(card)
-
-
-def test_the_card_gives_way_to_what_is_kept_clear_even_on_the_light() -> None:
-    room, light = QRect(0, 0, 800, 400), QRect(0, 0, 400, 400)
-    clear = QRect(400, 0, 400, 400)  # all that the light leaves free
-    card = place_card(QSize(300, 150), room, light, [clear])
-    assert not card.intersects(clear)
 
 
 def test_no_card_covers_stop_or_what_it_speaks_of_and_all_of_its_text_is_on_it(running: OperatorWindow, qtbot: QtBot) -> None:
@@ -124,20 +109,6 @@ def test_it_works_by_keyboard_alone_and_by_clicks(running: OperatorWindow, qtbot
     assert tour.place == 0
     qtbot.mouseClick(tour.card.skip, Qt.MouseButton.LeftButton)
     assert not tour.is_running
-
-
-def test_it_turns_to_the_page_that_it_speaks_of_and_its_light_follows_the_window(running: OperatorWindow, qtbot: QtBot) -> None:
-    panels, tour = running.panels, running.tour
-    panels.pages.setCurrentWidget(panels.events)
-    running.resize(1280, 720)
-    running.show_tour()
-    before = tour.light
-    running.resize(1600, 900)
-    qtbot.waitUntil(lambda: tour.light != before)
-    assert tour.light.contains(QRect(panels.live.mapTo(panels, QPoint(0, 0)), panels.live.size()))
-    for _ in itertools.takewhile(lambda _place: "Move it yourself" not in tour.card.text, _stops(tour)):
-        pass
-    assert panels.jog.isVisible()
 
 
 def test_without_a_robot_it_does_not_speak_of_moving_one(make_window: MakeWindow, engine: FakeEngine, qtbot: QtBot) -> None:

@@ -85,21 +85,6 @@ def test_key_shows_another_picture_of_the_same_look(window: OperatorWindow, open
     assert [(twin.look, twin.appearance_seed) for twin in opened[1:]] == [(None, 1), ("fluoroscopy", 1), ("fluoroscopy", 2)]
 
 
-def test_nothing_is_broken_off_for_a_look(
-    window: OperatorWindow, opened: list[TwinConfig], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(window.rig, "work_in_progress", lambda: "the robot is armed: disarm it first")
-    _entries(window)["Turbid gel"].trigger()
-    assert len(opened) == 1
-    assert window.panels.toast.text() == "The look stays as it is: the robot is armed: disarm it first"
-    assert _marked(window) == ["Clear bench"]
-
-
-def test_unknown_look_of_a_configuration_is_not_marked(make_window: MakeWindow, open_engine: OpenEngine) -> None:
-    window = make_window(open_engine, load_config(overrides={"twin": {"look": "moon"}}))
-    assert _marked(window) == []
-
-
 def test_nothing_can_be_chosen_while_another_rig_is_open(window: OperatorWindow, opened: list[TwinConfig], qtbot: QtBot) -> None:
     twin = window.rig.config
     rig = twin.rig.model_copy(update={"name": "camera", "camera": "webcam", "robot": "none"})

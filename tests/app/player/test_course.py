@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.player.course import Course, JumpKind, PlayClock, clock_text, course_of, event_line, neighbour, places_of
+from app.player.course import Course, JumpKind, PlayClock, course_of, places_of
 from core.session.manifest import Event, EventKind
 from core.session.reader import Timeline
 from tests.app.hand_clock import Clock
@@ -70,24 +70,6 @@ def test_each_kind_has_its_places() -> None:
     }
 
 
-def test_neighbours() -> None:
-    places = np.array([2, 5, 9])
-    assert [neighbour(places, at, 1) for at in (0, 2, 8, 9)] == [2, 5, 9, None]
-    assert [neighbour(places, at, -1) for at in (2, 3, 9, 12)] == [None, 2, 5, 9]
-
-
-@pytest.mark.parametrize(
-    ("time_s", "text"), [(0.0, "0:00.000"), (61.2345, "1:01.234"), (3723.5, "1:02:03.500"), (0.9996, "0:01.000")]
-)
-def test_times_are_read_as_a_clock(time_s: float, text: str) -> None:
-    assert clock_text(time_s) == text
-
-
-def test_events_in_words() -> None:
-    assert event_line(Event(0.0, EventKind.FAULT, "head jumped", {"detail": "31 px"})) == "fault: head jumped (31 px)"
-    assert event_line(Event(0.0, EventKind.ARM)) == "arm"
-
-
 def test_playing_follows_the_clock_at_its_speed_and_ends() -> None:
     wall, shown = Clock(), course([k / 10 for k in range(21)])
     clock = PlayClock(wall)
@@ -104,12 +86,6 @@ def test_playing_follows_the_clock_at_its_speed_and_ends() -> None:
     wall.now_s += 1.0
     assert not clock.advance(shown, 2.0)
     assert (clock.position_s, clock.is_playing) == (2.0, False)
-
-
-def test_speeds_go_from_a_tenth_to_eight() -> None:
-    clock = PlayClock()
-    assert [clock.change_speed(1) for _ in range(4)] == [2.0, 4.0, 8.0, 8.0]
-    assert [clock.change_speed(-1) for _ in range(7)] == [4.0, 2.0, 1.0, 0.5, 0.25, 0.1, 0.1]
 
 
 def test_a_long_gap_is_passed_over_and_told() -> None:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from queue import Queue
 
-import numpy as np
 import pytest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.player import decoder
-from app.player.decoder import Decoded, FrameDecoder, drawable
+from app.player.decoder import Decoded, FrameDecoder
 from core.session.reader import SessionReader
-from core.types import Tick
 from tests.core.session_data import SIZE, record, tick_of
 
 PICTURE_BYTES = SIZE[0] * SIZE[1] * 3
@@ -78,31 +74,3 @@ def test_a_late_report_of_decoding_ahead_displaces_no_request(
         qtbot.waitUntil(lambda: set(range(5, 12)) <= set(frames._kept))
         frames.stop()
         assert frames.wait(5000)
-
-
-def far(tick: Tick) -> Tick:
-    path = tick.scene.path
-    return replace(tick, scene=replace(tick.scene, path=replace(path, points=path.points * 1e30)))
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        far,
-        lambda tick: replace(tick, scene=replace(tick.scene, scale=1e-30, scale_xy=None)),
-        lambda tick: replace(tick, scene=replace(tick.scene, centerline=replace(tick.scene.centerline, piece=np.zeros((0, 2))))),
-    ],
-)
-def test_absurd_geometry_is_not_drawn(damage: Callable[[Tick], Tick]) -> None:
-    """Lines to the end of the world would take seconds to paint."""
-    sound = tick_of(0, 0.0, full=True)
-    assert drawable(sound).scene.path is not None
-    shown = drawable(damage(sound))
-    assert (shown.scene.path, shown.scene.vessel_graph, shown.scene.masks, shown.scene.scale) == (None, None, None, 1.0)
-    assert shown.scene.pose is sound.scene.pose
-
-
-def test_an_absurd_advice_is_not_drawn() -> None:
-    sound = tick_of(0, 0.0, full=True)
-    assert sound.advice is not None
-    assert drawable(replace(sound, advice=replace(sound.advice, advance_mm_s=1e12))).advice is None

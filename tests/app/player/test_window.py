@@ -284,17 +284,6 @@ def test_the_timeline_is_clicked_zoomed_and_selected(player: PlayerWindow, qtbot
     at(qtbot, player, 40)
 
 
-def test_the_timeline_claims_nothing_for_a_time_without_frames(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
-    times_s = [FIRST_S + k * STEP_S for k in range(11)] + [FIRST_S + 6.0 + k * STEP_S for k in range(11)]
-    window = open_player(record(tmp_path, (tick_of(k, time_s, full=True) for k, time_s in enumerate(times_s))))
-    until(qtbot, lambda: len(window.course) == len(times_s) and len(window.session.events) > 0)
-    line = window.panels.timeline
-    width = line.width() - 60
-    assert line.text_at(50 + 0.5 / 7.0 * width).startswith("0:00.500  state D")
-    assert line.text_at(50 + 3.5 / 7.0 * width) == "0:03.500  no frames"
-    assert line.text_at(50 + 6.5 / 7.0 * width).startswith("0:06.500  state D")
-
-
 def test_what_a_row_tells_is_shown_with_it(player: PlayerWindow, qtbot: QtBot) -> None:
     panels = player.panels
     told = panels.values.toPlainText()
@@ -524,20 +513,6 @@ def test_a_lost_picture_is_said_and_nothing_of_another_is_shown(open_player: Ope
     assert "No snapshot" in window.panels.toast.text()
 
 
-def test_of_a_lost_picture_the_values_of_its_own_row_are_shown(player: PlayerWindow, qtbot: QtBot) -> None:
-    panels = player.panels
-    player.go(25)
-    at(qtbot, player, 25)
-    until(qtbot, lambda: panels.values.toPlainText().startswith("frame 25 of the camera"))
-    row = player._reader.row(58)
-    panels.show_lost(row, 58)
-    assert panels.values.toPlainText().startswith("frame 58 of the camera")
-    assert (panels.mode.mode, panels.mode.isVisible()) == (Mode.ARMED, True)
-    panels.show_lost(None, 59)
-    assert panels.values.toPlainText() == "", "nobody knows what stood in a damaged row"
-    assert not panels.mode.isVisible()
-
-
 def test_a_session_without_rows_says_what_to_do(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
     folder = record(tmp_path, [tick_of(0, FIRST_S)])
     (folder / "frames.jsonl").unlink()
@@ -547,19 +522,6 @@ def test_a_session_without_rows_says_what_to_do(open_player: Open, tmp_path: Pat
     for key in (Key.Key_Space, Key.Key_N, Key.Key_Right, Key.Key_E, Key.Key_I, Key.Key_M, Key.Key_Return, Key.Key_End):
         press(window, key)
     assert window.place == -1
-
-
-def test_rows_that_were_refused_with_masks_are_drawn_without_skeletons(open_player: Open, tmp_path: Path, qtbot: QtBot) -> None:
-    """Skeletons are not recorded: the live picture must not look for them."""
-    full = tick_of(0, FIRST_S, full=True)
-    scene = full.scene
-    refused = type(scene)(
-        0, FIRST_S, scene.source_size, 1.0, masks=scene.masks, skeletons=scene.skeletons, refusal=Refusal(Reason.NO_ROBOT)
-    )
-    folder = record(tmp_path, [Tick(full.frame, refused, None, None, None, 0, 30.0)])
-    window = open_player(folder)
-    at(qtbot, window, 0)
-    assert window.panels.badge.title == "No robot in view"
 
 
 def replayed_file(session: Path, out: Path, *, name: str | None = None) -> Path:

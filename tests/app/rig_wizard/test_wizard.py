@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QFileDialog, QSpinBox
+from PySide6.QtWidgets import QApplication, QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.rig_wizard import servo_pages
@@ -19,7 +19,6 @@ from app.rig_wizard.model import RigWizardModel
 from app.rig_wizard.wizard import RigWizard
 from app.ui.texts import calibration_lines
 from app.ui.window_base import close_all, is_asked_to_end
-from core.calibration.camera import BoardView
 from core.calibration.servos import Assignment
 from core.config.calibration import CalibrationConfig, DrumsConfig, ScaleConfig, SteeringConfig, TendonConfig, ZeroConfig
 from core.config.models import Config, load_config
@@ -31,7 +30,7 @@ from hardware.calibration import bench as calibration_bench
 from hardware.calibration.bench import CalibrationBench
 from hardware.calibration.servo_identification import Zeros
 from hardware.servos.discovery import FoundPort, FoundServo, FoundServos
-from tests.app.fakes import make_scene, turn_the_wheel, until
+from tests.app.fakes import make_scene, until
 from tests.core.robots import THREE, TURNED
 
 
@@ -169,24 +168,6 @@ def test_two_clicks_give_the_scale(opened: RigWizard, qtbot: QtBot) -> None:
     page.click(12.0, 10.0)
     assert "px apart" in opened.message
     assert page.shapes() == []
-
-
-def test_a_length_that_is_corrected_after_the_two_clicks_counts(opened: RigWizard, qtbot: QtBot) -> None:
-    page, draft = opened.scale_page, opened.model.draft
-    _to(opened, page)
-    page.length.setValue(50.0)
-    qtbot.mouseClick(page.clicks_button, Qt.MouseButton.LeftButton)
-    page.click(100.0, 100.0)
-    page.length.setValue(60.0)
-    assert draft.scale is None, "one click is no length yet"
-    page.click(500.0, 100.0)
-    page.length.selectAll()
-    qtbot.keyClicks(page.length, "80")
-    assert draft.scale.mm_per_px == pytest.approx(0.2)
-    assert page.result.text().startswith("Scale: 0.2000 mm per pixel")
-    page.leave()  # the next page, and back: the picture may have moved since
-    page.length.setValue(100.0)
-    assert draft.scale.mm_per_px == pytest.approx(0.2)
 
 
 def test_a_board_that_is_not_seen_is_told(make_wizard: MakeWizard, qtbot: QtBot) -> None:
@@ -566,50 +547,6 @@ def test_without_results_it_closes_at_once_and_frees_the_camera(opened: RigWizar
     assert list_rigs() == ()
     assert opened.model.wait_closed()
     assert opened.model.bench is None
-
-
-def test_the_wheel_changes_no_servo_no_direction_and_no_number(opened: RigWizard) -> None:
-    """Turned over the table of joints it would pull a wire the wrong way ever after."""
-    lists, numbers = opened.findChildren(QComboBox), opened.findChildren(QSpinBox) + opened.findChildren(QDoubleSpinBox)
-    assert len(lists) > 14
-    assert len(numbers) > 3
-    for control in (*lists, *numbers):
-        control.setEnabled(True)
-        before = control.currentIndex() if isinstance(control, QComboBox) else control.value()
-        event = turn_the_wheel(control)
-        assert before == (control.currentIndex() if isinstance(control, QComboBox) else control.value()), control.accessibleName()
-        assert not event.isAccepted()
-    assert not opened.identify_page.is_done
-
-
-def test_escape_leaves_the_field_first(opened: RigWizard, qtbot: QtBot) -> None:
-    _to(opened, opened.scale_page)
-    opened.scale_page.length.setFocus()
-    qtbot.keyClick(opened.scale_page.length, Qt.Key.Key_Escape)
-    assert opened.isVisible()
-    assert opened.focusWidget() is not opened.scale_page.length
-    qtbot.keyClick(opened, Qt.Key.Key_Escape)
-    assert not opened.isVisible()
-
-
-def test_the_question_gives_way_to_another_page_and_to_what_went_wrong(opened: RigWizard) -> None:
-    _find_a_scale(opened)
-    for happens in (opened.next, lambda: opened.model.failed.emit("the port is gone")):
-        opened.ask_to_leave()
-        assert opened.question.isVisible()
-        happens()
-        assert not opened.question.isVisible()
-    assert opened.message == "the port is gone"
-    assert opened.line.isVisible()
-
-
-def test_a_board_that_is_forgotten_again_leaves_nothing_to_ask_about(opened: RigWizard) -> None:
-    draft = opened.model.draft
-    assert not draft.has_news
-    draft.views.append(BoardView(np.zeros((4, 2)), np.zeros((4, 2))))
-    assert draft.has_news
-    draft.forget_boards()
-    assert not draft.has_news
 
 
 def test_a_camera_without_pictures_is_none(make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,10 +10,9 @@ from pytestqt.qtbot import QtBot
 
 from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
-from app.settings.fields import NumberEdit, SettingField
-from core.config.models import RESOURCES, Config, load_config
+from app.settings.fields import SettingField
+from core.config.models import Config, load_config
 from core.config.schema import schema, settings_by_key
-from tests.core.robots import TURNED
 
 D_ALLOW, THETA = "perception.pose.d_allow_px", "perception.pose.theta_allow_deg"
 Key = Qt.Key
@@ -123,15 +122,6 @@ def test_the_tree_tells_where_something_differs_or_is_wrong(dialog: SettingsDial
     assert dialog._items["perception.pose"].data(0, Qt.ItemDataRole.AccessibleTextRole).endswith("not allowed")
 
 
-def test_the_tree_has_the_joints_of_the_robot_that_runs(dialog: SettingsDialog) -> None:
-    rig = {"name": "turned", "camera": "twin", "robot": "twin", "file": "turned.toml"}
-    dialog.show_rig(Config.model_validate({**load_config().model_dump(), "rig": rig, "servos": TURNED.model_dump()}))
-    tops = [dialog.tree.topLevelItem(place) for place in range(dialog.tree.topLevelItemCount())]
-    servos = next(item for item in tops if item.text(0) == "Servos")
-    shown = [servos.child(n).text(0) for n in range(servos.childCount()) if not servos.child(n).isHidden()]
-    assert shown == ["Joint tendon 1", "Joint tendon 2", "Joint advance"], "the rotation's degrees stand in its rig file"
-
-
 def test_the_problem_below_leads_to_its_field(dialog: SettingsDialog) -> None:
     type_into(dialog, D_ALLOW, "900")
     dialog.show_section(next(s for s in schema().walk() if s.key == "record"))
@@ -185,47 +175,6 @@ def test_a_slider_is_there_for_what_acts_at_once_and_nowhere_else(dialog: Settin
     assert field(dialog, "advice.fast_mm_s").slider is None
 
 
-def test_no_place_of_a_slider_gives_what_is_refused(dialog: SettingsDialog) -> None:
-    sections = {key.rpartition(".")[0] for key in settings_by_key()}
-    sliders = []
-    for section in sections:
-        dialog.go_to(section)
-        dialog.page.add_all()
-        sliders += [field for field in dialog.page.fields.values() if field.slider is not None]
-    assert len({shown.setting.key for shown in sliders}) > 20
-    for shown in sliders:
-        bounds = shown.setting.bounds
-        for place in (0, 1, 2, 333, 500, 998, 999, 1000):
-            value = float(shown._value_at(place))
-            assert bounds.low is not None and bounds.high is not None
-            assert bounds.low <= value <= bounds.high
-            assert value != bounds.low or not bounds.low_open
-            assert value != bounds.high or not bounds.high_open
-            assert bounds.step is None or value % bounds.step == 0
-
-
-def test_arrows_go_by_what_a_setting_is_a_multiple_of(dialog: SettingsDialog) -> None:
-    shown = field(dialog, "perception.tracking.window_px")
-    editor = shown.editor
-    before = int(editor.text())
-    editor.step(1)
-    assert int(editor.text()) == before + 32
-    assert "a multiple of 32" in shown._note()
-
-
-@pytest.mark.parametrize(
-    ("text", "is_whole", "steps", "after"),
-    [("6", False, 1, "6.1"), ("40", False, -1, "39"), ("0.5", False, 1, "0.51"), ("3", True, 10, "13"), ("0", False, 1, "0.01"),
-     ("abc", False, 1, "abc"), ("-0.2", False, -1, "-0.21")],
-)  # fmt: skip
-def test_up_and_down_step_by_what_fits_the_number(qtbot: QtBot, text: str, is_whole: bool, steps: int, after: str) -> None:
-    edit = NumberEdit(is_whole=is_whole)
-    qtbot.addWidget(edit)
-    edit.setText(text)
-    edit.step(steps)
-    assert edit.text() == after
-
-
 def test_what_was_wrong_with_the_file_is_shown(qtbot: QtBot, themed: None) -> None:
     made = SettingsDialog(SettingsDraft(load_config()), Path("x.toml"), ("x.toml: future: unknown key",))
     made.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose, False)
@@ -271,10 +220,3 @@ def test_a_folder_is_chosen_on_the_disk(dialog: SettingsDialog, tmp_path: Path) 
     assert seen[-1].record.folder == str(tmp_path)
     editor = dialog.page.fields["record.folder"].editor
     assert editor.text() == str(tmp_path)
-
-
-def test_a_shipped_model_goes_by_its_name(dialog: SettingsDialog) -> None:
-    seen = drafts(dialog)
-    chooser = field(dialog, "perception.segmentation.model").browse_button
-    chooser._on_chosen(RESOURCES / "models" / "other")
-    assert seen[-1].perception.segmentation.model == "other"

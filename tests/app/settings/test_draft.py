@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.settings.draft import SettingsDraft, as_text, search, with_changes
+from app.settings.draft import SettingsDraft, search, with_changes
 from core.config.models import Config, load_config
 from core.config.schema import Effect, schema
 from tests.core.robots import THREE
@@ -62,18 +62,6 @@ def test_what_is_allowed_is_taken(draft: SettingsDraft, key: str, entry: object,
     assert draft.set_entry(key, entry) == ""
     assert draft.value(key) == value
     assert draft.config is not None
-
-
-def test_the_field_shows_what_was_typed_to_the_letter(draft: SettingsDraft) -> None:
-    """Taking back the last figure of 12.5 leaves "12.": without the point, a 7 typed next would make 127 of it."""
-    key = "perception.pose.d_allow_px"
-    for typed in ("12.", "12.7"):
-        assert draft.set_entry(key, typed) == ""
-        assert draft.entry(key) == typed
-    assert draft.value(key) == 12.7
-    draft.set_entry(key, "12.")
-    draft.reset([key])
-    assert draft.entry(key) == "6"
 
 
 def test_what_does_not_go_together_is_told_of_the_section(draft: SettingsDraft) -> None:
@@ -164,10 +152,6 @@ def test_changes_that_do_not_go_together_with_what_runs_are_left_out() -> None:
 )
 def test_search_looks_at_name_meaning_unit_and_section(words: str, key: str) -> None:
     assert key in {setting.key for _, settings in search(words) for setting in settings}
-
-
-def test_values_as_text() -> None:
-    assert [as_text(value) for value in (6.0, 0.1, None, 7, "x", 1e-7)] == ["6", "0.1", "", "7", "x", "1e-07"]
 
 
 def test_a_rig_whose_robot_has_another_shape_is_shown_and_its_joints_stay(draft: SettingsDraft) -> None:

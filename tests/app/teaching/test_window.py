@@ -17,7 +17,6 @@ from pytestqt.qtbot import QtBot
 from app.annotator.editing import MaskMode
 from app.teaching import model as model_module
 from app.teaching.folder import TeachingStep
-from app.teaching.model import free_name, teaching_folder
 from app.training.model import TrainingPhase
 from app.ui.texts import OperatorStep
 from core.bench.bench import read_bench
@@ -294,19 +293,6 @@ def test_a_stroke_is_kept_when_another_frame_is_chosen_or_the_window_closed_at_o
     assert [taken.is_corrected for taken in again.model.view.frames[:4]] == [False, True, False, False]
 
 
-def test_escape_leaves_the_tool_before_it_closes_the_window(open_hand: OpenHand) -> None:
-    hand = open_hand()
-    window, page = hand.window, hand.window.vessel_page
-    hand.click(window.empty_page.take)
-    hand.click(window.next_button)
-    assert page.editor.canvas.mask_mode is MaskMode.REGION
-    QTest.keyClick(window, Qt.Key.Key_Escape)
-    assert page.editor.bar.mode_shown is MaskMode.POINTS
-    assert window.isVisible()
-    QTest.keyClick(window, Qt.Key.Key_Escape)
-    assert not window.isVisible()
-
-
 def test_a_vessel_that_is_drawn_is_there_after_back_and_after_closing(open_hand: OpenHand) -> None:
     hand = open_hand()
     window, page = hand.window, hand.window.vessel_page
@@ -379,16 +365,6 @@ def test_a_training_is_stopped_and_goes_on_while_the_window_is_closed(
     hand.click(hand.window.train_page.stop)
     qtbot.waitUntil(lambda: not hand.model.is_training, timeout=LONG_MS)
     assert hand.model.training.line.startswith("Stopped")
-
-
-def test_names_of_folder_and_model() -> None:
-    assert teaching_folder("my rig/2").name == "my_rig_2"
-    assert free_name("Bench ü 2").startswith("Bench_2")
-
-
-def test_a_line_of_another_version_is_no_result() -> None:
-    assert model_module.taught_result({"held_out": {"frames": 3}}) is None
-    assert model_module.taught_result({}) is None
 
 
 # ---- input events

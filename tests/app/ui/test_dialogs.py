@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
     QComboBox,
     QDialog,
     QLineEdit,
-    QListWidget,
     QPushButton,
     QWidget,
 )
@@ -31,13 +30,11 @@ from app.rig_wizard.wizard import RigWizard
 from app.settings.dialog import SettingsDialog
 from app.settings.draft import SettingsDraft
 from app.training.dialog import TrainingDialog
-from app.training.model import TrainingPhase, TrainingState
 from core.config.models import Config, load_config
 from core.control.drive_view import DriveView
 from hardware.calibration.bench import CalibrationBench
 from hardware.cameras.registry import FoundCamera
 from hardware.rig import FoundDevices
-from hardware.servos.discovery import FoundServo, FoundServos
 from tests.app.fakes import make_scene, until
 from tests.app.operator.test_preflight import BAD, GOOD, done, says
 from tests.app.rig_wizard.test_wizard import StillCamera
@@ -143,34 +140,6 @@ def test_the_training_is_named_and_works_by_enter(qtbot: QtBot) -> None:
 # ---- settings
 
 
-def test_a_long_section_never_stands_squeezed(settings: SettingsDialog) -> None:
-    """Each field has its height from its first moment on, not only after Qt has laid out the page once more."""
-    for key in ("servos", "record", "perception.quality"):
-        settings.tree.setCurrentItem(settings._items[key])
-        for field in settings.page.fields.values():
-            assert field.height() >= field.minimumSizeHint().height() - 1, field.setting.key
-
-
-def test_an_empty_field_says_so_and_what_that_means(settings: SettingsDialog) -> None:
-    settings.go_to("camera.exposure_ms")
-    field = settings.page.fields["camera.exposure_ms"]
-    assert field.editor.placeholderText() == "not set"
-    assert field.default_text == "not set"
-    assert field.setting.description.startswith("empty: automatic")
-
-
-def test_a_problem_is_told_by_the_names_on_the_page(settings: SettingsDialog) -> None:
-    settings._on_edited("perception.pose.theta_allow_deg", "500")
-    assert ">Pose state, Allowed angle</a>: must be above 0 and at most 180°" in settings.status.text()
-
-
-def test_a_switch_is_turned_wherever_it_is_clicked(settings: SettingsDialog) -> None:
-    settings.go_to("servos.torque_off_on_stop")
-    switch = settings.page.fields["servos.torque_off_on_stop"].editor
-    QTest.mouseClick(switch, Qt.MouseButton.LeftButton, pos=switch.rect().center())
-    assert settings.draft.value("servos.torque_off_on_stop") is True
-
-
 # ---- the rig wizard
 
 
@@ -196,18 +165,6 @@ def test_one_button_of_a_page_is_what_comes_next(wizard: RigWizard, qtbot: QtBot
         assert [one for one in (scale.take_button, scale.solve_button, wizard.next_button) if _is_main(one)] == [main]
 
 
-def test_the_steps_tell_which_are_done_and_what_was_said_on_a_page_goes_with_it(wizard: RigWizard, qtbot: QtBot) -> None:
-    wizard.camera_page.open_button.click()
-    until(qtbot, lambda: not wizard.model.is_busy)
-    wizard.model.message.emit("board 2: 45 of 54 corners")
-    assert wizard.message
-    wizard.next()
-    assert wizard.message == ""
-    steps = wizard.findChild(QListWidget)
-    told = [steps.item(row).data(Qt.ItemDataRole.AccessibleTextRole) for row in range(3)]
-    assert told == ["Camera, done", "Scale and lens, this page", "Port and servos"]
-
-
 def test_size_and_rate_can_be_set_for_real_cameras_only(wizard: RigWizard) -> None:
     page = wizard.camera_page
     page._on_found(FoundDevices((FoundCamera("webcam", "A webcam", device="/dev/video0"), FoundCamera("twin", "The twin")), ()))
@@ -217,23 +174,7 @@ def test_size_and_rate_can_be_set_for_real_cameras_only(wizard: RigWizard) -> No
     assert not any(field.isEnabled() for field in (*page.sizes, page.rate))
 
 
-def test_servos_go_by_the_name_that_is_printed_on_them(wizard: RigWizard, qtbot: QtBot) -> None:
-    wizard.camera_page.open_button.click()
-    until(qtbot, lambda: not wizard.model.is_busy)
-    wizard.model.draft.found = FoundServos("/dev/ttyUSB0", 1_000_000, (FoundServo(1, 1020), FoundServo(2, 4711)))
-    wizard.port_page.refresh()
-    assert [wizard.port_page.servos.item(row, 1).text() for row in range(2)] == ["XM430-W350 (1020)", "model 4711"]
-
-
 # ---- training
-
-
-def test_closing_while_it_trains_is_called_what_it_is(qtbot: QtBot) -> None:
-    with training(qtbot) as shown:
-        assert shown.minimumSizeHint().width() < 1000, "its path is long"
-        assert shown.hide_button.text() == "&Close"
-        shown._on_changed(TrainingState(TrainingPhase.RUNNING, "10 pictures to learn from"))
-        assert shown.hide_button.text() == "&Hide, go on training"
 
 
 # ---- before driving

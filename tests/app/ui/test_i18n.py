@@ -11,9 +11,8 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QLocale, Qt, QTranslator
-from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QApplication, QDialogButtonBox
+from PySide6.QtCore import QLocale, Qt
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.annotator.panels import QueueModel
@@ -22,12 +21,11 @@ from app.operator.window import OperatorWindow
 from app.settings.apply import SettingsController
 from app.ui import i18n
 from app.ui.actions import LanguageMenu, plain
-from app.ui.i18n import AUTO, CHINESE, ENGLISH, LOCALE, english_texts, language_in_use, tr, tr_text, use_language
-from app.ui.texts import QUANTITY, advice_headline, tip
+from app.ui.i18n import AUTO, CHINESE, ENGLISH, english_texts, language_in_use, tr, tr_text, use_language
+from app.ui.texts import advice_headline
 from core.annotation.model import Annotation, Status
 from core.config.files import read_settings
 from core.config.models import Config, QualityConfig
-from core.config.schema import Bounds
 from core.control.alerts import ALERTS
 from core.devices import UserError
 from core.messages import Message, message
@@ -173,19 +171,6 @@ def test_a_refusal_with_a_hint_at_the_pictures_kind_is_translated(chinese: None,
     assert re.search("[A-Za-z]", tr_text(detail)) is None
 
 
-def test_ranges_of_settings_are_translated(chinese: None) -> None:
-    assert tr_text(Bounds(0.0, 200.0, low_open=True).text("px")) == "大于 0 且不超过 200 px"
-    assert tr_text(Bounds(128, 4096).text("px")) == "128 至 4096 px"
-
-
-def test_tool_tips_fit_a_screen_and_no_line_begins_with_a_full_stop(chinese: None) -> None:
-    for name in QUANTITY:
-        lines = tip(name).splitlines()
-        assert HAN.search(lines[0])
-        assert not [line for line in lines if line[0] in "，。；：、"]
-        assert max(sum(1 if letter.isascii() else 2 for letter in line) for line in lines) <= 100
-
-
 def test_a_message_is_translated_by_its_template_also_from_an_error_and_a_pipe(chinese: None) -> None:
     made = message("the computer slept for {a:.0f} s", a=12.3)
     assert (made, made.template, dict(made.values)) == ("the computer slept for 12 s", "the computer slept for {a} s", {"a": "12"})
@@ -222,12 +207,6 @@ def test_as_the_system_says(
     assert tr("&File") == ("&File" if spoken == ENGLISH else "文件(&F)")
 
 
-def test_the_buttons_of_qt_speak_it_too(qtbot: QtBot, chinese: None) -> None:
-    box = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
-    qtbot.addWidget(box)
-    assert HAN.search(box.button(QDialogButtonBox.StandardButton.Cancel).text())
-
-
 @pytest.mark.parametrize("damage", ["missing", "cut"])
 def test_a_damaged_translation_is_english_and_one_line(
     qapp: QApplication, afterwards_english: None, tmp_path: Path, damage: str
@@ -241,24 +220,6 @@ def test_a_damaged_translation_is_english_and_one_line(
     assert language_in_use() == ENGLISH
     assert "\n" not in line
     assert "resources/translations" in line
-
-
-def test_without_a_font_for_it_one_line_names_the_package(
-    qapp: QApplication, afterwards_english: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(QFontDatabase, "families", lambda *_system: [])
-    line = use_language(qapp, CHINESE)
-    assert "fonts-noto-cjk" in line
-    assert language_in_use() == CHINESE
-
-
-def test_changing_back_leaves_no_translator_behind(qapp: QApplication, afterwards_english: None) -> None:
-    for choice in (CHINESE, CHINESE, ENGLISH):
-        use_language(qapp, choice)
-    assert QCoreApplication.translate(i18n.CONTEXT, "&File") == "&File"
-    qapp.processEvents()
-    assert set(LOCALE) == {CHINESE}
-    assert all(translator.parent() is not None for translator in qapp.findChildren(QTranslator))
 
 
 # ---- the window

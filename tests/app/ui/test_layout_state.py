@@ -117,24 +117,6 @@ def test_a_broken_file_is_ignored(qtbot: QtBot, first: Arranged) -> None:
     made.window.close()
 
 
-def test_full_screen_is_not_kept(first: Arranged, qtbot: QtBot) -> None:
-    first.window.showFullScreen()
-    first.window.close()
-    assert not Arranged(qtbot).window.isFullScreen()
-
-
-def test_columns_keep_their_shares_when_the_window_grows(qtbot: QtBot) -> None:
-    columns = Columns(QLabel(), QLabel(), 0.62)
-    qtbot.addWidget(columns)
-    columns.resize(1010, 300)
-    columns.show()
-    assert columns.sizes()[0] == pytest.approx(620, abs=2)
-    columns.resize(1510, 300)
-    assert columns.sizes()[0] == pytest.approx(930, abs=2)
-    columns.moveSplitter(500, 1)
-    assert columns.share == pytest.approx(1 / 3, abs=0.01)
-
-
 def test_overlays_of_the_operator_window_are_kept(make_window: MakeWindow) -> None:
     def arranged() -> OperatorWindow:
         window = make_window()

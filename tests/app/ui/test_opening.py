@@ -6,13 +6,11 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
+from PySide6.QtWidgets import QFileDialog, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.ui.actions import MenuEntry, plain
 from app.ui.layout_state import layout_settings
 from app.ui.opening import OfferedCommand, RecentMenu, ask_path, note_recent, recent_paths
-from app.ui.window_base import WindowFrame
 from app.widgets.messages import Offer, OfferStrip
 
 pytestmark = pytest.mark.usefixtures("own_folder")
@@ -48,15 +46,6 @@ def test_the_menu_opens_what_is_chosen(qtbot: QtBot, tmp_path: Path) -> None:
     assert opened == [tmp_path / "a & b"]
 
 
-def test_it_stands_behind_open(qtbot: QtBot) -> None:
-    window = WindowFrame()
-    qtbot.addWidget(window)
-    window.add_file_menu([MenuEntry("&Open...", lambda: None)], has_recent=True)
-    menu = window.menuBar().actions()[0].menu()
-    assert [plain(action.text()) for action in menu.actions()][:2] == ["Open...", "Open recent"]
-    assert isinstance(menu.actions()[1].menu(), RecentMenu)
-
-
 def test_a_command_that_is_cancelled_before_it_starts_never_runs(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
     parent, ended = QWidget(), list[tuple[object, ...]]()
     qtbot.addWidget(parent)
@@ -80,17 +69,6 @@ def test_who_asks_twice_for_a_path_sees_the_same_dialog(qtbot: QtBot, tmp_path: 
     assert ask_path(parent, "A folder", tmp_path, chosen.append) is not first, "that one asks for a file"
     first.reject()
     assert ask_path(parent, "A folder", tmp_path, chosen.append, folder) is not first
-
-
-def test_a_name_that_was_typed_stays_when_the_same_is_asked_again(qtbot: QtBot, tmp_path: Path) -> None:
-    parent, file = QWidget(), QFileDialog.FileMode.AnyFile
-    qtbot.addWidget(parent)
-    dialog = ask_path(parent, "Export as", tmp_path / "proposed.mp4", list[Path]().append, file)
-    name = dialog.findChild(QLineEdit)
-    assert name is not None and name.text() == "proposed.mp4"
-    name.setText("mine.mp4")
-    ask_path(parent, "Export as", tmp_path / "proposed.mp4", list[Path]().append, file)
-    assert name.text() == "mine.mp4"
 
 
 @pytest.mark.parametrize(

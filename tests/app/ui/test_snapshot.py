@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
-import threading
 from datetime import datetime
 from pathlib import Path
 
@@ -14,7 +12,6 @@ import platformdirs
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.ui import snapshot
 from app.ui.snapshot import Origin, SnapshotWriter, pictures_folder, write_snapshot
 from tests.app.fakes import make_pose, make_scene, make_tick
 
@@ -43,18 +40,6 @@ def test_three_files_are_written(tmp_path: Path) -> None:
     assert {key: record[key] for key in origin} == origin
 
 
-def test_a_snapshot_of_the_same_moment_takes_no_others_place(tmp_path: Path) -> None:
-    """Two keys within a millisecond, two windows, or a clock that was set back; any of the three files may be there."""
-    first = write_snapshot(tmp_path, make_tick(), Origin("SIM"), NOW)
-    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    (tmp_path / f"{first.stem}_2.json").write_text("somebody's own")
-    third = write_snapshot(tmp_path, make_tick(), Origin("LIVE"), NOW)
-    assert third.name == f"{first.stem}_3.png"
-    assert json.loads(third.with_suffix(".json").read_text())["rig"] == "LIVE"
-    assert {path: path.read_bytes() for path in before} == before
-    assert {path.name for path in tmp_path.glob("*_2*")} == {f"{first.stem}_2.json"}
-
-
 def test_writer_says_where_it_wrote(qtbot: QtBot, tmp_path: Path) -> None:
     writer = SnapshotWriter(tmp_path)
     with qtbot.waitSignal(writer.saved) as signal:
@@ -77,29 +62,3 @@ def test_unwritable_folder_is_one_clear_line(qtbot: QtBot, tmp_path: Path, obsta
     assert message.startswith("Snapshot not saved: ")
     assert "\n" not in message
     assert str(folder.parent) in message
-
-
-def test_an_unexpected_error_is_a_line_too_and_the_traceback_is_logged(
-    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def fail(*_args: object, **_more: object) -> None:
-        raise ValueError("out of\nrange")
-
-    monkeypatch.setattr(snapshot, "draw_overlay", fail)
-    writer = SnapshotWriter(tmp_path)
-    with caplog.at_level(logging.ERROR), qtbot.waitSignal(writer.failed) as signal:
-        writer.write(make_tick(), Origin("SIM"))
-    assert signal.args == ["Snapshot not saved: unexpected ValueError: out of range"]
-    assert "Traceback" in caplog.text
-
-
-def test_a_disk_that_does_not_answer_is_not_waited_for_for_ever(
-    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    gate = threading.Event()
-    monkeypatch.setattr(snapshot, "write_snapshot", lambda *_args: gate.wait(5) and tmp_path)
-    writer = SnapshotWriter(tmp_path)
-    writer.write(make_tick(), Origin("SIM"))
-    assert not writer.finish(within_ms=20)
-    gate.set()
-    assert writer.finish()

@@ -11,7 +11,6 @@ from app.ui.texts import (
     STATE_TITLE,
     advice_headline,
     refusal_line,
-    signed_degrees,
     tip,
     why_line,
 )
@@ -43,15 +42,6 @@ def test_why_line_gives_the_values_that_decided(state: PoseState, theta: float, 
 def test_why_line_owns_up_to_hysteresis() -> None:
     kept = make_pose(PoseState.B, theta=5.0, head=8.2, tail=8.0)
     assert words(why_line(kept, LIMITS)) == "to the centerline: d_head 8.2 px > d_tail 8.0 px, theta 5° right (kept for a moment)"
-
-
-def test_values_and_units_stay_together_when_the_line_wraps() -> None:
-    assert "14\N{NO-BREAK SPACE}px" in why_line(make_pose(PoseState.C), LIMITS)
-
-
-@pytest.mark.parametrize(("angle", "expected"), [(18.44, "+18.4°"), (-132.0, "−132.0°"), (-0.04, "0.0°"), (0.06, "+0.1°")])
-def test_signed_degrees(angle: float, expected: str) -> None:
-    assert signed_degrees(angle, 1) == expected
 
 
 def test_every_case_has_a_text() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -37,17 +36,15 @@ from app.annotator.canvas import CANVAS_KEYS
 from app.annotator.model import AnnotationModel, QueueEntry
 from app.annotator.window import AnnotatorWindow
 from app.player.window import PlayerWindow
-from app.ui import window_base
-from app.ui.actions import KEY_HINT, MenuEntry, add_menu, key_name, key_names, menu_tables, mnemonic, plain
+from app.ui.actions import KEY_HINT, MenuEntry, add_menu, key_names, menu_tables, mnemonic, plain
 from app.ui.texts import STOP_KEY, OperatorStep
-from app.ui.window_base import GuiLatencyMonitor, run_until_closed
+from app.ui.window_base import run_until_closed
 from app.widgets.jog_panel import KEYS
 from app.widgets.scene_overlay import Layer
 from core.annotation.model import ImageView
 from core.annotation.store import AnnotationStore, ItemKey, find_images
 from core.config.models import Config, PerceptionConfig
 from core.learning.dataset import write_png
-from core.program import program_version
 from core.session.reader import SessionReader
 from tests.app.conftest import MakeWindow
 from tests.app.golden_session import GOLDEN
@@ -174,15 +171,6 @@ def test_entries_that_are_added_later_stand_before_help_and_in_the_menu_of_their
     assert ("Ctrl+Alt+M", "Make a rig") in dict(page.tables)["Rig"]
 
 
-def test_about_says_what_it_is_not(window: QMainWindow) -> None:
-    next(action for action in _entries(window) if plain(action.text()) == "About LumenPilot").trigger()
-    box = next(widget for widget in QApplication.topLevelWidgets() if widget.windowTitle() == "About LumenPilot")
-    assert "not a medical device" in box.informativeText()
-    assert program_version() in box.text()
-    assert not box.iconPixmap().isNull()
-    box.close()
-
-
 # ---- the page of keys
 
 
@@ -249,15 +237,6 @@ def _pressed(name: str) -> list[Qt.Key]:
     words = {"Enter": Key.Key_Return, "Tab": Key.Key_Tab, "Insert": Key.Key_Insert, "Del": Key.Key_Delete, "Esc": Key.Key_Escape}
     words |= {"Shift+Del": Key.Key_Delete, "Space+drag": Key.Key_Space}
     return [words[name]]
-
-
-def test_names_of_keys() -> None:
-    left = "\N{LEFTWARDS ARROW}"
-    for key, name in (("Left", left), ("Shift+Left", f"Shift+{left}"), ("-", "\N{MINUS SIGN}"), ("+", "+"), ("PgUp", "PgUp")):
-        assert key_name(key) == name
-    assert key_names(["F3", "Shift+F3"]) == "F3", "it only adds the deadman's shift"
-    assert key_names(["Ctrl+Shift+Z", "Ctrl+Y"]) == "Ctrl+Shift+Z   Ctrl+Y"
-    assert key_names(["Shift+F6"]) == "Shift+F6"
 
 
 # ---- names for screen readers
@@ -338,30 +317,6 @@ def test_tab_reaches_every_button_list_and_field_of_the_drive_page(make_window: 
             reached.add(_named(place))
     assert {"Phantom", "Speed by hand", "Another random phantom", "STOP"} <= reached
     assert any(name.startswith("Servos on") or name.startswith("Arm") for name in reached)
-
-
-def test_a_busy_slot_is_measured(qtbot: QtBot) -> None:
-    beat, began_s = GuiLatencyMonitor(), time.monotonic()
-    beat.start()
-    qtbot.wait(60)
-    time.sleep(0.15)  # what a slow slot does
-    qtbot.wait(40)
-    assert 120 <= beat.max_block_ms <= 1000 * (time.monotonic() - began_s), "in milliseconds"
-    beat.stop()
-
-
-def test_blocks_are_forgotten_after_the_window(monkeypatch: pytest.MonkeyPatch, qtbot: QtBot) -> None:
-    now = [50.0]
-    monkeypatch.setattr(window_base.time, "monotonic", lambda: now[0])
-    beat = GuiLatencyMonitor(window_s=10.0)
-    for step_s in (0.0, 0.010, 0.110, 0.010, 0.060):
-        now[0] += step_s
-        beat._beat()
-    assert beat.max_block_ms == pytest.approx(100.0)
-    now[0] += 10.0 - 0.065
-    beat._last_s = now[0] - 0.010
-    beat._beat()
-    assert beat.max_block_ms == pytest.approx(50.0), "the block of 100 ms is older than ten seconds"
 
 
 @pytest.fixture(autouse=True)

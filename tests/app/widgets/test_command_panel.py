@@ -65,15 +65,6 @@ def test_what_the_gate_limited_and_rejected(statuses: list[dict[str, object]], e
     assert [(event.text, event.times) for event in found] == entries
 
 
-def test_repetitions_are_told_together_five_times_a_second_at_most() -> None:
-    clock = Clock()
-    gate, told = GateEvents(clock), []
-    for cycle in range(1, 11):
-        clock.now_s += 0.0625
-        told.append([event.times for event in gate.since_last(bus(cycle=cycle, clamps=(clamp(),)))])
-    assert told == [[1], [], [], [], [4], [], [], [], [4], []]
-
-
 ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
 
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 
 import pytest
-from PySide6.QtCore import QPoint
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QApplication, QMenu
 
 from app.widgets.event_log import MOST_ROWS, EventLog, LogKind
 from tests.app.widgets.conftest import Own
@@ -57,35 +54,6 @@ def test_a_repetition_within_two_seconds_is_counted(log: EventLog, wall: WallClo
     assert log.lines[0].endswith("×2"), "also after the list was read"
 
 
-def test_what_alternates_is_counted_by_its_key(log: EventLog, wall: WallClock) -> None:
-    for k in range(3):
-        log.add(LogKind.GATE, f"right: {k} mm", "right")
-        log.add(LogKind.GATE, f"left: {k} mm", "left", times=2)
-        wall.wait(1.0)
-    assert [line[20:] for line in log.lines] == ["right: 2 mm ×3", "left: 2 mm ×6"], "the first of a second is the upper one"
-
-
-def test_what_is_repeated_stays_the_newest_but_does_not_change_places_within_a_second(log: EventLog, wall: WallClock) -> None:
-    log.show_kind(LogKind.GATE)
-    for name in ("a", "b", "b", "a"):
-        log.add(LogKind.GATE, name)
-        log.add(LogKind.NOTE, name)
-    assert [line[-4:] for line in log.lines] == ["b ×2", "a ×2"]
-    wall.wait(1.0)
-    log.add(LogKind.GATE, "a")
-    log.add(LogKind.NOTE, "a")
-    assert [line[-4:] for line in log.lines] == ["a ×3", "b ×2"], "and notes are still hidden"
-
-
-def test_what_is_repeated_is_shown_again_when_its_line_was_dropped(log: EventLog) -> None:
-    log.add(LogKind.GATE, "clamped")
-    for k in range(MOST_ROWS):
-        log.add(LogKind.NOTE, str(k))
-    log.add(LogKind.GATE, "clamped")
-    assert log.lines[0].endswith("clamped ×2")
-    assert len(log.lines) == MOST_ROWS
-
-
 @pytest.mark.parametrize("visible", [True, False])
 def test_log_keeps_the_newest_two_thousand(log: EventLog, visible: bool) -> None:
     log.setVisible(visible)
@@ -106,35 +74,3 @@ def test_filter_shows_one_kind_also_of_what_comes_later(log: EventLog, wall: Wal
     assert [line[-1] for line in log.lines] == ["d", "b"]
     log.show_kind(None)
     assert [line.split("  ")[-1].strip() for line in log.lines] == ["d", "c ×2", "b", "a"]
-
-
-def test_copy_all_takes_what_is_shown(log: EventLog) -> None:
-    log.show()
-    log.add(LogKind.NOTE, "a")
-    log.add(LogKind.ALERT, "b")
-    log._view.customContextMenuRequested.emit(QPoint(5, 5))
-    menu = log.findChild(QMenu)
-    (action,) = menu.actions()
-    assert action.text() == "Copy all"
-    action.trigger()
-    menu.close()
-    assert QGuiApplication.clipboard().text() == "14:02:00  alert     b\n14:02:00  note      a"
-
-
-def test_a_list_that_was_scrolled_down_keeps_its_place(log: EventLog, wall: WallClock) -> None:
-    log.show()
-    for k in range(60):
-        log.add(LogKind.NOTE, str(k))
-    QApplication.processEvents()
-    view, bar = log._view, log._view.verticalScrollBar()
-    bar.setValue(240)
-    before = view.indexAt(QPoint(5, 5)).data()
-    log.add(LogKind.NOTE, "new")
-    assert view.indexAt(QPoint(5, 5)).data() == before
-    wall.wait(1.0)
-    for repeated in ("40", "55"):  # in view, and above it
-        log.add(LogKind.NOTE, repeated)
-        assert view.indexAt(QPoint(5, 5)).data() == before
-    bar.setValue(0)
-    log.add(LogKind.NOTE, "newer")
-    assert bar.value() == 0 and view.indexAt(QPoint(5, 5)).data().endswith("newer")

@@ -7,7 +7,6 @@ import pytest
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QPainter, QPixmap
 
-from app.ui import theme
 from app.widgets.image_canvas import ImageCanvas, Viewport, halvings, render
 
 
@@ -31,14 +30,6 @@ class Painted(ImageCanvas):
         painter.end()
         assert self._picture.width() == round(200 * self._picture.devicePixelRatio())
         return self._picture.devicePixelRatio()
-
-
-@pytest.mark.usefixtures("qapp")
-def test_a_window_moved_to_a_screen_of_another_density_is_sharp_there_too() -> None:
-    canvas = Painted(1.0)
-    assert canvas.painted() == 1.0
-    canvas.ratio = 2.0
-    assert canvas.painted() == 2.0
 
 
 @pytest.mark.usefixtures("qapp")
@@ -89,17 +80,6 @@ def test_the_picture_cannot_be_lost() -> None:
     assert left == pytest.approx(60.0), "no more than a margin of surroundings"
 
 
-def test_another_widget_size_keeps_what_is_seen() -> None:
-    assert Viewport.fitted(SIZE, ROOM).in_room((640, 480)).zoom == 1.0
-    near = Viewport.fitted(SIZE, ROOM).zoomed(4.0, (450.0, 300.0))
-    assert near.in_room((500, 500)).center == near.center
-
-
-def test_halvings_of_large_pictures_only() -> None:
-    assert len(halvings(np.zeros((480, 640, 3), np.uint8))) == 1
-    assert [level.shape[1] for level in halvings(np.zeros((300, 7681, 3), np.uint8))] == [7681, 3841, 1921]
-
-
 @pytest.mark.parametrize("size", [(640, 480), (5120, 3840)])
 def test_a_pixel_is_rendered_where_it_lies(size: tuple[int, int]) -> None:
     image = np.zeros((size[1], size[0], 3), np.uint8)
@@ -111,11 +91,3 @@ def test_a_pixel_is_rendered_where_it_lies(size: tuple[int, int]) -> None:
         x, y = view.to_screen((202.0 * unit - 0.5, 102.0 * unit - 0.5))
         assert picture.pixelColor(round(x), round(y)).red() > 200
         assert picture.pixelColor(round(x + 4 * view.zoom * unit), round(y)).red() < 40
-
-
-def test_beyond_the_picture_is_nothing_and_light_changes_greys() -> None:
-    image = np.full((480, 640, 3), 100, np.uint8)
-    view = Viewport.fitted(SIZE, ROOM)
-    picture = render((image,), view, 1.0, 2.0, 10.0)
-    assert picture.pixelColor(20, 300).name().upper() == theme.INK
-    assert picture.pixelColor(450, 300).red() == (100 - 128) * 2 + 128 + 10

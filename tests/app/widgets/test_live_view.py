@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QImage
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.ui import theme
@@ -23,10 +23,9 @@ from core.types import (
     RobotPath,
     Route,
     Scene,
-    Skeletons,
     Speed,
 )
-from tests.app.fakes import FakeBench, make_pose, make_scene
+from tests.app.fakes import FakeBench, make_scene
 from tests.app.widgets.conftest import Own
 
 ADVICE = Advice(Speed.SLOW, 3.0, 18.3, "coming back")
@@ -59,13 +58,6 @@ def crowd(*counts: int) -> Points:
     """So many places in each corner."""
     places = [corner.center().toTuple() for corner, count in zip(CORNERS, counts, strict=False) for _ in range(count)]
     return np.array(places).reshape(-1, 2)
-
-
-def test_the_loupe_begins_where_it_hides_least() -> None:
-    assert LoupeCorner().choose(CORNERS, MIDDLE, None, crowd()) == UPPER_RIGHT
-    assert LoupeCorner().choose(CORNERS, MIDDLE, None, crowd(50, 20, 1, 40)) == LOWER_RIGHT
-    assert LoupeCorner().choose(CORNERS, MIDDLE, CORNERS[LOWER_RIGHT].center(), crowd(50, 20, 1, 40)) == UPPER_LEFT
-    assert LoupeCorner().choose(CORNERS, CORNERS[LOWER_RIGHT].center(), None, crowd(50, 20, 1, 40), STRIPS) == UPPER_LEFT
 
 
 @pytest.mark.parametrize(
@@ -221,17 +213,6 @@ def test_each_layer_draws_something_and_nothing_when_off(view: LiveView, bench: 
     assert picture(view) == bare
 
 
-def test_skeletons_are_shown_as_pixels_while_there_is_no_graph_and_no_path(view: LiveView) -> None:
-    skeleton = np.zeros((480, 640), bool)
-    skeleton[239:242, 100:500] = True
-    nothing = np.zeros_like(skeleton)
-    masks = Masks(nothing, nothing, nothing.astype(np.float32), nothing.astype(np.float32))
-    _show(view, blank_frame(), replace(make_scene(), masks=masks, skeletons=Skeletons(skeleton, nothing)))
-    assert near(picture(view), 300, 240, theme.VESSEL, reach=3)
-    view.set_layer(Layer.VESSEL, False)
-    assert not near(picture(view), 300, 240, theme.VESSEL, reach=3)
-
-
 def test_stale_overlays_go_away_the_picture_stays(view: LiveView, bench: FakeBench) -> None:
     image, scene = bench.scene_at(0, 6.0)
     _show(view, Frame(0, 0.0, image), scene)
@@ -285,26 +266,3 @@ def test_target_is_marked_without_any_scene(view: LiveView) -> None:
     assert near(picture(view), 200, 120, theme.TARGET, reach=16)
     view.show_target(None)
     assert not near(picture(view), 200, 120, theme.TARGET, reach=16)
-
-
-def test_labels_stay_on_their_side_when_the_offset_is_about_zero(view: LiveView) -> None:
-    pose = make_pose(head=10.0)
-    _show(view, blank_frame(), make_scene(pose))
-    assert view._marks._head_side == 1.0
-    _show(view, blank_frame(), make_scene(make_pose(head=-1.0)))
-    assert view._marks._head_side == 1.0, "too near to zero to change sides"
-    _show(view, blank_frame(), make_scene(make_pose(head=-5.0)))
-    assert view._marks._head_side == -1.0
-
-
-def test_the_loupe_does_not_stay_below_an_alert(view: LiveView, bench: FakeBench) -> None:
-    cover = QWidget(view)
-    cover.setGeometry(10, 10, 620, 60)
-    view.set_covers(cover)
-    image, scene = bench.scene_at(0, 0.0)
-    for shown in (False, True):
-        cover.setVisible(shown)
-        _show(view, Frame(0, 0.0, image), scene)
-        view._show_loupe()
-        assert view._loupe.isVisible()
-        assert view._loupe.geometry().intersects(cover.geometry()) is not shown

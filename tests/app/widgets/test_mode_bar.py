@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QMenu, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.ui.texts import STOP_KEY, OperatorStep, Undriven, next_step, who_drives
-from app.widgets.mode_bar import DOUBLE_PRESS_S, HEIGHT, MODE_LOOK, REASON_DWELL_S, ModeBadge, ModeBar
+from app.widgets.mode_bar import DOUBLE_PRESS_S, HEIGHT, MODE_LOOK, ModeBadge, ModeBar
 from core.control.alerts import ALERTS
 from core.control.drive_view import DriveView
 from core.control.faults import CAUSES, Cause, Fault
@@ -148,12 +148,6 @@ def test_next_step_and_its_line(view: DriveView, step: OperatorStep, granted: bo
     assert (following.step, following.granted, following.text) == (step, granted, text)
 
 
-def test_acknowledging_looks_subdued_while_servos_in_use_still_have_the_fault() -> None:
-    hot = Fault(Cause.HOT)
-    assert not next_step(DriveView(0.0, servos_on=True, latched=hot, active=(hot,))).granted
-    assert next_step(DriveView(0.0, servos_on=True, latched=hot)).granted
-
-
 def test_what_is_not_as_configured_is_said_where_it_is_known() -> None:
     detail = "not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm)"
     wrong = next_step(DriveView(0.0, active=(Fault(Cause.SERVOS_WRONG, detail),)))
@@ -240,48 +234,12 @@ def test_without_a_robot_only_stop_can_be_pressed(qtbot: QtBot, bar: ModeBar) ->
     assert heard == ["stop"]
 
 
-def test_reasons_that_alternate_stay_long_enough_to_be_read(bar: ModeBar) -> None:
-    bar.show_view(arming_refused(Cause.CONFIDENCE_LOW, time_s=10.0))
-    first = bar.text
-    bar.show_view(arming_refused(Hindrance.PERCEPTION_SETTLING, time_s=10.03))
-    assert bar.text == first
-    bar.show_view(arming_refused(Hindrance.PERCEPTION_SETTLING, time_s=10.03 + REASON_DWELL_S))
-    assert bar.text != first
-    bar.show_view(DriveView(11.1, permitted=Source.OPERATOR, servos_on=True))
-    assert bar.main.is_granted, "what may be done now is shown at once"
-
-
 def test_no_line_is_cut_at_1280_by_720(bar: ModeBar) -> None:
     refused = [DriveView(0.0, servos_on=True, against_arming=(key, key, key)) for key in ALERTS]
     latched = [DriveView(0.0, latched=Fault(cause)) for cause in CAUSES]
     for view in (None, *VIEWS, DriveView(0.0, Mode.HOLD), DriveView(0.0, Mode.STOPPED), *refused, *latched):
         bar.show_view(view)
         assert bar.text_fits, bar.text
-
-
-def test_in_the_smallest_window_a_long_line_ends_in_an_ellipsis_and_the_tool_tip_has_it_all(bar: ModeBar) -> None:
-    bar.resize(bar.minimumWidth(), HEIGHT)
-    bar.show_view(arming_refused(Cause.BUS_NOISE, Cause.WARM))
-    assert not bar.text_fits
-    assert bar.main.toolTip().count("\n") >= 2
-    assert ALERTS[Cause.BUS_NOISE].what_to_do.split()[-1] in bar._text.toolTip()
-
-
-def test_places_do_not_move_with_the_mode(bar: ModeBar) -> None:
-    places = set()
-    for view in (None, *VIEWS):
-        bar.show_view(view)
-        QApplication.processEvents()
-        places.add((bar.main.mapTo(bar, QPoint()).toTuple(), bar.deadman.geometry().getRect(), bar.stop.geometry().getRect()))
-    assert len(places) == 1
-
-
-def test_the_bar_speaks(bar: ModeBar) -> None:
-    bar.show_view(ARMED)
-    assert bar.accessibleDescription() == bar.text
-    assert bar.main.accessibleName() == "Hand over (F7)"
-    for widget in (bar.main, bar.second, bar.deadman, bar.stop):
-        assert widget.accessibleName() and widget.accessibleDescription() and widget.toolTip()
 
 
 def test_stop_fires_when_the_mouse_goes_down_and_not_again_when_it_comes_up(qtbot: QtBot, bar: ModeBar) -> None:

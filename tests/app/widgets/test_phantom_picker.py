@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.widgets.phantom_picker import PhantomPicker
-from tests.app.fakes import turn_the_wheel
 from tests.app.widgets.conftest import Own
 
 
@@ -25,17 +23,6 @@ def test_picker_gives_names_as_the_configuration_writes_them(own: Own) -> None:
     assert picker.title == "random 2"
 
 
-def test_the_wheel_chooses_nothing(own: Own) -> None:
-    picker = own(PhantomPicker([("s_curve", "S-curve"), ("tree", "Tree")], "random:5"))
-    chosen: list[str] = []
-    picker.chosen.connect(chosen.append)
-    for widget in (picker._combo, picker._seed):
-        for notches in (-1, 1):
-            turn_the_wheel(widget, notches)
-    assert chosen == []
-    assert picker.name == "random:5"
-
-
 def test_seed_counts_when_confirmed_not_at_each_digit(own: Own) -> None:
     holder = own(QWidget())
     picker = PhantomPicker([("tree", "Tree")], "random:1")
@@ -49,20 +36,3 @@ def test_seed_counts_when_confirmed_not_at_each_digit(own: Own) -> None:
     assert chosen == []
     QTest.keyClick(picker._seed, Qt.Key.Key_Return)
     assert chosen == ["random:42"]
-
-
-@pytest.mark.parametrize("came_by", ["key", "configuration"])
-def test_the_seed_before_this_one_can_be_typed_again(own: Own, came_by: str) -> None:
-    picker = own(PhantomPicker([("tree", "Tree")], "random:1"), show=True)
-    chosen: list[str] = []
-    picker.chosen.connect(chosen.append)
-    if came_by == "key":
-        picker.roll()
-    else:
-        picker.show_name("random:2")
-    assert picker.name == "random:2"
-    picker._seed.setFocus()
-    picker._seed.selectAll()
-    QTest.keyClicks(picker._seed, "1")
-    QTest.keyClick(picker._seed, Qt.Key.Key_Return)
-    assert chosen[-1:] == ["random:1"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QAbstractButton
 
 from app.widgets.scene_overlay import Layer, OverlayBar, scene_shapes
 from core.types import Pose, PoseState, RobotPath, Scene, Vector
@@ -57,22 +56,6 @@ def test_without_a_pose_nothing_is_measured() -> None:
     assert shapes.robot_vector is not None
 
 
-def test_long_lines_are_thinned_but_keep_their_ends() -> None:
-    points = np.column_stack([np.arange(200.0), np.zeros(200)])
-    shapes = scene_shapes(scene(path=RobotPath(points, 1.0, None, True, 0.0, 3.0)))
-    assert 30 < len(shapes.robot_line) < 60
-    np.testing.assert_allclose(shapes.robot_line[[0, -1]], points[[0, -1]])
-
-
-def test_ghost_is_mapped_to_source_pixels_with_the_robots_thickness() -> None:
-    path = RobotPath(np.array([[0.0, 0.0], [10.0, 0.0]]), 1.0, None, True, 0.0, 3.0)
-    shapes = scene_shapes(scene(0.5, path=path), np.array([[10.0, 0.0], [20.0, 5.0]]))
-    assert shapes.ghost is not None
-    np.testing.assert_allclose(shapes.ghost, [[20.5, 0.5], [40.5, 10.5]])
-    assert shapes.robot_width == pytest.approx(12.0)
-    assert scene_shapes(scene(0.5, path=path)).ghost is None
-
-
 def test_chips_switch_their_layer(own: Own) -> None:
     bar = own(OverlayBar())
     seen: list[tuple[Layer, bool]] = []
@@ -82,21 +65,3 @@ def test_chips_switch_their_layer(own: Own) -> None:
     assert not bar.is_on(Layer.VECTORS)
     bar.set_all(True)
     assert seen[-1] == (Layer.VECTORS, True)
-
-
-@pytest.mark.parametrize("is_rehearsed", [False, True])
-@pytest.mark.parametrize(("width", "rows"), [(1200, 1), (600, 2), (420, 2)])
-def test_chips_go_in_two_rows_where_one_would_cut_their_names(own: Own, width: int, rows: int, is_rehearsed: bool) -> None:
-    bar = own(OverlayBar())
-    bar.show_rehearsal(is_rehearsed)
-    bar.resize(width, bar.heightForWidth(width))
-    bar.grab()
-    chips = [chip for chip in bar.findChildren(QAbstractButton) if not chip.isHidden()]
-    assert len(chips) == 10 + is_rehearsed
-    assert len({chip.y() for chip in chips}) == rows
-    assert all(chip.width() >= chip.sizeHint().width() for chip in chips) is (width > 420)
-    for chip in chips:
-        assert bar.rect().contains(chip.geometry())
-        assert not any(chip.geometry().intersects(other.geometry()) for other in chips if other is not chip)
-    in_order = sorted(chips, key=lambda chip: (chip.y(), chip.x()))
-    assert [chip.text() for chip in in_order] == [layer.value.label for layer in Layer][: 10 + is_rehearsed]

@@ -6,13 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QMenu, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.ui import theme
-from app.widgets.painting import number
 from app.widgets.servo_table import Column, ServoTable, Tone, bus_line, error_words, known_joints, pair_balances, servo_rows
 from core.config.safety import SafetyConfig
 from core.control.kept_zero import ZeroRequest
@@ -28,14 +24,6 @@ SAFETY = SafetyConfig()
 
 def cells(status: BusStatus | None, place: int) -> dict[Column, tuple[str, Tone]]:
     return {column: (cell.text, cell.tone) for column, cell in zip(Column, servo_rows(status, SERVOS, SAFETY)[place], strict=True)}
-
-
-def test_no_heading_of_the_table_is_cut_in_the_smallest_window(own: Own) -> None:
-    table = own(ServoTable(), 470, 240, show=True)
-    header, metrics = table.table.horizontalHeader(), QFontMetrics(theme.font(11))
-    for place in range(table.table.columnCount()):
-        heading = table.table.horizontalHeaderItem(place).text().strip()
-        assert metrics.horizontalAdvance(heading) + 6 <= header.sectionSize(place), heading
 
 
 def test_where_a_joint_is_is_known_of_a_zeroed_one_that_answers() -> None:
@@ -133,10 +121,6 @@ def test_nothing_is_known_without_a_bus_and_while_its_port_is_closed() -> None:
         assert {cell.text for row in servo_rows(status, SERVOS, SAFETY) for cell in row[1:]} == {DASH}
 
 
-def test_numbers_have_a_true_minus_and_never_a_negative_zero() -> None:
-    assert (number(-0.004, 2), number(-1.256, 2), number(3.0, 0)) == ("0.00", f"{MINUS}1.26", "3")
-
-
 def test_a_pair_is_balanced_when_its_pulls_sum_to_twice_the_pretension() -> None:
     first, second = pair_balances(bus(servo(0, position_mm=2.0), servo(1, position_mm=-1.4)), SERVOS)
     assert (first.names, first.sum_mm, first.wanted_mm) == (("right", "left"), pytest.approx(0.6), pytest.approx(0.6))
@@ -174,12 +158,6 @@ def test_bus_line_has_phase_timing_and_counts() -> None:
     assert "no servo bus" in bus_line(None).text
 
 
-def test_bus_line_spells_out_errors() -> None:
-    line = bus_line(bus(servo(1, error=HardwareError.OVERLOAD)))
-    assert (line.text, line.tone) == ("!! left overload", Tone.BAD)
-    assert "bus armed" in line.tip
-
-
 @pytest.fixture
 def table(own: Own, clock: Clock) -> Iterator[ServoTable]:
     widget = own(ServoTable(SAFETY, clock), 446, 205, show=True)
@@ -188,34 +166,12 @@ def table(own: Own, clock: Clock) -> Iterator[ServoTable]:
         menu.close()
 
 
-def test_five_times_a_second_at_most_but_a_new_phase_at_once(table: ServoTable, clock: Clock) -> None:
-    table.show_status(bus(), SERVOS)
-    clock.now_s += 0.1
-    table.show_status(bus(servo(0, temperature_c=33.0)), SERVOS)
-    assert table.table.cell(0, Column.TEMPERATURE).text == "31"
-    table.show_status(bus(servo(0, temperature_c=33.0), phase=BusPhase.STOPPED), SERVOS)
-    assert table.table.cell(0, Column.TEMPERATURE).text == "33"
-    assert table.bus_text.startswith("bus stopped")
-    table.show_status(None, SERVOS)
-    assert table.table.cell(0, Column.TEMPERATURE).text == DASH
-
-
 def test_an_old_status_is_silence_not_news(table: ServoTable, clock: Clock) -> None:
     table.show_status(bus(), SERVOS)
     clock.now_s += 3.0
     table.show_status(bus(), SERVOS)
     assert table.bus_text == "!! nothing heard from the servo bus for 3 s"
     assert table.table.cell(0, Column.POSITION).text == DASH
-
-
-@pytest.mark.parametrize("size", [(446, 203), (446, 230), (636, 330)])
-def test_all_rows_and_columns_fit(table: ServoTable, size: tuple[int, int]) -> None:
-    table.resize(*size)
-    table.show_status(bus(), SERVOS)
-    table.grab()
-    view = table.table
-    assert view.rowViewportPosition(6) + view.rowHeight(6) <= view.viewport().height()
-    assert view.columnViewportPosition(8) + view.columnWidth(8) == view.viewport().width()
 
 
 def button(widget: QWidget, text: str) -> QPushButton:
@@ -295,13 +251,6 @@ def test_arming_takes_an_open_question_back_and_closes_the_dialog_of_the_zeros(t
     table.show_status(bus(), SERVOS)
     assert table.question.text == ""
     assert table.zeros is None
-
-
-def test_tab_reaches_the_buttons_only(table: ServoTable) -> None:
-    table.show_status(bus(phase=BusPhase.DISARMED), SERVOS)
-    assert table.table.focusPolicy() is Qt.FocusPolicy.NoFocus
-    for text in ("Restart", "Zero", "Torque off"):
-        assert button(table, text).focusPolicy() is Qt.FocusPolicy.TabFocus
 
 
 def test_a_robot_of_another_shape_has_rows_of_its_own(qtbot: QtBot) -> None:

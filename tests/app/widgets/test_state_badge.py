@@ -34,17 +34,6 @@ def test_badge_shows_a_dash_and_the_reason_without_a_pose(own: Own) -> None:
     assert badge.why.endswith("41 % inside, 60 % needed")
 
 
-def test_badge_keeps_its_sentence_until_texts_are_renewed_but_never_a_wrong_letter(own: Own) -> None:
-    badge = own(StateBadge(LIMITS, 0.5))
-    badge.show_scene(make_scene(make_pose(PoseState.C, head=14.0)))
-    before = badge.why
-    badge.show_scene(make_scene(make_pose(PoseState.C, head=19.0)), renew_text=False)
-    assert badge.why == before
-    badge.show_scene(make_scene(make_pose(PoseState.B, head=6.5, tail=12.0)), renew_text=False)
-    assert badge.letter == "B"
-    assert badge.why != before
-
-
 def _shown(badge: StateBadge, confidence: float, *, renew_text: bool = True) -> tuple[bool, str]:
     badge.show_scene(make_scene(replace(make_pose(PoseState.D), confidence=confidence)), renew_text=renew_text)
     return badge.is_unsure, badge.sureness

@@ -32,12 +32,3 @@ def test_needle_points_to_the_side_of_the_sign(own: Own, theta: float, side: int
     ]
     assert needle
     assert (np.mean(needle) - image.width() / 2) * side > 5
-
-
-def test_needle_follows_at_once_the_number_when_texts_are_renewed(own: Own) -> None:
-    gauge = own(ThetaGauge(10.0))
-    gauge.show_pose(make_pose(theta=10.0))
-    gauge.show_pose(make_pose(theta=20.0), renew_text=False)
-    assert gauge.text == "+10.0°"
-    gauge.show_pose(make_pose(theta=20.0))
-    assert gauge.text == "+20.0°"

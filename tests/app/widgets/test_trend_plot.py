@@ -23,25 +23,6 @@ def test_frames_without_a_pose_are_gaps(own: Own) -> None:
     np.testing.assert_array_equal(theta, [0.0, 1.0, np.nan, 3.0, 4.0])
 
 
-def test_trends_go_on_to_the_left_while_nothing_comes(own: Own) -> None:
-    """Where now is there is no value: the newest one is not taken for it."""
-    plot = own(TrendPlot(LIMITS))
-    for k in range(50):
-        plot._pace.reset()
-        plot.add(make_scene(make_pose(theta=5.0), index=k, captured_s=100.0 + 0.1 * k))
-    newest_s = plot.curves[0].xData[-1]
-    assert newest_s == 0.0
-    plot._pace.reset()
-    plot.show_silence(12.0)
-    assert plot.curves[0].xData[-1] == pytest.approx(-12.0)
-    plot._pace.reset()
-    plot.show_silence(SPAN_S + 1.0)
-    assert len(plot.curves[0].xData) == 0
-    plot._pace.reset()
-    plot.add(make_scene(make_pose(theta=5.0), index=50, captured_s=120.0))
-    assert plot.curves[0].xData[-1] == 0.0
-
-
 def test_trends_hold_thirty_seconds_and_restart_when_the_clock_jumps_back(own: Own) -> None:
     plot = own(TrendPlot(LIMITS))
     for k in range(1200):

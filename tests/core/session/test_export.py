@@ -12,7 +12,6 @@ import pytest
 from core.session.export import export_csv, export_mp4
 from core.session.manifest import SessionError
 from core.session.reader import SessionReader
-from core.session.recovery import recover
 from core.types import Image, Tick
 from tests.core.session_data import number_in, record, tick_of
 
@@ -87,18 +86,6 @@ def test_a_session_without_pictures_is_no_mp4(tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.mp4*"))
 
 
-def test_colons_in_a_relative_path_name_no_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    session = record(Path("rig:1"), [tick_of(i, 1000.0 + i / 10, full=True) for i in range(5)])
-    assert not session.is_absolute()
-    with SessionReader(session) as reader:
-        assert reader.wait(20.0)
-        frame = reader.frame(4)
-        assert number_in(frame.image) == 4
-        assert export_mp4(reader, Path("clip:1.mp4")) == 5
-    assert recover(session, Path("copy:1")).pictures == 5
-
-
 def no_links(*_: object) -> None:
     raise OSError(errno.EPERM, os.strerror(errno.EPERM))
 
@@ -125,19 +112,3 @@ def test_of_two_that_export_to_one_file_the_first_one_stands(
         export_csv(reader, tmp_path / "y.csv")
     assert out.read_bytes() == (tmp_path / "y.csv").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.csv", "y.csv"]
-
-
-def test_a_drive_without_links_takes_an_export_too(session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "link", no_links)
-    with SessionReader(session) as reader:
-        written = export_csv(reader, tmp_path / "x.csv")
-    assert len((tmp_path / "x.csv").read_text().splitlines()) == written + 1
-    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
-
-
-def test_a_file_that_was_made_while_exporting_is_not_overwritten(session: Path, tmp_path: Path) -> None:
-    out = tmp_path / "x.csv"
-    with SessionReader(session) as reader, pytest.raises(SessionError, match="was made by something else meanwhile"):
-        export_csv(reader, out, lambda: out.write_text("another program's") and None)
-    assert out.read_text() == "another program's"
-    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]

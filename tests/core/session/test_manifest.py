@@ -18,7 +18,6 @@ from core.session.manifest import (
     Description,
     SessionError,
     about_rig,
-    changed_description,
     new_manifest,
     read_manifest,
     remember_description,
@@ -123,13 +122,3 @@ def test_what_is_remembered_is_of_no_single_session(tmp_path: Path, monkeypatch:
     assert remembered_description() == Description(operator="Ana", task="loop", condition="shared", phantom="silicone 3")
     next(tmp_path.rglob(DESCRIPTION)).write_text("not JSON")
     assert remembered_description() == Description()
-
-
-def test_texts_are_kept_as_a_file_can_hold_them() -> None:
-    given = changed_description(
-        ANA, {"operator": " Ana\n Maria ", "notes": "half \ud83d of it\nline 2", "tags": "#pilot, Pilot,, day  2 ", "task": None}
-    )
-    assert (given.operator, given.task) == ("Ana Maria", "loop")
-    assert given.notes == "half ? of it\nline 2"
-    assert given.tags == ("Pilot", "day 2")
-    assert len(changed_description(ANA, {"notes": "x" * 100_000}).notes) == 4000

@@ -1,7 +1,6 @@
 """Videos of other programs: damaged tags, odd orders, odd shapes, pictures that are turned or mirrored."""
 
 import struct
-from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -12,7 +11,7 @@ from app.annotator.sources import extract_frames
 from core.annotation.model import AnnotationError
 from core.devices import DamagedPicture, DeviceError, EndOfStream
 from core.files import read_image
-from core.session.video import open_video, upright
+from core.session.video import open_video
 from hardware.cameras.files import VideoFile
 from tests.core.drawing import film, greys
 
@@ -100,15 +99,6 @@ def test_a_video_that_nothing_here_can_decode_is_one_clear_line(tmp_path: Path) 
         VideoFile(path).open()
     with pytest.raises(AnnotationError, match="cannot be decoded here"):
         extract_frames(path, range)
-
-
-@pytest.mark.parametrize("aspect", ["3000/1", "1/3000", "16777216/1", "2/1"])
-def test_pixels_of_an_absurd_shape_are_taken_for_square(aspect: str, tmp_path: Path) -> None:
-    class Stream:
-        sample_aspect_ratio = Fraction(aspect)
-
-    frame = av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="rgb24")
-    assert upright(frame, Stream()).shape == ((48, 128, 3) if aspect == "2/1" else (48, 64, 3))
 
 
 @pytest.mark.parametrize(

@@ -206,14 +206,6 @@ def test_damaged_pictures_are_lost_to_a_window(tmp_path: Path) -> None:
     assert (lost[0], lost[-1]) == (0, 7)
 
 
-def test_pixels_that_are_not_square_are_made_so(tmp_path: Path) -> None:
-    video = VideoFile(_h264(tmp_path / "v.mkv", 1, aspect=Fraction(3, 2)), paced=False)
-    video.open()
-    frame = video.read(0.0)
-    video.close()
-    assert frame.image.shape == (48, 96, 3)
-
-
 def test_a_trimmed_video_is_whole(tmp_path: Path) -> None:
     """It still counts the pictures before its beginning, which are not shown."""
     with av.open(str(_video(tmp_path / "v.mp4", 40))) as whole, av.open(str(tmp_path / "trimmed.mp4"), "w") as trimmed:
@@ -283,15 +275,6 @@ def test_late_frames_are_skipped_and_early_ones_waited_for(tmp_path: Path, clock
     video.close()
     assert after.index == 12  # due 0.4 s after the first one: 0.1 s late, less a rounding error
     assert following.captured_s - first.captured_s == pytest.approx(13 / 30), "when it was due, not when it was handed out"
-
-
-def test_a_frame_that_is_not_yet_due_is_kept(tmp_path: Path, clock: _Clock) -> None:
-    video = VideoFile(_video(tmp_path / "v.mp4", 3, rate=1))
-    video.open()
-    given = [video.read(0.4) for _ in range(6)]
-    video.close()
-    assert [None if frame is None else frame.index for frame in given] == [0, None, None, 1, None, None]
-    assert given[3].captured_s == pytest.approx(101.0)
 
 
 def test_a_file_without_pictures_in_it_is_closed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

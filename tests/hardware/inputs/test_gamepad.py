@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import struct
 from collections.abc import Callable, Iterator
@@ -340,15 +339,6 @@ def test_a_listener_that_fails_is_seen(listener: GamepadListener, tmp_path: Path
 # --- which device ----------------------------------------------------------------------------------------------------------------
 
 
-def test_the_lowest_number_is_the_first(tmp_path: Path) -> None:
-    devices = [FakeDevice(tmp_path / name) for name in ("js10", "js2", "event1")]
-    found = find_gamepad(GamepadConfig())
-    assert found[1] == "js2"
-    os.close(found[0])
-    for device in devices:
-        device.unplug()
-
-
 def test_a_configured_one_that_is_missing_is_named(tmp_path: Path) -> None:
     with pytest.raises(GamepadError, match=r"js7 is not there: plug it in, or leave gamepad\.device out"):
         find_gamepad(GamepadConfig(device=str(tmp_path / "js7")))
@@ -412,15 +402,6 @@ def test_the_kernel_is_asked_for_name_and_layout(monkeypatch: pytest.MonkeyPatch
     device.unplug()
 
 
-def test_wheels_and_motion_sensors_are_passed_over(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    device = FakeDevice(tmp_path / "js0")
-    monkeypatch.setattr(driver.fcntl, "ioctl", _kernel([0, 1, 2], [0x120], b"Wheel"))
-    assert find_gamepad(GamepadConfig()) is None
-    with pytest.raises(GamepadError, match="no gamepad with two sticks"):
-        find_gamepad(GamepadConfig(device=str(tmp_path / "js0")))
-    device.unplug()
-
-
 @pytest.mark.parametrize("axes", [[0, 1, 2, 5, 0x0A, 0x09, 0x10, 0x11], [0, 1, 2, 5, 0x10, 0x11], [0, 1, 3, 5]])
 def test_one_with_its_right_stick_elsewhere_is_refused_by_name(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, axes: list[int]
@@ -453,18 +434,6 @@ def test_a_second_window_says_that_the_gamepad_is_not_its_own_and_gets_it_when_t
     second.until(lambda: other.name == "js0")
     assert other.problem is None
     other.close()
-    device.unplug()
-
-
-def test_a_gamepad_that_cannot_be_locked_is_not_said_to_be_another_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    device = FakeDevice(tmp_path / "js0")
-
-    def no_locks(_: int, __: int) -> None:
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setattr(fcntl, "flock", no_locks)
-    with pytest.raises(GamepadError, match=r"js0 cannot be locked \(No locks available\), so its STOP does nothing here"):
-        find_gamepad(GamepadConfig(device=str(tmp_path / "js0")), drives=True)
     device.unplug()
 
 

@@ -82,15 +82,6 @@ def test_what_a_killed_run_left_is_removed(small_set: SynthPlan) -> None:
     assert not any(path.exists() for path in left)
 
 
-def test_a_run_that_was_killed_before_it_had_begun_is_gone_on_with(tmp_path: Path) -> None:
-    left = tmp_path / f".{7:016x}.part"
-    left.write_bytes(b"half a plan")
-    assert write_set(SynthPlan(tmp_path, 1, 3, size=(320, 240))) == 1
-    (tmp_path / "plan.json").unlink()
-    with pytest.raises(SynthError, match="did not write"):
-        write_set(SynthPlan(tmp_path, 1, 3, size=(320, 240)))
-
-
 @pytest.mark.parametrize(("count", "seed", "words"), [(5, 4, "other settings"), (2, 3, "holds more than 2 frames")])
 def test_another_plan_or_a_smaller_count_does_not_overwrite_a_set(small_set: SynthPlan, count: int, seed: int, words: str) -> None:
     with pytest.raises(SynthError, match=words):
@@ -133,12 +124,6 @@ def test_a_look_is_shown_with_several_poses() -> None:
     assert np.array_equal(alone.picture.vessel, frames[0].picture.vessel), "the first look is the same"
 
 
-def test_a_pose_is_shown_once_however_many_there_are() -> None:
-    shapes = dataset.robot_shapes(make_phantom("random:3"), 3, dataset.LOOKS_PER_EPISODE, 8)
-    moved = [shape for shape in shapes if shape[0] is not shapes[-1][0]]
-    assert len({shape[0].tobytes() for shape in moved}) == len(moved) > 100
-
-
 def test_a_set_of_several_poses_grows_in_the_middle_of_a_look(tmp_path: Path) -> None:
     plan = SynthPlan(tmp_path / "set", 4, 3, size=(160, 120), poses=3)
     write_set(plan)
@@ -151,18 +136,6 @@ def test_a_set_of_several_poses_grows_in_the_middle_of_a_look(tmp_path: Path) ->
     assert all((plan.out / name).read_bytes() == (whole.out / name).read_bytes() for name in written)
     with pytest.raises(SynthError, match="other settings"):
         write_set(replace(plan, count=8, poses=1))
-
-
-def test_a_smaller_count_is_refused_wherever_the_frames_are(tmp_path: Path) -> None:
-    """Several workers were interrupted: the later episode is there before the end of the first."""
-    plan = SynthPlan(tmp_path / "set", 40, 3)
-    (plan.out / "images").mkdir(parents=True)
-    dataset._prepare(replace(plan, out=tmp_path / "other"))
-    (tmp_path / "other" / "plan.json").rename(plan.out / "plan.json")
-    (plan.out / "images" / "000017.png").touch()
-    with pytest.raises(SynthError, match="holds more than 16 frames"):
-        dataset._prepare(replace(plan, count=16))
-    dataset._prepare(plan)
 
 
 @pytest.fixture(scope="module")

@@ -9,16 +9,14 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-import cv2
 import numpy as np
 import psutil
 import pytest
 
-from core.config.models import Config, load_config
+from core.config.models import Config
 from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
@@ -115,30 +113,6 @@ def test_what_was_started_ahead_becomes_the_rig() -> None:
         assert rig.robot._client.pid != ahead.bus.pid, "the second connection has a process of its own"
     finally:
         rig.close()
-
-
-@pytest.mark.usefixtures("no_process_stays_behind")
-def test_what_was_started_ahead_of_a_twin_that_cannot_be_is_ended() -> None:
-    ahead = start_ahead(CONFIG)
-    assert ahead is not None
-    with pytest.raises(DeviceError, match="no such phantom"):
-        open_rig(Config.model_validate({"twin": {"phantom": "no such phantom"}}), ahead)
-
-
-def test_a_twin_without_a_robot_is_not_started_ahead() -> None:
-    assert start_ahead(load_config(overrides={"rig": {"robot": "none"}})) is None
-
-
-@pytest.mark.usefixtures("no_process_stays_behind")
-def test_what_was_started_ahead_of_another_rig_is_ended(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    open_before = psutil.Process().num_fds()
-    ahead = start_ahead(CONFIG)
-    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((48, 64, 3), np.uint8))
-    rig = {"camera": "image_folder", "robot": "none", "source": str(tmp_path)}
-    open_rig(load_config(overrides={"rig": rig}), ahead).close()
-    ahead.end()  # once more
-    assert psutil.Process().num_fds() == open_before
-    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.usefixtures("no_process_stays_behind")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.types import GraphEdge, VesselGraph
-from hardware.twin.phantom import BOARD_MM, Phantom
+from hardware.twin.phantom import Phantom
 from hardware.twin.rendering.appearance import Appearance, make_view, random_appearance
 from hardware.twin.view import CameraView
 
@@ -31,18 +31,6 @@ def test_barrel_distortion_pulls_towards_the_middle() -> None:
 def test_there_and_back(view: CameraView) -> None:
     corners = np.array([[0.0, 0], [view.size[0] - 1, 0], [view.size[0] - 1, view.size[1] - 1], [17, 300], [320, 240]])
     assert np.abs(view.project(view.unproject(corners)) - corners).max() < 1e-6
-
-
-def test_grid_holds_the_millimetres_under_each_pixel_centre() -> None:
-    grid = TILTED.grid_mm()
-    assert grid.shape == (480, 640, 2)
-    assert TILTED.project(grid[123, 456][None])[0] == pytest.approx([456, 123], abs=1e-6)
-
-
-def test_default_view_shows_the_board_upright_in_the_middle() -> None:
-    view = make_view(Appearance(), (640, 480))
-    assert view.project(np.array([BOARD_MM]) / 2)[0] == pytest.approx([319.5, 239.5])
-    assert view.pixels_per_mm((100.0, 75.0)) == pytest.approx(Appearance().pixels_per_mm)
 
 
 def test_zoom_belongs_to_640_px_and_grows_with_the_image() -> None:

@@ -143,16 +143,6 @@ def test_painting_a_window_equals_painting_the_whole(family: str, monkeypatch: p
     assert difference.max() <= 1
 
 
-@pytest.mark.parametrize("size", [(161, 97), (97, 161), (1280, 720)])
-def test_any_size(size: tuple[int, int]) -> None:
-    picture = Renderer(PHANTOM, Appearance(), size).render(_robot())
-    assert picture.image.shape == (size[1], size[0], 3)
-    assert picture.image.dtype == np.uint8
-    assert picture.vessel.shape == picture.robot.shape == (size[1], size[0])
-    assert picture.vessel.dtype == picture.robot.dtype == np.bool_
-    assert picture.robot.any()
-
-
 def _contrast(picture: RenderedFrame, without: RenderedFrame) -> float:
     """How far the robot's pixels differ from the same picture without it, in grey levels."""
     grey, empty = (cv2.cvtColor(p.image, cv2.COLOR_RGB2GRAY).astype(float) for p in (picture, without))
@@ -183,46 +173,6 @@ def test_every_family_shows_the_vessel_it_labels(family: str) -> None:
         edges = cv2.Laplacian(cv2.cvtColor(picture.image, cv2.COLOR_RGB2GRAY), cv2.CV_32F)
         border = (cv2.dilate(mask, kernel) > 0) & (cv2.erode(mask, kernel) == 0)
         assert np.abs(difference).max() > 2.0 or np.abs(edges)[border].mean() > 3.0, f"seed {seed}"
-
-
-def test_a_glowing_liquid_lights_what_lies_around_it() -> None:
-    dark, lit = (Renderer(PHANTOM, replace(QUIET, glow=value, board_rgb=(0.1, 0.1, 0.1))).render(None) for value in (0.0, 0.4))
-    gain = lit.image.astype(int).sum(axis=2) - dark.image.astype(int).sum(axis=2)
-    around = cv2.dilate(lit.vessel.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
-    assert np.median(gain[lit.vessel]) > 60
-    assert 5 < np.median(gain[around & ~lit.vessel]) < np.median(gain[lit.vessel])
-    assert abs(np.median(gain[:40, :40])) <= 1
-
-
-def test_a_gel_has_no_sharp_edge() -> None:
-    plain = replace(QUIET, board_texture="plain", cables=0, labels=0, dust=0, stains=0, fittings=0, end_fittings=False, lamps=0)
-    steepest = []
-    for scatter_mm in (0.1, 1.0):
-        picture = Renderer(PHANTOM, replace(plain, material="gel", scatter_mm=scatter_mm, liquid_rgb=(0.1, 0.1, 0.5))).render(None)
-        wall = cv2.morphologyEx(picture.vessel.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((5, 5), np.uint8)) > 0
-        steepest.append(np.abs(cv2.Sobel(picture.image[..., 0], cv2.CV_32F, 1, 1))[wall].max())
-    assert steepest[1] < 0.6 * steepest[0]
-
-
-def test_lamps_of_two_colours_light_a_side_each_and_the_robot_too() -> None:
-    two = replace(QUIET, light_deg=180.0, lamp_rgb=((1.0, 0.3, 0.3), (0.3, 0.3, 1.0)))
-    white, tinted = (Renderer(PHANTOM, look).render(_robot()) for look in (QUIET, two))
-    share = (tinted.image.astype(float) + 1) / (white.image.astype(float) + 1)
-    width = share.shape[1]
-    for column, strong, weak in ((slice(0, width // 8), 0, 2), (slice(-width // 8, None), 2, 0)):
-        assert np.median(share[:, column, strong]) > 0.95
-        assert np.median(share[:, column, weak]) < 0.45
-    left = tinted.robot & (np.arange(width) < width // 6)
-    assert np.median(share[left][:, 0]) > 1.8 * np.median(share[left][:, 2])
-
-
-def test_rippling_water_throws_a_net_of_light() -> None:
-    dim = replace(QUIET, board_rgb=(0.4, 0.4, 0.4))
-    still, rippled = (Renderer(PHANTOM, replace(dim, caustics=value)).render(None) for value in (0.0, 0.6))
-    ratio = (rippled.image.astype(float).mean(axis=2) + 1) / (still.image.astype(float).mean(axis=2) + 1)
-    assert np.percentile(ratio, 99) > 1.25
-    assert 0.75 < np.percentile(ratio, 5) < np.median(ratio) < 1.0
-    assert np.array_equal(still.vessel, rippled.vessel)
 
 
 def test_a_faint_tip_stays_labelled() -> None:
