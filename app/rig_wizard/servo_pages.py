@@ -180,7 +180,8 @@ class DrumsPage(WizardPage):
         self.column.addStretch(1)
 
     def _field(self, per_mm: float) -> QDoubleSpinBox:
-        field = QDoubleSpinBox(decimals=2)  # those of a caliper; one more does not fit
+        field = QDoubleSpinBox(decimals=3)
+        field.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)  # they would cut the unit
         field.setRange(0.0, per_mm * 150.0)
         field.setSingleStep(0.1)
         field.setSuffix(" mm")

@@ -5,6 +5,7 @@ Nothing of the operator window runs meanwhile: the bench owns camera and port, a
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -23,6 +24,7 @@ from hardware.calibration.servo_probe import ProbeLimits, ServoProbe, SteeredRob
 from hardware.cameras.live import CameraFeed
 from hardware.rig import START_INSERTION_MM, RigKind, kind_of, real_camera
 from hardware.servos.eeprom import backups_folder
+from hardware.simulated_clock import SimulatedClock
 
 if TYPE_CHECKING:
     from hardware.twin.rendering.calibration_board import BoardPictures
@@ -46,12 +48,20 @@ class CalibrationBench:
     stop : ends whatever moves.
     """
 
-    def __init__(self, config: Config, camera: Camera, port: str | None, perceive: Perceive, on_close: Callable[[], None]) -> None:
-        self.config, self.port, self._perceive, self._on_close = config, port, perceive, on_close
+    def __init__(
+        self,
+        config: Config,
+        camera: Camera,
+        port: str | None,
+        perceive: Perceive,
+        on_close: Callable[[], None],
+        clock: SimulatedClock | None = None,
+    ) -> None:
+        self.config, self.port, self._perceive, self._on_close, self._clock = config, port, perceive, on_close, clock
         self.kind = kind_of(config.rig)
         self._backups = backups_folder() if self.kind is RigKind.LIVE else None
         self.stop = StopSwitch()
-        self.feed = CameraFeed(camera)
+        self.feed = CameraFeed(camera, clock=clock or time.monotonic)
         self._boards: dict[BoardSpec, BoardPictures] = {}
         self._boards_shown = 0
 
@@ -69,13 +79,13 @@ class CalibrationBench:
     ) -> Iterator[ServoProbe]:
         """One servo, zeroed where it stands, armed."""
         config = probe_config(servos, servo_id, limits, sign, found)
-        with ServoProbe.opened(config, self.config.safety, limits, self.stop, self._backups) as probe:
+        with ServoProbe.opened(config, self.config.safety, limits, self.stop, self._backups, self._clock) as probe:
             yield probe
 
     @contextmanager
     def steer(self, servos: ServosConfig) -> Iterator[SteeredRobot]:
         """All of them, zeroed where they stand, armed."""
-        with SteeredRobot.opened(servos, self.config.safety, self.stop, self._backups) as robot:
+        with SteeredRobot.opened(servos, self.config.safety, self.stop, self._backups, self._clock) as robot:
             yield robot
 
     def servos_config(self, servos: ServosConfig) -> ServosConfig:
@@ -132,7 +142,7 @@ def open_bench(config: Config, perceive: Perceive) -> CalibrationBench:
     from hardware.twin.process import RemoteTwin
 
     twin = RemoteTwin(config, START_INSERTION_MM)
-    return CalibrationBench(config, twin, twin.port, perceive, twin.close)
+    return CalibrationBench(config, twin, twin.port, perceive, twin.close, twin.clock)
 
 
 def observe_robot(feed: CameraFeed, perceive: Perceive, alive: Callable[[], None]) -> Look:

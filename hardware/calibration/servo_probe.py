@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import threading
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from hardware.servos.bus_ipc import BusStatus
 from hardware.servos.dynamixel_port import NoAnswer, ServoError
 from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
+from hardware.simulated_clock import SimulatedClock
 
 _PERIOD_S = 0.02
 _ARRIVED_MM, _SETTLED_MM = 0.02, 0.25
@@ -240,10 +240,19 @@ class ServoProbe:
     @classmethod
     @contextmanager
     def opened(
-        cls, config: ServosConfig, safety: SafetyConfig, limits: ProbeLimits, stop: StopSwitch, backups: Path | None = None
+        cls,
+        config: ServosConfig,
+        safety: SafetyConfig,
+        limits: ProbeLimits,
+        stop: StopSwitch,
+        backups: Path | None = None,
+        clock: SimulatedClock | None = None,
     ) -> Iterator[ServoProbe]:
-        """Connect and arm, with ``probe_config``'s bus; where the servo stands now is 0. At the end it holds, disarmed."""
-        robot = ServoRobot(config, safety, name=f"servo {feed_of(config).id}", backups=backups)
+        """Connect and arm, with ``probe_config``'s bus; where the servo stands now is 0. At the end it holds, disarmed.
+
+        `clock`: of a simulated bench.
+        """
+        robot = ServoRobot(config, safety, name=f"servo {feed_of(config).id}", backups=backups, clock=clock)
         try:
             with armed(robot, config, stop, ZeroBasis.HERE):
                 yield cls(robot, config, limits, stop)
@@ -266,8 +275,8 @@ class ServoProbe:
         Raises ProcedureStopped (STOP came; the servos hold), Strained (too much current; the torque is off), ProbeFailed.
         """
         target_mm = max(self._limits.low_mm, min(self._limits.high_mm, target_mm))
-        until_s = time.monotonic() + abs(target_mm - self.position_mm) / self._limits.speed_mm_s + _EXTRA_S
-        while time.monotonic() < until_s:
+        until_s = self._robot.now_s() + abs(target_mm - self.position_mm) / self._limits.speed_mm_s + _EXTRA_S
+        while self._robot.now_s() < until_s:
             state = self._checked()
             at_mm = state.position_mm or 0.0
             status, goal_mm = self._robot.bus_status(), at_mm
@@ -284,8 +293,8 @@ class ServoProbe:
 
     def pause(self, seconds: float) -> None:
         """Stand still for a while."""
-        until_s = time.monotonic() + seconds
-        while time.monotonic() < until_s:
+        until_s = self._robot.now_s() + seconds
+        while self._robot.now_s() < until_s:
             self.alive()
             self._stop.sleep(_PERIOD_S)
 
@@ -295,7 +304,7 @@ class ServoProbe:
         status = self._robot.bus_status()
         if (failure := self._robot.failure) is not None:
             raise ProbeFailed(failure)
-        if status is None or time.monotonic() - status.time_s > _SILENCE_S:
+        if status is None or self._robot.now_s() - status.time_s > _SILENCE_S:
             raise ProbeFailed("the servo bus is silent: check port and supply")
         check_armed(status, f"servo {self.servo_id}")
         state = self._newest(status)
@@ -304,7 +313,7 @@ class ServoProbe:
 
     def _newest(self, status: BusStatus) -> ServoState:
         """What the servo told last; before it has told anything it is waited for."""
-        until_s = time.monotonic() + _SILENCE_S
+        until_s = self._robot.now_s() + _SILENCE_S
         newest: BusStatus | None = status
         while True:
             readings = () if newest is None else newest.servos
@@ -313,7 +322,7 @@ class ServoProbe:
                 self._last = reading
             if self._last is not None:
                 return self._last
-            if time.monotonic() > until_s:
+            if self._robot.now_s() > until_s:
                 raise ProbeFailed(f"servo {self.servo_id} does not tell where it is: check its cable")
             self._robot.hold()
             self._stop.sleep(_PERIOD_S)
@@ -349,14 +358,19 @@ class SteeredRobot:
     @classmethod
     @contextmanager
     def opened(
-        cls, servos: ServosConfig, safety: SafetyConfig, stop: StopSwitch, backups: Path | None = None
+        cls,
+        servos: ServosConfig,
+        safety: SafetyConfig,
+        stop: StopSwitch,
+        backups: Path | None = None,
+        clock: SimulatedClock | None = None,
     ) -> Iterator[SteeredRobot]:
-        """Connect, zero where a search has left the wires, and arm; at the end they hold, disarmed.
+        """Connect, zero where a search has left the wires, and arm; at the end they hold, disarmed. `clock`: of a simulated bench.
 
         Raises NotReady, too, when a servo pulls with more current than friction takes.
         """
         config = patient(servos)
-        robot = ServoRobot(config, safety, name="robot", backups=backups)
+        robot = ServoRobot(config, safety, name="robot", backups=backups, clock=clock)
         with armed(robot, config, stop, ZeroBasis.SEARCHED):
             yield cls(robot, config, stop)
 
@@ -367,8 +381,8 @@ class SteeredRobot:
 
     def pause(self, seconds: float) -> None:
         """Keep the bend for a while."""
-        until_s = time.monotonic() + seconds
-        while time.monotonic() < until_s:
+        until_s = self._robot.now_s() + seconds
+        while self._robot.now_s() < until_s:
             self.alive()
             self._stop.sleep(_PERIOD_S)
 
@@ -396,8 +410,8 @@ class SteeredRobot:
         return tuple(state.ticks for state in self._states())
 
     def _states(self) -> list[ServoState]:
-        until_s = time.monotonic() + 1.0
-        while time.monotonic() < until_s:
+        until_s = self._robot.now_s() + 1.0
+        while self._robot.now_s() < until_s:
             status = self._robot.bus_status()
             readings = () if status is None else status.servos
             states = [reading for reading in readings if isinstance(reading, ServoState)]

@@ -86,7 +86,8 @@ class ServoRobot:
         self._reported_offs = self._reported_releases = 0
         self._not_connected: str | None = None
 
-    def _now_s(self) -> float:
+    def now_s(self) -> float:
+        """The clock of orders and reports."""
         return time.monotonic() if self._clock is None else self._clock()
 
     @property
@@ -218,7 +219,7 @@ class ServoRobot:
         """A sign of life of the application; `permitted` says whose orders may be followed (None: of no source)."""
         self._supervised = True
         if (client := self._client) is not None:
-            client.put_heartbeat(Heartbeat(self._now_s(), permitted))
+            client.put_heartbeat(Heartbeat(self.now_s(), permitted))
 
     def send(
         self,
@@ -246,7 +247,7 @@ class ServoRobot:
         """
         limited = within_speeds(command, self._servos)
         client = self._connected()
-        client.put_order(BusOrder(limited, source, self._now_s(), captured_s, retracts))
+        client.put_order(BusOrder(limited, source, self.now_s(), captured_s, retracts))
         self._beat_unsupervised()
         sent = self._sent(client.status())
         return sent.motion if sent is not None else Command()
@@ -254,7 +255,7 @@ class ServoRobot:
     def hold(self) -> None:
         """Stop all motion and keep the bend; stays armed."""
         if (client := self._client) is not None:
-            client.put_order(BusOrder(None, Source.OPERATOR, self._now_s()))
+            client.put_order(BusOrder(None, Source.OPERATOR, self.now_s()))
             self._beat_unsupervised()
 
     def status(self) -> RobotStatus:
@@ -267,7 +268,7 @@ class ServoRobot:
         states = [reading for reading in self._states if isinstance(reading, ServoState)]
         servos = self._servos
         if not states:
-            return status_at((0.0,) * len(servos.joints), (0.0,) * len(servos.tendons), self._now_s(), servos)
+            return status_at((0.0,) * len(servos.joints), (0.0,) * len(servos.tendons), self.now_s(), servos)
         forces_mn = tuple(
             wire_force_mn(joint, servos.model_of(joint), state.current_ma or 0.0)
             for joint, state in zip(servos.tendons, states, strict=False)
@@ -324,7 +325,7 @@ class ServoRobot:
     def _sent(self, status: BusStatus | None) -> IssuedGoals | None:
         if status is None or status.sent is None or not status.armed or self.failure is not None:
             return None
-        is_late = self._now_s() - status.time_s > self._safety.bus_hold_s
+        is_late = self.now_s() - status.time_s > self._safety.bus_hold_s
         return status.sent.kept() if is_late else status.sent
 
     def kept_back(self) -> Rejection | None:
@@ -366,7 +367,7 @@ class ServoRobot:
     def _beat_unsupervised(self) -> None:
         """A sign of life of a program without a supervisor."""
         if (client := self._client) is not None and not self._supervised:
-            client.put_heartbeat(Heartbeat(self._now_s(), Source.OPERATOR))
+            client.put_heartbeat(Heartbeat(self.now_s(), Source.OPERATOR))
 
 
 def _stops(status: BusStatus) -> int:

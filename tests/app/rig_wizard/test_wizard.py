@@ -239,7 +239,7 @@ def test_the_twins_drums_are_known(opened: RigWizard) -> None:
     page = opened.drums_page
     assert page.is_done
     assert [field.value() for field in page.ways] == [40.0] * 3
-    assert [field.value() for field in page.diameters] == [12.73] * 3
+    assert [field.value() for field in page.diameters] == [12.732] * 3
     assert "20 / 29 / 29 N" in page.result.text()
 
 

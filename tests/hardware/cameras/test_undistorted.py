@@ -86,6 +86,22 @@ def test_a_feed_gives_only_pictures_of_after_the_question() -> None:
     assert camera.is_closed
 
 
+def test_pictures_of_a_slow_simulation_are_waited_for_by_its_own_clock() -> None:
+    """A wizard on a busy computer told the user of the twin to check its cable."""
+    clock, now_s = threading.Lock(), [100.0]
+
+    class Slow(ScriptedCamera):
+        def read(self, timeout_s: float) -> Frame | None:
+            time.sleep(0.02)
+            with clock:
+                now_s[0] += 0.001
+                return Frame(0, now_s[0], np.zeros((4, 4, 3), np.uint8))
+
+    feed = CameraFeed(Slow(), clock=lambda: now_s[0])
+    assert len(feed.next_frames(5, 0.01)) == 5
+    feed.close()
+
+
 def test_a_lost_camera_is_told_and_found_again() -> None:
     back = threading.Event()
 
