@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 MOST_SHOWN = 20
 """Frames that changed most, and runs of lost and gained poses, that are shown."""
-_WRITTEN = ("replay.json", "changes.jsonl", "replay.svg", "replay.pdf")
+_WRITTEN = ("replay.json", "changes.jsonl")
 """Files of ``--out``."""
 _DASH = "\N{EN DASH}"
 
@@ -265,7 +265,7 @@ def replay(
     diff: Annotated[bool, typer.Option("--diff", help="also the frames that changed most")] = False,
     out: Annotated[
         Path | None,
-        typer.Option(help="folder for replay.json, changes.jsonl and the figure as SVG and PDF; of several sessions a folder each"),
+        typer.Option(help="folder for replay.json and changes.jsonl; of several sessions a folder each"),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, max=256, help="processes, which share the sessions")] = 1,
     scheduler: SchedulerOption = None,
@@ -294,7 +294,7 @@ def run_replay(options: ReplayOptions, out: Path | None = None, *, as_json: bool
             check_apart(options.jsonl, [out / name for name in _WRITTEN], "--jsonl", "--out")
     done = replay_session(options, _watched)
     if out is not None:
-        write_replay(out, name_as_text(name_of(options.session)), done.changes, done.result)
+        write_replay(out, done.changes, done.result)
     result = done.result
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
@@ -336,20 +336,12 @@ def prepare_out(out: Path) -> None:
     make_folder(out)
 
 
-def write_replay(out: Path, name: str, changes: Sequence[Change], result: dict[str, Any]) -> None:
+def write_replay(out: Path, changes: Sequence[Change], result: dict[str, Any]) -> None:
     """A session's files in the folder; raises UserError."""
-    from app.commands.evaluation_report import can_draw
-
     try:
         (out / "replay.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         with (out / "changes.jsonl").open("w", encoding="utf-8") as file:
             file.writelines(json.dumps(change_to_json(change), allow_nan=False) + "\n" for change in changes)
-        if can_draw():
-            from app.commands.figures import draw_replay, save_figure
-
-            figure = draw_replay(changes, result["states"]["matrix"], name)
-            for ending in (".svg", ".pdf"):
-                save_figure(figure, out / f"replay{ending}")
     except OSError as error:
         raise UserError(f"{error.filename or out}: cannot be written ({error.strerror or error})") from None
 
@@ -459,7 +451,7 @@ def _run(sums: _Sums, sessions: list[Path], options: ReplayOptions, out: Path | 
             for done in replays:
                 if not done.problem and out is not None:
                     name = name_of(done.session)
-                    write_replay(out / name, name_as_text(name), done.changes, done.result)
+                    write_replay(out / name, done.changes, done.result)
                 sums.add(done)
                 bar.advance(task)
                 if sums.interrupted:
