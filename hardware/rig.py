@@ -259,9 +259,6 @@ def with_port(config: Config, port: str | None) -> Config:
     return config.model_copy(update={"rig": rig, "servos": config.servos.model_copy(update={"port": port})})
 
 
-_REALSENSE_ENDING = ".bag"
-
-
 def rig_config(
     rig: str | None, config_path: Path | None, source: Path | None, own: dict[str, Any] | None = None
 ) -> tuple[Config, RigKind]:
@@ -300,7 +297,9 @@ def with_source(config: Config, source: Path) -> Config:
     from core.files import VIDEO_ENDINGS
 
     ending = source.suffix.lower()
-    camera = "video_file" if ending in VIDEO_ENDINGS else "realsense" if ending == _REALSENSE_ENDING else "image_folder"
+    if ending == ".bag":
+        raise UserError(f"{source}: RealSense recordings are not played: rs-convert -i {source} -p FOLDER/ writes their pictures")
+    camera = "video_file" if ending in VIDEO_ENDINGS else "image_folder"
     if camera == "image_folder" and source.is_file():
         _check_picture(source)
     chosen = {"camera": camera, "robot": "none", "source": str(source), "file": None}
@@ -317,7 +316,7 @@ def _check_picture(file: Path) -> None:
     except ImageError as error:
         if file.suffix.lower() in IMAGE_ENDINGS:
             raise
-        endings = ", ".join((*IMAGE_ENDINGS, *VIDEO_ENDINGS, _REALSENSE_ENDING))
+        endings = ", ".join((*IMAGE_ENDINGS, *VIDEO_ENDINGS))
         raise UserError(f"{error}; --source takes a folder of pictures, or a file that ends in {endings}") from None
 
 

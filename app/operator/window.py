@@ -141,7 +141,7 @@ class OperatorWindow(WindowFrame):
         from core.learning.dataset import IMAGE_ENDINGS
 
         is_session = any((at / MANIFEST).is_file() for at in (path, path.parent))
-        if not is_session and (path.is_dir() or path.suffix.lower() in (*IMAGE_ENDINGS, *VIDEO_ENDINGS, ".bag")):
+        if not is_session and (path.is_dir() or path.suffix.lower() in (*IMAGE_ENDINGS, *VIDEO_ENDINGS)):
             self.source_chosen.emit(path)
         else:
             super().open_path(path)

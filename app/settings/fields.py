@@ -34,7 +34,7 @@ from core.config.rig_file import rigs_folder
 from core.config.schema import Effect, FieldKind, Setting
 from core.files import VIDEO_ENDINGS
 
-_VIDEOS = " ".join(f"*{ending}" for ending in (*VIDEO_ENDINGS, ".bag"))
+_VIDEOS = " ".join(f"*{ending}" for ending in VIDEO_ENDINGS)
 _MODELS = RESOURCES / "models"
 
 

@@ -385,7 +385,7 @@ class RigConfig(ConfigSection):
     name: str = Field("twin", min_length=1, description="what sessions and messages call this rig")
     camera: CameraName = Field("twin", description="where pictures come from")
     robot: Literal["twin", "servos", "none"] = Field("twin", description="what moves; servos = real ones, see section Servos")
-    source: str | None = Field(None, description="path of the video, folder, or RealSense recording (.bag)")
+    source: str | None = Field(None, description="path of the video or folder")
     file: str | None = Field(
         None, min_length=1, description="rig file, made by the rig wizard, whose calibration is used; empty: not calibrated"
     )

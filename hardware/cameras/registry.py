@@ -72,13 +72,6 @@ def _realsense_live(config: CameraConfig) -> Camera:
     return realsense_camera(config)
 
 
-def _realsense_recording(source: Path) -> Camera:
-    _need_realsense()
-    from hardware.cameras.realsense import RealSenseRecording
-
-    return RealSenseRecording(source)
-
-
 def _find_realsense() -> Sequence[FoundCamera]:
     if find_spec(_LIBREALSENSE) is None and not sysfs.realsense_on_usb():
         return ()
@@ -230,9 +223,7 @@ def _image_folder(source: Path) -> Camera:
 
 CAMERA_KINDS: dict[str, CameraKind] = {
     "twin": CameraKind("bench twin"),  # opened by the rig, together with its robot
-    "realsense": CameraKind(
-        "RealSense", _realsense_live, _realsense_recording, _find_realsense, _check_realsense, _check_realsense_library
-    ),
+    "realsense": CameraKind("RealSense", _realsense_live, None, _find_realsense, _check_realsense, _check_realsense_library),
     "webcam": CameraKind("webcam", _webcam_live, None, _find_webcams, _check_webcam),
     "basler": CameraKind("Basler", _basler_live, None, _find_basler, _check_basler),
     "video_file": CameraKind("video", recorded=_video_file),

@@ -113,24 +113,6 @@ def _stream(form: Any, kind: Any = rs.stream.color, uid: int = 1) -> Any:
     return stream
 
 
-def write_bag(path: Path, numbers: list[int], *, form: Any = rs.format.rgb8) -> Path:
-    """A recording of these frames at 30 a second, written by the library's own recorder."""
-    camera = SoftRealSense(form=form)
-    recorder = rs.recorder(str(path), camera.device)
-    sensor = recorder.query_sensors()[0]
-    queue = rs.frame_queue(2)
-    sensor.open(sensor.get_stream_profiles()[0])
-    sensor.start(queue)
-    for number in numbers:
-        camera.inject(number, 1e12 + number * 1000.0 * PERIOD_S)
-        came, _ = queue.try_wait_for_frame(2000)
-        assert came
-    time.sleep(0.2)  # the recorder writes in a thread of its own, and tells nobody when it is done
-    sensor.stop()
-    sensor.close()
-    return path
-
-
 class SoftCapture:
     """OpenCV's capture object of a webcam: gives `picture` after `picture`, does not take every setting, and can be lost."""
 

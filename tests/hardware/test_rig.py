@@ -27,15 +27,9 @@ from tests.hardware.soft_cameras import (
     WIDTH,
     SoftRealSense,
     take_frames,
-    write_bag,
 )
 
 LENS = LensConfig(k1=-0.12, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_bag(tmp_path_factory.mktemp("bag") / "run.bag", list(range(60)))
 
 
 # ---- what there is
@@ -153,15 +147,6 @@ def test_the_camera_is_let_go_when_the_servos_fail(soft: SoftRealSense, tmp_path
     rig = open_rig(_rig(robot="none"))
     take_frames(rig.camera, 1)
     rig.close()
-
-
-def test_a_recording_is_played_back(bag: Path) -> None:
-    rig = open_rig(_rig(robot="none", source=str(bag)))
-    try:
-        assert (rig.name, rig.kind, rig.robot) == ("run.bag", RigKind.PLAYBACK, None)
-        assert take_frames(rig.camera, 3)[-1].index >= 2
-    finally:
-        rig.close()
 
 
 # ---- rigs

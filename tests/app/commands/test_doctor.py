@@ -11,6 +11,7 @@ import pytest
 from app.commands.doctor import doctor
 from core.config.models import Config
 from core.config.rig_file import RigFileError
+from core.devices import UserError
 from hardware.preflight import checks as program
 from hardware.preflight.checks import Check
 from hardware.rig import RigKind, rig_config
@@ -125,10 +126,10 @@ def test_the_twin_never_touches_the_bench(tmp_path: Path) -> None:
     assert (config.rig.camera, config.rig.robot, config.servos.port, kind) == ("twin", "twin", None, RigKind.SIM)
 
 
-def test_a_realsense_recording_is_played(tmp_path: Path) -> None:
+def test_a_realsense_recording_is_to_be_converted(tmp_path: Path) -> None:
     (tmp_path / "run.bag").touch()
-    config, kind = rig_config(None, None, tmp_path / "run.bag")
-    assert (config.rig.camera, config.rig.robot, kind) == ("realsense", "none", RigKind.PLAYBACK)
+    with pytest.raises(UserError, match=r"run\.bag: RealSense recordings are not played: rs-convert -i "):
+        rig_config(None, None, tmp_path / "run.bag")
 
 
 def test_an_unknown_rig_names_the_known_ones() -> None:

@@ -17,12 +17,12 @@ from core.types import Image
 from hardware.cameras import files
 from hardware.cameras.files import ImageFolder, VideoFile
 from hardware.cameras.live import LiveCamera
-from hardware.cameras.realsense import RealSenseRecording, realsense_camera
+from hardware.cameras.realsense import realsense_camera
 from hardware.cameras.webcam import WebcamSensor
 from hardware.twin.world import TwinCamera, TwinWorld
 from tests.core.drawing import film
 from tests.hardware.soft_cameras import CONFIG as SOFT
-from tests.hardware.soft_cameras import SoftRealSense, SoftWebcam, write_bag
+from tests.hardware.soft_cameras import SoftRealSense, SoftWebcam
 
 
 def _noise(count: int) -> Iterator[Image]:
@@ -60,8 +60,6 @@ MAKERS: dict[str, Callable[[Path, ExitStack], Camera]] = {
     "video unpaced": lambda folder, _: VideoFile(_video(folder / "v.mp4"), paced=False),
     "image folder": lambda folder, _: ImageFolder(_pictures(folder / "pictures"), period_s=0.01),
     "RealSense": _realsense,
-    "RealSense recording paced": lambda folder, _: RealSenseRecording(write_bag(folder / "r.bag", list(range(12)))),
-    "RealSense recording unpaced": lambda folder, _: RealSenseRecording(write_bag(folder / "r.bag", list(range(12))), paced=False),
     "webcam": _webcam,
     "twin": _twin,
 }

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 import numpy as np
 import pyrealsense2 as rs
 import pytest
 
-from core.devices import DeviceError, EndOfStream
-from core.types import Frame
-from hardware.cameras.realsense import RealSenseInfo, RealSenseRecording, RealSenseSensor, find_cameras, realsense_camera
+from core.devices import DeviceError
+from hardware.cameras.realsense import RealSenseInfo, RealSenseSensor, find_cameras, realsense_camera
 from tests.hardware.soft_cameras import (
     CONFIG,
     PERIOD_S,
@@ -20,7 +18,6 @@ from tests.hardware.soft_cameras import (
     take_frames,
     until_back,
     until_lost,
-    write_bag,
 )
 
 # --- RealSense -------------------------------------------------------------------------------------------------------------------
@@ -166,63 +163,3 @@ def test_a_realsense_camera_is_lost_and_found(how: str) -> None:
     assert after.index > before.index
     assert after.captured_s > before.captured_s
     assert camera.name == "Intel RealSense L515"
-
-
-# --- RealSense recordings --------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_bag(tmp_path_factory.mktemp("bag") / "run.bag", list(range(60)))
-
-
-def _until_the_end(recording: RealSenseRecording) -> list[Frame | None]:
-    """All that a recording gives; it is closed then."""
-    frames: list[Frame | None] = []
-    with pytest.raises(EndOfStream, match="end of the recording"):
-        while True:
-            frames.append(recording.read(0.0))
-    recording.close()
-    return frames
-
-
-def test_sixty_of_sixty_frames_come_exactly_from_a_recording(bag: Path) -> None:
-    recording = RealSenseRecording(bag, paced=False)
-    recording.open()
-    frames = _until_the_end(recording)
-    assert [frame.index for frame in frames if frame] == list(range(60))
-    for frame in frames:
-        assert np.array_equal(frame.image, picture(frame.index))
-        assert frame.captured_s == pytest.approx(frame.index * PERIOD_S, abs=1e-3)
-        assert frame.lost == 0
-
-
-def test_frames_that_the_recording_lacks_are_lost(tmp_path: Path) -> None:
-    recording = RealSenseRecording(write_bag(tmp_path / "gaps.bag", [0, 1, 4, 5]), paced=False)
-    recording.open()
-    assert [(frame.index, frame.lost) for frame in take_frames(recording, 4)] == [(0, 0), (1, 0), (2, 2), (3, 2)]
-    recording.close()
-
-
-def test_a_recording_in_bgr_is_given_in_rgb(tmp_path: Path) -> None:
-    recording = RealSenseRecording(write_bag(tmp_path / "bgr.bag", [0], form=rs.format.bgr8), paced=False)
-    recording.open()
-    assert np.array_equal(take_frames(recording, 1)[0].image, picture(0)[..., ::-1])
-    recording.close()
-
-
-@pytest.mark.parametrize("content", [None, b"", b"not a recording", b"#ROSBAG V2.0\n"])
-def test_a_foreign_recording_is_one_clear_line(tmp_path: Path, content: bytes | None) -> None:
-    path = tmp_path / "x.bag"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(DeviceError, match=r"x\.bag: (no such recording|cannot be played as a RealSense recording)") as caught:
-        RealSenseRecording(path).open()
-    assert "\n" not in str(caught.value)
-
-
-def test_a_cut_recording_is_one_clear_line(bag: Path, tmp_path: Path) -> None:
-    path = tmp_path / "cut.bag"
-    path.write_bytes(bag.read_bytes()[: bag.stat().st_size // 2])
-    with pytest.raises(DeviceError, match=r"cut\.bag: cannot be played"):
-        RealSenseRecording(path).open()
