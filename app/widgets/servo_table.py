@@ -264,8 +264,11 @@ def _of_joint(joint: JointConfig, text: str) -> str:
 
 
 def _mm(joint: JointConfig, value_mm: float | None) -> str:
-    """Hundredths for a tendon, tenths for a feed."""
-    return NONE if value_mm is None else number(value_mm, 1 if joint.high_mm - joint.low_mm > _LONG_TRAVEL_MM else 2)
+    """Hundredths for a tendon, tenths for a feed, and degrees of a rotation, which say so under a heading in mm."""
+    if value_mm is None:
+        return NONE
+    text = number(value_mm, 1 if joint.high_mm - joint.low_mm > _LONG_TRAVEL_MM else 2)
+    return f"{text}°" if joint.kind is JointKind.ROTATION else text
 
 
 @dataclass(frozen=True, slots=True)

@@ -269,3 +269,4 @@ def test_a_robot_of_another_shape_has_rows_of_its_own(qtbot: QtBot) -> None:
     tips = [cell.tip for cell in rows[3]]
     assert any("envelope -200 to 200°" in tip for tip in tips), tips
     assert any("N mm at most" in tip for tip in tips), tips
+    assert rows[3][list(Column).index(Column.POSITION)].text == "30.0°"

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from core.config.safety import SafetyConfig, ServosConfig
-from core.control.faults import Cause
+from core.control.faults import Cause, Fault
 from core.control.gate import Rejection, RejectReason, Source
 from core.control.joints import Retracted
 from core.control.kept_zero import ZeroRequest
@@ -375,6 +377,10 @@ def test_what_is_not_finite_is_rejected_by_name(bench: Bench, number: float) -> 
     assert bench.goals == before
 
 
+def _restarted(state: ServoState) -> ServoReading:
+    return MissingServo(state.name, state.id, state.time_s, 0, "", restarted=True)
+
+
 def _silent(state: ServoState) -> ServoReading:
     return MissingServo(state.name, state.id, state.time_s, 3, "no answer") if state.id == 3 else state
 
@@ -452,6 +458,77 @@ def test_the_first_cause_stays_until_acknowledged_and_nothing_arms_itself(bench:
     assert not bench.guard.armed
     bench.arm()
     assert bench.guard.armed
+
+
+# --- every state x event ---------------------------------------------------------------------------------------------------------
+
+
+def _in_state(state: str) -> Bench:
+    bench = Bench()
+    bench.arm()
+    bench.cycles(3)
+    if state != "armed":
+        bench.guard.disarm()
+    if state in {"fault", "stopped"}:
+        bench.guard.end_motion(Fault(Cause.HOT if state == "fault" else Cause.STOP_PRESSED))
+    return bench
+
+
+def _state_of(guard: BusGuard) -> str:
+    return "armed" if guard.armed else "stopped" if guard.stopped else "fault" if guard.latched is not None else "off"
+
+
+def _arm(bench: Bench) -> None:
+    with suppress(NotReady):
+        bench.arm()
+
+
+def _altered(**changes: object) -> Callable[[Bench], None]:
+    def inject(bench: Bench) -> None:
+        bench.alter = lambda state: replace(state, **changes)
+        bench.cycle()
+
+    return inject
+
+
+def _application_dies(bench: Bench) -> None:
+    bench.beating = False
+    bench.cycles(30)
+
+
+EVENTS: dict[str, tuple[Callable[[Bench], object], tuple[str, str, str, str]]] = {
+    #                                                                                   off        armed      fault      stopped
+    "a cycle": (Bench.cycle,                                                          ("off",     "armed",   "fault",   "stopped")),
+    "arm": (_arm,                                                                     ("armed",   "armed",   "fault",   "stopped")),
+    "acknowledge": (lambda bench: bench.guard.acknowledge(),                          ("off",     "armed",   "off",     "off")),
+    "disarm": (lambda bench: bench.guard.disarm(),                                    ("off",     "off",     "fault",   "stopped")),
+    "STOP": (lambda bench: bench.guard.end_motion(Fault(Cause.STOP_PRESSED)),         ("stopped",) * 4),
+    "port lost": (lambda bench: bench.guard.end_motion(bench.guard.lose_port()),      ("stopped",) * 4),
+    "too hot": (_altered(temperature_c=90.0),                                         ("off",     "fault",   "fault",   "stopped")),
+    "overload": (_altered(error=HardwareError.OVERLOAD),                              ("off",     "stopped", "fault",   "stopped")),
+    "torque taken": (_altered(torque=False),                                          ("off",     "fault",   "fault",   "stopped")),
+    "all restarted": (lambda bench: (setattr(bench, "alter", _restarted), bench.cycle()),
+                                                                                      ("off",     "fault",   "fault",   "stopped")),
+    "application dies": (_application_dies,                                           ("off",     "fault",   "fault",   "stopped")),
+    "stands still": (lambda bench: bench.cycle(pause_s=1.5),                          ("off",     "fault",   "fault",   "stopped")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("event", "place"), list(product(EVENTS, range(4))))
+def test_every_event_in_every_state(event: str, place: int) -> None:
+    inject, after = EVENTS[event]
+    bench = _in_state(("off", "armed", "fault", "stopped")[place])
+    before, first = list(bench.goals), bench.guard.latched
+    inject(bench)
+    assert _state_of(bench.guard) == after[place]
+    if place == 2 and event in {"STOP", "port lost"}:
+        assert bench.guard.latched is first, "the first cause stays"
+    if after[place] != "armed":
+        assert bench.guard.sent is None
+        at = list(bench.goals)
+        bench.cycles(3)
+        assert bench.goals == at
+        assert place == 1 or at == before, "nothing moves that was not armed"
 
 
 # --- whose order: at a hand-over the next one's order is there before his permission ----------------------------------------------
