@@ -36,19 +36,12 @@ def doctor(as_json: JsonOption = False, rig: RigOption = None, config: ConfigOpt
 
 def _checks(rig: str | None, config_path: Path | None) -> Iterator[Check]:
     """All checks; those of the program alone where it does not load."""
-    # A library that is cut short would end this process at its import: it is checked before.
-    problem = program.load_problem(program.OPENCV)
-    if problem:
-        problem = f"{program.OPENCV}: {problem}"
-    else:
-        try:
-            from hardware.preflight.preflight import run_checks
-            from hardware.rig import rig_config
-        except ImportError as error:
-            problem = one_line(error)
-    if problem:
+    try:
+        from hardware.preflight.preflight import run_checks
+        from hardware.rig import rig_config
+    except ImportError as error:
         yield from (check() for check in program.OF_THE_PROGRAM)
-        yield Check("all others", False, f"not made, since the program does not load: {problem}", RENEW)
+        yield Check("all others", False, f"not made, since the program does not load: {one_line(error)}", RENEW)
         return
     config, _ = rig_config(rig, config_path, None)
     yield from run_checks(config)

@@ -45,7 +45,6 @@ class CameraKind:
     recorded : plays ``rig.source``; None: it cannot.
     find : the cameras that are plugged in. Raises ImportError, DeviceError.
     check : the preflight's check of the configured camera, without opening it. Raises ImportError, DeviceError.
-    check_library : raises ImportError when the driver's library must not even be loaded.
     """
 
     title: str
@@ -53,7 +52,6 @@ class CameraKind:
     recorded: Callable[[Path], Camera] | None = None
     find: Callable[[], Sequence[FoundCamera]] = lambda: ()
     check: Callable[[CameraConfig], Check] | None = None
-    check_library: Callable[[], None] = lambda: None
 
 
 _LIBREALSENSE = "pyrealsense2"
@@ -81,14 +79,6 @@ def _find_realsense() -> Sequence[FoundCamera]:
     return [FoundCamera("realsense", camera.describe(), serial=camera.serial) for camera in find_cameras()]
 
 
-def _check_realsense_library() -> None:
-    """A library cut short ends a process that loads it with a memory fault."""
-    from hardware.preflight.checks import REALSENSE, load_problem
-
-    if find_spec(_LIBREALSENSE) is not None and (problem := load_problem(REALSENSE)):
-        raise ImportError(message("the library of RealSense cameras cannot be used: {problem}", problem=problem))
-
-
 _UDEV = (
     "install librealsense's udev rules: sudo cp 99-realsense-libusb.rules /etc/udev/rules.d/ "
     "&& sudo udevadm control --reload-rules && sudo udevadm trigger, then plug the camera in again"
@@ -101,7 +91,6 @@ def _check_realsense(config: CameraConfig) -> Check:
 
     if find_spec(_LIBREALSENSE) is None:
         return Check("camera", False, message("RealSense cameras need the package pyrealsense2"), how_to_install(_LIBREALSENSE))
-    _check_realsense_library()
     from hardware.cameras.realsense import find_cameras
 
     cameras = find_cameras()
@@ -223,7 +212,7 @@ def _image_folder(source: Path) -> Camera:
 
 CAMERA_KINDS: dict[str, CameraKind] = {
     "twin": CameraKind("bench twin"),  # opened by the rig, together with its robot
-    "realsense": CameraKind("RealSense", _realsense_live, None, _find_realsense, _check_realsense, _check_realsense_library),
+    "realsense": CameraKind("RealSense", _realsense_live, None, _find_realsense, _check_realsense),
     "webcam": CameraKind("webcam", _webcam_live, None, _find_webcams, _check_webcam),
     "basler": CameraKind("Basler", _basler_live, None, _find_basler, _check_basler),
     "video_file": CameraKind("video", recorded=_video_file),

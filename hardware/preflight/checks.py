@@ -9,8 +9,6 @@ import ctypes
 import os
 import re
 import shutil
-import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -137,15 +135,6 @@ LIBRARIES = {
 }
 """Shared library -> the Debian package that has it; the same list as in ``scripts/set_up.sh``."""
 
-OPENCV, REALSENSE = "OpenCV", "RealSense"
-_BINARIES = (
-    ("Qt's window plugin (xcb)", "PySide6_Essentials", "**/plugins/platforms/libqxcb.so"),
-    (OPENCV, "opencv-python-headless", "cv2/cv2*.so"),
-    (REALSENSE, "pyrealsense2", "pyrealsense2/pyrealsense2*.so"),
-)
-_LOAD = "import ctypes, sys\ntry: ctypes.CDLL(sys.argv[1])\nexcept OSError as error: sys.exit(str(error))\n"
-_LOAD_WITHIN_S = 60.0
-
 
 def check_python(version: tuple[int, ...] = sys.version_info[:3]) -> Check:
     """Python 3.11 to 3.13."""
@@ -211,67 +200,7 @@ def check_libraries(load: Callable[[str], object] = ctypes.CDLL) -> Check:
     return Check("system libraries", True, message("{a} can be loaded", a=len(LIBRARIES)))
 
 
-def load_elsewhere(path: Path) -> str:
-    """Load a shared library in a process of its own, which a broken one may take down; returns what is wrong, or ""."""
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", _LOAD, str(path)], capture_output=True, text=True, timeout=_LOAD_WITHIN_S, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return "does not load within a minute"
-    if done.returncode < 0:
-        return f"loading it ends with a fault ({signal.Signals(-done.returncode).name})"
-    return "" if done.returncode == 0 else one_line(done.stderr or f"loading it ends with code {done.returncode}")
-
-
-def load_problem(title: str) -> str:
-    """Why OPENCV or REALSENSE cannot be loaded, "" when it can. Asked in a process of its own, in a tenth of a second."""
-    path = dict(_binaries())[title]
-    return load_elsewhere(path) if path is not None else "is not installed"
-
-
-def _binaries() -> list[tuple[str, Path | None]]:
-    found: list[tuple[str, Path | None]] = []
-    for title, package, pattern in _BINARIES:
-        try:
-            files = metadata.distribution(package).files or []
-        except metadata.PackageNotFoundError:
-            files = []
-        match = next((file for file in files if file.match(pattern)), None)
-        found.append((title, Path(str(match.locate())) if match is not None else None))
-    return found
-
-
-def check_binaries(
-    binaries: Iterable[tuple[str, Path | None]] | None = None, load: Callable[[Path], str] = load_elsewhere
-) -> Check:
-    """The vendors' own libraries with all that they need in turn."""
-    name = "vendor libraries"
-    problems, fine, packages, missing = [], [], [], []
-    is_damaged = False
-    for title, path in _binaries() if binaries is None else binaries:
-        if title == REALSENSE and path is None and is_installed():
-            continue  # an extra; the check of the camera names it where one is configured
-        problem = load(path) if path is not None else "is not installed"
-        if not problem:
-            fine.append(title)
-            continue
-        problems.append(f"{title}: {problem}")
-        needed = re.search(r"(lib[\w.+-]+?\.so[.\d]*): cannot open shared object", problem)
-        if needed and needed[1] in LIBRARIES:
-            packages.append(LIBRARIES[needed[1]])
-        elif needed and not list(Path(sys.prefix).rglob(f"{needed[1].partition('.so')[0]}*.so*")):
-            missing.append(needed[1])  # no Python package brings it: a library of the system
-        else:  # a damaged file, or one of an installed package
-            is_damaged = True
-    if not problems:
-        return Check(name, True, message("{a} can be loaded", a=", ".join(fine)))
-    install = f"sudo apt-get install --yes --no-install-recommends {' '.join(dict.fromkeys(packages))}"
-    search = [f"find and install the package of {library}: apt-file search {library}" for library in dict.fromkeys(missing)]
-    return Check(name, False, "; ".join(problems), " && ".join([install] * bool(packages) + [RENEW] * is_damaged + search))
-
-
-OF_THE_PROGRAM: tuple[Callable[[], Check], ...] = (check_python, check_packages, check_libraries, check_binaries)
+OF_THE_PROGRAM: tuple[Callable[[], Check], ...] = (check_python, check_packages, check_libraries)
 """Those that can be made where the rest of the program does not load."""
 
 

@@ -35,7 +35,6 @@ from hardware.preflight.checks import NOT_CONFIGURED, RENEW, Check, one_line
 from hardware.processes import holders
 from hardware.rig import RigKind, kind_of, real_camera
 
-_SEE_LIBRARIES = "see the vendor libraries in main.py doctor"
 _FIRST_FRAME_WITHIN_S, _WATCHED_S = 6.0, 1.5
 _FEWEST_FRAMES = 3
 _LEAST_RATE = 0.8
@@ -57,15 +56,10 @@ def check_camera(config: Config) -> Check:
     try:
         return kind.check(config.camera)
     except (ImportError, DeviceError) as error:
-        return Check("camera", False, one_line(error), _SEE_LIBRARIES)
+        return Check("camera", False, one_line(error), RENEW)
 
 
-def _safe_camera(config: Config) -> Camera:
-    camera_kind(config.rig.camera).check_library()
-    return real_camera(config)
-
-
-def check_picture(config: Config, make_camera: Callable[[Config], Camera] = _safe_camera, watched_s: float = _WATCHED_S) -> Check:
+def check_picture(config: Config, make_camera: Callable[[Config], Camera] = real_camera, watched_s: float = _WATCHED_S) -> Check:
     """A real camera is opened for a moment: it gives frames, at its rate, and they are neither black nor white nor blurred."""
     name = "picture"
     if kind_of(config.rig) is not RigKind.LIVE:
@@ -84,7 +78,7 @@ def check_picture(config: Config, make_camera: Callable[[Config], Camera] = _saf
         finally:
             camera.close()
     except ImportError as error:
-        return Check(name, False, one_line(error), _SEE_LIBRARIES)
+        return Check(name, False, one_line(error), RENEW)
     except DeviceError as error:
         return Check(name, False, one_line(error), "see the camera; close other programs that use it (fuser -v /dev/video*)")
     if len(frames) < _FEWEST_FRAMES:
@@ -180,7 +174,6 @@ def list_cameras() -> Check:
     lines = []
     for kind in CAMERA_KINDS.values():
         try:
-            kind.check_library()
             lines += [camera.title for camera in kind.find()]
         except (ImportError, DeviceError) as error:
             lines.append(f"{kind.title}: {one_line(error)}")

@@ -33,7 +33,6 @@ CHECKS: dict[str, tuple[Callable[[Config], Check], Level | None]] = {
     "python": (lambda config: checks.check_python(), None),
     "packages": (lambda config: checks.check_packages(), Level.BAD),
     "system libraries": (lambda config: checks.check_libraries(), None),
-    "vendor libraries": (lambda config: checks.check_binaries(), None),
     "display": (lambda config: checks.check_display(os.environ), None),
     "model": (lambda config: model_checks.check_model(config.perception.segmentation.model), Level.BAD),
     "self-test": (lambda config: model_checks.check_self_test(config.perception), Level.BAD),

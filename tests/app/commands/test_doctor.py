@@ -12,7 +12,6 @@ from app.commands.doctor import doctor
 from core.config.models import Config
 from core.config.rig_file import RigFileError
 from core.devices import UserError
-from hardware.preflight import checks as program
 from hardware.preflight.checks import Check
 from hardware.rig import RigKind, rig_config
 from tests.app.program import run, run_apart
@@ -67,22 +66,6 @@ def test_people_get_a_table_and_what_to_do(monkeypatch: pytest.MonkeyPatch, caps
     checks.pop()
     assert _exit_code(as_json=False) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "All is well."
-
-
-def test_an_opencv_that_ends_its_process_is_told_without_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    binaries = program._binaries()
-    (tmp_path / "cv2.so").write_bytes(b"\x7fELF but no more")
-    monkeypatch.setattr(program, "_binaries", lambda: [*binaries, (program.OPENCV, tmp_path / "cv2.so")])
-    monkeypatch.setattr("hardware.preflight.preflight.run_checks", None)
-    assert _exit_code(as_json=True) == 1
-    checks = json.loads(capsys.readouterr().out)["checks"]
-    assert [check["name"] for check in checks[:4]] == ["python", "packages", "system libraries", "vendor libraries"]
-    assert "OpenCV: " in checks[3]["detail"]
-    assert checks[4]["name"] == "all others"
-    assert "does not load: OpenCV: " in checks[4]["detail"]
-    assert checks[4]["fix"] == "make clean && make setup"
 
 
 def test_a_package_that_does_not_load_is_told_without_it(

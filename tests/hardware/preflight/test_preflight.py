@@ -100,51 +100,6 @@ def test_a_missing_library_is_one_command() -> None:
     _bad(checks.check_libraries(load), "missing: libxcb-cursor.so.0$", "sudo apt-get install .* libxcb-cursor0$")
 
 
-def test_vendor_libraries_are_really_loaded(tmp_path: Path) -> None:
-    broken = tmp_path / "libbroken.so"
-    broken.write_bytes(b"\x7fELF but no more")
-    check = checks.check_binaries([("OpenCV", broken), ("Qt", None)])
-    _bad(check, r"OpenCV: .*libbroken\.so.*; Qt: is not installed", "^make clean && make setup$")
-
-
-_RENEW, _SHAPE = "make clean && make setup", "libxcb-shape.so.0: cannot open shared object file"
-
-
-@pytest.mark.parametrize(
-    ("problems", "fix"),
-    [
-        ([_SHAPE], "^sudo apt-get install .* libxcb-shape0$"),
-        (["libQt6Core.so.6: cannot open shared object file"], f"^{_RENEW}$"),
-        (["loading it ends with a fault (SIGBUS)"], f"^{_RENEW}$"),
-        ([_SHAPE, "libQt6Core.so.6: cannot open shared object file"], f"^sudo apt-get install .* libxcb-shape0 && {_RENEW}$"),
-    ],
-)
-def test_what_a_vendor_library_lacks_is_one_command(problems: list[str], fix: str) -> None:
-    """A library of the system has its package; what an installed package brings is mended by a new venv."""
-    binaries = [(f"library {k}", Path(str(k))) for k in range(len(problems))]
-    _bad(checks.check_binaries(binaries, lambda path: problems[int(str(path))]), "library 0: l", fix)
-    _good(checks.check_binaries(binaries, lambda _: ""), "library 0.* can be loaded")
-
-
-def _cut_short(tmp_path: Path) -> Path:
-    """A library whose process dies of a bus error when it is loaded, as one does that a full disk has cut."""
-    package = metadata.distribution("pyrealsense2")
-    whole = next(file for file in package.files or [] if file.match("pyrealsense2/pyrealsense2*.so"))
-    cut = tmp_path / "pyrealsense2.so"
-    cut.write_bytes(Path(str(whole.locate())).read_bytes()[:200_000])
-    return cut
-
-
-def test_a_realsense_library_cut_short_ends_no_other_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    cut = _cut_short(tmp_path)
-    assert "SIGBUS" in checks.load_elsewhere(cut)
-    monkeypatch.setattr(checks, "_binaries", lambda: [("RealSense", cut)])
-    config = _rig(camera="realsense")
-    for check in (device_checks.check_camera(config), device_checks.check_picture(config)):
-        _bad(check, "library of RealSense cameras cannot be used: .*SIGBUS", "see the vendor libraries in main.py doctor")
-    _good(device_checks.list_cameras(), "RealSense: the library .*SIGBUS")
-
-
 def test_a_display(tmp_path: Path) -> None:
     def answers(display: str) -> bool:
         return display == ":5"
@@ -256,7 +211,6 @@ def plugged(monkeypatch: pytest.MonkeyPatch, dev: Path, sys_: Path) -> list[Real
     """The RealSense cameras that the library finds; there is nothing else."""
     found: list[RealSenseInfo] = []
     monkeypatch.setattr(realsense, "find_cameras", lambda: found)
-    monkeypatch.setattr("hardware.preflight.checks.load_problem", lambda _: "")
     return found
 
 
