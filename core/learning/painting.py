@@ -64,9 +64,9 @@ class Tube:
 XRAY = "xray"
 """The kind that is seen by absorption: no walls, lamps or colours."""
 TUBES = {
-    "clear": Tube(0.22, (0.0, 0.18), (1, 1), (0.15, 0.9), shades=0.55, refracts=0.6),
+    "clear": Tube(0.22, (0.0, 0.18), (1, 1), (0.05, 0.9), shades=0.55, refracts=0.6),
     "milky": Tube(0.20, (0.25, 0.92), (0, 1), veil_share=1.0, veil=(0, 0.55), shades=0.55, refracts=0.6),
-    "channel": Tube(0.17, (0.05, 0.6), (0, 1), (0.15, 0.9)),
+    "channel": Tube(0.17, (0.05, 0.6), (0, 1), (0.05, 0.9)),
     XRAY: Tube(0.16, (0, 0), (1, 1), (0, 0)),
     "solid": Tube(0.08, (0.7, 1), (0, 0), veil_share=1.0, veil=(0, 0.55)),
     "liquid": Tube(0.10, (0.15, 0.7), (0.3, 1), veil_share=1.0, veil=(0, 0.55), shades=0.55, refracts=0.6),
@@ -74,10 +74,16 @@ TUBES = {
 }
 WALL_STYLES = {"band": 0.35, "lines": 0.4, "inner": 0.25}
 """A wall of its own tone with an outer line; two lines; the inner line alone."""
+_CLEAR = 0.25
+"""Opacity below which a wall is a lens: the lumen seems to reach the outer line, and a label further in would lie at no edge."""
 PATTERNS = {"plain": 0.5, "rings": 0.2, "coil": 0.15, "bands": 0.15}
 """Share of the robots with each pattern. Rings may be near the tip alone; bands always are."""
 _REFLECTIONS = (0.25, 0.3, 0.2, 0.15, 0.1)
 """Share of the benches with 0, 1, ... bright lines along the tube, which a network may take for a robot."""
+_BESIDE_WALL, _UNBROKEN = 0.4, 0.4
+"""Share of these lines that lie at 0.55 to 0.95 of the radius, where a network may take them for the wall, and without gaps."""
+_RIMS = 0.4
+"""Share of the benches whose lumen is darker or brighter from 0.5 to 0.92 of the radius on: a round tube of liquid bends light."""
 _CLIPS = (0.7, 0.22, 0.08)
 """Share of the benches with 0, 1, ... clips over the tube."""
 _CABLES = 0.3
@@ -196,6 +202,8 @@ class PaintedBench:
             wall = np.clip(1 - (distance_px - wall_px), 0, 1) * (1 - self._surface.inside)
             self._under = _seen_through(rng, under, self._surface, look, wall)
             self._fill(rng, look)
+            if rng.random() < _RIMS:
+                self._under *= _rim(rng, self._surface)
             _paint_wall(rng, self._front, self._surface, wall, wall_px, _between(rng, look.wall))
             for _ in range(int(rng.choice(len(_REFLECTIONS), p=_REFLECTIONS))):
                 _paint_reflection(rng, self._front, self._surface)
@@ -339,24 +347,41 @@ def _paint_wall(rng: Generator, front: _Front, surface: _Surface, wall: F32, wal
         front.lay(np.minimum(np.exp(-away * away) * np.float32(strength) * side, 1), tone)
 
     if style == "band":
-        front.lay(np.minimum(wall * np.float32(strength * rng.uniform(0.3, 1)) * one_side, 1), color)
+        opacity = strength * rng.uniform(0.3, 1)
+        if opacity < _CLEAR:
+            wall_px = min(wall_px, 1.0)
+        else:
+            front.lay(np.minimum(wall * np.float32(opacity) * one_side, 1), color)
     if style != "inner":
         line(wall_px, one_side)
     if style != "band":
-        line(0.0, 2 - one_side)
+        line(0.0, np.maximum(2 - one_side, np.float32(0.4)))
+
+
+def _rim(rng: Generator, surface: _Surface) -> F32:
+    """Light (h, w) that is left of 1 or added to it beside the walls, with a sharp or soft inner edge, on both sides or on one."""
+    begins, soft = float(rng.uniform(0.5, 0.92)), float(rng.uniform(0.03, 0.3))
+    rim = np.clip((surface.ratio - begins) / soft, 0, 1) * surface.inside
+    if rng.random() < 0.5:
+        rim *= np.clip(0.5 + surface.lit * float(rng.choice((-1, 1))), 0, 1)
+    return np.asarray(1 + float(rng.uniform(-0.6, 0.5)) * rim, np.float32)
 
 
 def _paint_reflection(rng: Generator, front: _Front, surface: _Surface) -> None:
-    """A bright line along the tube, broken by random gaps: in the middle, or on the side towards or away from the lamp."""
+    """A bright line along the tube, often with gaps: in the middle, or beside a wall, on the side towards or away from the lamp."""
     at, width = float(rng.uniform(-0.9, 0.95)), float(rng.uniform(0.04, 0.16))
+    if rng.random() < _BESIDE_WALL:
+        at = float(rng.uniform(0.55, 0.95) * rng.choice((-1, 1)))
     away = (surface.ratio - np.float32(abs(at))) * np.float32(1 / width)
     line = np.exp(-away * away) * surface.inside
     if abs(at) > 0.12:
         line *= (surface.lit >= 0) == (at >= 0)
         line *= np.abs(surface.lit) ** np.float32(rng.uniform(0, 2))
-    gaps = smooth_noise(rng, surface.ratio.shape, rng.uniform(3, 14), rng.uniform(0.5, 3)) + np.float32(rng.uniform(-0.4, 1.2))
+    if rng.random() >= _UNBROKEN:
+        gaps = smooth_noise(rng, surface.ratio.shape, rng.uniform(3, 14), rng.uniform(0.5, 3)) + np.float32(rng.uniform(-0.4, 1.2))
+        line *= np.clip(gaps, 0, 1)
     color = 0.75 + 0.25 * random_color(rng, float(rng.beta(0.5, 6)))
-    front.lay(line * np.clip(gaps, 0, 1) * np.float32(rng.uniform(0.2, 1)), color)
+    front.lay(line * np.float32(rng.uniform(0.2, 1)), color)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,8 +1,11 @@
 """Painted benches: every kind is a picture, labels agree with the geometry, and only the robot and its shadow are new."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from core.learning import painting
 from core.learning.boards import BOARDS, lay_cable, paint_board, photographs, ramp, smooth_noise
 from core.learning.painting import PATTERNS, TUBES, PaintedBench, exposed
 from tests.core.learning.toy_scene import toy_scene
@@ -64,6 +67,21 @@ def test_every_tube_is_painted_and_repeats_with_its_seed(tube: str) -> None:
         away[20:76, :110] = False  # the robot and its shadow
         assert np.array_equal(pictures[0][:, away], pictures[1][:, away])
         assert not np.array_equal(pictures[0], pictures[1])
+
+
+def test_the_one_line_of_a_clear_wall_is_drawn_where_its_label_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(painting, "WALL_STYLES", {"band": 1.0})
+    monkeypatch.setattr(painting, "_UNEVEN_LIGHT", 0.0)
+    reach = []
+    for seed in range(8):
+        empty = []
+        for opacity in (0.0, 0.2):
+            monkeypatch.setitem(TUBES, "clear", replace(TUBES["clear"], wall=(opacity, opacity)))
+            empty.append(PaintedBench(np.random.default_rng(seed), SCENE.distance_px, SCENE.ratio, "clear").empty())
+        outside = (SCENE.distance_px > 0) & (np.abs(empty[1] - empty[0]).max(axis=0) > 0.02)
+        reach.append(float(SCENE.distance_px[outside].max(initial=0.0)))
+    assert max(reach) > 0
+    assert max(reach) < 3.5
 
 
 @pytest.mark.parametrize("pattern", PATTERNS)
