@@ -1,17 +1,15 @@
-"""``python -m tools.benchmarks window|player|recording|stream|follow``: pace of windows, costs, drift of followed lines."""
+"""``python -m tools.benchmarks window|recording|stream|follow``: pace of windows, costs, drift of followed lines."""
 
 from __future__ import annotations
 
-import json
 import math
-import multiprocessing
 import os
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 import psutil
 import typer
-from PySide6.QtCore import QEvent, QObject, QTimer
+from PySide6.QtCore import QObject, QTimer
 
 from app.commands.benchmark import print_figures, quantiles, stream_config, use_offscreen
 from app.commands.options import ConfigOption, JsonOption, ModelOption, PresetOption
@@ -29,30 +27,23 @@ from app.operator.manual_drive import REPEAT_MS
 from app.operator.rig_engine import EngineMaker, RigEngine, leaving_a_core
 from app.operator.startup import finish_loading, make_window
 from app.operator.window import OperatorWindow
-from app.player.window import PlayerWindow
 from app.ui.texts import OperatorStep
 from app.ui.window_base import make_application, quit_on_signal
 from core import geometry
 from core.annotation.follow import followed_lines
 from core.annotation.model import Annotation
-from core.config.models import Config, PerceptionConfig, PursuitConfig, TwinConfig, choose_model, load_config
+from core.config.models import PerceptionConfig, PursuitConfig, TwinConfig, choose_model, load_config
 from core.control.drive_view import DriveView
 from core.control.look_ahead import look_ahead
 from core.control.modes import DRIVING_MODES, Mode
 from core.control.motion import AT_REST, Jog
-from core.devices import UserError
 from core.evaluation.metrics import MIN_GROUPS, RESAMPLES
 from core.perception.centerline import plan_route
 from core.perception.pipeline import Pipeline, open_pipeline
 from core.perception.vectors import fit_robot_vector
-from core.session.codec import row_of
-from core.session.files import EncodedFrame, SessionFiles
 from core.session.live_output import FoxgloveServer, LiveOutput
 from core.session.manifest import about_rig
-from core.session.reader import SessionReader
-from core.session.video import FrameEncoder
 from core.session.writer import SessionWriter
-from core.system import begin_as_worker
 from core.types import Frame, Image, Point, Scene, Tick
 from hardware.rig import rig_config
 from hardware.twin.phantoms import make_phantom
@@ -253,99 +244,6 @@ def _step(engine: RigEngine, count: int, output: LiveOutput | None) -> list[floa
             if output is not None:
                 output.put(tick, pilot.view, engine.bus_status())
     return times
-
-
-_CYCLE = 300  # frames that are perceived and encoded; the session repeats them
-_SEEKS = 60
-_WAIT_S = 120.0
-
-
-def player(
-    minutes: Annotated[float, typer.Argument(min=0.5, max=600.0, help="length of the session")],
-    json: JsonOption = False,
-    model: ModelOption = None,
-    preset: PresetOption = None,
-    config: ConfigOption = None,
-) -> None:
-    """Open a session of so many minutes in the player and seek in it at random (offscreen when there is no display).
-
-    Seconds until the first picture is on the screen and until every row can be reached; from the wish to a row's picture; memory of
-    this process, which did not make the session.
-    """
-    use_offscreen(os.environ)
-    settings = load_config(config, preset, choose_model(model))
-    with tempfile.TemporaryDirectory(prefix="lumenpilot_benchmark_") as parent:
-        child = multiprocessing.get_context("spawn").Process(target=_make_session, args=(settings, minutes, parent))
-        child.start()
-        child.join()
-        if child.exitcode:
-            raise UserError(f"{parent}: the session could not be made (exit code {child.exitcode}); is the disk full?")
-        (folder,) = Path(parent).iterdir()
-        size_mb = sum(file.stat().st_size for file in folder.iterdir()) / 1e6
-        print_figures(_measure(folder, settings) | {"minutes": minutes, "size_mb": round(size_mb, 1)}, json, "player")
-
-
-def _make_session(config: Config, minutes: float, parent: str) -> None:
-    begin_as_worker()
-    pipeline, images = open_pipeline(config.perception), _stream_images()
-    height, width = images[0].shape[:2]
-    encoder = FrameEncoder((width, height), config.record)
-    cycle = []
-    for place in range(_CYCLE):
-        frame = Frame(place, place / FRAMES_PER_SECOND, images[place % len(images)])
-        tick = Tick(frame, pipeline(frame), None, None, None, 0, FRAMES_PER_SECOND)
-        packet = encoder.encode(frame.image, frame.captured_s, force_key=place == 0)
-        cycle.append((packet, row_of(tick, None)))
-    files = SessionFiles(Path(parent), about_rig(config, "SIM", "benchmark"), config.record, first_s=0.0, now_s=0.0)
-    for index in range(round(60.0 * minutes * FRAMES_PER_SECOND)):
-        packet, row = cycle[index % _CYCLE]
-        at_s = index / FRAMES_PER_SECOND
-        packet = replace(packet, pts_ms=round(1000.0 * at_s))
-        line = json.dumps(row | {"index": index, "captured_s": round(at_s, 6)}, allow_nan=False, separators=(",", ":"))
-        files.write_frame(EncodedFrame(at_s, packet, encoder, line))
-    problem = files.close("benchmark", 0)
-    encoder.close()
-    if problem:
-        raise SystemExit(problem)
-
-
-def _measure(folder: Path, config: Config) -> dict[str, Any]:
-    application = make_application()
-
-    def until(condition: Callable[[], bool]) -> float:
-        """Run the event loop until it is true; seconds that it took."""
-        began_s = time.monotonic()
-        while not condition():
-            if time.monotonic() - began_s > _WAIT_S:
-                raise UserError(f"the player did not show what was asked for within {_WAIT_S:.0f} s")
-            application.processEvents()
-            time.sleep(0.0005)
-        return time.monotonic() - began_s
-
-    began_s = time.monotonic()
-    with SessionReader(folder) as reader:
-        window = PlayerWindow(reader, config)
-        window.show()
-        window.start()
-        until(lambda: window.place >= 0)
-        opens_s = time.monotonic() - began_s
-        until(lambda: reader.wait(0.0) and len(window.course) == len(reader))
-        known_s = time.monotonic() - began_s
-        rng, seeks_ms = np.random.default_rng(0), []
-        for place in rng.integers(0, len(window.course), _SEEKS).tolist():
-            window.go(place)
-            seeks_ms.append(1000.0 * until(lambda wanted=place: window.place == wanted))  # type: ignore[misc]
-        rows, memory_mb = len(window.course), psutil.Process().memory_info().rss / 2**20
-        window.close()
-        window.deleteLater()
-        application.sendPostedEvents(window, QEvent.Type.DeferredDelete.value)
-    return {
-        "opens_s": round(opens_s, 2),
-        "known_s": round(known_s, 2),
-        "seek_ms": quantiles(seeks_ms),
-        "memory_mb": round(memory_mb, 1),
-        "rows": rows,
-    }
 
 
 _MOVE_S = 1.5
@@ -594,4 +492,4 @@ def _clip(seed: int, count: int) -> tuple[list[Image], list[Any]]:
 
 
 if __name__ == "__main__":
-    run_tool(window, player, recording, stream, follow)
+    run_tool(window, recording, stream, follow)
