@@ -78,22 +78,6 @@ def test_every_format_goes_out_and_comes_back(kind: str, image: FoundImage, tmp_
     assert not (tmp_path / "nothing").exists()
 
 
-@pytest.mark.parametrize("kind", [name for name, one in FORMATS.items() if one.write is not None])
-def test_images_of_one_name_are_told_apart(kind: str, tmp_path: Path) -> None:
-    images = []
-    for number, folder in enumerate(("monday", "tuesday")):
-        (tmp_path / folder).mkdir()
-        images.append(found_image(tmp_path / folder / "frame.png", f"{number}" * 64))
-    contents = [Annotation(masks=(VESSEL_BOX, piece)) for piece in (ROBOT_BOX, replace(ROBOT_BOX, points=VESSEL_BOX.points))]
-    answers = [stored(content, one.sha256) for content, one in zip(contents, images, strict=True)]
-    out = tmp_path / "out"
-    assert export_as(FORMATS[kind], answers, images, out) == 2
-    back, problems = read_files([out] if out.is_file() else sorted(out.rglob(f"*{FORMATS[kind].ending}")), images)
-    assert (kind == "imagej") == bool(problems), "only ImageJ's file does not say where its picture lies"
-    for one, content in zip(back, contents, strict=False):
-        assert np.array_equal(*(fill(part.masks, MaskTarget.ROBOT, SIZE) for part in (one.content, content)))
-
-
 def test_the_newest_lines_go_out_with_the_masks_that_count(image: FoundImage, tmp_path: Path) -> None:
     answers = [
         stored(replace(ALL, robot=VESSEL_LINE), rater="ben", changed="2026-01-02"),
@@ -288,14 +272,6 @@ def test_what_is_damaged_or_unknown_is_named(tmp_path: Path, image: FoundImage, 
     found, problems = read(tmp_path, image, content)
     assert found == []
     assert problems[0].startswith(line)
-
-
-def test_one_bad_shape_leaves_the_others(tmp_path: Path, image: FoundImage) -> None:
-    content = labelme()
-    content["shapes"].insert(0, {"label": "robot", "points": None})
-    (found,), problems = read(tmp_path, image, content)
-    assert np.array_equal(fill(found.masks, MaskTarget.VESSEL, SIZE), fill([VESSEL_BOX], MaskTarget.VESSEL, SIZE))
-    assert problems[0].startswith("shape 1 is damaged")
 
 
 def test_files_damaged_at_random_never_raise(tmp_path: Path, image: FoundImage) -> None:

@@ -5,7 +5,6 @@ import random
 import shutil
 import signal
 import sqlite3
-import sys
 import time
 from contextlib import closing
 from pathlib import Path
@@ -158,20 +157,6 @@ def test_a_study_keeps_its_settings(tmp_path: Path) -> None:
         store._database.execute("UPDATE studies SET settings = 'x'")
         with pytest.raises(AnnotationError, match="settings of study 'pilot' are damaged"):
             store.study_settings("pilot")
-
-
-@pytest.mark.skipif(os.name != "posix" or sys.platform == "darwin", reason="file names are Unicode there")
-def test_an_image_whose_name_is_no_utf_8_is_annotated_like_any_other(tmp_path: Path) -> None:
-    odd = tmp_path / os.fsdecode(b"aorta_\xe4.png")
-    write_png(tmp_path / "plain.png", np.full((48, 64, 3), 90, np.uint8))
-    (tmp_path / "plain.png").rename(odd)
-    with AnnotationStore(tmp_path / "a.sqlite") as store:
-        (found,), problems = find_images([odd], store)
-        assert (found.record.name, found.path, problems) == ("aorta_\\xe4.png", odd, [])
-        save(store, History(), DRAWN, ItemKey(found.sha256, "", "ann"))
-        assert find_images([odd], store)[0] == [found]
-        with pytest.raises(AnnotationError, match="cannot hold a name that is no UTF-8"):
-            save(store, History(), DRAWN, ItemKey(found.sha256, "", os.fsdecode(b"\xe4")))
 
 
 def test_a_renamed_image_finds_its_annotations_and_a_changed_one_is_another(tmp_path: Path) -> None:

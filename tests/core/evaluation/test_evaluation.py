@@ -115,15 +115,6 @@ def test_a_bad_table_is_one_clear_line(table, text: str, words: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_no_table(table, tmp_path: Path) -> None:
-    with pytest.raises(EvaluationError, match="no such file"):
-        read_measurements(tmp_path / "nowhere.csv")
-    with pytest.raises(EvaluationError, match="cannot be read"):
-        read_measurements(tmp_path)
-    with pytest.raises(EvaluationError, match="UTF-8"):
-        read_measurements(table(f"{HEADER}\nbär,1,2,B,3,B", "latin-1"))
-
-
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     rows = [
         Measurement('odd, "name"\nof two lines', 1.25, None, None, 0.1 + 0.2, "D"),
@@ -280,13 +271,6 @@ def test_the_papers_own_labels_equal_the_paper_and_do_not_better_it() -> None:
 )
 def test_a_verdict_counts_the_digits_that_the_paper_prints(kind, better, ours, paper, expected) -> None:
     assert verdict(kind, better, ours, paper) is expected
-
-
-def test_how_figures_are_written() -> None:
-    assert FigureFormat.PERCENT.write(39 / 44) == "88.6 %"
-    assert FigureFormat.DEGREES.write(-0.001) == "0.00°"
-    assert FigureFormat.COEFFICIENT.write(0.87) == "0.870"
-    assert FigureFormat.RATIO.write(None) == "–"
 
 
 def test_the_papers_shares_of_states() -> None:

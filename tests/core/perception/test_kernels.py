@@ -81,50 +81,11 @@ def test_a_map_is_read_as_opencv_reads_it_and_beyond_its_border_as_there(shape: 
     np.testing.assert_allclose(geometry.sample(mask, places), geometry.sample(mask.astype(np.float32), places), atol=1e-12)
 
 
-def test_places_that_are_no_number_are_read_at_the_border_and_end_nothing() -> None:
-    values = np.arange(12.0, dtype=np.float32).reshape(3, 4)
-    found = compiled.sample(values, np.array([np.nan, np.inf, -np.inf]), np.array([np.nan, 1.0, np.inf]))
-    assert found.tolist() == [0.0, 7.0, 8.0]
-
-
-def test_arrays_of_any_strides_and_such_as_are_not_to_be_written() -> None:
-    points = walk(3, 30)
-    fixed = points.copy()
-    fixed.setflags(write=False)
-    for same in (fixed, np.asfortranarray(points), np.repeat(points, 2, axis=0)[::2], points[::-1][::-1]):
-        np.testing.assert_array_equal(compiled.arc_length(same), compiled.arc_length(points))
-
-
-@pytest.mark.parametrize("points", [np.zeros((3, 2), np.float32), np.zeros((3, 2), np.int64), np.zeros(3)])
-def test_an_array_of_another_kind_is_a_type_error_and_compiles_nothing(points: np.ndarray) -> None:
-    with pytest.raises(TypeError):
-        compiled.arc_length(points)
-
-
 def test_every_kernel_is_compiled_before_it_is_called() -> None:
     compiled.load()
     kernels = [value for value in vars(compiled).values() if hasattr(value, "nopython_signatures")]
     assert len(kernels) > 20
     assert all(kernel.nopython_signatures and not kernel._can_compile for kernel in kernels)
-
-
-def test_kernels_compile_where_no_cache_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    from core.perception import kernels
-
-    def refuse(*_: object, **options: object) -> object:
-        if options.get("cache"):
-            raise RuntimeError("cannot cache function: no locator available")
-        return lambda function: function
-
-    monkeypatch.setattr(kernels, "_njit", refuse)
-    assert kernels.kernel((kernels.POINTS,))(len) is len
-
-
-def test_a_line_of_points_that_are_no_numbers_is_one_clear_error() -> None:
-    with pytest.raises(ValueError, match="no numbers"):
-        geometry.resample(np.array([[0.0, 0.0], [np.nan, 1.0]]), 2.0)
-    with pytest.raises(ValueError, match="steps of nothing"):
-        geometry.resample(np.array([[0.0, 0.0], [1.0, 1.0]]), 0.0)
 
 
 @settings(max_examples=80)

@@ -196,20 +196,6 @@ def test_a_shipped_models_files_are_those_of_its_manifest(manifest: Path) -> Non
     assert all(path.stat().st_size <= 12_000_000 for path in manifest.parent.iterdir() if path.is_file())
 
 
-def test_what_else_lies_in_a_models_folder_outlives_the_model(model: Path) -> None:
-    (model / "frames" / "images").mkdir(parents=True)
-    (model / "frames" / "images" / "a.png").write_bytes(b"drawn by hand")
-    (model / SECOND_LOOK).mkdir()
-    (model / SECOND_LOOK / "NOTES.md").write_text("mine")
-    with changed(model) as work:
-        write_figures(work, {"new": 1})
-    save_model(DualUNet(TINY).eval(), model, training={"steps": 1}, figures={})
-    assert read_model_info(model).training == {"steps": 1}
-    assert (model / "frames" / "images" / "a.png").read_bytes() == b"drawn by hand"
-    assert (model / SECOND_LOOK / "NOTES.md").read_text() == "mine"
-    assert [path.name for path in model.parent.iterdir()] == [model.name]
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of a file's size")
 def test_a_full_disk_is_one_clear_error_and_the_old_model_stays(model: Path) -> None:
     import resource
@@ -270,12 +256,6 @@ def test_a_new_model_is_on_the_disk_before_the_old_one_goes(model: Path, monkeyp
     assert done[done.index("moved") :] == ["moved", f"on disk: {model.parent.name}", "old one deleted"]
 
 
-def test_figures_that_cannot_be_stored_are_one_clear_error(model: Path) -> None:
-    (model / f".{INFO}.new").mkdir()
-    with pytest.raises(ModelError, match=r"model\.json: cannot be written .* copy the model"):
-        write_figures(model, {"robot_dice": 0.5})
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -293,21 +273,3 @@ def test_a_manifest_that_contradicts_itself_is_one_clear_error(model: Path, chan
     with pytest.raises(ModelError, match=said) as raised:
         open_segmenter(SegmentationConfig(model=str(model)))
     assert len(str(raised.value).splitlines()) == 1
-
-
-def test_a_network_of_other_planes_under_a_good_hash_is_one_clear_error(model: Path) -> None:
-    torch.manual_seed(3)
-    save_model(with_prior_planes(DualUNet(TINY).eval()), model.with_name("near"), training={}, figures={})
-    shutil.copyfile(model.with_name("near") / ONNX, model / ONNX)
-    info = json.loads((model / INFO).read_text())
-    (model / INFO).write_text(json.dumps(info | {"onnx_sha256": sha256_of(model / ONNX)}))
-    with pytest.raises(ModelError, match=r"is no network of model\.json's shape") as raised:
-        OpenVinoSegmenter(model, 1)(np.zeros((64, 64, 3), np.uint8))
-    assert len(str(raised.value).splitlines()) == 1
-
-
-def test_a_link_that_leads_to_itself_is_one_clear_error(tmp_path: Path) -> None:
-    (tmp_path / "loop").symlink_to(tmp_path / "loop")
-    with pytest.raises(ModelError, match="leads nowhere but to itself; choose another folder"):
-        save_model(DualUNet(TINY).eval(), tmp_path / "loop", training={}, figures={})
-    assert (tmp_path / "loop").is_symlink()

@@ -1,7 +1,6 @@
 """What kind of pictures a model knows: signatures by hand, a fit that holds for new pictures, and the refusal of others."""
 
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from core.evaluation.confidence import (
     signatures_in,
 )
 from core.learning.dataset import DatasetError, write_png
-from core.learning.model_writer import save_model, save_with_second_look, write_calibration
+from core.learning.model_writer import save_model, write_calibration
 from core.perception.inference import OpenVinoSegmenter, TorchSegmenter
 from core.perception.model_file import INFO, MODELS, ModelError, read_model_info
 from core.perception.out_of_distribution import OutOfDistributionReference, signature_of
@@ -29,7 +28,7 @@ from core.perception.pipeline import CalibratedSegmenter, Pipeline, open_calibra
 from core.perception.quality import ConfidenceCalibration, ConfidenceFeatures
 from core.perception.segmentation import OrientationAverage, Segmentation, Segmenter
 from core.perception.tip_refinement import TipRefinement
-from core.perception.unet import DualUNet, UNetShape, with_prior_planes
+from core.perception.unet import DualUNet, UNetShape
 from core.types import Frame, Image, Reason, Refusal
 from hardware.twin.phantoms import PHANTOM_NAMES
 from hardware.twin.world import TwinWorld
@@ -110,11 +109,6 @@ def test_another_folder_of_one_rig_does_not_open_the_door_to_everything(count: i
     assert (familiarity.distance(known(200, seed=2) + rig) / familiarity.limit > 1.0).mean() < 0.1, "it is known"
     rig[5], rig[7] = 0.0, 6.0
     assert (familiarity.distance(known(200, seed=2) + rig) / familiarity.limit > 1.0).mean() > 0.9, "others are not"
-
-
-def test_pictures_that_are_all_the_same_are_said() -> None:
-    with pytest.raises(OutOfDistributionError, match="all pictures are the same"):
-        fitted(np.ones((50, 24), np.float32))
 
 
 def test_known_pictures_are_grouped_by_their_seed_or_by_their_place(tmp_path: Path) -> None:
@@ -327,22 +321,6 @@ def test_of_another_network_it_is_refused(model: Path, tmp_path: Path) -> None:
         (tmp_path / "wider" / INFO).write_text(json.dumps(values))
         with pytest.raises(ModelError, match="familiarity is of another network"):
             read_model_info(tmp_path / "wider")
-
-
-@pytest.mark.slow
-def test_it_stays_with_a_new_second_look_and_goes_with_a_new_network(model: Path, tmp_path: Path) -> None:
-    base = Path(shutil.copytree(model, tmp_path / "base"))
-    seen = np.array([OpenVinoSegmenter(base, 1).segment_signed([image])[0][2] for image in pictures(LEAST)])
-    names = ConfidenceFeatures.names()
-    zeros = (0.0,) * len(names)
-    calibration = ConfidenceCalibration(features=names, mean=zeros, scale=(1.0,) * len(names), weights=zeros, offset=0.0)
-    write_calibration(base, calibration, familiarity=fitted(seen))
-    save_with_second_look(base, with_prior_planes(DualUNet(SHAPE)), tmp_path / "near", training={}, figures={})
-    near = read_model_info(tmp_path / "near")
-    assert near.calibration is None
-    assert near.familiarity == read_model_info(base).familiarity is not None
-    save_model(DualUNet(SHAPE), tmp_path / "near", training={}, figures={})
-    assert read_model_info(tmp_path / "near").familiarity is None
 
 
 def test_the_shipped_model_knows_the_twin_on_every_engine() -> None:

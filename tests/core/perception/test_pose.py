@@ -172,12 +172,6 @@ def test_an_odd_frame_among_contradictions_does_not_keep_the_old_state() -> None
     assert states([INSIDE, AWAY, INSIDE, AWAY, AWAY, AWAY]) == "AAAACC"
 
 
-@pytest.mark.parametrize("frame_s", [1 / 60, 1 / 30, 1 / 20, 0.1])
-def test_an_odd_frame_among_agreements_changes_nothing(frame_s: float) -> None:
-    assert states([INSIDE, INSIDE, AWAY, INSIDE, INSIDE] * 8, frame_s) == "A" * 40
-    assert states([INSIDE, AWAY] * 20, frame_s) == "A" * 40, "nor does a state that flickers from frame to frame"
-
-
 def test_frames_that_come_unevenly_count_by_their_time() -> None:
     steady = StateFilter(CONFIG)
     told = [steady.update(one, at_s) for one, at_s in [(INSIDE, 0.0), (AWAY, 0.03), (AWAY, 0.04), (AWAY, 0.05), (AWAY, 0.13)]]
@@ -201,14 +195,6 @@ def test_noise_within_the_band_does_not_change_the_state() -> None:
 
 def test_a_frame_without_pose_shows_no_state_and_forgets() -> None:
     assert states([pose(2, 2, 2), None, pose(20, 10, 30)]) == "A-C"
-
-
-def test_settings_that_count_frames_are_understood() -> None:
-    """Sessions keep the settings that they were recorded with."""
-    assert PoseConfig.model_validate({"dwell_frames": 6}).dwell_s == 0.2
-    assert PoseConfig.model_validate({"dwell_frames": 6, "dwell_s": 0.3}).dwell_s == 0.3
-    with pytest.raises(ValueError, match="dwell_frames"):
-        PoseConfig.model_validate({"dwell_frames": "many"})
 
 
 def test_the_filter_never_shows_a_state_that_no_frame_had() -> None:

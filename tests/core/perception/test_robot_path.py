@@ -304,37 +304,6 @@ def test_too_little_to_be_a_robot() -> None:
     assert reason_of(blob) is Reason.NO_ROBOT
 
 
-def test_a_closed_ring_shows_no_end() -> None:
-    robot = np.zeros((SIZE[1], SIZE[0]), np.float32)
-    cv2.circle(robot, (320, 240), 80, 1.0, 7)
-    assert reason_of(robot) is Reason.AMBIGUOUS_PATH
-
-
-def mesh(pitch_px: int, until_px: int = 640) -> np.ndarray:
-    robot = np.zeros((SIZE[1], SIZE[0]), np.float32)
-    for x in range(pitch_px // 2, until_px, pitch_px):
-        cv2.line(robot, (x, 0), (x, SIZE[1]), 1.0, 5)
-    for y in range(pitch_px // 2, SIZE[1], pitch_px):
-        cv2.line(robot, (0, y), (until_px, y), 1.0, 5)
-    return robot
-
-
-def test_a_mesh_is_not_searched_for_a_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot_path, "explore", lambda *_: pytest.fail("searched"))
-    refusal = perceive(mesh(60))
-    assert refusal.reason is Reason.AMBIGUOUS_PATH
-    assert "mesh" in refusal.detail
-
-
-@pytest.mark.parametrize("size", [(640, 360), (360, 640), (640, 64), (131, 640)])
-def test_any_aspect(size: tuple[int, int]) -> None:
-    length = max(size) * 0.6
-    middle = (min(size) - 1) / 2
-    line = np.array([[-10.0, middle], [length, middle]]) if size[0] > size[1] else np.array([[middle, -10.0], [middle, length]])
-    path = path_of(probability(depth(line, 4.0, size)), vessel=everywhere(size))
-    assert path.head == pytest.approx(tuple(line[-1]), abs=0.5)
-
-
 def test_the_papers_form_is_reached_by_configuration() -> None:
     paper = load_config(preset="paper").perception
     assert paper.path.cosine == "absolute"
@@ -386,7 +355,6 @@ def test_in_a_stream_a_wrong_head_beside_the_border_is_mended_when_it_shows_to_b
     assert path.head[0] == pytest.approx(300.0, abs=2.0)
 
 
-STRAIGHT = np.column_stack([np.arange(101.0), np.zeros(101)])
 CORNER = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]])
 HAIRPIN = np.array([[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [10.0, 0.0], [0.0, 0.0]])
 

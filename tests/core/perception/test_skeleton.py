@@ -142,14 +142,6 @@ def test_the_papers_form_leaves_the_ends_as_thinning_made_them() -> None:
     assert np.argwhere(ours)[:, 1].max() > np.argwhere(literal)[:, 1].max()
 
 
-def test_empty_masks_have_empty_skeletons() -> None:
-    nothing = np.zeros((48, 64), np.float32)
-    skeletons = thin_masks(masks_of(nothing, nothing), PerceptionConfig())
-    assert not skeletons.vessel.any()
-    assert not skeletons.robot.any()
-    assert skeletons.bridges == ()
-
-
 LITERAL = GapConfig(rule="every_pair", gap_threshold_px=8.0)
 
 
@@ -233,20 +225,6 @@ def test_two_pieces_side_by_side_are_two_strands_not_a_gap() -> None:
 def test_a_step_of_a_few_px_between_two_strands_of_one_direction_is_a_gap() -> None:
     torn = rows((20, 10, 60), (25, 64, 120))
     assert len(repaired(torn, GapConfig(max_turn_deg=30.0)).bridges) == 1
-
-
-def test_nothing_to_repair_gives_the_same_skeletons() -> None:
-    whole = Skeletons(np.zeros((60, 160), bool), rows((30, 10, 120)))
-    assert repair(whole, GapConfig()) is whole
-    empty = Skeletons(np.zeros((60, 160), bool), np.zeros((60, 160), bool))
-    assert repair(empty, GapConfig()) is empty
-
-
-def test_the_input_is_not_written_to() -> None:
-    broken = rows((30, 10, 50), (30, 60, 120))
-    before = broken.copy()
-    assert len(repaired(broken, GapConfig()).bridges) == 1
-    assert (broken == before).all()
 
 
 def test_a_line_is_one_chain_between_two_ends() -> None:

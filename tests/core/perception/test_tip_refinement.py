@@ -154,16 +154,6 @@ def test_the_second_look_fades_out_at_its_edges_but_not_at_the_pictures() -> Non
     assert column[height] == pytest.approx(0.25)
 
 
-def test_small_and_empty_pictures_are_no_trouble() -> None:
-    class Small(First):
-        def __call__(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return np.zeros(image.shape[:2], np.float32), np.zeros(image.shape[:2], np.float32)
-
-    vessel, robot = TipRefinement(Small(bar(0, 1)), Near())(np.zeros((60, 90, 3), np.uint8))
-    assert vessel.shape == robot.shape == (60, 90)
-    assert not robot.any()
-
-
 # ---- its network
 
 
@@ -238,20 +228,6 @@ def test_half_of_the_windows_show_what_the_second_look_mended(tmp_path: Path) ->
     assert 8 < mended < 32, "half of the windows come with what was seen in the end"
 
 
-def test_focused_windows_show_what_was_wrong(tmp_path: Path) -> None:
-    """Two frames, one of them understood: with focus, the piece that was missed in the other is in nearly every window."""
-    samples = _samples(tmp_path)
-    looks = [PriorViews.at(samples[0], sees(bar(0, 250))), PriorViews.at(samples[1], sees(bar(0, 200)))]
-    assert looks[0].wrong == () and looks[1].wrong
-
-    def missed_shown(focus: float) -> int:
-        crops = TipCrops(samples, looks, TrainingPlan(steps=50, batch=4, look_share=0.0, focus_share=focus))
-        shown = (tuple(part.numpy() for part in crops[index]) for index in range(100))
-        return sum(bool(((target[1] > 0) & (planes[4] < 128)).any()) for planes, target in shown)
-
-    assert missed_shown(0.9) > 80 > missed_shown(0.0)
-
-
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("models") / "near"
@@ -319,12 +295,6 @@ def test_later_looks_are_through_windows_beside_each_other_and_the_mean_counts()
     assert np.abs(begins[2:] - [[14, 10], [-14, -10]]).max() <= 4
     assert vessel[240, 298] == pytest.approx((0.8 + 3 * 0.4) / 4, abs=0.01)
     assert segmenter.engine == "drawn, second look 4 times"
-
-
-@pytest.mark.parametrize("looks", [0, MAX_PASSES + 1])
-def test_more_looks_than_there_are_windows_for_are_refused(looks: int) -> None:
-    with pytest.raises(ValueError, match=f"1 to {MAX_PASSES} times, not {looks}"):
-        TipRefinement(First(bar(0, 300)), Near(), passes=looks)
 
 
 @pytest.mark.parametrize("device", ["openvino", "torch"])

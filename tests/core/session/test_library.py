@@ -3,10 +3,8 @@
 import json
 from pathlib import Path
 
-import pytest
-
 from core.session.library import Cached, SummaryCache, find_sessions, first_summary, signature_of, whole_summary
-from core.session.manifest import MANIFEST, Description, Event, EventKind, SessionError, write_description
+from core.session.manifest import MANIFEST, Description, Event, EventKind, write_description
 from core.session.reader import SessionReader
 from core.session.writer import SessionWriter
 from core.types import PoseState
@@ -68,13 +66,6 @@ def test_a_session_that_is_being_recorded_is_no_broken_one(tmp_path: Path) -> No
     assert writer.close()
     after = first_summary(session)
     assert (after.is_recording, after.problem, after.description.operator) == (False, "", "Ana")
-
-
-def test_a_folder_that_is_not_there_holds_nothing_and_a_file_is_no_folder(tmp_path: Path) -> None:
-    assert find_sessions(tmp_path / "not yet") == []
-    (tmp_path / "file").touch()
-    with pytest.raises(SessionError, match=r"cannot be read \(Not a directory\); choose another folder"):
-        find_sessions(tmp_path / "file")
 
 
 def test_the_cache_is_kept_and_nothing_depends_on_it(tmp_path: Path) -> None:

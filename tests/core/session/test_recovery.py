@@ -19,7 +19,7 @@ import av
 import pytest
 
 from core.session import recovery
-from core.session.files import SessionFiles, add_event, lines_of
+from core.session.files import add_event, lines_of
 from core.session.manifest import EVENTS, Event, EventKind, SessionError, read_manifest
 from core.session.reader import SessionReader
 from core.session.recovery import Recovery, expected_loss, find_cut_sessions, recover
@@ -314,12 +314,6 @@ def test_a_disk_that_cannot_be_read_any_further_costs_only_what_comes_after(sess
     assert done.loss.problems == ("frames.jsonl: cannot be read further (Input/output error)",)
 
 
-def test_a_session_is_called_by_its_own_name_however_it_is_given(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (session / "evaluation").mkdir()
-    monkeypatch.chdir(session / "evaluation")
-    assert recover(Path("..")).folder == session.with_name(f"{session.name}_recovered")
-
-
 def test_a_picture_that_is_lost_with_its_row_takes_along_what_builds_on_it(session: Path) -> None:
     lost = COUNT // 2
     path = session / "frames.jsonl"
@@ -354,14 +348,6 @@ def test_a_session_with_nothing_left_says_so_and_leaves_no_half_copy(session: Pa
     with pytest.raises(SessionError, match="nothing left to recover"):
         recover(session)
     assert [path.name for path in session.parent.iterdir()] == [session.name]
-
-
-def test_an_empty_session_is_not_offered(tmp_path: Path) -> None:
-    files = SessionFiles(tmp_path, ABOUT, QUICK, first_s=0.0, now_s=0.0)
-    files.close("never began", 0)
-    set_open(files.folder)
-    assert find_cut_sessions(tmp_path) == ()
-    assert find_cut_sessions(tmp_path / "no folder") == ()
 
 
 # --- damage at random
@@ -477,17 +463,6 @@ def test_a_note_that_finds_no_room_leaves_nothing_of_itself(session: Path) -> No
     with short_of_room(session), pytest.raises(SessionError, match="the note was not kept"):
         add_event(session, Event(1001.0, EventKind.NOTE, "the tip touched the wall here"))
     assert (session / EVENTS).read_bytes() == before
-
-
-def test_lines_of_gives_places_by_which_a_line_can_be_read_again(tmp_path: Path) -> None:
-    path = tmp_path / "x.jsonl"
-    path.write_bytes(b'{"a":1}\n\n   \n{"b":2}\n{"c"')
-    found = list(lines_of(path))
-    assert [(line.number, line.offset, line.data, line.is_cut) for line in found] == [
-        (1, 0, b'{"a":1}', False),
-        (4, 13, b'{"b":2}', False),
-        (5, 21, b'{"c"', True),
-    ]
 
 
 def test_a_copy_that_cannot_be_written_is_one_line(session: Path, tmp_path: Path) -> None:
