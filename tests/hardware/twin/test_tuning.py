@@ -10,7 +10,7 @@ import pytest
 from core.config.models import Config, PursuitConfig
 from hardware.twin.rehearsal import RehearsalPlan
 from hardware.twin.trial import TrialPlan
-from hardware.twin.tuning import SEARCH_RUNS, SEARCH_SEEDS, SETTINGS, Task, candidates, compared, rank, search
+from hardware.twin.tuning import CALM, SEARCH_RUNS, SEARCH_SEEDS, SETTINGS, Task, candidates, compared, rank, search
 
 
 def row(seed: int, *, reached: bool = True, time_s: float = 10.0, force_n: float = 0.1) -> dict[str, Any]:
@@ -26,6 +26,8 @@ def test_candidates_are_the_configured_settings_and_others_that_are_valid() -> N
     for one in others:
         PursuitConfig.model_validate(PursuitConfig().model_dump() | one)
         assert all(low <= one[name] <= high for name, (low, high) in SETTINGS.items())
+    for calm, (gain, more_s) in zip(others, CALM, strict=False):
+        assert (calm["gain"], calm["look_ahead_s"]) == pytest.approx((own["gain"] * gain, own["look_ahead_s"] + more_s))
     assert candidates(PursuitConfig(), 12, 1) == [own, *others] != candidates(PursuitConfig(), 12, 2)
 
 
@@ -78,6 +80,12 @@ def test_better_is_what_is_surely_better_and_nowhere_worse(change: dict[str, Any
     found = compared(before, after)
     assert found["is_better"] is is_better
     assert found["time"]["low"] <= found["time"]["change"] <= found["time"]["high"]
+
+
+def test_a_force_that_is_hardly_there_does_not_stand_against_a_shorter_time() -> None:
+    before = [row(seed, time_s=10.0 + 0.1 * seed, force_n=0.0002) for seed in range(30)]
+    after = [row(seed, time_s=8.0 + 0.1 * seed, force_n=0.00025) for seed in range(30)]
+    assert compared(before, after)["is_better"]
 
 
 @pytest.mark.parametrize(("force_n", "is_better"), [(0.1, True), (0.2, False)])
