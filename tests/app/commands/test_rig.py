@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from app import cli
-from app.commands.rig import calibrate_rig
+from app.commands.rig import behaviour_lines, calibrate_rig
 from app.rig_wizard.board_print import BoardPrintError, paper_for
 from core.calibration.camera import BoardError, BoardSpec, BoardView, find_board
 from core.config.calibration import BehaviourConfig, CalibrationConfig, Estimate, ScaleConfig
@@ -83,7 +83,9 @@ def test_what_was_identified_is_kept_where_it_was_asked_for(identified: Path) ->
     assert behaviour is not None and behaviour.head_p95_mm == 0.5
     assert make_rig(with_rig(load_config(), find_rig("bench 1")[1], path), "bench 1", None).behaviour == behaviour
     shown = _run("show", "bench 1")
-    assert "play:                   1.000 mm (0.900 to 1.100)" in shown and "0.50 (95 %)" in shown
+    assert "play:                   1.000 mm (0.900 to 1.100)" in shown and "0.50 (95 %)" in shown and "another jog" not in shown
+    doubtful = behaviour.model_copy(update={"head_p95_mm": 5.7})
+    assert "above 1.5 mm some of this is wrong" in behaviour_lines(doubtful, load_config().servos)[-1]
 
 
 def test_a_rig_is_shown() -> None:
