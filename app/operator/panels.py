@@ -138,7 +138,7 @@ class OperatorPanels(ScenePanels):
             self.jog.show_status(status_by_servos(bus, self._servo_config))
         self.servos.show_status(bus, self._servo_config, now_s)
         self.commands.show_view(view, bus)
-        for event in self._gate.since_last(bus) if bus is not None else ():
+        for event in self._gate.since_last(bus, self._servo_config) if bus is not None else ():
             self.events.add(LogKind.GATE, event.text, event.key, event.times)
 
     def show_alerts(self, alerts: tuple[Alert, ...]) -> None:

@@ -18,6 +18,7 @@ from app.ui.workers import Pace
 from app.widgets.basics import card_note, column
 from app.widgets.painting import NONE, PaintedWidget, draw_bar, draw_text, draw_track, number, polygon, set_colours
 from app.widgets.servo_table import TONE_ROLE, Cell, Tone
+from core.config.safety import ServosConfig
 from core.control.drive_view import DriveView
 from core.control.gate import RejectReason, Source
 from core.types import Command
@@ -146,9 +147,9 @@ class GateEvents:
         self._rejections: dict[RejectReason, int] = {}
         self._waiting: dict[Hashable, GateEvent] = {}
 
-    def since_last(self, status: BusStatus) -> list[GateEvent]:
+    def since_last(self, status: BusStatus, servos: ServosConfig) -> list[GateEvent]:
         """What is to be told now: nothing more than five times a second."""
-        for event in self._found(status):
+        for event in self._found(status, servos):
             times = event.times + (self._waiting[event.key].times if event.key in self._waiting else 0)
             self._waiting[event.key] = replace(event, times=times)
         if not self._waiting or not self._pace.due():
@@ -156,14 +157,16 @@ class GateEvents:
         told, self._waiting = list(self._waiting.values()), {}
         return told
 
-    def _found(self, status: BusStatus) -> list[GateEvent]:
+    def _found(self, status: BusStatus, servos: ServosConfig) -> list[GateEvent]:
         if self._cycle is None or status.cycle < self._cycle:  # the first of a bus process: what it counted before is no news
             self._rejections = dict(status.rejections)
         elif status.cycle == self._cycle:
             return []
         self._cycle, found = status.cycle, []
+        units = {joint.name: joint.unit for joint in servos.joints}
         for clamp in status.clamps:
-            change = f"{number(clamp.asked_mm, 2)} \N{RIGHTWARDS ARROW} {number(clamp.allowed_mm, 2)} mm"
+            unit = " mm" if (unit := units.get(clamp.joint, "mm")) == "mm" else unit
+            change = f"{number(clamp.asked_mm, 2)} \N{RIGHTWARDS ARROW} {number(clamp.allowed_mm, 2)}{unit}"
             text = f"{joint_title(clamp.joint)}: {change}, {tr_text(clamp.limit.value)}"
             found.append(GateEvent((clamp.joint, clamp.limit), text))
         for joint in status.at_end:

@@ -14,6 +14,7 @@ from core.types import Advice, Command, Speed
 from tests.app.bus_status import MINUS, bus
 from tests.app.hand_clock import Clock
 from tests.app.widgets.conftest import Own
+from tests.core.robots import TURNED
 
 
 def clamp(joint: str = "right", asked_mm: float = 1.2, allowed_mm: float = 0.8, limit: Limit = Limit.RATE) -> Clamp:
@@ -34,6 +35,7 @@ SEEN = Rejection(STALE, "182 ms (at most 150 ms)")
                 (f"delivery 1: {MINUS}3.00 → {MINUS}2.90 mm, step from the measured position", 1),
             ],
         ),
+        ([{"clamps": (clamp("rotation", -7.17, -6.45),)}], [(f"rotation: {MINUS}7.17 → {MINUS}6.45°, speed", 1)]),
         ([{"cycle": 7, "clamps": (clamp(),)}] * 3, [("right: 1.20 → 0.80 mm, speed", 1)]),
         ([{"rejections": {STALE: 4}}], []),
         (
@@ -54,14 +56,23 @@ SEEN = Rejection(STALE, "182 ms (at most 150 ms)")
         ),
         ([{"at_end": ("advance",)}], [("advance: stopped at the end of its envelope", 1)]),
     ],
-    ids=["in their order", "a cycle once", "counted before", "between cycles", "rest", "new bus process", "end of envelope"],
+    ids=[
+        "in their order",
+        "degrees",
+        "a cycle once",
+        "counted before",
+        "between cycles",
+        "rest",
+        "new bus process",
+        "end of envelope",
+    ],
 )
 def test_what_the_gate_limited_and_rejected(statuses: list[dict[str, object]], entries: list[tuple[str, int]]) -> None:
     clock = Clock()
     gate, found = GateEvents(clock), []
     for cycle, changes in enumerate(statuses, start=1):
         clock.now_s += 1.0
-        found += gate.since_last(bus(**{"cycle": cycle, **changes}))
+        found += gate.since_last(bus(**{"cycle": cycle, **changes}), TURNED)
     assert [(event.text, event.times) for event in found] == entries
 
 
