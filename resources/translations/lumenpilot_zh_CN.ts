@@ -8778,11 +8778,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../hardware/cameras/registry.py"/>
-        <source>the library of RealSense cameras cannot be used: {problem}</source>
-        <translation>无法使用 RealSense 相机的库：{problem}</translation>
-    </message>
-    <message>
-        <location filename="../../hardware/cameras/registry.py"/>
         <source>RealSense cameras need the package pyrealsense2</source>
         <translation>RealSense 相机需要软件包 pyrealsense2</translation>
     </message>
@@ -9673,11 +9668,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>vendor libraries</source>
-        <translation>厂商库</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
         <source>display</source>
         <translation>显示</translation>
     </message>
@@ -9815,11 +9805,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/ui/i18n.py"/>
         <source>see the servo port</source>
         <translation>见“舵机端口”</translation>
-    </message>
-    <message>
-        <location filename="../../app/ui/i18n.py"/>
-        <source>see the vendor libraries in main.py doctor</source>
-        <translation>请查看 main.py doctor 中的厂商库检查</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
@@ -12153,8 +12138,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>path of the video, folder, or RealSense recording (.bag)</source>
-        <translation>视频、文件夹或 RealSense 录制（.bag）的路径</translation>
+        <source>path of the video or folder</source>
+        <translation>视频或文件夹的路径</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
