@@ -76,7 +76,7 @@ def test_a_session_is_not_replayed_into_itself(tmp_path: Path) -> None:
 
 
 def test_a_replay_writes_no_file_twice_and_none_over_its_configuration(tmp_path: Path) -> None:
-    for name in ("replay.json", "changes.jsonl", "replay.svg", "replay.pdf"):
+    for name in ("replay.json", "changes.jsonl"):
         with pytest.raises(UserError, match=f"{name}: is written by --out, too; choose another file for --jsonl"):
             call("replay", GOLDEN, "--out", tmp_path / "new", "--jsonl", tmp_path / "new" / name)
     (tmp_path / "own.toml").write_text("")
