@@ -130,14 +130,20 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     mask = _robot_parts(strong, strong > cut, high)
     mask = _with_ends(mask, strong, cut, high)
     mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0
+    shadow = np.zeros(image.shape[:2], np.bool_)
+    shadow[box] = _shadow_beside(mask, image[box], view.lab[box])
+    mask = (
+        np.asarray(cv2.morphologyEx((mask & ~shadow[box]).view(np.uint8), cv2.MORPH_OPEN, _disc(3)) > 0) if shadow.any() else mask
+    )
     values = np.clip(strong / (2.0 * cut), 0.0, 1.0)
+    values[shadow[box]] = 0.0
     evidence[box] = values
     around = cv2.dilate(mask.view(np.uint8), _disc(5)) > 0
     probability[box] = np.where(mask, np.maximum(values, 0.6), np.where(around, np.minimum(values, 0.49), 0.0))
     if view.window is None:
         _continue_to_border(probability, view.reachable)
     rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
-    doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim | unusable
+    doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim & ~shadow | unusable
     return Difference(probability, evidence, doubtful, unusable, is_noisy)
 
 
@@ -197,10 +203,9 @@ def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> M
 
 def _with_ends(mask: Mask, strong: NDArray[np.float32], cut: NDArray[np.float32], high: float) -> Mask:
     """The robot's `mask` (h, w) with ends of another colour, which differ less than its body; `cut` is lowered there, in place."""
-    depth = cv2.distanceTransform(mask.view(np.uint8), cv2.DIST_L2, 3)
     if not mask.any():
         return mask
-    width = 4.0 * float(depth[mask].mean())  # a strip's mean depth is a quarter of its width
+    width = _width_px(mask)
     body = cv2.dilate(mask.view(np.uint8), _disc(2 * _END_RIM_PX + 1)) > 0
     around = cv2.dilate(mask.view(np.uint8), _square(2 * round(_END_REACH * width) + 1)) > 0
     rest = np.where(around & ~body, strong, np.float32(0.0))
@@ -243,6 +248,54 @@ _END_EDGE = 0.5
 """An end's edge lies at this share of its own contrast."""
 _END_BESIDE = 0.15
 """Most of the surroundings of an end that is body: beside the body, where its shadow lies, it is more."""
+
+
+def _shadow_beside(mask: Mask, image: Image, empty: Image) -> Mask:
+    """What of the robot's `mask` (h, w) is the shadow that it casts along all of its length in a lamp's light.
+
+    In a shadow the bench is seen darker, in its own colours. A robot that may itself be that dark is left as it is: nothing but
+    rims would be left of it.
+
+    Parameters
+    ----------
+    empty : the bench, (h, w, 3) in Lab of 8 bits.
+    """
+    shadow = np.zeros(mask.shape, np.bool_)
+    if not mask.any():
+        return shadow
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+    box = np.s_[y : y + height, x : x + width]
+    robot = mask[box]
+    seen, there = (cv2.medianBlur(np.ascontiguousarray(lab), 5).astype(np.float32) for lab in (lab_of(image[box]), empty[box]))
+    share = (seen[..., 0] + np.float32(_LAB_BLACK)) / (there[..., 0] + np.float32(_LAB_BLACK))
+    colours = seen[..., 1:] - 128.0 - share[..., None] * (there[..., 1:] - 128.0)
+    darker = robot & (share > _SHADOW_SHARE[0]) & (share < _SHADOW_SHARE[1]) & (np.square(colours).sum(axis=2) < _SHADOW_COLOR**2)
+    area, across = np.count_nonzero(robot), _width_px(robot)
+    if np.count_nonzero(darker) < _SHADOW_LEAST * area:
+        return shadow
+    wide = cv2.morphologyEx(darker.view(np.uint8), cv2.MORPH_OPEN, _disc(max(3, 2 * round(_SHADOW_RIM * across) + 1))) > 0
+    rest = cv2.morphologyEx((robot & ~wide).view(np.uint8), cv2.MORPH_OPEN, _disc(3))
+    beside = cv2.dilate(rest, _square(2 * round(across / 2.0) + 1)) > 0
+    if np.count_nonzero(wide) > _SHADOW_LEAST * area and np.count_nonzero(robot & beside) > _SHADOW_BESIDE * area:
+        shadow[box] = wide
+    return shadow
+
+
+def _width_px(mask: Mask) -> float:
+    """The width of a strip that `mask` (h, w) shows: its mean depth is a quarter of it."""
+    return 4.0 * float(cv2.distanceTransform(mask.view(np.uint8), cv2.DIST_L2, 3)[mask].mean())
+
+
+_LAB_BLACK = 16.0 * 255.0 / 100.0
+"""L* + 16, a* and b* are proportional to the cube root of the light (CIE 1976)."""
+_SHADOW_SHARE = 0.55, 0.97
+"""Of that root, in a robot's shadow: darker is no shadow, lighter is no difference."""
+_SHADOW_COLOR = 5.0
+"""Greatest distance of a shadow's colour from the bench's, in levels of Lab."""
+_SHADOW_RIM = 0.1
+"""Half of a rim's width, in widths of robot and shadow: a robot's blurred rim has the bench's colour, too."""
+_SHADOW_LEAST, _SHADOW_BESIDE = 0.3, 0.9
+"""Least share of a shadow in what differs, and of what differs that lies beside the rest."""
 
 
 def _contrast(strong: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -348,8 +401,7 @@ def disagreement(network: Probability, difference: Difference, robot: Mask) -> M
     """
     if not robot.any():
         return robot
-    depth = cv2.distanceTransform(robot.view(np.uint8), cv2.DIST_L2, 3)
-    width = 4.0 * float(depth[robot].mean())  # a strip's mean depth is a quarter of its width
+    width = _width_px(robot)
     side = 2 * round(_END_REACH * width) + 1
     beside = cv2.blur(robot.view(np.uint8).astype(np.float32), (side, side))
     is_beyond = ~robot & (beside < np.float32(_BEYOND)) & (beside > 0.0)

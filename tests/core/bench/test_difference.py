@@ -202,6 +202,27 @@ def test_a_tip_as_bright_as_the_bench_is_not_taught_as_background(bench: Bench) 
     assert not disagreement(seen_by_network(robot), difference, np.zeros_like(mask)).any()
 
 
+def with_shadow(image: Image, shadow: Mask) -> Image:
+    """A shadow with soft edges."""
+    shade = cv2.GaussianBlur(np.where(shadow, np.float32(0.65), np.float32(1.0)), (0, 0), 1.0)
+    return np.asarray(image * shade[..., None], np.uint8)
+
+
+@pytest.mark.parametrize("color", [(30, 30, 30), (250, 250, 250), (200, 40, 40)])
+def test_the_shadow_that_a_robot_casts_beside_itself_is_no_robot(bench: Bench, color: tuple[int, int, int]) -> None:
+    (x, y), (to_x, to_y) = ROBOT
+    shadow = line((x, y + 7), (to_x, to_y + 7))
+    image = noisy(with_line(with_shadow(board(), shadow), *ROBOT, color), 2.0, 3)
+    difference = found(image, bench)
+    assert dice(difference.probability >= 0.5, line(*ROBOT)) > 0.9
+    assert (difference.doubtful & shadow).sum() < 0.2 * shadow.sum(), "that it is background is learnt"
+
+
+def test_a_robot_as_dark_as_a_shadow_stays_whole(bench: Bench) -> None:
+    image = noisy(with_shadow(board(), line(*ROBOT)), 2.0, 3)
+    assert dice(found(image, bench).probability >= 0.5, line(*ROBOT)) > 0.9
+
+
 def test_a_taught_network_denies_a_shadow_and_not_a_robot_that_it_overlooks(bench: Bench) -> None:
     shadow = tuple(int(0.7 * level) for level in board()[135, 100])
     image = noisy(with_line(with_line(board(), (0, 126), (200, 134), shadow), *ROBOT, (60, 60, 60)), 2.0, 3)
