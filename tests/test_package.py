@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from email import message_from_bytes
@@ -127,6 +128,54 @@ def test_the_base_runs_without_the_optional_packages_and_what_raters_need_withou
     assert done.returncode == 0, done.stderr
     assert "golden_session" in done.stdout
     assert '"network"' in (tmp_path / "told.jsonl").read_text()
+
+
+RATERS = """
+import sys
+from pathlib import Path
+
+sys.modules |= dict.fromkeys(("fcntl", "termios", "pty", "tty", "resource", "grp", "pwd"))
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication
+
+wait = QApplication.exec
+
+def shown_for_a_moment(_application):
+    def close():
+        print("shown:", *(type(window).__name__ for window in QApplication.topLevelWidgets() if window.isVisible()))
+        QApplication.closeAllWindows()
+
+    QTimer.singleShot(1000, close)
+    return wait()
+
+QApplication.exec = shown_for_a_moment
+from app.cli import main
+frames, folder = sys.argv[1], Path(sys.argv[2])
+for words in (
+    ("annotate", folder / "golden_session"),
+    ("play", folder / "golden_session"),
+    ("train", "--data", frames, "--steps", "2", "--batch", "1", "--crop", "64", "--base", "4", "--out", folder / "model"),
+    ("evaluate", frames, "--out", folder / "report"),
+):
+    sys.argv = ["main.py", *map(str, words)]
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code, words
+"""
+
+
+@pytest.mark.slow
+def test_raters_annotate_play_train_and_evaluate_where_python_has_no_modules_of_posix(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "tests/data/golden_session", tmp_path / "golden_session")
+    synth.make_set(tmp_path / "set", 4, seed=5)
+    command = [sys.executable, "-c", RATERS, str(tmp_path / "set"), str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "shown: AnnotatorWindow" in done.stdout
+    assert "shown: PlayerWindow" in done.stdout
+    assert (tmp_path / "model" / "model.json").is_file()
+    assert any((tmp_path / "report").iterdir())
 
 
 _NOT_THERE = "the package {}, which is not installed: make setup"
