@@ -4,9 +4,9 @@ In a vessel the head does not simply turn as it is bent: a wall holds or turns i
 where the vessel turns away, theta grows without a turn of the head. So a turn counts as wrong where the head turned against the
 command in the picture and also against the vessel's direction, or did not follow a large command there, beyond what feeding a
 bent head and the poses' noise explain. A head that springs free turns by what was commanded before and had no effect: that is no
-wrong turn either. The same holds for the feed and the robot's length in the picture, which no bend changes (the way of the head
-along itself does: a head that straightens goes back while it is fed). Robots wired right stay far below the limits, swapped tendons
-and a reversed feed reach them within a second.
+wrong turn either. The same holds for the way of the robot against the feed: its length in the picture where it comes in from the
+border, which a head that straightens does not change; else the way of the head along itself. Robots wired right stay far below the
+limits, swapped tendons and a reversed feed reach them within a second.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from core.control.faults import Cause, Fault
 from core.messages import message
 from core.perception.vectors import fit_robot_vector
-from core.types import Scene
+from core.types import Point, Scene
 
 WRONG_TURN_DEG = 4.0
 """Turn against the command that disarms."""
@@ -59,13 +59,15 @@ class HeadSeen:
     Attributes
     ----------
     heading_deg, theta_deg : direction in the picture, and against the vessel's.
-    length_mm : of the robot in the picture.
+    place_mm : in the picture.
+    length_mm : of the robot in the picture; None where its tail is not where it comes in.
     """
 
     captured_s: float
     heading_deg: float
     theta_deg: float
-    length_mm: float
+    place_mm: Point
+    length_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +87,10 @@ def head_seen(scene: Scene, pixels_per_mm: float) -> HeadSeen | None:
     if line is None:
         return None
     heading_deg, vessel_deg = (math.degrees(math.atan2(y, x)) for x, y in (line.direction, scene.vessel_vector.direction))
+    place = scene.path.head[0] / pixels_per_mm, scene.path.head[1] / pixels_per_mm
     length_px = float(np.linalg.norm(np.diff(scene.path.points, axis=0), axis=1).sum())
-    return HeadSeen(scene.captured_s, heading_deg, _wrapped(heading_deg - vessel_deg), length_px / pixels_per_mm)
+    length_mm = length_px / pixels_per_mm if scene.path.entry_on_border else None
+    return HeadSeen(scene.captured_s, heading_deg, _wrapped(heading_deg - vessel_deg), place, length_mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +105,7 @@ class _Sent:
 
 
 _Motion = tuple[float, float, float]
-"""Heading (deg), theta (deg), and length (mm)."""
+"""Heading (deg), theta (deg), and way (mm)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,12 +242,7 @@ def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent]) -> 
     before = earlier[-1]
     turned_deg = max(abs(a - b) for a, b in zip(turns_deg, before.turns_deg, strict=True))
     fed_mm = max(abs(a - b) for a, b in zip(feds_mm, before.feds_mm, strict=True))
-    way_mm = head.length_mm - before.head.length_mm
-    step = (
-        _wrapped(head.heading_deg - before.head.heading_deg),
-        _wrapped(head.theta_deg - before.head.theta_deg),
-        way_mm if abs(way_mm) <= _CUT_MM + _FOLLOWED * fed_mm else 0.0,
-    )
+    step = _step(before.head, head, _CUT_MM + _FOLLOWED * fed_mm)
     raw = _each(lambda a, b: a + b, before.raw, step)
     most = _each(lambda least, commanded: least + _FOLLOWED * commanded, _FOLLOWED_LEAST, (turned_deg, turned_deg, fed_mm))
     way = _each(lambda to, at: to - at, raw, before.moved)
@@ -254,6 +253,18 @@ def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent]) -> 
 def _each(function: Callable[[float, float], float], one: _Motion, other: _Motion) -> _Motion:
     """A function of each of three pairs of numbers."""
     return function(one[0], other[0]), function(one[1], other[1]), function(one[2], other[2])
+
+
+def _step(before: HeadSeen, now: HeadSeen, most_mm: float) -> _Motion:
+    """The motion from one frame to the next; a length that changes by more than `most_mm` is not used."""
+    turned_deg = _wrapped(now.heading_deg - before.heading_deg)
+    if before.length_mm is not None and now.length_mm is not None and abs(now.length_mm - before.length_mm) <= most_mm:
+        way_mm = now.length_mm - before.length_mm
+    else:
+        x, y = (a - b for a, b in zip(now.place_mm, before.place_mm, strict=True))
+        along = math.radians(before.heading_deg + turned_deg / 2.0)
+        way_mm = x * math.cos(along) + y * math.sin(along)
+    return turned_deg, _wrapped(now.theta_deg - before.theta_deg), way_mm
 
 
 def _noise(seen: list[_Seen], which: int) -> float:

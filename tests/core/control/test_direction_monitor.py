@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -51,7 +51,9 @@ def _course(
         way_mm += robot.feed * feed_mm_s(max(0.0, now_s - LATE_S)) * TURN_S
         if step % 2 == 0:
             heading = robot.turn * bend_deg(max(0.0, now_s - LATE_S)) + vessel_deg(now_s) + rng.normal(0.0, 1.0) * robot.noise_deg
-            monitor = monitor.observe(HeadSeen(now_s, heading, robot.of_theta * (heading - vessel_deg(now_s)), way_mm))
+            along = math.radians(robot.turn * bend_deg(0.0))
+            place = way_mm * math.cos(along), way_mm * math.sin(along)
+            monitor = monitor.observe(HeadSeen(now_s, heading, robot.of_theta * (heading - vessel_deg(now_s)), place))
             found.append(monitor)
     return found
 
@@ -118,7 +120,9 @@ def test_a_vessel_that_turns_away_is_no_turn_of_the_head() -> None:
     ]
     for k in range(1, 30):
         now_s = k * FRAME_S
-        bent.append(bent[-1].drive(MotionSent(now_s, -30.0 * now_s, 8.0)).observe(HeadSeen(now_s, 0.0, 30.0 * now_s, 8.0 * now_s)))
+        bent.append(
+            bent[-1].drive(MotionSent(now_s, -30.0 * now_s, 8.0)).observe(HeadSeen(now_s, 0.0, 30.0 * now_s, (8.0 * now_s, 0.0)))
+        )
     assert all(not one.faults() for one in bent)
 
 
@@ -127,7 +131,7 @@ def test_a_head_that_follows_a_bend_of_the_vessel_against_a_large_command_goes_t
     monitor, found_s = DirectionMonitor(), math.inf
     for k in range(60):
         now_s = k * FRAME_S
-        monitor = monitor.drive(MotionSent(now_s, -10.0 * now_s, 5.0)).observe(HeadSeen(now_s, 6.0 * now_s, 0.0, 0.0))
+        monitor = monitor.drive(MotionSent(now_s, -10.0 * now_s, 5.0)).observe(HeadSeen(now_s, 6.0 * now_s, 0.0, (0.0, 0.0)))
         found_s = min(found_s, now_s) if monitor.faults() else found_s
     assert 1.0 < found_s < 1.4
 
@@ -137,7 +141,9 @@ def test_a_wall_that_turns_the_head_with_the_vessel_is_no_turn_against_it() -> N
     for k in range(1, 40):
         now_s = k * FRAME_S
         monitor = monitor.drive(MotionSent(now_s, -20.0 * now_s, 8.0))
-        monitor = monitor.observe(HeadSeen(now_s, 40.0 * now_s, -5.0 * now_s, 0.0))  # guided right, while it turns to the left
+        monitor = monitor.observe(
+            HeadSeen(now_s, 40.0 * now_s, -5.0 * now_s, (0.0, 0.0))
+        )  # guided right, while it turns to the left
         assert not any(fault.cause is Cause.WRONG_TURN for fault in monitor.faults())
 
 
@@ -153,7 +159,7 @@ def test_a_single_wrong_pose_is_no_motion() -> None:
     for k in range(60):
         now_s = k * FRAME_S
         wrong = 180.0 if k in {20, 40, 41} else 0.0
-        monitor = monitor.drive(MotionSent(now_s, -20.0 * now_s, -3.0)).observe(HeadSeen(now_s, wrong, wrong, wrong))
+        monitor = monitor.drive(MotionSent(now_s, -20.0 * now_s, -3.0)).observe(HeadSeen(now_s, wrong, wrong, (wrong, 0.0)))
         assert not monitor.faults(), now_s
 
 
@@ -162,15 +168,15 @@ def test_a_pause_of_commands_or_poses_begins_again() -> None:
     assert 0.0 < monitor.wrong_turn_deg < WRONG_TURN_DEG
     resumed = monitor.drive(MotionSent(2.0, 6.0, 0.0))
     assert resumed.seen == ()
-    assert resumed.observe(HeadSeen(2.04, -90.0, -90.0, 0.0)).wrong_turn_deg == 0.0
-    late = monitor.observe(HeadSeen(0.9, -40.0, -40.0, 0.0))
+    assert resumed.observe(HeadSeen(2.04, -90.0, -90.0, (0.0, 0.0))).wrong_turn_deg == 0.0
+    late = monitor.observe(HeadSeen(0.9, -40.0, -40.0, (0.0, 0.0)))
     assert (late.wrong_turn_deg, len(late.seen)) == (0.0, 1)
 
 
 def test_poses_without_commands_and_commands_without_poses_say_nothing() -> None:
     alone = DirectionMonitor()
     for k in range(40):
-        alone = alone.observe(HeadSeen(k * FRAME_S, 9.0 * k, 9.0 * k, 0.0))
+        alone = alone.observe(HeadSeen(k * FRAME_S, 9.0 * k, 9.0 * k, (0.0, 0.0)))
     assert alone == DirectionMonitor()
     blind = DirectionMonitor()
     for k in range(400):
@@ -182,16 +188,47 @@ def test_poses_without_commands_and_commands_without_poses_say_nothing() -> None
 def test_the_head_of_a_scene() -> None:
     found = head_seen(scene_at(STRAIGHT, (200.0, 100.0), None, heading_deg=12.0), 4.0)
     assert (found.heading_deg, found.theta_deg) == (pytest.approx(12.0, abs=0.1), pytest.approx(12.0, abs=0.1))
+    assert found.place_mm == (50.0, 25.0)
     assert found.length_mm == pytest.approx(15.0)
+    inside = scene_at(STRAIGHT, (200.0, 100.0), None, heading_deg=12.0)
+    assert inside.path is not None
+    assert head_seen(replace(inside, path=replace(inside.path, entry_on_border=False)), 4.0).length_mm is None
+
+
+def _fed(feed_mm_s: float, seen: Callable[[float], HeadSeen], seconds: float = 3.0) -> list[DirectionMonitor]:
+    course = [DirectionMonitor()]
+    for k in range(round(seconds / FRAME_S)):
+        course.append(course[-1].drive(MotionSent(k * FRAME_S, 0.0, feed_mm_s)).observe(seen(k * FRAME_S)))
+    return course
+
+
+def test_a_head_that_straightens_while_it_is_fed_has_not_gone_back() -> None:
+    def seen(now_s: float) -> HeadSeen:
+        return HeadSeen(now_s, 0.0, 0.0, (1.0 * now_s - 2.0 * min(now_s, 1.5), 0.0), 80.0 + 1.0 * now_s)
+
+    assert max(one.wrong_feed_mm for one in _fed(1.0, seen)) == 0.0
+    blind = _fed(1.0, lambda now_s: replace(seen(now_s), length_mm=None))
+    assert any(one.faults() for one in blind), "without the length it looks as if it did"
 
 
 def test_a_robot_that_is_covered_or_cut_in_the_picture_has_not_gone_back() -> None:
-    monitor = DirectionMonitor()
-    for k in range(75):
-        now_s = k * FRAME_S
-        seen_mm = 80.0 + 3.0 * now_s - (25.0 if 20 <= k < 50 else 0.0)
-        monitor = monitor.drive(MotionSent(now_s, 0.0, 3.0)).observe(HeadSeen(now_s, 0.0, 0.0, seen_mm))
-        assert monitor.wrong_feed_mm < 0.1, now_s
+    def seen(now_s: float) -> HeadSeen:
+        length_mm = 80.0 + 3.0 * now_s - (25.0 if 0.8 <= now_s < 2.0 else 0.0)
+        return HeadSeen(now_s, 0.0, 0.0, (3.0 * now_s, 0.0), length_mm)
+
+    assert max(one.wrong_feed_mm for one in _fed(3.0, seen)) < 0.1
+
+
+@pytest.mark.parametrize("length_mm", [None, 80.0])
+def test_a_reversed_feed_shows_by_the_length_or_else_by_the_head(length_mm: float | None) -> None:
+    """None: all of the robot is in the picture, so that its length stays."""
+
+    def seen(now_s: float) -> HeadSeen:
+        return HeadSeen(now_s, 0.0, 0.0, (-3.0 * now_s, 0.0), None if length_mm is None else length_mm - 3.0 * now_s)
+
+    course = _fed(3.0, seen, 1.0)
+    assert any(fault.cause is Cause.WRONG_FEED for one in course for fault in one.faults())
+    assert not course[-1].feeds
 
 
 _rates = st.lists(st.floats(-140.0, 140.0), min_size=2, max_size=6)
@@ -212,7 +249,7 @@ def test_a_robot_that_is_wired_right_never_seems_to_go_the_other_way(
         monitor = monitor.drive(MotionSent(now_s, turn_deg[-1], feed))
         if step % 2:
             then_deg, then_mm = (known[max(0, len(known) - 1 - late)] for known in (turn_deg, fed_mm))
-            monitor = monitor.observe(HeadSeen(now_s, share * then_deg, share * then_deg, share * then_mm))
+            monitor = monitor.observe(HeadSeen(now_s, share * then_deg, share * then_deg, (share * then_mm, 0.0)))
             assert not monitor.faults(), now_s
 
 
@@ -225,7 +262,7 @@ def test_a_robot_that_is_wired_the_other_way_is_always_noticed(rate: float, shar
         monitor = monitor.drive(MotionSent(now_s, sign * rate * now_s, 0.0))
         if step % 2:
             most_deg = share * rate * max(0.0, now_s - late_s)
-            monitor = monitor.observe(HeadSeen(now_s, -sign * most_deg, -sign * most_deg, 0.0))
+            monitor = monitor.observe(HeadSeen(now_s, -sign * most_deg, -sign * most_deg, (0.0, 0.0)))
             if monitor.faults():
                 break
     assert monitor.faults()
