@@ -133,6 +133,12 @@ def test_a_memory_fault_says_where() -> None:
     assert "string_at" in done.stderr
 
 
+@pytest.mark.parametrize("errors", ["2>&-", "2>/dev/full"])
+def test_without_a_standard_error_the_exit_code_is_the_same(tmp_path: Path, errors: str) -> None:
+    command = f'exec "{sys.executable}" "{ROOT / "main.py"}" session info "{tmp_path / "nothing"}" {errors}'
+    assert subprocess.run(["sh", "-c", command], check=False).returncode == 2
+
+
 def test_the_help_of_synth_names_every_look_beside_the_ten() -> None:
     """It is written out there: whoever asks for help does not wait for the twin to be imported."""
     said = " ".join(help_of("synth").split())

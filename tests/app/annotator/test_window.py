@@ -361,6 +361,16 @@ def test_undo_and_redo_reach_over_a_restart(make: MakeRater) -> None:
     assert again.message == "Nothing to undo"
 
 
+def test_a_right_click_that_misses_answers_nothing(rater: Rater) -> None:
+    for line in (ROBOT, VESSEL):
+        rater.click(*line)
+        rater.press(Key.Key_Return)
+    beside = rater.at(ROBOT[1]) + QPoint(0, 14)
+    for _ in range(2):
+        QTest.mouseClick(rater.canvas, Qt.MouseButton.RightButton, pos=beside)
+    assert (rater.drawn.state, rater.model.index, len(rater.drawn.robot)) == (None, 0, 3)
+
+
 OUTLINE: tuple[Point, ...] = ((300.0, 300.0), (400.0, 300.0), (400.0, 400.0), (300.0, 400.0))
 
 
@@ -543,6 +553,28 @@ def test_a_tube_snaps_to_the_walls(vessel_rater: Rater) -> None:
     vessel_rater.press(Key.Key_Z, modifier=Qt.KeyboardModifier.ControlModifier)
     assert not vessel_rater.drawn.masks
     assert vessel_rater.message == "Undone: add a tube to the vessel mask"
+
+
+def test_a_tube_is_kept_by_the_key_that_goes_on_before_it_is_computed(vessel_rater: Rater) -> None:
+    vessel_rater.press(Key.Key_Y)
+    vessel_rater.canvas.editor.radius_px = 18.0
+    vessel_rater.drag((100.0, 240.0), (400.0, 240.0))
+    vessel_rater.press(Key.Key_N)
+    vessel_rater.press(Key.Key_P)
+    assert height_at(vessel_rater, 250) > VESSEL_RADIUS
+    assert vessel_rater.canvas.mask_mode is MaskMode.POINTS
+
+
+def test_two_quick_gestures_are_both_kept(vessel_rater: Rater) -> None:
+    vessel_rater.press(Key.Key_R)
+    vessel_rater.canvas.editor.radius_px = 15.0
+    vessel_rater.click((100.0, 240.0), (500.0, 240.0))
+    vessel_rater.qtbot.waitUntil(lambda: len(vessel_rater.drawn.masks) == 2)
+    for column in (100, 500):
+        assert abs(height_at(vessel_rater, column) - 2 * VESSEL_RADIUS) <= 4
+    vessel_rater.click((100.0, 240.0), button=Qt.MouseButton.RightButton)
+    vessel_rater.qtbot.waitUntil(lambda: height_at(vessel_rater, 100) == 0)
+    assert height_at(vessel_rater, 500) > 0
 
 
 def test_the_wheel_is_the_circles_size_and_with_ctrl_the_zoom(vessel_rater: Rater) -> None:

@@ -17,6 +17,7 @@ from app.commands.train import TrainOptions, run_train
 from core.devices import UserError
 from core.learning.dataset import write_mask, write_png
 from core.learning.training_plan import TrainingPlan
+from core.perception.model_file import MODELS
 from core.session.files import add_event
 from core.session.manifest import EVENTS, FRAMES, Event, EventKind
 from core.session.reader import SessionReader, rows_cut_off
@@ -65,6 +66,19 @@ def test_perceive_does_not_write_over_its_pictures(
     assert contents(labelled) == before
 
 
+@pytest.mark.parametrize("given", [".", "a.png", "{tmp}/linked/a.png"])
+def test_the_masks_of_a_set_are_known_however_its_pictures_are_given(
+    labelled: Path, tmp_path: Path, given: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "linked").symlink_to(labelled / "images")
+    (tmp_path / "a.png").symlink_to(labelled / "images" / "a.png")
+    monkeypatch.chdir(labelled / "images")
+    before = contents(labelled)
+    with pytest.raises(UserError, match="is a mask of the set, which --masks would overwrite"):
+        call("perceive", given.format(tmp=tmp_path), "--jsonl", tmp_path / "o.jsonl", "--masks", "../masks")
+    assert contents(labelled) == before
+
+
 def test_a_session_is_not_replayed_into_itself(tmp_path: Path) -> None:
     session = Path(shutil.copytree(GOLDEN, tmp_path / "session"))
     before = contents(session)
@@ -82,6 +96,15 @@ def test_a_replay_writes_no_file_twice_and_none_over_its_configuration(tmp_path:
     (tmp_path / "own.toml").write_text("")
     with pytest.raises(UserError, match=r"own.toml: is an input, which --jsonl would overwrite"):
         call("replay", GOLDEN, "--config", tmp_path / "own.toml", "--jsonl", tmp_path / "own.toml")
+
+
+@pytest.mark.parametrize("name", ["measurements.csv", "scatter.svg"])
+def test_a_table_is_not_evaluated_into_itself(tmp_path: Path, name: str) -> None:
+    table = tmp_path / name
+    table.write_text("image,angle_1,angle_2,state,algorithm_angle,algorithm_state,mine\na,1,,A,2,A,x\n")
+    with pytest.raises(UserError, match=f"{name}: is an input, which --out would overwrite"):
+        call("evaluate", "--csv", table, "--out", tmp_path)
+    assert table.read_text().endswith(",x\n")
 
 
 def test_frames_are_not_made_into_somebody_elses_folder(labelled: Path) -> None:
@@ -108,6 +131,17 @@ def test_a_folder_without_frames_to_judge_by_is_told_before_frames_are_made(
     monkeypatch.setattr("app.commands.train.make_set", lambda *_: pytest.fail("frames are made"))
     with pytest.raises(UserError, match="nothing here: no labelled frames; needs images"):
         run_train(TrainOptions(tmp_path / "m", synthetic=4, held_out=tmp_path / "nothing here"), TrainingPlan(steps=1))
+
+
+def test_frames_within_the_model_that_is_trained_are_not_learnt_from(labelled: Path, tmp_path: Path) -> None:
+    model = Path(shutil.copytree(MODELS / "default", tmp_path / "model"))
+    frames = Path(shutil.copytree(labelled, model / "frames"))
+    before = contents(frames)
+    for option in ("--data", "--held-out"):
+        other = () if option == "--data" else ("--data", labelled)
+        with pytest.raises(UserError, match="frames: lies within --out, which is replaced now and then; choose another --out"):
+            call("train", option, frames, *other, "--init", model, "--out", model, "--steps", "1")
+    assert contents(frames) == before
 
 
 def test_a_finished_model_is_not_replaced(labelled: Path, tmp_path: Path) -> None:

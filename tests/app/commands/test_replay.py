@@ -19,15 +19,19 @@ import pytest
 from app.commands import replay
 from app.commands.replay import (
     ReplayOptions,
+    prepare_out,
     replay_config,
     run_replay,
     run_replays,
     sessions_in,
 )
+from app.player.replayed import Replayed
 from core.config.models import Config
 from core.devices import UserError
+from core.files import name_of
 from core.session.codec import scene_to_json
 from core.session.manifest import read_manifest
+from core.session.reader import check_is_session
 from core.types import Scene
 from tests.app.golden_session import COUNT, GOLDEN, TRUTH
 from tests.app.program import run as main
@@ -80,6 +84,25 @@ def test_all_files_tell_the_same(replayed: tuple[dict[str, object], Path]) -> No
     assert json.loads((out / "out" / "replay.json").read_text()) == result
     frames = [json.loads(line) for line in (out / "out" / "changes.jsonl").read_text().splitlines()]
     assert [frame["after"]["theta_signed_deg"] for frame in frames] == [line["theta_signed_deg"] for line in lines]
+
+
+def test_what_a_replay_has_written_may_be_written_over_and_is_no_session(
+    replayed: tuple[dict[str, object], Path], tmp_path: Path
+) -> None:
+    """Its frames had the name of a session's: the same command was refused the second time."""
+    again = Path(shutil.copytree(replayed[1] / "out", tmp_path / "again"))
+    prepare_out(again)
+    with pytest.raises(UserError):
+        check_is_session(again)
+    (again / "frames.jsonl").write_text("{}\n")  # as earlier versions called it
+    prepare_out(again)
+    with pytest.raises(UserError):
+        check_is_session(again)
+    session = Path(shutil.copytree(GOLDEN, tmp_path / "session"))
+    (session / "replay.json").write_text("{}\n")
+    with pytest.raises(UserError, match="is a recorded session"):
+        prepare_out(session)
+    assert (session / "frames.jsonl").is_file()
 
 
 def options(session: Path, **changes: object) -> ReplayOptions:
@@ -173,6 +196,17 @@ def test_ctrl_c_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     result = json.loads(done.stdout)
     assert (result["ended"], result["frames"]) == ("interrupted after 3 of 5 frames", 3)
     assert len(out.read_text().splitlines()) == 3
+
+
+def test_a_session_that_is_given_as_here_keeps_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = record(tmp_path, (tick_of(index, 1000.0 + index / 30) for index in range(3)))
+    monkeypatch.chdir(session)
+    run_replay(options(Path("."), jsonl=tmp_path / "r.jsonl"))
+    assert [json.loads(line)["image"] for line in (tmp_path / "r.jsonl").read_text().splitlines()] == [
+        f"{session.name}#{row}" for row in range(3)
+    ]
+    for given in (Path("."), session):
+        assert Replayed(tmp_path / "r.jsonl", name_of(given)).skipped == 0
 
 
 @pytest.fixture(scope="module")

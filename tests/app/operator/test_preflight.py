@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
@@ -270,6 +270,21 @@ def test_the_list_shows_words_not_only_colours_and_the_worst_first(window: QWidg
     assert not shown.isModal()
     shown.leave.click()
     assert not shown.isVisible()
+    desk.close()
+
+
+@pytest.mark.parametrize("size", [(1100, 660), (1280, 720), (1600, 900)])
+def test_the_list_that_opens_by_itself_does_not_lie_over_stop(running: OperatorWindow, qtbot: QtBot, size: tuple[int, int]) -> None:
+    running.resize(*size)
+    qtbot.wait(30)
+    stop = running.panels.mode_bar.stop
+    desk = PreflightModel(lambda: running.rig.config, lambda: running.controls.view, running, command=says(GOOD))
+    shown = PreflightList(desk, running, stop)
+    shown.open_list()
+    with_title = shown.geometry().adjusted(0, -30, 0, 0)
+    assert not with_title.intersects(QRect(stop.mapToGlobal(QPoint(0, 0)), stop.size()))
+    assert shown.height() >= 300
+    shown.close()
     desk.close()
 
 

@@ -15,12 +15,13 @@ from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.annotator.sources import image_files
+from app.operator.record_bar import RecordBar
 from app.operator.recording import AfterSession, RecoveryController, declined_names
 from app.operator.services import WindowServices
 from app.operator.window import OperatorWindow
 from app.ui.description_form import DescriptionDialog
 from app.ui.opening import OtherWindows
-from app.widgets.messages import OfferStrip
+from app.widgets.messages import Offer, OfferButton, OfferStrip
 from core.annotation.store import DEFAULT_NAME
 from core.config.models import Config
 from core.control.alerts import ALERTS, Alert
@@ -241,6 +242,18 @@ def test_no_picture_of_the_old_rig_is_kept_as_one_of_the_new(
     assert engines[1].pilot.acts == [Act.STOP]
 
 
+def test_a_double_click_is_one_click(qtbot: QtBot) -> None:
+    bar, asked = RecordBar(), list[bool]()
+    qtbot.addWidget(bar)
+    bar.show()
+    bar.clicked.connect(lambda: asked.append(True))
+    qtbot.mouseClick(bar, Qt.MouseButton.LeftButton)
+    qtbot.mouseDClick(bar, Qt.MouseButton.LeftButton)
+    assert asked == [True], "the second would end what the first has begun"
+    qtbot.mouseClick(bar, Qt.MouseButton.LeftButton)
+    assert asked == [True, True]
+
+
 LONG_MS = 120_000
 
 
@@ -376,6 +389,21 @@ def test_the_window_offers_it_when_a_recording_ends_and_takes_it_back_when_the_n
     side.close()
 
 
+def test_a_double_click_answers_one_offer_and_not_the_next(strip: OfferStrip, qtbot: QtBot) -> None:
+    done: list[str] = []
+    for key in "ab":
+        strip.offer(Offer(key, f"Session {key}", answers=(OfferButton("Never ask again", lambda key=key: done.append(key)),)))
+    left = Qt.MouseButton.LeftButton
+    qtbot.mouseClick(strip.answers["Never ask again"], left)
+    assert strip.text == "Session b"
+    button = strip.answers["Never ask again"]
+    qtbot.mouseDClick(button, left)
+    qtbot.mouseRelease(button, left)
+    assert done == ["a"]
+    qtbot.mouseClick(button, left)
+    assert done == ["a", "b"]
+
+
 def cut(folder: Path, frames: int = 12) -> Path:
     """A session as a power failure leaves it: not closed, its last row half written."""
     session = record(folder, (tick_of(index, 100.0 + index / 10) for index in range(frames)))
@@ -473,7 +501,6 @@ def test_a_cancelled_recovery_is_no_fault_and_ends_the_others_too(
     desk: RecoveryController, strip: OfferStrip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from app.ui.workers import ChildProcess  # what is started
-    from app.widgets.messages import Offer  # of the copy before
 
     started: list[ChildProcess] = []
 

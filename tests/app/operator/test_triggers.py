@@ -17,7 +17,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from app.commands.trigger import request_of
-from app.operator.triggers import TriggerServer
+from app.operator.triggers import MAX_LINE, TriggerServer
 from app.operator.window import OperatorWindow
 from core.config.files import trigger_socket
 from core.control.modes import Mode
@@ -139,6 +139,26 @@ def test_a_line_that_makes_no_sense_is_answered_and_the_next_one_is_served(
         assert json.loads(_answer(line, qtbot))["error"].startswith(error)
         assert error in _log(running)
         assert ask("status")["ok"]
+
+
+def test_a_line_without_an_end_is_named_and_ends_its_client_alone(
+    line: socket.socket, server: TriggerServer, running: OperatorWindow, qtbot: QtBot
+) -> None:
+    line.send(b"x" * (MAX_LINE + 1))
+    assert json.loads(_answer(line, qtbot).splitlines()[0])["error"] == f"a line has {MAX_LINE} bytes at most"
+    assert "a line without an end" in _log(running)
+    with socket.socket(socket.AF_UNIX) as other:
+        other.connect(str(server.path))
+        other.sendall(b'{"command": "sta')
+    until(qtbot, lambda: "left in the middle of a line" in _log(running))
+
+
+def test_many_requests_at_once_are_all_answered(line: socket.socket, qtbot: QtBot) -> None:
+    line.send(b'{"command": "mark"}\n' * 30)
+    answers = b""
+    while answers.count(b"\n") < 30:
+        answers += _answer(line, qtbot)
+    assert answers.count(b'"ok": false') == 30
 
 
 def test_a_second_window_says_so_and_a_socket_left_by_a_dead_one_is_replaced(

@@ -13,13 +13,14 @@ from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QEvent, QRect, Qt
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtWidgets import QAbstractItemView, QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from app.operator.engine_thread import EnginePhase, EngineThread
 from app.operator.window import OperatorWindow
 from app.ui import theme
 from app.ui.actions import action_of
+from app.widgets.event_log import LogKind
 from app.widgets.scene_overlay import Layer
 from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import Config
@@ -221,6 +222,20 @@ def test_a_camera_that_never_gives_a_picture_says_why(make_window: MakeWindow, b
     until(qtbot, lambda: window.shown_tick is not None)
 
 
+def test_what_was_put_off_for_an_older_picture_is_not_shown_any_more(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    panels, tick = running.panels, running.shown_tick
+    assert tick is not None
+    engine.silent = True
+    until(qtbot, lambda: panels.badge.title == "No new picture")
+    panels.show_tick(tick, 0.0)
+    panels.blank("No new picture", "it was unplugged in this moment")
+    qtbot.wait(50)
+    assert panels.badge.title == "No new picture"
+    assert panels.live.scene is None
+
+
 def test_refusal_is_named_and_the_picture_goes_on(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     engine.refusal = Refusal(Reason.OUTSIDE_VESSEL, "41 % inside, 60 % needed")
     until(qtbot, lambda: running.panels.badge.title == "Robot is outside the vessel")
@@ -310,6 +325,26 @@ def test_keys_move_the_robot_while_held(running: OperatorWindow, engine: FakeEng
     assert engine.jogs[-1] == AT_REST, "without the focus no release is heard"
 
 
+def test_the_arrows_are_the_menu_bars_after_a_tap_on_alt(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
+    bar, live = running.menuBar(), running.panels.live
+    running.activateWindow()
+    live.setFocus()
+    qtbot.keyClick(live, Key.Key_Alt)
+    assert running.focusWidget() is bar
+    engine.jogs.clear()
+    for key in (Key.Key_Right, Key.Key_W):
+        qtbot.keyClick(bar, key)
+    assert engine.jogs == [], "who looks for a menu moves nothing"
+    assert bar.activeAction() is bar.actions()[1]
+    qtbot.keyClick(bar, Key.Key_Space)
+    assert engine.pilot.acts == [Act.STOP]
+    qtbot.keyClick(bar, Key.Key_Escape)
+    assert running.focusWidget() is live
+    qtbot.keyPress(live, Key.Key_Right)
+    assert engine.jogs[-1] == Jog(bend=1.0)
+    qtbot.keyRelease(live, Key.Key_Right)
+
+
 def test_space_stops_from_any_widget(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot) -> None:
     chip = running.panels.overlay_bar._chips[Layer.MASKS]
     chip.setFocus()
@@ -333,6 +368,25 @@ def test_digits_switch_overlays_but_not_when_typed_into_the_seed(running: Operat
     seed.setFocus()
     qtbot.keyClicks(seed, "12")
     assert running.panels.overlay_bar.is_on(Layer.MASKS)
+
+
+@pytest.mark.parametrize("way", ["key", "tab and enter"])
+def test_a_phantom_is_chosen_by_keyboard(running: OperatorWindow, engine: FakeEngine, qtbot: QtBot, way: str) -> None:
+    picker = running.panels.picker
+    combo, chosen, moved = picker._combo, [], len(engine.jogs)
+    picker.chosen.connect(chosen.append)
+    if way == "key":
+        qtbot.keyClick(running, Key.Key_P, Qt.KeyboardModifier.ControlModifier)
+    else:
+        assert combo.focusPolicy() & Qt.FocusPolicy.TabFocus
+        combo.setFocus()
+        qtbot.keyClick(combo, Key.Key_Return)
+    qtbot.waitUntil(combo.view().isVisible)
+    qtbot.keyClick(combo.view(), Key.Key_Down)
+    qtbot.keyClick(combo.view(), Key.Key_Return)
+    qtbot.waitUntil(lambda: chosen == ["tree"])
+    assert not combo.view().isVisible()
+    assert all(jog.is_rest for jog in engine.jogs[moved:]), "the arrows chose, they moved nothing"
 
 
 def test_enter_presses_the_button_that_has_the_focus(running: OperatorWindow, qtbot: QtBot) -> None:
@@ -383,6 +437,46 @@ def test_choosing_a_phantom_opens_it_and_forgets_the_old_world(make_window: Make
     qtbot.keyClick(window, Key.Key_R)
     until(qtbot, lambda: len(opened) == 3)
     assert opened[-1] == "random:1"
+
+
+def test_a_list_is_reached_by_tab_scrolled_by_keys_and_left_by_escape(
+    running: OperatorWindow, engine: FakeEngine, qtbot: QtBot
+) -> None:
+    """While it has the focus the arrows are its own; letters and STOP are the robot's as everywhere."""
+    panels = running.panels
+    panels.pages.setCurrentWidget(panels.events)
+    view = panels.events.findChild(QAbstractItemView)
+    for number in range(200):
+        panels.events.add(LogKind.OPERATOR, f"event {number}")
+    view.verticalScrollBar().setRange(0, max(500, view.verticalScrollBar().maximum()))
+    for _ in range(80):
+        qtbot.keyClick(running.focusWidget(), Key.Key_Tab)
+        if running.focusWidget() is view:
+            break
+    assert running.focusWidget() is view
+    engine.jogs.clear()
+    bar = view.verticalScrollBar()
+    qtbot.keyClick(view, Key.Key_Down)
+    assert bar.value() > 0
+    before = bar.value()
+    qtbot.keyClick(view, Key.Key_PageDown)
+    assert bar.value() > before
+    qtbot.keyClick(view, Key.Key_Home)
+    qtbot.keyClick(view, Key.Key_Up)
+    assert bar.value() == bar.minimum()
+    assert engine.jogs == []
+    qtbot.keyPress(view, Key.Key_W)
+    assert engine.jogs[-1] == Jog(advance=1.0)
+    qtbot.keyRelease(view, Key.Key_W)
+    qtbot.keyClick(view, Key.Key_Space)
+    assert engine.pilot.acts == [Act.STOP]
+    qtbot.keyClick(view, Key.Key_Escape)
+    assert running.focusWidget() is not view
+    qtbot.keyPress(running, Key.Key_Up)
+    assert engine.jogs[-1] == Jog(advance=1.0)
+    qtbot.keyRelease(running, Key.Key_Up)
+    qtbot.mouseClick(view.viewport(), Qt.MouseButton.LeftButton)
+    assert running.focusWidget() is not view
 
 
 def test_snapshot_key_writes_three_files_says_where_and_names_the_phantom_that_runs(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QApplication, QComboBox, QDoubleSpinBox, QFileDialog, QSpinBox
 from pytestqt.qtbot import QtBot
 
 from app.rig_wizard import servo_pages
@@ -30,7 +30,7 @@ from hardware.calibration import bench as calibration_bench
 from hardware.calibration.bench import CalibrationBench
 from hardware.calibration.servo_identification import Zeros
 from hardware.servos.discovery import FoundPort, FoundServo, FoundServos
-from tests.app.fakes import make_scene, until
+from tests.app.fakes import make_scene, turn_the_wheel, until
 from tests.core.robots import THREE, TURNED
 
 
@@ -547,6 +547,20 @@ def test_without_results_it_closes_at_once_and_frees_the_camera(opened: RigWizar
     assert list_rigs() == ()
     assert opened.model.wait_closed()
     assert opened.model.bench is None
+
+
+def test_the_wheel_changes_no_servo_no_direction_and_no_number(opened: RigWizard) -> None:
+    """Turned over the table of joints it would pull a wire the wrong way ever after."""
+    lists, numbers = opened.findChildren(QComboBox), opened.findChildren(QSpinBox) + opened.findChildren(QDoubleSpinBox)
+    assert len(lists) > 14
+    assert len(numbers) > 3
+    for control in (*lists, *numbers):
+        control.setEnabled(True)
+        before = control.currentIndex() if isinstance(control, QComboBox) else control.value()
+        event = turn_the_wheel(control)
+        assert before == (control.currentIndex() if isinstance(control, QComboBox) else control.value()), control.accessibleName()
+        assert not event.isAccepted()
+    assert not opened.identify_page.is_done
 
 
 def test_a_camera_without_pictures_is_none(make_wizard: MakeWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
+from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run, scrubbed
 from core.program import program_version
 from core.session.manifest import read_manifest
 from core.session.reader import SessionReader
@@ -142,3 +142,8 @@ def test_a_run_that_goes_on_or_was_killed_is_no_crash(tmp_path: Path) -> None:
     assert crash_of_last_run(tmp_path) is None
     assert not killed.exists()
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_personal_paths_are_left_out() -> None:
+    assert scrubbed(f"open {Path.home()}/videos/x.mkv") == "open ~/videos/x.mkv"
+    assert "<python>" in scrubbed(f"{sys.prefix}/lib/python3.11/site-packages/cv2")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.ui.layout_state import layout_settings
@@ -69,6 +69,17 @@ def test_who_asks_twice_for_a_path_sees_the_same_dialog(qtbot: QtBot, tmp_path: 
     assert ask_path(parent, "A folder", tmp_path, chosen.append) is not first, "that one asks for a file"
     first.reject()
     assert ask_path(parent, "A folder", tmp_path, chosen.append, folder) is not first
+
+
+def test_a_name_that_was_typed_stays_when_the_same_is_asked_again(qtbot: QtBot, tmp_path: Path) -> None:
+    parent, file = QWidget(), QFileDialog.FileMode.AnyFile
+    qtbot.addWidget(parent)
+    dialog = ask_path(parent, "Export as", tmp_path / "proposed.mp4", list[Path]().append, file)
+    name = dialog.findChild(QLineEdit)
+    assert name is not None and name.text() == "proposed.mp4"
+    name.setText("mine.mp4")
+    ask_path(parent, "Export as", tmp_path / "proposed.mp4", list[Path]().append, file)
+    assert name.text() == "mine.mp4"
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,18 @@ def test_three_files_are_written(tmp_path: Path) -> None:
     assert {key: record[key] for key in origin} == origin
 
 
+def test_a_snapshot_of_the_same_moment_takes_no_others_place(tmp_path: Path) -> None:
+    """Two keys within a millisecond, two windows, or a clock that was set back; any of the three files may be there."""
+    first = write_snapshot(tmp_path, make_tick(), Origin("SIM"), NOW)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    (tmp_path / f"{first.stem}_2.json").write_text("another's own")
+    third = write_snapshot(tmp_path, make_tick(), Origin("LIVE"), NOW)
+    assert third.name == f"{first.stem}_3.png"
+    assert json.loads(third.with_suffix(".json").read_text())["rig"] == "LIVE"
+    assert {path: path.read_bytes() for path in before} == before
+    assert {path.name for path in tmp_path.glob("*_2*")} == {f"{first.stem}_2.json"}
+
+
 def test_writer_says_where_it_wrote(qtbot: QtBot, tmp_path: Path) -> None:
     writer = SnapshotWriter(tmp_path)
     with qtbot.waitSignal(writer.saved) as signal:

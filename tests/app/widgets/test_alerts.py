@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+import shiboken6
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
@@ -98,6 +100,16 @@ def test_a_click_dismisses_one_and_the_next_in_line_takes_its_place(qtbot: QtBot
     assert strip.texts == [words(key) for key in (Cause.HOT, Cause.DISK_LOW, Cause.WARM)]
     strip.clear()
     assert strip.isHidden()
+
+
+def test_a_double_click_dismisses_one_alert_and_not_the_next(qtbot: QtBot, strip: AlertStrip) -> None:
+    strip.show_alerts([alert(key) for key in (Cause.WARM, Cause.TRACKING)])
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    qtbot.mouseDClick(strip._rows[0], LEFT)
+    qtbot.mouseRelease(strip._rows[0], LEFT)
+    assert strip.texts == [words(Cause.WARM)]
+    qtbot.mouseClick(strip._rows[0], LEFT)
+    assert strip.texts == []
 
 
 def test_a_click_on_an_alert_sets_no_target_behind_it(own: Own, qtbot: QtBot, clock: Clock) -> None:
@@ -204,6 +216,19 @@ def test_a_more_urgent_sound_ends_the_running_one(qtbot: QtBot, install: Install
 
 
 @posix_only
+def test_nothing_is_heard_after_the_owner_is_gone(qtbot: QtBot, install: Install) -> None:
+    notes = install("aplay", "exec /bin/sleep 60")
+    owner = QObject()
+    sounds = AlertSounds(owner)
+    sounds.play("stop")
+    qtbot.waitUntil(lambda: played(notes) == ["stop"])
+    process = sounds._process.processId()
+    shiboken6.delete(owner)  # a warning of Qt fails the test
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+
+
+@posix_only
 def test_a_player_that_fails_is_given_up_once_and_the_next_one_plays(
     qtbot: QtBot, install: Install, make_sounds: Callable[..., AlertSounds], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -219,6 +244,21 @@ def test_a_player_that_fails_is_given_up_once_and_the_next_one_plays(
     assert "pw-play gave up: no server" in caplog.text
 
 
+@posix_only
+@pytest.mark.parametrize("trouble", ["does not start", "hangs"])
+def test_a_player_that_never_ends_well_is_given_up_too(
+    qtbot: QtBot, install: Install, make_sounds: Callable[..., AlertSounds], beeps: list[int], tmp_path: Path, trouble: str
+) -> None:
+    install("aplay", "exec /bin/sleep 60")
+    sounds = make_sounds()
+    sounds._guard.setInterval(50)
+    if trouble == "does not start":
+        (tmp_path / "bin" / "aplay").unlink()
+    sounds.play("stop")
+    qtbot.waitUntil(lambda: beeps == [1])
+    assert sounds.playing is None
+
+
 def test_without_a_player_it_beeps_and_says_so_once(
     install: Install, make_sounds: Callable[..., AlertSounds], beeps: list[int], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -228,3 +268,12 @@ def test_without_a_player_it_beeps_and_says_so_once(
         sounds.play("stop")
     assert beeps == [1, 1]
     assert len(caplog.records) == 1
+
+
+def test_a_missing_file_and_an_unknown_name_beep(
+    install: Install, make_sounds: Callable[..., AlertSounds], beeps: list[int], tmp_path: Path
+) -> None:
+    install("aplay")
+    make_sounds(tmp_path).play("stop")
+    make_sounds().play("fanfare")
+    assert beeps == [1, 1]

@@ -148,6 +148,12 @@ def test_next_step_and_its_line(view: DriveView, step: OperatorStep, granted: bo
     assert (following.step, following.granted, following.text) == (step, granted, text)
 
 
+def test_acknowledging_looks_subdued_while_servos_in_use_still_have_the_fault() -> None:
+    hot = Fault(Cause.HOT)
+    assert not next_step(DriveView(0.0, servos_on=True, latched=hot, active=(hot,))).granted
+    assert next_step(DriveView(0.0, servos_on=True, latched=hot)).granted
+
+
 def test_what_is_not_as_configured_is_said_where_it_is_known() -> None:
     detail = "not armed: outside its envelope: right at 4.00 mm (-2.4 to 2.8 mm)"
     wrong = next_step(DriveView(0.0, active=(Fault(Cause.SERVOS_WRONG, detail),)))

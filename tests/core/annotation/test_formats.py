@@ -78,6 +78,22 @@ def test_every_format_goes_out_and_comes_back(kind: str, image: FoundImage, tmp_
     assert not (tmp_path / "nothing").exists()
 
 
+@pytest.mark.parametrize("kind", [name for name, one in FORMATS.items() if one.write is not None])
+def test_images_of_one_name_are_told_apart(kind: str, tmp_path: Path) -> None:
+    images = []
+    for number, folder in enumerate(("monday", "tuesday")):
+        (tmp_path / folder).mkdir()
+        images.append(found_image(tmp_path / folder / "frame.png", f"{number}" * 64))
+    contents = [Annotation(masks=(VESSEL_BOX, piece)) for piece in (ROBOT_BOX, replace(ROBOT_BOX, points=VESSEL_BOX.points))]
+    answers = [stored(content, one.sha256) for content, one in zip(contents, images, strict=True)]
+    out = tmp_path / "out"
+    assert export_as(FORMATS[kind], answers, images, out) == 2
+    back, problems = read_files([out] if out.is_file() else sorted(out.rglob(f"*{FORMATS[kind].ending}")), images)
+    assert (kind == "imagej") == bool(problems), "only ImageJ's file does not say where its picture lies"
+    for one, content in zip(back, contents, strict=False):
+        assert np.array_equal(*(fill(part.masks, MaskTarget.ROBOT, SIZE) for part in (one.content, content)))
+
+
 def test_the_newest_lines_go_out_with_the_masks_that_count(image: FoundImage, tmp_path: Path) -> None:
     answers = [
         stored(replace(ALL, robot=VESSEL_LINE), rater="ben", changed="2026-01-02"),

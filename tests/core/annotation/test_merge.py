@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from core.annotation import merge
+from core.annotation import store as annotation_store
 from core.annotation.agreement_report import agreement_report
 from core.annotation.merge import Joined, join, salvage
 from core.annotation.model import Annotation, AnnotationError, ImageView, MaskPolygon, MaskTarget, measure_lines
@@ -151,6 +152,24 @@ def test_of_a_copy_that_went_on_the_new_edits_come(begin, tmp_path: Path) -> Non
         history = store.history(keys[0])
         history.undo()
         assert history.current == drawn(1.0)
+
+
+def test_two_who_begin_in_one_millisecond_with_the_same_words_are_two(begin, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(annotation_store, "_now", lambda: "2026-03-01T10:00:00.000+00:00")
+    here, there = begin("a", "user", 3.0), begin("b", "user", 3.0)
+    with pytest.raises(AnnotationError, match="a rater 'user' is there and here"):
+        joined(here, there)
+    for path, state in ((here, PoseState.C), (there, PoseState.D)):  # as an older version wrote it: no origins
+        with closing(sqlite3.connect(path)) as database, database:
+            database.execute("DROP TABLE origins")
+        with AnnotationStore(path) as store:
+            answer(store, ItemKey(SHAS[0], "", "user"), drawn(0.0, state))
+        with closing(sqlite3.connect(path)) as database, database:
+            database.execute("DELETE FROM annotations WHERE study <> ''")
+            database.execute("DELETE FROM journal WHERE annotation_id NOT IN (SELECT id FROM annotations)")
+            database.execute("DROP TABLE origins")
+    with pytest.raises(AnnotationError, match="a rater 'user' is there and here"):
+        joined(here, there)
 
 
 def test_files_of_an_earlier_version_know_their_copies_by_their_edits(begin, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from core.calibration.camera import (
     BoardSpec,
     BoardView,
     LensError,
+    ScaleError,
     board_bitmap,
     distort,
     find_board,
@@ -157,6 +158,12 @@ def test_two_clicks_on_a_known_length() -> None:
     assert found.mm_per_px == pytest.approx(0.3)  # 500 px
     assert found.plane is None
     assert 0.001 < found.uncertainty_share < 0.003
+
+
+@pytest.mark.parametrize(("second", "length_mm"), [((110.0, 100.0), 10.0), ((400.0, 500.0), 0.0), ((400.0, 500.0), float("nan"))])
+def test_clicks_that_say_nothing_are_refused(second: tuple[float, float], length_mm: float) -> None:
+    with pytest.raises(ScaleError):
+        scale_of_clicks((100.0, 100.0), second, length_mm, SIZE)
 
 
 def test_working_pixels_are_scaled_too() -> None:

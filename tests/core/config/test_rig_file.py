@@ -335,3 +335,19 @@ def test_a_recording_is_no_rig() -> None:
     config = load_config(overrides={"rig": {"camera": "video_file", "source": "a.mp4", "robot": "none"}})
     with pytest.raises(RigFileError, match="plays a recording"):
         make_rig(config, "bench 1", None)
+
+
+def test_a_rig_whose_file_was_renamed_is_not_saved_over_by_another_one_of_its_name() -> None:
+    old = write_rig(make_rig(REAL, "bench", KNOWN))
+    kept = old.rename(old.with_name("lab before the move.toml"))
+    assert write_rig(make_rig(REAL, "bench", None)) == old
+    assert read_rig(kept).calibration == KNOWN
+    assert find_rig("bench")[0] == old
+
+
+def test_a_rig_that_is_saved_again_in_other_letters_stays_one_file() -> None:
+    path = write_rig(make_rig(REAL, "empt", None))
+    assert write_rig(make_rig(REAL, "EMPT", KNOWN)) == path
+    assert [one.path for one in list_rigs()] == [path]
+    assert find_rig("empt")[1].calibration == KNOWN
+    assert read_rig(path.with_name("empt.older.toml")).calibration is None

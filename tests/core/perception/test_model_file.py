@@ -196,6 +196,20 @@ def test_a_shipped_models_files_are_those_of_its_manifest(manifest: Path) -> Non
     assert all(path.stat().st_size <= 12_000_000 for path in manifest.parent.iterdir() if path.is_file())
 
 
+def test_what_else_lies_in_a_models_folder_outlives_the_model(model: Path) -> None:
+    (model / "frames" / "images").mkdir(parents=True)
+    (model / "frames" / "images" / "a.png").write_bytes(b"drawn by hand")
+    (model / SECOND_LOOK).mkdir()
+    (model / SECOND_LOOK / "NOTES.md").write_text("mine")
+    with changed(model) as work:
+        write_figures(work, {"new": 1})
+    save_model(DualUNet(TINY).eval(), model, training={"steps": 1}, figures={})
+    assert read_model_info(model).training == {"steps": 1}
+    assert (model / "frames" / "images" / "a.png").read_bytes() == b"drawn by hand"
+    assert (model / SECOND_LOOK / "NOTES.md").read_text() == "mine"
+    assert [path.name for path in model.parent.iterdir()] == [model.name]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of a file's size")
 def test_a_full_disk_is_one_clear_error_and_the_old_model_stays(model: Path) -> None:
     import resource

@@ -194,6 +194,11 @@ def test_a_damaged_event_is_named(time_s: object, kind: object) -> None:
         event_from_json(json.dumps({"time_s": time_s, "kind": kind}).encode())
 
 
+def test_a_target_written_as_text_alone_gets_its_place() -> None:
+    assert event_from_json(b'{"time_s": 1.0, "kind": "target", "text": "12.0, -3.5"}').data == {"xy": [12.0, -3.5]}
+    assert event_from_json(b'{"time_s": 1.0, "kind": "target", "text": "cleared"}').data == {}
+
+
 def test_a_perceived_line_comes_back_in_source_pixels() -> None:
     scene = replace(full_scene(7, 1.0), scale=0.5, scale_xy=(0.5, 0.5), source_size=(192, 128))
     line = scene_to_json("x#7", scene)

@@ -112,3 +112,11 @@ def test_of_two_that_export_to_one_file_the_first_one_stands(
         export_csv(reader, tmp_path / "y.csv")
     assert out.read_bytes() == (tmp_path / "y.csv").read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["x.csv", "y.csv"]
+
+
+def test_a_file_that_was_made_while_exporting_is_not_overwritten(session: Path, tmp_path: Path) -> None:
+    out = tmp_path / "x.csv"
+    with SessionReader(session) as reader, pytest.raises(SessionError, match="was made by something else meanwhile"):
+        export_csv(reader, out, lambda: out.write_text("another program's") and None)
+    assert out.read_text() == "another program's"
+    assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]

@@ -1,5 +1,6 @@
 """The recorder: nothing is lost without being reported, its sender never waits, and a disk that fails stops it visibly."""
 
+import errno
 import math
 import os
 import shutil
@@ -21,7 +22,7 @@ from core.evaluation.replay import event_target
 from core.session import files as session_files
 from core.session import writer as session_writer
 from core.session.files import EncodedFrame, SessionFiles, is_being_written
-from core.session.manifest import About, Event, EventKind, event_of_target, frames_lost, read_manifest
+from core.session.manifest import About, Event, EventKind, SessionError, event_of_target, frames_lost, read_manifest
 from core.session.reader import SessionReader
 from core.session.video import FrameEncoder, Packet
 from core.session.writer import Ring, SessionWriter, faults_between
@@ -617,3 +618,29 @@ def test_an_unexpected_failure_ends_the_recorder_visibly(tmp_path: Path, caplog:
         wait_for(lambda: not writer.put(tick_of(2, 1000.2)))
     session = writer.status().folder
     assert read_manifest(session).closed
+
+
+def test_a_reason_with_a_name_that_is_no_utf8_still_ends_the_session(tmp_path: Path) -> None:
+    """The manifest could not hold the folder's name, stayed open, and the recorder went on saying that it records."""
+    files = SessionFiles(tmp_path, ABOUT, QUICK, first_s=1000.0, now_s=1000.0)
+    assert files.close("disk full in /data/b\udcfc", 0) == ""
+    manifest = read_manifest(files.folder)
+    assert (manifest.closed, manifest.ended) == (True, "disk full in /data/b\\xfc")
+
+
+def test_a_drive_without_locks_can_be_recorded_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_locks(_file: int, _kind: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", no_locks)
+    files = SessionFiles(tmp_path / "under way", ABOUT, QUICK, first_s=1000.0, now_s=1000.0)
+    assert is_being_written(files.folder), "it has just been written to"
+    with pytest.raises(SessionError, match="is being recorded"):
+        session_files.add_event(files.folder, Event(1000.0, EventKind.NOTE, "kink"))
+    os.utime(files.folder / session_files.FRAMES, (0.0, 0.0))
+    assert not is_being_written(files.folder), "it was cut"
+    assert files.close("the end", 0) == ""
+    session = record(tmp_path, ticks(3))
+    assert read_manifest(session).closed
+    assert not is_being_written(session)
+    assert session_files.add_event(session, Event(1000.0, EventKind.NOTE, "kink")).text == "kink"

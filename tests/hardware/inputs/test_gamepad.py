@@ -437,6 +437,18 @@ def test_a_second_window_says_that_the_gamepad_is_not_its_own_and_gets_it_when_t
     device.unplug()
 
 
+def test_a_gamepad_that_cannot_be_locked_is_not_said_to_be_another_windows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    device = FakeDevice(tmp_path / "js0")
+
+    def no_locks(_: int, __: int) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(driver.fcntl, "flock", no_locks)
+    with pytest.raises(GamepadError, match=r"js0 cannot be locked \(No locks available\), so its STOP does nothing here"):
+        find_gamepad(GamepadConfig(device=str(tmp_path / "js0")), drives=True)
+    device.unplug()
+
+
 @pytest.mark.parametrize("text", ["dead_zone = 0", "dead_zone = nan", "expo = 1.5", "device = ''", "invert = true"])
 def test_bad_settings_are_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "mine.toml"
