@@ -170,7 +170,9 @@ class DirectionMonitor:
             return self
         is_next = bool(self.seen) and 0.0 < head.captured_s - self.seen[-1].head.captured_s <= _GAP_S
         kept = _kept(self.seen, head.captured_s) if is_next else ()
-        now = _next(kept, head, [_at(self.sent, head.captured_s - lag_s) for lag_s in _LAGS_S])
+        # what was commanded before the first command may act until the longest lag has passed: that motion is not followed later
+        is_early = head.captured_s < self.sent[0].time_s + _LAGS_S[-1]
+        now = _next(kept, head, [_at(self.sent, head.captured_s - lag_s) for lag_s in _LAGS_S], is_early)
         return replace(self, seen=(*kept, now))._compared(kept, now)
 
     def _compared(self, earlier: tuple[_Seen, ...], now: _Seen) -> DirectionMonitor:
@@ -233,7 +235,7 @@ def _kept(seen: tuple[_Seen, ...], now_s: float) -> tuple[_Seen, ...]:
     return tuple(kept)
 
 
-def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent]) -> _Seen:
+def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent], is_early: bool) -> _Seen:
     turns_deg = tuple(command.turn_deg for command in commands)
     feds_mm = tuple(command.fed_mm for command in commands)
     now = _Seen(head, turns_deg, feds_mm, tuple(command.drift_deg for command in commands))
@@ -247,6 +249,7 @@ def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent]) -> 
     most = _each(lambda least, commanded: least + _FOLLOWED * commanded, _FOLLOWED_LEAST, (turned_deg, turned_deg, fed_mm))
     way = _each(lambda to, at: to - at, raw, before.moved)
     moved = _each(lambda at, by: at + by, before.moved, _each(lambda by, limit: max(-limit, min(limit, by)), way, most))
+    raw = moved if is_early else raw
     return replace(now, raw=raw, moved=moved, step=step, change=_each(lambda a, b: abs(a - b), step, before.step))
 
 

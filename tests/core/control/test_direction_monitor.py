@@ -231,6 +231,19 @@ def test_a_reversed_feed_shows_by_the_length_or_else_by_the_head(length_mm: floa
     assert not course[-1].feeds
 
 
+def test_what_was_commanded_before_the_program_is_no_motion_against_it() -> None:
+    """By hand the head was sent to the left and the robot backwards, and gets there when the program has begun."""
+    monitor = DirectionMonitor()
+    for k in range(75):
+        now_s = k * FRAME_S
+        late = min(1.0, now_s / 0.24) - 1.0
+        heading, length_mm = 15.0 * max(0.0, now_s - LATE_S) - 57.0 * late, 80.0 + max(0.0, now_s - LATE_S) - 1.5 * late
+        monitor = monitor.drive(MotionSent(now_s, 15.0 * now_s, 1.0)).observe(
+            HeadSeen(now_s, heading, heading, (0.0, 0.0), length_mm)
+        )
+        assert not monitor.faults(), now_s
+
+
 _rates = st.lists(st.floats(-140.0, 140.0), min_size=2, max_size=6)
 
 
