@@ -128,9 +128,9 @@ def probe_config(
 
     Notes
     -----
-    A known servo turns its own joint's millimetres per turn, with its own torque. An unknown one may drive any of them (any of its
-    model, where the line has just the models of the rig): with the largest of their ways its wire or screw never moves further, nor
-    faster, than it is asked to, and with the smallest of their torques it never pulls harder than it may.
+    A known servo turns its own joint's millimetres per turn, with its own torque. An unknown one may drive any of them: with
+    the largest of their ways its wire or screw never moves further, nor faster, than it is asked to, and with the smallest of
+    their torques it never pulls harder than it may.
 
     Raises ProbeFailed when the robot has no feed, or another number of servos, or `servo_id` is not among them.
     """
@@ -141,6 +141,8 @@ def probe_config(
         raise ProbeFailed(f"servo {servo_id} cannot be moved: {len(servos.joints)} servos are needed, there are {listed}")
     every.remove(servo_id)
     every.insert(place, servo_id)
+    largest = max(joint.mm_per_turn for joint in servos.joints if joint.kind is not JointKind.ROTATION)
+    unknown = largest, min(joint.max_turn_nmm for joint in servos.joints)
     known = {} if found is not None else {joint.id: (joint.mm_per_turn, joint.max_turn_nmm) for joint in servos.joints}
     bounds = {
         "low_mm": limits.low_mm - _MARGIN_MM,
@@ -152,21 +154,12 @@ def probe_config(
     }
     joints = []
     for joint, one in zip(servos.joints, every, strict=True):
-        mm_per_turn, turn_nmm = known.get(one) or _bounds_of_unknown(servos, models, one)
+        mm_per_turn, turn_nmm = known.get(one, unknown)
         turned = {"id": one, "model": models[one], "sign": sign if one == servo_id else 1, "mm_per_turn": mm_per_turn}
         # in place of a rotation, whose values are degrees, one more joint that only holds
         kind = JointKind.DELIVERY if joint.kind is JointKind.ROTATION else joint.kind
         joints.append(joint.model_copy(update=turned | bounds | {"kind": kind, "max_force_n": turn_nmm / mm_per_turn}))
     return patient(servos).model_copy(update={"joints": tuple(joints), "pretension_mm": 0.0})
-
-
-def _bounds_of_unknown(servos: ServosConfig, models: Mapping[int, int], servo_id: int) -> tuple[float, float]:
-    """Way (mm) and greatest torque (N mm) at one turn of a servo that may drive several joints."""
-    of_joint = {joint.name: servos.model_of(joint).number for joint in servos.joints}
-    is_told = sorted(of_joint.values()) == sorted(models.values())
-    may_be = [joint for joint in servos.joints if not is_told or of_joint[joint.name] == models[servo_id]]
-    feeds = [joint for joint in may_be if joint.kind is not JointKind.ROTATION] or [feed_of(servos)]
-    return max(joint.mm_per_turn for joint in feeds), min(joint.max_turn_nmm for joint in may_be)
 
 
 def patient(servos: ServosConfig) -> ServosConfig:

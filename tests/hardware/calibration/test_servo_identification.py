@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 
@@ -314,17 +313,6 @@ def test_a_servo_that_nobody_knows_yet_moves_nothing_farther_or_faster_than_aske
         assert 0.0 < _way_mm(servos, made, servo_id, asked_mm) <= asked_mm + 0.01
     real = next(joint for joint in servos.joints if joint.id == servo_id)
     assert registers.velocity_mm_s(real, registers.profile_velocity(made.joints[JOINT_NAMES.index("advance")])) <= 4.0
-
-
-def test_a_strong_servo_is_tried_with_the_torque_of_a_tendon_and_a_small_one_with_that_of_the_shaft() -> None:
-    """With the shaft's 80 N mm the gear of a strong one does not turn: the wizard said that something holds its wire."""
-    servos = read_rig(RESOURCES / "rigs" / "two_tendons_rotation.toml").servos
-    models = {1: 1020, 2: 1210, 3: 1020, 4: 1020}
-    tested = {servo_id: probe_config(servos, servo_id, ProbeLimits(), found=models) for servo_id in models}
-    forces = {servo_id: next(one for one in made.joints if one.id == servo_id).max_force_n for servo_id, made in tested.items()}
-    assert forces == {1: 20.0, 2: pytest.approx(80.0 * math.tau / 40.0), 3: 20.0, 4: 20.0}
-    other = probe_config(servos, 1, ProbeLimits(), found=dict.fromkeys(models, 1020))  # the shaft has a strong one, too
-    assert [one.max_force_n for one in other.joints] == pytest.approx([80.0 * math.tau / 40.0] * 4)
 
 
 class _Wires:
