@@ -56,7 +56,7 @@ def check_camera(config: Config) -> Check:
     try:
         return kind.check(config.camera)
     except (ImportError, DeviceError) as error:
-        return Check("camera", False, one_line(error), RENEW)
+        return Check("camera", False, one_line(error), RENEW if isinstance(error, ImportError) else "")
 
 
 def check_picture(config: Config, make_camera: Callable[[Config], Camera] = real_camera, watched_s: float = _WATCHED_S) -> Check:

@@ -439,8 +439,10 @@ def explained(phantom: Phantom, run: JogRecord, known: BehaviourConfig, servos: 
     """Which parameter, if it were another than `known`, explains how a run went.
 
     The joints' motion is replayed in the twin, and again with each parameter changed. A likelihood with all parameters within what
-    is known of them is compared with those where one of them is free; the best one is named where it is clearly better than that
-    and than the others, and a replay with it comes clearly nearer. Raises JogError for too short a run, and FloatingPointError.
+    is known of them is compared with those where one of them is free; the best one, or two as good, is named where it is clearly
+    better than that and than the others, and a replay with it comes clearly nearer.
+
+    Raises JogError for too short a run, and FloatingPointError.
     """
     if len(run.time_s) < _LEAST_PICTURES:
         raise JogError("the robot is seen for too short a time to explain the run")
@@ -472,11 +474,15 @@ def explained(phantom: Phantom, run: JogRecord, known: BehaviourConfig, servos: 
     equals = [place for place in np.argsort(-gains).tolist() if gains[place] >= _AS_WELL * gains[best]]
     if gains[best] < max(_CLEARLY, _ALONE * most) or len(equals) > _NAMED:
         return Explanation(round(away_mm, 2), round(away_mm, 2), {})
-    changed = np.clip(start + freed[best][1] * _STEPS, _LOW, _HIGH)
-    left = np.linalg.norm(predicted(phantom, target, run, changed)[:, 0] - run.body_mm[:, 0], axis=1)
-    left_mm = float(np.median(left[seen]))
-    values = {_TOLD[k]: round(float((start + freed[k][1] * _STEPS)[k] * _unit(_TOLD[k], real_mm)), 4) for k in equals}
-    return Explanation(round(away_mm, 2), round(left_mm, 2), values if left_mm <= (1.0 - _MOST) * away_mm else {})
+    values: dict[str, float] = {}
+    left_mm = away_mm
+    for place in equals:
+        changed = np.clip(start + freed[place][1] * _STEPS, _LOW, _HIGH)
+        left = np.linalg.norm(predicted(phantom, target, run, changed)[:, 0] - run.body_mm[:, 0], axis=1)
+        if (still_mm := float(np.median(left[seen]))) <= (1.0 - _MOST) * away_mm:
+            values[_TOLD[place]] = round(float(changed[place] * _unit(_TOLD[place], real_mm)), 4)
+            left_mm = min(left_mm, still_mm)
+    return Explanation(round(away_mm, 2), round(left_mm, 2), values)
 
 
 def _likelihood(misses: Floats, slopes: Floats, within: Floats) -> tuple[float, Floats]:
