@@ -56,6 +56,8 @@ class RigWizardModel(QObject):
         self._then: Callable[[object], None] | None = None
         self.busy = ""
         """The job that runs, in words."""
+        self.is_failed = False
+        """Whether the last job failed, or STOP came while it ran."""
         self._worker = Worker("rig wizard", self)
         self._worker.done.connect(lambda _key, result: self._end_job(result))
         self._worker.failed.connect(lambda _key, line: self._end_job(None, line))
@@ -77,6 +79,7 @@ class RigWizardModel(QObject):
 
     def _end_job(self, result: object, failure: str = "") -> None:
         then, self._then, self.busy = self._then, None, ""
+        self.is_failed = bool(failure) or (self.bench is not None and self.bench.stop.is_pressed)
         if failure:
             self.failed.emit(failure)
         elif then is not None:

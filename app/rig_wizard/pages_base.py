@@ -196,6 +196,11 @@ class StepPage(QWidget):
         if self.hint:
             self.column.addWidget(note(tr(self.hint)))
 
+    @property
+    def is_done(self) -> bool:
+        """Whether the step has been done: it gets a tick, and the wizard's Next is not called Skip."""
+        return False
+
 
 class WizardPage(StepPage):
     """One step of the rig wizard."""
@@ -215,11 +220,6 @@ class WizardPage(StepPage):
     def has_servos(self) -> bool:
         """Whether servos were found, and no job is running."""
         return self.draft is not None and self.draft.found is not None and not self.model.is_busy
-
-    @property
-    def is_done(self) -> bool:
-        """Whether the step has been done: it gets a tick, and Next is not called Skip."""
-        return False
 
     @property
     def may_leave(self) -> bool:
@@ -284,13 +284,33 @@ def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
     return made
 
 
-def focus_after_work(began: QWidget | None, stop: QWidget, onward: QPushButton, *, is_done: bool) -> None:
-    """Where the keyboard goes after a job: on, or back to what began it. Qt moved it to another button while these were off."""
-    for one in (onward, began) if is_done else (began, onward):
-        if one is not None and one is not stop and one.isEnabled() and one.isVisible():
-            one.setFocus()
+class JobFocus:
+    """Gives the keyboard back after a job, unless it was moved meanwhile: Qt moved it, mostly to STOP, when the buttons went off.
+
+    Made before they do; ``has_begun`` when they are off.
+    """
+
+    def __init__(self, dialog: QWidget, page: StepPage) -> None:
+        self._dialog, self._page, self._began = dialog, page, dialog.focusWidget()
+        self._goes_on = self._began is page.main and not page.is_done
+        self._moved_to: QWidget | None = None
+
+    def has_begun(self, stop: QWidget) -> None:
+        self._moved_to = self._dialog.focusWidget() or stop
+
+    def end(self, page: StepPage, onward: QWidget, *, is_failed: bool = False) -> None:
+        """On, where the main button's job made its page done, or else back to what began it.
+
+        After a job that failed or was stopped to no button: a second Enter, meant for STOP, moves nothing.
+        """
+        if self._dialog.focusWidget() is not self._moved_to or self._moved_to is self._began:
             return
-    stop.window().setFocus()
+        is_news = self._goes_on and page is self._page and page.is_done
+        for one in () if is_failed else (onward, self._began) if is_news else (self._began,):
+            if one is not None and one.isEnabled() and one.isVisible():
+                one.setFocus()
+                return
+        self._dialog.setFocus()
 
 
 def set_main_button(which: QPushButton, is_main: bool) -> None:

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from app.operator.stop_keys import StopKeys
 from app.rig_wizard.camera_pages import CameraPage, ScalePage
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import WizardPage, WizardPicture, button, focus_after_work, note, set_main_button
+from app.rig_wizard.pages_base import JobFocus, WizardPage, WizardPicture, button, note, set_main_button
 from app.rig_wizard.servo_pages import DrumsPage, IdentifyPage, PortPage, SteeringPage, ZeroPage
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
@@ -144,8 +144,7 @@ class RigWizard(QDialog):
         self._timer.timeout.connect(self._update_picture)
         self._timer.start()
         self._shown_frame: object = None
-        self._began: QWidget | None = None
-        """What had the focus when the job that runs began."""
+        self._job: JobFocus | None = None
         self._go(0)
 
     @property
@@ -259,8 +258,7 @@ class RigWizard(QDialog):
     @Slot()
     def _refresh(self) -> None:
         busy, page = self.model.is_busy, self.page
-        if busy and self._began is None:
-            self._began = self.focusWidget()
+        begun = JobFocus(self, page) if busy and self._job is None else None
         page.refresh()
         for row, other in enumerate(self.pages):
             item = self.steps.item(row)
@@ -276,9 +274,12 @@ class RigWizard(QDialog):
         self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.model.draft is not None))
         self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
         set_main_button(self.next_button, is_last or page.is_done)
-        if not busy and (self._began is not None or self.focusWidget() is self.stop_button):
-            focus_after_work(self._began, self.stop_button, self.next_button, is_done=page.is_done)
-            self._began = None
+        if begun is not None:
+            self._job = begun
+            begun.has_begun(self.stop_button)
+        elif not busy and self._job is not None:
+            self._job.end(page, self.next_button, is_failed=self.model.is_failed)
+            self._job = None
         if page.main is not None:
             set_main_button(page.main, not page.is_done)
         if busy:

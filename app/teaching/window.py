@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QStackedWid
 from app.annotator.canvas import AnnotationCanvas
 from app.annotator.outline_editor import VesselOutlineEditor
 from app.operator.manual_drive import JogKeys
-from app.rig_wizard.pages_base import button, focus_after_work, note
+from app.rig_wizard.pages_base import JobFocus, button, note
 from app.teaching.folder import TeachingStep
 from app.teaching.model import NewestFrame, TeachingModel
 from app.teaching.pages import (
@@ -81,8 +81,7 @@ class TeachingWindow(QDialog):
         self.model, self._newest, self._driver, self._use = model, newest, driver, use
         self._keys: JogKeys | None = None
         self._shown_index = -1
-        self._began: QWidget | None = None
-        """What had the focus when the job that runs began."""
+        self._job: JobFocus | None = None
         self.setWindowTitle(tr("Teach this bench: {name}", name=model.rig))
         self.setModal(False)
         theme.set_sheet(self, theme.FORM_SHEET)
@@ -250,8 +249,7 @@ class TeachingWindow(QDialog):
         if not self.isVisible():
             return
         model, view = self.model, self.model.view
-        if model.is_busy and self._began is None:
-            self._began = self.focusWidget()
+        begun = JobFocus(self, self._page) if model.is_busy and self._job is None else None
         if not model.is_busy and self._page.step is not view.step:
             self._page.leave()
             self._enter(self.pages[view.step])
@@ -271,9 +269,12 @@ class TeachingWindow(QDialog):
         self.over_button.setEnabled(not model.is_busy and not model.is_training)
         self.close_button.setText(tr("&Close, go on training") if model.is_training else tr("&Close"))
         show_main(self._page, self.next_button)
-        if not model.is_busy and (self._began is not None or self.focusWidget() is self.stop_button):
-            focus_after_work(self._began, self.stop_button, self.next_button, is_done=self._page.is_done)
-            self._began = None
+        if begun is not None:
+            self._job = begun
+            begun.has_begun(self.stop_button)
+        elif not model.is_busy and self._job is not None:
+            self._job.end(self._page, self.next_button)
+            self._job = None
         if model.is_busy:
             work = tr_text(model.busy)
             self.say(f"{work[0].upper()}{work[1:]} ...")

@@ -28,6 +28,7 @@ from core.devices import DeviceError
 from core.types import Frame
 from hardware.calibration import bench as calibration_bench
 from hardware.calibration.bench import CalibrationBench
+from hardware.calibration.rig_draft import RigDraft
 from hardware.calibration.servo_identification import Zeros
 from hardware.servos.discovery import FoundPort, FoundServo, FoundServos
 from tests.app.fakes import make_scene, turn_the_wheel, until
@@ -400,6 +401,56 @@ def test_stop_reaches_a_job_that_runs(opened: RigWizard, qtbot: QtBot) -> None:
     opened.model.run("looking", bench.stop.check)  # asking for the next step is going on
     _idle(opened, qtbot)
     assert opened.message == ""
+
+
+def _enter(wizard: RigWizard, qtbot: QtBot) -> None:
+    qtbot.keyClick(wizard, Qt.Key.Key_Return)
+    _idle(wizard, qtbot)
+
+
+def test_a_second_enter_on_stop_moves_nothing(opened: RigWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    _to(opened, opened.identify_page)
+    _with_servos(opened)
+    moved: list[int] = []
+
+    def wiggle(servo_id: int) -> None:
+        moved.append(servo_id)
+        opened.model.bench.stop.sleep(20.0)
+
+    monkeypatch.setattr(opened.model.draft, "wiggle", wiggle)
+    opened.identify_page.wiggle_button.setFocus()
+    qtbot.keyClick(opened, Qt.Key.Key_Return)
+    assert opened.focusWidget() is opened.stop_button
+    for _ in range(2):
+        _enter(opened, qtbot)
+    assert len(moved) == 1
+
+
+def test_enter_goes_on_only_after_the_job_that_did_its_step(
+    opened: RigWizard, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _to(opened, opened.zero_page)
+    _with_servos(opened)
+    page, draft = opened.zero_page, opened.model.draft
+    draft.zeros = Zeros((0.1,) * 4, ("right: not seen",))
+    monkeypatch.setattr(draft, "nudge", lambda name, _way_mm: draft._nudged.add(name))
+    page.tighten.setFocus()
+    for _ in range(2):
+        _enter(opened, qtbot)
+        assert page.is_done and opened.focusWidget() is page.tighten, "the wire may want more of it"
+    draft.zeros = None
+    monkeypatch.setattr(RigDraft, "find_zeros", lambda one: setattr(one, "zeros", Zeros((0.1,) * 4)))
+    page.find_button.setFocus()
+    _enter(opened, qtbot)
+    assert opened.focusWidget() is opened.next_button
+
+    def fail(_draft: RigDraft) -> None:
+        raise DeviceError("no head")
+
+    monkeypatch.setattr(RigDraft, "find_zeros", fail)
+    page.find_button.setFocus()
+    _enter(opened, qtbot)
+    assert opened.focusWidget() is opened, "neither on nor once more"
 
 
 # ---- the end

@@ -196,6 +196,13 @@ def test_another_program_that_has_the_folder_is_named_and_nothing_is_lost(open_h
 # ---- the pages
 
 
+def test_looks_at_the_live_picture_leave_the_keyboard_on_stop(open_hand: OpenHand, driven: Path) -> None:
+    hand = open_hand(driven)
+    hand.window.stop_button.setFocus()
+    hand.show(toy_picture(toy_robot(0, 0.5), seed=3))
+    assert hand.window.focusWidget() is hand.window.stop_button
+
+
 def test_the_servos_are_switched_on_and_alerts_are_seen_in_this_window(open_hand: OpenHand) -> None:
     hand = open_hand()
     QTest.keyClick(hand.window, Qt.Key.Key_F3)
