@@ -111,6 +111,7 @@ def _open_playback(config: Config) -> Rig:
     rig = config.rig
     if rig.source is None:
         raise DeviceError(f"rig {rig.name}: camera {rig.camera} needs rig.source, the path of the video or folder")
+    _check_no_bag(Path(rig.source))
     play = camera_kind(rig.camera).recorded
     if play is None:
         raise DeviceError(f"rig {rig.name}: a {rig.camera} plays no files: leave rig.source out, or set rig.camera to video_file")
@@ -296,14 +297,17 @@ def with_source(config: Config, source: Path) -> Config:
         raise DeviceError(f"{source}: no such file or folder")
     from core.files import VIDEO_ENDINGS
 
-    ending = source.suffix.lower()
-    if ending == ".bag":
-        raise UserError(f"{source}: RealSense recordings are not played: rs-convert -i {source} -p FOLDER/ writes their pictures")
-    camera = "video_file" if ending in VIDEO_ENDINGS else "image_folder"
+    _check_no_bag(source)
+    camera = "video_file" if source.suffix.lower() in VIDEO_ENDINGS else "image_folder"
     if camera == "image_folder" and source.is_file():
         _check_picture(source)
     chosen = {"camera": camera, "robot": "none", "source": str(source), "file": None}
     return config.model_copy(update={"rig": RigConfig.model_validate(config.rig.model_dump() | chosen)})
+
+
+def _check_no_bag(source: Path) -> None:
+    if source.suffix.lower() == ".bag":
+        raise DeviceError(f"{source}: RealSense recordings are not played: rs-convert -i {source} -p FOLDER/ writes their pictures")
 
 
 def _check_picture(file: Path) -> None:

@@ -339,6 +339,8 @@ def prepare_out(out: Path) -> None:
 def write_replay(out: Path, changes: Sequence[Change], result: dict[str, Any]) -> None:
     """A session's files in the folder; raises UserError."""
     try:
+        for ending in ("svg", "pdf"):  # an earlier version's figure, of another replay
+            (out / f"replay.{ending}").unlink(missing_ok=True)
         (out / "replay.json").write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         with (out / "changes.jsonl").open("w", encoding="utf-8") as file:
             file.writelines(json.dumps(change_to_json(change), allow_nan=False) + "\n" for change in changes)

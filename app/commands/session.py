@@ -115,7 +115,7 @@ def _explain(reader: SessionReader, runs: list[dict[str, Any]]) -> None:
             part = motion.between(began_s, began_s + run["seconds"])
             try:
                 run["explained"] = asdict(explained(bench.phantom, part, known, config.servos, spread))
-            except JogError as error:
+            except (JogError, FloatingPointError) as error:
                 sys.stderr.write(f"note: {error}\n")
 
 

@@ -604,7 +604,7 @@ class PlayerWindow(WindowFrame):
 
     def ask_export(self) -> None:
         """The whole session in another form, by the ending of the file's name."""
-        folder, endings = self._reader.folder, " ".join(f"*.{ending}" for ending in PLUGINS.names)
+        folder, endings = self._reader.folder.absolute(), " ".join(f"*.{ending}" for ending in PLUGINS.names)
         start, mode = folder.with_name(f"{folder.name}.mp4"), QFileDialog.FileMode.AnyFile
         ask_path(self, tr("Export the session as"), start, self._export, mode, [endings])
 

@@ -285,6 +285,8 @@ class SettingsDialog(QDialog):
             self._locked = why
             for widget in (self.page, self.reset_all):
                 widget.setEnabled(not why)
+            if why:
+                self.question.cancel()  # its answer would change them
             self._update()
 
     def show_rig(self, running: Config) -> None:

@@ -133,6 +133,7 @@ def test_a_live_rig_with_servos_that_are_checked_but_not_armed(soft: SoftRealSen
         ({"camera": "twin", "robot": "servos"}, "the twin has servos of its own"),
         ({"camera": "twin", "robot": "twin", "servos": {"port": "/dev/ttyUSB0"}}, r"leave servos\.port"),
         ({"camera": "webcam", "robot": "none", "source": "film.mp4"}, "a webcam plays no files"),
+        ({"camera": "realsense", "robot": "none", "source": "run.bag"}, "rs-convert"),
         ({"camera": "image_folder"}, "needs rig.source"),
     ],
 )

@@ -114,6 +114,9 @@ def test_info_explains_a_rehearsed_run_by_what_was_identified(
         assert f"its replay in the identified twin is 1.5 mm off: {told}" in " ".join(
             capsys.readouterr().out.replace("│", "").split()
         )
+    monkeypatch.setattr("hardware.twin.identification.explained", MagicMock(side_effect=FloatingPointError("no such twin")))
+    info(session, explain=True)
+    assert "note: no such twin" in capsys.readouterr().err
 
 
 def test_what_a_session_is_about_is_given_and_changed(recorded: tuple[Path, dict[str, object]]) -> None:

@@ -166,7 +166,10 @@ def test_lost_pictures_are_counted_and_the_rest_goes_on(tmp_path: Path, capsys: 
     lines = (session / "frames.jsonl").read_text().splitlines()
     (session / "frames.jsonl").write_text("\n".join([lines[0], '{"row": 1, "nonsense', lines[2]]) + "\n")
     session, out = session.rename(tmp_path / os.fsdecode(b"caf\xe9")), tmp_path / "out"
+    out.mkdir()
+    (out / "replay.svg").write_text("an earlier version's figure")
     run_replay(options(session), out, as_json=True)
+    assert not (out / "replay.svg").exists()
     told = json.loads(capsys.readouterr().out)
     assert told["frames"] == 2
     frames = [json.loads(line) for line in (out / "changes.jsonl").read_text().splitlines()]

@@ -114,6 +114,15 @@ def player(open_player: Open, session: Path, qtbot: QtBot) -> PlayerWindow:
     return window
 
 
+def test_here_can_be_exported(open_player: Open, session: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As by: play ."""
+    monkeypatch.chdir(session)
+    asked: list[Path] = []
+    monkeypatch.setattr("app.player.window.ask_path", lambda _parent, _title, start, *_: asked.append(start))
+    opened_at_start(open_player, Path(), qtbot).ask_export()
+    assert asked == [session.with_name(f"{session.name}.mp4")]
+
+
 def opened_at_start(open_player: Open, folder: Path, qtbot: QtBot) -> PlayerWindow:
     window = open_player(folder)
     until(qtbot, lambda: window.place == 0 and len(window.course) == COUNT)

@@ -185,7 +185,10 @@ def test_what_was_wrong_with_the_file_is_shown(qtbot: QtBot, themed: None) -> No
 
 def test_a_locked_dialog_says_why_and_changes_nothing(dialog: SettingsDialog) -> None:
     type_into(dialog, D_ALLOW, "9")
+    dialog.reset_all.click()
     dialog.lock("The robot is armed")
+    dialog.question._on_yes()
+    assert dialog.draft.value(D_ALLOW) == 9.0
     assert "The robot is armed" in dialog.status.text()
     assert not dialog.page.isEnabled()
     assert not dialog.save.isEnabled()
