@@ -445,7 +445,7 @@ class BusGuard:
     def record_sent(self, goals_mm: Joints, order: BusOrder | None, now_s: float) -> None:
         """These goals went out, as the servos count them."""
         self._written_mm = goals_mm
-        motion = joint_motion(goals_mm, self._gate.speeds_mm_s or (0.0,) * len(goals_mm), self._servos)
+        motion = joint_motion(goals_mm, self._gate.speeds_mm_s, self._servos)
         self.sent = IssuedGoals(goals_mm, motion, now_s, order if self.rejection is None else None)
 
 

@@ -19,7 +19,16 @@ from core.control.gate import Rejection, RejectReason, Source
 from core.control.joints import Retracted
 from core.control.kept_zero import ZeroRequest
 from core.types import Command
-from hardware.servos.bus_guard import RELEASE_MM_S, Attention, BusGuard, OneStep, ReleaseRamp, UnattendedWatch
+from hardware.servos.bus_guard import (
+    RELAX_MM_S,
+    RELEASE_MM_S,
+    Attention,
+    BusGuard,
+    OneStep,
+    ReleaseRamp,
+    UnattendedWatch,
+    report_of,
+)
 from hardware.servos.bus_ipc import BusOrder, Heartbeat, pack_heartbeat, pack_order, unpack_heartbeat, unpack_order
 from hardware.servos.dynamixel_port import NotReady
 from hardware.servos.registers import HardwareError, MissingServo, ServoReading, ServoState
@@ -82,6 +91,10 @@ def test_tendons_are_let_go_slowly_to_no_pull_and_nothing_else_moves() -> None:
         at_mm = [at if goal is None else goal for goal, at in zip(goals, at_mm, strict=True)]
         assert at_mm[:4] == pytest.approx(tendons)
     assert ramp.goals((0.05, -1.7, 0.0, 0.0, 40.0, 3.0, 3.0), 11.0) is None
+
+
+def test_without_hurry_they_are_let_go_at_half_the_speed() -> None:
+    assert ReleaseRamp(SERVOS.joints, PULLED, 10.0, RELAX_MM_S).goals(PULLED, 10.1)[0] == pytest.approx(2.2)
 
 
 def test_a_drum_that_does_not_turn_ends_it() -> None:
@@ -224,9 +237,10 @@ def test_it_follows_orders_and_tells_what_was_sent(bench: Bench) -> None:
 
 def test_what_was_limited_is_told_as_it_was_sent(bench: Bench) -> None:
     """Asked for 20 mm/s from rest, the joint may get faster by 200 mm/s^2."""
+    assert bench.guard.clamp_count == 0
     bench.command = Command(advance_mm_s=20.0, bend=1.0)
     bench.cycles(3)
-    assert bench.guard.clamps
+    assert bench.guard.clamp_count >= len(bench.guard.clamps) > 0
     assert bench.guard.sent.motion.advance_mm_s == pytest.approx(8.0)
     assert 0.0 < bench.guard.sent.motion.bend < 0.3
 
@@ -460,6 +474,107 @@ def test_the_first_cause_stays_until_acknowledged_and_nothing_arms_itself(bench:
     assert bench.guard.armed
 
 
+def test_a_warning_and_what_arming_mends_hinder_no_arming() -> None:
+    for changes, cause in (({"temperature_c": 66.0}, Cause.WARM), ({"watchdog_tripped": True}, Cause.WATCHDOG)):
+        bench = Bench()
+        _altered(**changes)(bench)
+        assert [fault.cause for fault in bench.guard.active] == [cause]
+        bench.guard.check_arming()
+
+
+def test_disarmed_a_silent_application_is_no_fault() -> None:
+    bench = Bench()
+    bench.beating = False
+    bench.cycles(100)
+    assert bench.guard.active == ()
+
+
+def test_no_readings_at_all_are_no_measurement(bench: Bench) -> None:
+    bench.guard.update([], 0, bench.beat, bench.now_s)
+
+
+def test_positions_are_as_old_as_the_oldest(bench: Bench) -> None:
+    bench.cycle()
+    bench.alter = lambda state: replace(state, time_s=state.time_s - 0.2) if state.id == 3 else state
+    bench.cycle()
+    assert bench.reason is RejectReason.STALE_MEASUREMENT
+
+
+def test_what_was_sent_stays_told_until_more_is_sent(bench: Bench) -> None:
+    bench.cycles(3)
+    sent = bench.guard.sent
+    bench.guard.step(bench.order, bench.beat, bench.now_s)
+    assert bench.guard.sent is sent
+    assert sent.order is not None
+
+
+def test_the_operator_alone_pulls_a_feed_out_of_its_envelope() -> None:
+    for source in Source:
+        bench = Bench()
+        bench.positions[4] = bench.goals[4] = SERVOS.joints[4].low_mm
+        bench.arm()
+        bench.beating = False
+        for _ in range(20):
+            now_s = bench.now_s + CYCLE_S
+            bench.beat = Heartbeat(now_s, source)
+            bench.order = BusOrder(Command(advance_mm_s=-1.0), source, now_s, now_s, Retracted.ROBOT)
+            bench.cycle()
+        assert (bench.positions[4] < SERVOS.joints[4].low_mm - 0.1) is (source is Source.OPERATOR)
+
+
+def test_servos_that_are_too_hot_are_relaxed_where_they_hold_and_only_then(bench: Bench) -> None:
+    """Not while the motion goes on, which must end first, nor without torque, where nothing holds."""
+    bench.alter = lambda state: replace(state, temperature_c=90.0)
+    assert bench.guard.update(bench.readings(), 0, bench.beat, bench.now_s) is not None
+    assert not bench.guard.must_relax
+    bench.guard.disarm()
+    assert bench.guard.must_relax
+    bench.alter = lambda state: replace(state, temperature_c=90.0, torque=False)
+    bench.cycle()
+    assert not bench.guard.must_relax
+
+
+def test_tendons_that_have_not_told_where_they_are_for_long_are_not_let_go(bench: Bench) -> None:
+    bench.cycle()
+    assert bench.guard.release_ramp(bench.now_s) is not None
+    assert bench.guard.release_ramp(bench.now_s + SAFETY.measurement_max_age_s + 0.01) is None
+
+
+def test_stops_and_restarts_are_counted(bench: Bench) -> None:
+    assert bench.guard.restarts == 0
+    bench.guard.end_motion(Fault(Cause.STOP_PRESSED))
+    assert bench.guard.fault_counts[Cause.STOP_PRESSED] == 1
+    bench.alter = _restarted
+    bench.cycle()
+    assert bench.guard.restarts == len(SERVOS.joints)
+
+
+# --- what is reported ------------------------------------------------------------------------------------------------------------
+
+
+def test_goals_count_where_they_are_followed_and_values_where_all_tell_theirs() -> None:
+    bench = Bench()
+    bench.goals[4] = 0.3
+    states = bench.readings()
+    for armed in (True, False):
+        report = report_of(states, armed=armed, errors=0)
+        assert report.tracking_mm == (0.0,) * 4 + (0.3 if armed else 0.0,) + (0.0,) * 2
+    assert report.temperatures_c == (30.0,) * 7
+    gap = report_of([*states[:6], MissingServo("delivery_2", 7, bench.now_s, 1, "silent")], armed=True, errors=0)
+    assert (gap.temperatures_c, gap.voltages_v, gap.tracking_mm) == ((), (), ())
+    assert gap.misses == (0,) * 6 + (1,)
+
+
+def test_what_only_an_armed_servo_can_lose() -> None:
+    state = replace(Bench().readings()[0], is_limited=False, torque=False)
+    for armed in (True, False):
+        report = report_of([state], armed=armed, errors=0)
+        assert (report.limit_lost, report.torque_taken, report.rebooted) == ((armed,), (armed,), False)
+    switched_off = report_of([replace(state, error=HardwareError.OVERLOAD)], armed=True, errors=0)
+    assert switched_off.torque_taken == (False,), "it did so itself"
+    assert report_of([state], armed=True, errors=0, rebooted=True).rebooted
+
+
 # --- every state x event ---------------------------------------------------------------------------------------------------------
 
 
@@ -580,6 +695,7 @@ def test_a_hold_is_everybodys(bench: Bench) -> None:
     bench.beat = Heartbeat(bench.now_s, Source.PROGRAM)
     bench.cycle()
     assert bench.reason is RejectReason.NO_COMMAND
+    assert bench.guard.followed is bench.order
     bench.order = BusOrder(Command(advance_mm_s=5.0), Source.OPERATOR, bench.now_s)
     bench.cycle()
     assert bench.reason is RejectReason.WRONG_SOURCE
