@@ -192,6 +192,10 @@ def test_the_head_of_a_scene() -> None:
     assert found.length_mm == pytest.approx(15.0)
     inside = scene_at(STRAIGHT, (200.0, 100.0), None, heading_deg=12.0)
     assert inside.path is not None
+    slant = replace(inside.vessel_vector, start=(0.0, 0.0), end=(math.cos(0.35), math.sin(0.35)))
+    assert head_seen(replace(inside, vessel_vector=slant), 4.0).theta_deg == pytest.approx(12.0 - math.degrees(0.35), abs=0.1)
+    assert [head_seen(replace(inside, **{part: None}), 4.0) for part in ("pose", "path", "vessel_vector")] == [None] * 3
+    assert head_seen(replace(inside, path=replace(inside.path, points=inside.path.points[-1:])), 4.0) is None
     assert head_seen(replace(inside, path=replace(inside.path, entry_on_border=False)), 4.0).length_mm is None
 
 
@@ -242,6 +246,49 @@ def test_what_was_commanded_before_the_program_is_no_motion_against_it() -> None
             HeadSeen(now_s, heading, heading, (0.0, 0.0), length_mm)
         )
         assert not monitor.faults(), now_s
+
+
+def test_a_vessel_that_turned_before_hides_no_wrong_turn() -> None:
+    """For two seconds it turns away to the right beside a head that is not steered; then that is steered left, and turns right."""
+    monitor = DirectionMonitor()
+    for k in range(80):
+        now_s = k * FRAME_S
+        turned = 10.0 * max(0.0, now_s - 2.0)
+        theta = turned - 15.0 * min(now_s, 2.0)
+        monitor = monitor.drive(MotionSent(now_s, -turned, 0.0)).observe(HeadSeen(now_s, turned, theta, (0.0, 0.0)))
+    assert monitor.wrong_turn_deg >= WRONG_TURN_DEG
+    assert not monitor.turns
+
+
+@pytest.mark.parametrize(("share", "is_held"), [(0.05, True), (0.15, False)])
+def test_a_head_that_gives_way_a_little_is_held_and_one_that_goes_the_wrong_way_is_not(share: float, is_held: bool) -> None:
+    course = _course(Robot(turn=-share, feed=-share), _ramp(15.0), lambda _: 3.5, seconds=1.2)
+    assert not any(one.faults() for one in course)
+    assert (course[-1].turns, course[-1].feeds) == (is_held, is_held)
+
+
+def test_a_steady_motion_has_no_noise() -> None:
+    monitor = DirectionMonitor()
+    assert (monitor.wrong_turn_deg, monitor.wrong_feed_mm, monitor.commanded) == (0.0, 0.0, (0.0, 0.0))
+    for k in range(26):
+        now_s = k * FRAME_S
+        monitor = monitor.drive(MotionSent(now_s, 10.0 * now_s, 2.0))
+        monitor = monitor.observe(HeadSeen(now_s, -5.0 * now_s, -5.0 * now_s, (0.0, 0.0), 80.0 - 1.0 * now_s))
+    assert monitor.wrong_turn_deg == pytest.approx(5.0, abs=0.02)
+    assert monitor.wrong_feed_mm == pytest.approx(1.0, abs=0.02)
+
+
+def test_between_two_commands_the_motion_is_in_proportion() -> None:
+    """10 mm/s fed turn a head that is bent by 15 degrees by 10 degrees a second."""
+    monitor = DirectionMonitor()
+    for k in range(5):
+        monitor = monitor.drive(MotionSent(k * 0.1, 15.0 + k, 10.0))
+    seen = monitor.observe(HeadSeen(0.37, 0.0, 0.0, (0.0, 0.0))).seen[-1]
+    assert seen.turns_deg == pytest.approx((18.7, 17.5, 16.2))
+    assert seen.feds_mm == pytest.approx((3.7, 2.5, 1.2))
+    assert seen.drifts_deg == pytest.approx(
+        (1.0 + 16 / 15 + 17 / 15 + 0.7 * 18 / 15, 1.0 + 16 / 15 + 0.5 * 17 / 15, 1.0 + 0.2 * 16 / 15)
+    )
 
 
 _rates = st.lists(st.floats(-140.0, 140.0), min_size=2, max_size=6)
