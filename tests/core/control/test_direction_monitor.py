@@ -221,6 +221,8 @@ def test_a_robot_that_is_covered_or_cut_in_the_picture_has_not_gone_back() -> No
         return HeadSeen(now_s, 0.0, 0.0, (3.0 * now_s, 0.0), length_mm)
 
     assert max(one.wrong_feed_mm for one in _fed(3.0, seen)) < 0.1
+    course = _fed(8.0, lambda now_s: HeadSeen(now_s, 0.0, 0.0, (8.0 * now_s, 0.0), 80.0 + 8.0 * now_s - 25.0 * (now_s > 2.0)))
+    assert max(one.wrong_feed_mm for one in course) < 0.1, "nor after much feed"
 
 
 @pytest.mark.parametrize("length_mm", [None, 80.0])
@@ -284,11 +286,46 @@ def test_between_two_commands_the_motion_is_in_proportion() -> None:
     for k in range(5):
         monitor = monitor.drive(MotionSent(k * 0.1, 15.0 + k, 10.0))
     seen = monitor.observe(HeadSeen(0.37, 0.0, 0.0, (0.0, 0.0))).seen[-1]
+    assert monitor.observe(HeadSeen(0.45, 0.0, 0.0, (0.0, 0.0))).seen[-1].turns_deg[0] == 19.0
     assert seen.turns_deg == pytest.approx((18.7, 17.5, 16.2))
     assert seen.feds_mm == pytest.approx((3.7, 2.5, 1.2))
     assert seen.drifts_deg == pytest.approx(
         (1.0 + 16 / 15 + 17 / 15 + 0.7 * 18 / 15, 1.0 + 16 / 15 + 0.5 * 17 / 15, 1.0 + 0.2 * 16 / 15)
     )
+
+
+@pytest.mark.parametrize("follows", [False, True])
+def test_what_had_no_effect_may_spring_free_and_what_had_may_not(follows: bool) -> None:
+    """Right and forward for a second, held or followed; then the command goes back, and head and robot go right and forward."""
+    causes: set[Cause] = set()
+    monitor = DirectionMonitor()
+    for k in range(50):
+        now_s = k * FRAME_S
+        share = (min(now_s, 1.0) if follows else 0.0) + 0.9 * max(0.0, now_s - 1.0)
+        command = 1.0 - abs(now_s - 1.0), 3.0 if now_s < 1.0 else -3.0
+        monitor = monitor.drive(MotionSent(now_s, 10.0 * command[0], command[1]))
+        monitor = monitor.observe(HeadSeen(now_s, 10.0 * share, 10.0 * share, (0.0, 0.0), 80.0 + 3.0 * share))
+        causes |= {fault.cause for fault in monitor.faults()}
+    assert causes == ({Cause.WRONG_TURN, Cause.WRONG_FEED} if follows else set())
+
+
+def test_a_bent_head_that_is_turned_on_by_its_feed_was_not_seen_to_turn() -> None:
+    monitor = DirectionMonitor()
+    for k in range(40):
+        now_s = k * FRAME_S
+        late_s = max(0.0, now_s - LATE_S)
+        drift = 16.0 * late_s + 16.0 / 15.0 * late_s**2
+        monitor = monitor.drive(MotionSent(now_s, 30.0 + 4.0 * now_s, 8.0))
+        monitor = monitor.observe(HeadSeen(now_s, drift, drift, (0.0, 0.0), 80.0 + 8.0 * late_s))
+    assert (monitor.turns, monitor.feeds) == (False, True)
+
+
+def test_with_few_pictures_a_reversed_feed_shows_by_long_steps() -> None:
+    monitor = DirectionMonitor()
+    for k in range(10):
+        now_s = k * 0.2
+        monitor = monitor.drive(MotionSent(now_s, 0.0, 12.0)).observe(HeadSeen(now_s, 0.0, 0.0, (0.0, 0.0), 80.0 - 12.0 * now_s))
+    assert [fault.cause for fault in monitor.faults()] == [Cause.WRONG_FEED]
 
 
 _rates = st.lists(st.floats(-140.0, 140.0), min_size=2, max_size=6)
