@@ -102,6 +102,9 @@ def test_a_drum_that_does_not_turn_ends_it() -> None:
     ramp = ReleaseRamp(SERVOS.joints, PULLED, 10.0)
     assert ramp.goals(PULLED, 11.6) is not None
     assert ramp.goals(PULLED, 10.0 + 2.3 / RELEASE_MM_S + 0.51) is None
+    slack = ReleaseRamp(SERVOS.joints, (-1.7,) * 4 + PULLED[4:], 10.0)
+    assert slack.goals((0.3,) * 4 + PULLED[4:], 10.49) is not None
+    assert slack.goals((0.3,) * 4 + PULLED[4:], 10.51) is None
 
 
 def test_a_tendon_that_cannot_be_read_keeps_no_other_one_tight_and_is_named() -> None:
@@ -530,10 +533,13 @@ def test_the_operator_alone_pulls_a_feed_out_of_its_envelope() -> None:
             bench.order = BusOrder(Command(advance_mm_s=-1.0), source, now_s, now_s, Retracted.ROBOT)
             bench.cycle()
         assert (bench.positions[4] < SERVOS.joints[4].low_mm - 0.1) is (source is Source.OPERATOR)
+        assert bench.guard.rejection is None
+        assert bench.guard.at_end == (("advance",) if source is Source.PROGRAM else ())
 
 
 def test_servos_that_are_too_hot_are_relaxed_where_they_hold_and_only_then(bench: Bench) -> None:
     """Not while the motion goes on, which must end first, nor without torque, where nothing holds."""
+    assert not Bench().guard.must_relax, "not before the first reading"
     bench.alter = lambda state: replace(state, temperature_c=90.0)
     assert bench.guard.update(bench.readings(), 0, bench.beat, bench.now_s) is not None
     assert not bench.guard.must_relax
@@ -542,6 +548,12 @@ def test_servos_that_are_too_hot_are_relaxed_where_they_hold_and_only_then(bench
     bench.alter = lambda state: replace(state, temperature_c=90.0 if state.id == 5 else 30.0)
     bench.cycle()
     assert bench.guard.must_relax, "one is enough"
+    bench.guard.release_ramp(bench.now_s)
+    assert not bench.guard.must_relax, "they were"
+    hot = bench.alter
+    for bench.alter in (lambda state: state, hot):
+        bench.cycle()
+    assert bench.guard.must_relax, "they had cooled down"
     bench.alter = lambda state: replace(state, temperature_c=90.0, torque=False)
     bench.cycle()
     assert not bench.guard.must_relax
