@@ -280,6 +280,16 @@ def test_a_steady_motion_has_no_noise() -> None:
     assert monitor.wrong_feed_mm == pytest.approx(1.0, abs=0.02)
 
 
+def test_noise_that_is_taken_off_is_two_and_a_half_deviations() -> None:
+    """A pose that alternates by 0.2 degrees has second differences of 0.8, as noise with a deviation of 0.41 has."""
+    monitor = DirectionMonitor()
+    for k in range(26):
+        now_s = k * FRAME_S
+        heading = -5.0 * now_s + (0.2 if k % 2 == 0 else -0.2)
+        monitor = monitor.drive(MotionSent(now_s, 10.0 * now_s, 0.0)).observe(HeadSeen(now_s, heading, heading, (0.0, 0.0)))
+    assert monitor.wrong_turn_deg == pytest.approx(5.4 - 2.5 * 0.41, abs=0.1)
+
+
 def test_between_two_commands_the_motion_is_in_proportion() -> None:
     """10 mm/s fed turn a head that is bent by 15 degrees by 10 degrees a second."""
     monitor = DirectionMonitor()

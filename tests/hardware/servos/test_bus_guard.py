@@ -787,6 +787,11 @@ def test_what_a_look_finds(changes: dict[str, object], problem: str) -> None:
     )
 
 
+def test_the_first_joint_that_must_not_hold_on_is_told() -> None:
+    states = [replace(_held(temperature_c=90.0), name=joint.name, id=joint.id) for joint in SERVOS.joints]
+    assert UnattendedWatch().update(states, 100.0, SERVOS).problem == "right 90 °C"
+
+
 def test_a_current_that_is_too_high_at_three_looks_in_a_row_is_no_peak() -> None:
     others = [MissingServo(joint.name, joint.id, 100.0, 1, "no answer") for joint in SERVOS.joints[1:]]
     watch = UnattendedWatch()
