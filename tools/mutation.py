@@ -54,6 +54,7 @@ LOADED = ["__main__", "pytest", "hypothesis.stateful", "pytestqt.plugin", "PySid
 MISTRUST = "without a trusted measurement there is an objection already; it stands there for the type checker"
 MOVING = "what moves has goals and a time; it stands there for the type checker"
 TIE = "differs only where two numbers are equal to the last bit, a billionth of a millimetre apart"
+MOMENT = "differs only at the very moment, to the last bit of the clock"
 EXPLAINED = {
     ("gate", "if objection is not None or request is None or believed is None:", "without term 3"): MISTRUST,
     ("gate", "believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None",
@@ -77,6 +78,45 @@ EXPLAINED = {
         "without term 2"): "a request of another source is refused, whatever its envelope",
     ("kept_zero", "turns = (away + TICKS_PER_TURN // 2) // TICKS_PER_TURN", "2 -> 3"):
         "what was moved by more than a quarter of a turn is not offered, and nearer both round alike",
+    ("direction_monitor", "is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE * WRONG_TURN_DEG", "GtE -> Gt"): TIE,
+    ("direction_monitor", "is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE * WRONG_TURN_DEG", "LtE -> Lt"): TIE,
+    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_DEG and -min(turned) <= _LITTLE * WRONG_TURN_DEG", "GtE -> Gt"): TIE,
+    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_MM and -gone <= _LITTLE * WRONG_FEED_MM", "GtE -> Gt"): TIE,
+    ("direction_monitor", "if against > wrong_deg:", "Gt -> GtE"): TIE,
+    ("direction_monitor", "if against > wrong_mm:", "Gt -> GtE"): TIE,
+    ("direction_monitor", "if age_s <= _WINDOW_S and (age_s <= _DENSE_S or is_apart):", "LtE -> Lt of age_s <= _WINDOW_S"): MOMENT,
+    ("direction_monitor", "is_apart = not kept or one.head.captured_s - kept[-1].head.captured_s >= _APART_S", "GtE -> Gt"): MOMENT,
+    ("direction_monitor", "if not self.sent or head.captured_s < self.sent[0].time_s:", "Lt -> LtE"): MOMENT,
+    ("direction_monitor", "is_early = head.captured_s < self.sent[0].time_s + _LAGS_S[-1]", "Lt -> LtE"): MOMENT,
+    ("direction_monitor", "return replace(self, sent=(*(one for one in self.sent if one.time_s >= oldest_s), now))",
+        "GtE -> Gt"): MOMENT,
+    ("direction_monitor", 'side = "right" if self.commanded[0] > 0.0 else "left"',
+        "Gt -> GtE"): "no turn is wrong without a command",
+    ("bus_guard", "if silent_s <= servos.heartbeat_timeout_s + LINGER_S + servos.watchdog_s + _TRIPPED_S:", "LtE -> Lt"): MOMENT,
+    ("bus_guard", "fresh = beat is not None and now_s - beat.time_s <= self._safety.command_max_age_s", "LtE -> Lt"): MOMENT,
+    ("bus_guard",
+        "if not any(joint.name in tight and now_s <= self._end_s(place, joint) for place, joint in enumerate(self._joints)):",
+        "LtE -> Lt"): MOMENT,
+    ("bus_guard", "if at is not None and self._cycle_s - at.measured_s <= self._safety.measurement_max_age_s:",
+        "LtE -> Lt"): MOMENT,
+    ("bus_guard", "if order is None or order.command is None or self._measurement is None or order.issued_s < self._armed_s:",
+        "Lt -> LtE"): MOMENT,
+    ("bus_guard", "if silence_s > self._servos.heartbeat_timeout_s:", "Gt -> GtE"): MOMENT,
+    ("bus_guard",
+        "told[place][0] if place in told and told[place][1] >= oldest_s else None for place in range(len(self._servos.joints))",
+        "GtE -> Gt"): MOMENT,
+    ("bus_guard", "strained.append(0 if ma is None or most_ma is None or abs(ma) <= most_ma else count + 1)", "LtE -> Lt"): TIE,
+    ("bus_guard", "whole = bool(states) and not missing", "without term 1"): "no readings are no values in either case",
+    ("bus_guard", "permitted: Source | None = beat.permitted if self.armed and beat is not None and fresh else None",
+        "without term 2"): "what is fresh is there; it stands there for the type checker",
+    ("bus_guard",
+        "self.rejection = measurement_problem(self._measurement, now_s, self._servos, self._safety) or step.rejection",
+        "without term 2"): "the gate gives no goals only where the measurement has a problem",
+    ("bus_guard", "self._too_hot_c = max((0.0 if math.isnan(one) else one for one in above), default=-math.inf)", "0.0 -> 1.0"):
+        "a temperature that is no number is too hot, by how much does not matter",
+    ("bus_guard",
+        'faults.append(Fault(Cause.HEARTBEAT_LOST, f"no heartbeat of the application for {1000 * silence_s:.0f} ms"))',
+        "1000 -> 1001"): "a thousandth of a number that is told",
     ("health", "reported_s: float = 0.0", "0.0 -> 1.0"): "before the first report nothing is pressed, whenever that was",
 }
 # fmt: on
