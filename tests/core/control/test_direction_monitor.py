@@ -319,6 +319,35 @@ def test_what_had_no_effect_may_spring_free_and_what_had_may_not(follows: bool) 
     assert causes == ({Cause.WRONG_TURN, Cause.WRONG_FEED} if follows else set())
 
 
+def test_it_may_spring_free_long_after_it_has_followed() -> None:
+    """It follows for a second, rests for five, is held while the command goes on, and springs free while that goes back."""
+    monitor = DirectionMonitor()
+    for k in range(200):
+        now_s = k * FRAME_S
+        on, back = max(0.0, now_s - 6.0), max(0.0, now_s - 7.0)
+        command = min(now_s, 1.0) + on - 2.0 * back
+        feed = -3.0 if now_s >= 7.0 else 3.0 if now_s >= 6.0 or now_s < 1.0 else 0.0
+        share = min(now_s, 1.0) + 0.8 * back
+        monitor = monitor.drive(MotionSent(now_s, 10.0 * command, feed))
+        monitor = monitor.observe(HeadSeen(now_s, 10.0 * share, 10.0 * share, (0.0, 0.0), 80.0 + 3.0 * share))
+        assert not monitor.faults(), now_s
+    assert 4.0 <= now_s - monitor.seen[0].head.captured_s + 0.12
+    assert now_s - monitor.seen[0].head.captured_s <= 4.0 + FRAME_S
+    assert 4.25 <= now_s - monitor.sent[0].time_s <= 4.6
+
+
+def test_what_does_not_follow_was_not_seen_to_turn() -> None:
+    """Noise of a head that is held, and a vessel that turns away beside it."""
+    assert not _course(Robot(turn=0.0, noise_deg=2.0), _ramp(5.0), seconds=1.6)[-1].turns
+    monitor = DirectionMonitor().drive(MotionSent(1.0, 0.0, 0.0))
+    assert monitor.observe(HeadSeen(0.9, 0.0, 0.0, (0.0, 0.0))) == monitor, "before the first command"
+    for k in range(25, 75):
+        now_s = k * FRAME_S
+        monitor = monitor.drive(MotionSent(now_s, 10.0 * (now_s - 1.0), 0.0))
+        monitor = monitor.observe(HeadSeen(now_s, 0.0, -5.0 * (now_s - 1.0), (0.0, 0.0)))
+    assert not monitor.turns
+
+
 def test_a_bent_head_that_is_turned_on_by_its_feed_was_not_seen_to_turn() -> None:
     monitor = DirectionMonitor()
     for k in range(40):
