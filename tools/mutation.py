@@ -106,6 +106,8 @@ EXPLAINED = {
         "told[place][0] if place in told and told[place][1] >= oldest_s else None for place in range(len(self._servos.joints))",
         "GtE -> Gt"): MOMENT,
     ("bus_guard", "strained.append(0 if ma is None or most_ma is None or abs(ma) <= most_ma else count + 1)", "LtE -> Lt"): TIE,
+    ("bus_guard", "strained.append(0 if ma is None or most_ma is None or abs(ma) <= most_ma else count + 1)", "without term 2"):
+        "a model without that limit reports no current; it stands there for the type checker",
     ("bus_guard", "whole = bool(states) and not missing", "without term 1"): "no readings are no values in either case",
     ("bus_guard", "permitted: Source | None = beat.permitted if self.armed and beat is not None and fresh else None",
         "without term 2"): "what is fresh is there; it stands there for the type checker",
