@@ -532,7 +532,9 @@ class TeachingFolder:
         self._check(raises=True)
         frames = [replace(taken.frame, reason=taken.frame.reason or _left_out(taken)) for taken in self._frames]
         corrected = {taken.stem for taken in self._frames if taken.is_corrected}
-        chosen = [one if one.picture.stem in corrected else self._completed(one) for one in teaching.choose(frames, WANTED)]
+        chosen = teaching.choose(frames, WANTED)
+        completed = [one if one.picture.stem in corrected else self._completed(one) for one in chosen]
+        chosen = [was if one.reason else now for was, now, one in zip(chosen, completed, self._checked(completed), strict=True)]
         teaching.write_teaching_set(self.folder / _SET, self._bench, chosen, [one for one in frames if one.reason], len(frames))
         return self.folder / _SET
 

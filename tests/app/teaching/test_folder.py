@@ -136,6 +136,22 @@ def test_the_network_completes_the_masks_by_difference_and_not_those_drawn_by_ha
     assert all(np.any(mask & whole) for mask in doubtful.values()), "beyond its end the network sees more robot"
 
 
+def test_a_mask_that_is_rejected_once_completed_stays_as_it_was_reviewed(
+    work: TeachingFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive(work)
+    written: list[teaching.TeachingFrame] = []
+    monkeypatch.setattr(teaching, "write_teaching_set", lambda _folder, _bench, chosen, *_: written.extend(chosen))
+    work.teaching_set()
+    before, spoilt = written[:], np.ones((480, 640), bool)
+    monkeypatch.setattr(
+        work, "_completed", lambda frame: replace(frame, robot=spoilt) if frame.picture.stem == before[0].picture.stem else frame
+    )
+    written.clear()
+    work.teaching_set()
+    assert not any(one.robot is spoilt for one in written)
+
+
 # ---- taken up again
 
 
