@@ -928,6 +928,13 @@ def test_after_these_the_servos_must_be_checked_again(cause: Cause, benches: dic
     assert bench.tick(ServoCheckReport()).permitted is Source.OPERATOR
 
 
+def test_stop_is_latched_also_while_the_servos_are_not_in_use(benches: dict[Mode, Bench]) -> None:
+    bench = benches[V].copy()
+    bench.tick(ServoRequestBegun())
+    decision = bench.tick(Act.STOP)
+    assert (bench.state.mode, decision.latched) == (S, Fault(Cause.STOP_PRESSED))
+
+
 @pytest.mark.parametrize("servos_on", [True, False])
 def test_a_pressed_e_stop_must_be_released_and_then_acknowledged(servos_on: bool, benches: dict[Mode, Bench]) -> None:
     bench = benches[V].copy()
