@@ -307,7 +307,9 @@ def with_source(config: Config, source: Path) -> Config:
 
 def _check_no_bag(source: Path) -> None:
     if source.suffix.lower() == ".bag":
-        raise DeviceError(f"{source}: RealSense recordings are not played: rs-convert -i {source} -p FOLDER/ writes their pictures")
+        raise DeviceError(
+            f"{source}: RealSense recordings are not played: rs-convert -c -i {source} -p FOLDER/ writes their pictures"
+        )
 
 
 def _check_picture(file: Path) -> None:

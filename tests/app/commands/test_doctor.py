@@ -111,7 +111,7 @@ def test_the_twin_never_touches_the_bench(tmp_path: Path) -> None:
 
 def test_a_realsense_recording_is_to_be_converted(tmp_path: Path) -> None:
     (tmp_path / "run.bag").touch()
-    with pytest.raises(UserError, match=r"run\.bag: RealSense recordings are not played: rs-convert -i "):
+    with pytest.raises(UserError, match=r"run\.bag: RealSense recordings are not played: rs-convert -c -i "):
         rig_config(None, None, tmp_path / "run.bag")
 
 
