@@ -18,7 +18,7 @@ from core.types import Advice, Frame, Point, Reason, Refusal, RobotStatus, Scene
 
 
 class Perceive(Protocol):
-    """Turns a frame into a scene; ``target`` is the operator's target in source pixels."""
+    """Turns a frame into a scene; ``target`` is the place in source pixels that the operator clicked."""
 
     def __call__(self, frame: Frame, target: Point | None = None) -> Scene: ...
 

@@ -217,12 +217,12 @@ class Pipeline:
         self._state = StreamState(self._config)
 
     def perceive_single(self, frame: Frame, target: Point | None = None) -> Scene:
-        """Perceive a frame by itself; `target` is the operator's target in source pixels."""
+        """Perceive a frame by itself; `target` is the place in source pixels that the operator clicked."""
         watch = _Stopwatch()
         return watch.finish(self._perceive(frame, target, watch, self._single))
 
     def __call__(self, frame: Frame, target: Point | None = None) -> Scene:
-        """Perceive the next frame of a stream; `target` is the operator's target in source pixels."""
+        """Perceive the next frame of a stream; `target` is the place in source pixels that the operator clicked."""
         tracking = self._config.tracking
         if not tracking.enabled:
             watch = _Stopwatch()
