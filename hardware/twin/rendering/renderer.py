@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.bench.bench import bench_stamp, read_bench
-from core.bench.robot_texture import REACH_RADII, RobotTexture, lines_above, read_textures
+from core.bench.robot_texture import PAINTED_TEXTURES, REACH_RADII, RobotTexture, covers_of, lines_above, read_textures
 from core.types import Image, Mask, Points
 from hardware.twin.catalog import OWN_LOOK
 from hardware.twin.phantom import BOARD_MM, Phantom, own_file
@@ -112,8 +112,9 @@ class Renderer:
     def _taken(self, own: _OwnBench) -> tuple[F32, F32, F32]:
         """The same layers where the background is a picture."""
         self._light = np.ones(own.picture.shape[:2], np.float32)
-        keep = 1 - own.above
-        return np.asarray((own.picture - own.above) / np.maximum(keep, np.float32(0.01)), np.float32), own.above, keep
+        keep, shown = 1 - own.above, 1 - own.covers[..., None]
+        under = np.asarray((own.picture - own.above) / np.maximum(keep, np.float32(0.01)), np.float32)
+        return under, own.above * shown + own.picture * (1 - shown), keep * shown
 
     def _with_robot(self, points: Points, band: Band, sheath_mm: float) -> Image:
         """The noise-free image, with the window around the robot painted again."""
@@ -180,10 +181,14 @@ class Renderer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OwnBench:
-    """The empty picture of a bench (H, W, 3), 0..1, with what of it lies ``above`` the robot; and the robot's texture, if known."""
+    """The empty picture of a bench (H, W, 3), 0..1, and the robot's texture, if known.
+
+    What of the picture lies ``above`` the robot is added to it; ``covers`` (H, W) are opaque.
+    """
 
     picture: F32
     above: F32
+    covers: F32
     texture: RobotTexture | None
     appearance: Appearance
 
@@ -210,11 +215,12 @@ def _own_bench(phantom: Phantom, view: CameraView, appearance: Appearance) -> _O
     noise = float(np.median(bench.noise))
     appearance = replace(appearance, blur_px=0.0, vignette=0.0, noise=noise, saturation=0.0 if grey else 1.0)
     if not textures:
-        return _OwnBench(picture, np.zeros_like(picture), None, appearance)
-    chosen = textures[appearance.clutter_seed % len(textures)]
+        return _OwnBench(picture, np.zeros_like(picture), np.zeros(picture.shape[:2], np.float32), None, appearance)
+    chosen = textures[appearance.clutter_seed % min(len(textures), PAINTED_TEXTURES)]
     radius_mm = chosen.radius_px * zoom / view.pixels_per_mm((BOARD_MM[0] / 2, BOARD_MM[1] / 2))
     appearance = replace(appearance, robot_radius_mm=radius_mm, robot_shadow=0.0)
-    return _OwnBench(picture, fitted(lines_above(bench.empty)), chosen, appearance)
+    covers = fitted(np.float32(255) * covers_of(textures, bench.empty.shape[:2]))
+    return _OwnBench(picture, fitted(lines_above(bench.empty)), covers, chosen, appearance)
 
 
 def _lamp_in_image(view: CameraView, light_deg: float) -> tuple[float, float]:

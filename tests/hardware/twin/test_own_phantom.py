@@ -150,6 +150,14 @@ def test_it_is_kept_with_its_bench_and_seen_as_the_bench_is(tmp_path: Path) -> N
     assert seen.robot[:, 150].sum() == pytest.approx(12, abs=1)
     red, green, _ = seen.image[236:245].astype(float).mean(axis=0).T
     assert red[285:295].mean() > 2 * red[20:270].mean() and green[20:295].min() > 150
+    line = np.array([(x, 240.0, 0.0 if 150 <= x < 170 else 1.0) for x in range(250)], np.float32)
+    write_textures([RobotTexture(rgba, 6.0, (0.0, 240.0), line)] * 2, folder)  # a clip, in both frames
+    renderer = Renderer(phantom, named_appearance("own", 0), SIZE)
+    empty = renderer.render(None).image.astype(float)
+    seen = renderer.render(VIEW.unproject(np.array([(0.0, 240.0), (300.0, 240.0)])))
+    apart = np.abs(seen.image - empty)[236:245].mean(axis=(0, 2))
+    assert np.abs(empty - picture).mean() < 2.0 * noise and apart[153:167].max() < 5.0
+    assert seen.robot[240, 160] and apart[[120, 140, 180, 200]].min() > 20.0
     (folder / "phantom.json").write_text("{}")
     with pytest.raises(ValueError, match="damaged"):
         read_phantom(name)
