@@ -31,7 +31,7 @@ from core.evaluation.rehearsal import FEWEST_RUNS
 from core.evaluation.trial import Row, summarise
 
 if TYPE_CHECKING:
-    from hardware.twin.rehearsal import RehearsalPicture, RehearsalPlan
+    from hardware.twin.rehearsal import RehearsalPicture, RehearsalPlan, SeenHeads
 
 _FIRST_SHARE = 0.7
 """Of the time, for the set speeds; slower ones are tried in the rest."""
@@ -47,8 +47,6 @@ def rehearse(
     minutes: Annotated[float, typer.Option(min=0.1, max=1000.0, help="time that it may take; fewer runs then")] = 30.0,
     workers: Annotated[int, typer.Option(min=1, max=256, help="processes, at low priority")] = min(2, os.cpu_count() or 1),
     seed: Annotated[int, typer.Option(min=0, max=1_000_000, help="of the first run")] = 0,
-    head_px: Annotated[float, typer.Option(min=0.0, max=50.0, help="error of the perceived head, median, in px at 640")] = 1.5,
-    missing: Annotated[float, typer.Option(min=0.0, max=0.9, help="share of the frames without an answer")] = 0.05,
     max_seconds: Annotated[float, typer.Option(min=1.0, max=3600.0, help="simulated time after which a run has failed")] = 120.0,
     tune: Annotated[bool, typer.Option("--tune", help="search better settings of pursuit for this way, instead")] = False,
     kept_in: Annotated[str | None, typer.Option("--rig", help="--tune: keep them in the file of this rig")] = None,
@@ -75,7 +73,7 @@ def rehearse(
     config = with_own_phantom(config, bench) if bench is not None else config
     picture = RehearsalPicture.of(config, point_option(target), told.get("size_px"))
     trial = TrialPlan(config, max_seconds=max_seconds, look="bench", own=True, target_px=picture.trial_px)
-    plan, sharp = RehearsalPlan(trial, head_px, missing), picture.sharp(config)
+    sharp = picture.sharp(config)
     for turn in sharp if not (as_json or progress_json) else ():
         x, y = turn.xy
         console.print(
@@ -83,6 +81,9 @@ def rehearse(
             f"{turn.limit_deg:.0f} there",
             soft_wrap=True,
         )
+    began_s, writer = time.monotonic(), progress_writer()
+    seen = _seen(config, picture, workers)
+    plan = RehearsalPlan(trial, seen)
     if tune:
         _tune(plan, runs, seed, workers, kept_in, as_json=as_json)
         return
@@ -92,9 +93,12 @@ def rehearse(
         "size_px": picture.view.size,
         "sharp": [turn.model_dump(mode="json") for turn in sharp],
         "speed_mm_s": config.advice.fast_mm_s,
-        "assumed": {"head_px": head_px, "missing": missing, "robot": "identified" if config.twin.behaviour else "twin"},
+        "assumed": {
+            "pictures": len(seen.confidence),
+            "missing": round(seen.missing, 4),
+            "robot": "identified" if config.twin.behaviour else "twin",
+        },
     }
-    began_s, writer = time.monotonic(), progress_writer()
     tried: list[tuple[float, list[Row]]] = []
     good: float | None = None
     for speed in SPEEDS:
@@ -117,6 +121,20 @@ def rehearse(
         sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
     else:
         _print(about, runs)
+
+
+def _seen(config: Config, picture: RehearsalPicture, workers: int) -> SeenHeads:
+    """How perception does in pictures of the way."""
+    from hardware.twin.rehearsal import WANDERS, SeenHeads, seen_heads
+
+    look = partial(seen_heads, config, picture.target)
+    with progress_bar() as bar, closing(over_processes(workers, look, WANDERS)) as results:
+        task = bar.add_task("perceiving the way in pictures", total=len(WANDERS))
+        parts = []
+        for part in results:
+            parts.append(part)
+            bar.advance(task)
+    return SeenHeads.joined(parts)
 
 
 def _tune(plan: RehearsalPlan, runs: int, seed: int, workers: int, rig: str | None, *, as_json: bool) -> None:

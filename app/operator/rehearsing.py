@@ -48,7 +48,7 @@ class RehearsalController(QObject):
         self._child: ChildProcess | None = None
         self._bench: tuple[tuple[str, ...], int] | None = None
         """Options that name the phantom, and when it was made; None: no phantom."""
-        self._done, self._speed = 0, 1.0
+        self._done, self._total, self._speed = 0, RUNS, 1.0
         self._so_far: RehearsalResult | None = None
         self.result: RehearsalResult | None = None
         """Of the present target; None: it was not rehearsed."""
@@ -142,14 +142,14 @@ class RehearsalController(QObject):
             elif "arrived" in record:
                 self.result = self._so_far = RehearsalResult.model_validate(record)
             elif isinstance(record.get("speed"), int | float):
-                self._done, self._speed = 0, float(record["speed"])
+                self._done, self._total, self._speed = 0, RUNS, float(record["speed"])
             elif isinstance(record.get("done"), int | float):
-                self._done = int(record["done"])
+                self._done, self._total = int(record["done"]), int(record.get("total") or RUNS)
         except ValidationError:  # of another version
             return
         if self._so_far is not None:
             self._window.panels.show_rehearsal(self._so_far)
-        self._card.show_running(self._done, RUNS, self._so_far, self._speed)
+        self._card.show_running(self._done, self._total, self._so_far, self._speed)
 
     def _on_ended(self, code: int, said: str) -> None:
         self._child = None

@@ -102,7 +102,7 @@ class RehearsalResult(_Part):
     sharp: tuple[SharpBranch, ...] = ()
     speed_mm_s: float
     recommended_speed_mm_s: float | None = None
-    assumed: dict[str, float | str] = Field({}, description="errors of perception, and whose robot: twin, or identified")
+    assumed: dict[str, float | str] = Field({}, description="pictures perceived, share without an answer, and whose robot")
 
 
 def rehearsal_of(event: Event) -> RehearsalResult | None:

@@ -1,7 +1,8 @@
 """Rehearsal: many runs to one target of a bench's own phantom, with other friction, stiffness, start and play in each.
 
-Perception is simulated from the truth, with noise, and nothing is painted: a run takes a tenth of the time of one with pictures.
-Before that, the geometry alone tells which branches on the way turn off more sharply than the head bends.
+Before the runs, the robot is perceived in the twin's pictures all along the way. A run then paints nothing, which takes a tenth of
+the time: it perceives the truth with the errors, and without the answers, of pictures that had the head nearby. The geometry alone
+tells which branches on the way turn off more sharply than the head bends.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from core import geometry
 from core.config.calibration import BehaviourConfig, Estimate
@@ -23,6 +25,7 @@ from core.evaluation.metrics import wilson_95
 from core.evaluation.rehearsal import FedMoment, RehearsedWay, SharpBranch, WeakestPlace, way_per_feed
 from core.evaluation.trial import Row, TrialSample, summarise
 from core.perception.centerline import centerline_at, plan_route
+from core.perception.pipeline import open_pipeline
 from core.perception.pose import measure_pose
 from core.perception.vectors import fit_robot_vector, fit_vessel_vector
 from core.types import Frame, Image, Masks, Point, Points, Reason, Refusal, RobotPath, Scene
@@ -30,8 +33,8 @@ from hardware.twin.phantom import Phantom
 from hardware.twin.phantoms import make_phantom
 from hardware.twin.physics import MAX_PULL_MM, ROBOT_RADIUS_MM, DriveProperties
 from hardware.twin.rendering.appearance import Appearance, appearance_of, make_view
-from hardware.twin.trial import FIRST_SEED, Target, Trial, TrialPlan, target_near
-from hardware.twin.truth import true_graph, visible_path, with_caps
+from hardware.twin.trial import FIRST_SEED, Target, TargetError, Trial, TrialPlan, start_mm, target_near
+from hardware.twin.truth import RouteFollower, heading, true_graph, visible_path, with_caps
 from hardware.twin.view import CameraView
 from hardware.twin.world import TwinWorld
 
@@ -43,14 +46,17 @@ LEAST_SHARE, FORCE_P95_N, FORCE_MAX_N = 0.95, 0.15, 0.5
 """A speed is recommended where so many runs arrive, and the wall force stays below these."""
 PLAY_MM, SLACK_MM, START_MM = (0.03, 0.2), (0.0, 0.06), 5.0
 """Spread of the play and of the slack of the wires, and of the insertion at the start to both sides; uniform."""
-HEAD_PX, MISSING = 1.5, 0.05
-"""Error of the head, median, and share of frames without an answer, where nothing was measured: as on taught benches."""
-_MEMORY_S, _GAP_S = 0.3, 0.2
-"""Time over which an error of the head stays, and mean length of a time without answers."""
-_MEDIAN = 1.1774
-"""Of a Rayleigh distribution."""
+WANDERS = (0.0, 0.4, 0.8)
+"""How far the robot sways on the ways on which it is perceived in pictures (``RouteFollower``)."""
+_PICTURE_S, _PICTURE_MM_S = 0.1, 10.0
+_NEAREST, _MEMORY_S = 8, 0.3
+"""A run perceives as in one of so many pictures whose heads were nearest, and for so long on average as in the same one."""
 _LINE_PX = 40.0
 """Length of the robot's end over which an error of the head fades out."""
+_HEADING_PX = 10.0
+"""Over so much of its end the robot's direction is taken."""
+_COMMANDS = 5
+"""To the robot for each picture of the way."""
 _NICENESS = 10
 _BIN_MM = 10.0
 """Length of the pieces of the way among which the weakest is looked for."""
@@ -59,13 +65,80 @@ _STEP_MM, _BESIDE_MM = 2.5, 12.0
 _BLANK: Image = np.zeros((1, 1, 3), np.uint8)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenHeads:
+    """What perception gives in pictures of the way.
+
+    Attributes
+    ----------
+    heads_mm : true heads (N, 2), on the board.
+    errors_mm : of the perceived ones, along the robot and to its right (N, 2); NaN: no answer.
+    confidence : (N,).
+    """
+
+    heads_mm: Points
+    errors_mm: Points
+    confidence: NDArray[np.float64]
+
+    @staticmethod
+    def joined(parts: Sequence[SeenHeads]) -> SeenHeads:
+        return SeenHeads(*(np.concatenate([getattr(one, name) for one in parts]) for name in SeenHeads.__slots__))
+
+    @property
+    def missing(self) -> float:
+        """Share of the pictures without an answer."""
+        return float(np.isnan(self.errors_mm[:, 0]).mean())
+
+
+def seen_heads(config: Config, target: Target, wander: float) -> SeenHeads:
+    """Drive the twin's robot to `target` in its pictures, a picture every millimetre, and perceive each.
+
+    Raises UserError where the model or the bench cannot be opened, and TargetError where the camera never sees the head.
+    """
+    one = config.perception.segmentation.model_copy(update={"threads": 1})
+    pipeline = open_pipeline(config.perception.model_copy(update={"segmentation": one}))
+    world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety)
+    view, scale = world.view, config.perception.working_size_px / max(world.view.size)
+    x, y = view.project(np.array([target.point_mm]))[0].tolist()
+    follower = RouteFollower(world.phantom, target.node, wander=wander)
+    first_mm = max(5.0, start_mm(world.phantom, target) - START_MM)
+    world.insert(first_mm, target=target.node)
+    heads, errors, confidence = [], [], []
+    for _ in range(round(1.2 * (target.at_mm - first_mm) / (_PICTURE_S * _PICTURE_MM_S))):
+        for _ in range(_COMMANDS):
+            dt_s = _PICTURE_S / _COMMANDS
+            world.send(follower.command(world.physics.robot_points_mm(), _PICTURE_MM_S, dt_s))
+            world.advance(dt_s)
+        robot = world.physics.robot_points_mm()
+        path = visible_path(with_caps(robot, world.appearance.robot_radius_mm), view, scale)
+        if path is None:
+            continue
+        scene, head_mm = pipeline(world.frame(), (x, y)), world.physics.head_mm
+        error = np.full(2, np.nan)
+        if scene.pose is not None and scene.path is not None and scene.route is not None:
+            px_per_mm = view.pixels_per_mm(head_mm) * scale
+            error = _in_frame(heading(path, _HEADING_PX)) @ np.subtract(scene.path.head, path[-1]) / px_per_mm
+        heads.append(head_mm)
+        errors.append(error)
+        confidence.append(scene.pose.confidence if scene.pose is not None else 0.0)
+        if math.dist(head_mm, target.point_mm) < _STEP_MM:
+            break
+    if not heads:
+        raise TargetError("the camera never sees the robot on the way to this target; choose another")
+    return SeenHeads(np.array(heads), np.array(errors), np.array(confidence))
+
+
+def _in_frame(ahead: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turns a vector of the picture into its parts along a unit vector and to the right of it."""
+    return np.array([ahead, [-ahead[1], ahead[0]]])
+
+
 @dataclass(frozen=True, slots=True)
 class RehearsalPlan:
-    """``trial`` has phantom and target; ``head_px`` and ``missing`` are perception's errors; ``speed`` is a share."""
+    """``trial`` has phantom and target; ``seen`` is how perception does on the way, None: without errors; ``speed`` is a share."""
 
     trial: TrialPlan
-    head_px: float = HEAD_PX
-    missing: float = MISSING
+    seen: SeenHeads | None = None
     speed: float = 1.0
 
 
@@ -93,7 +166,8 @@ class Rehearsal(Trial):
         self._scale = trial.config.perception.working_size_px / max(view.size)
         self._graph = true_graph(self._world.phantom, view, self._scale)
         self._masks_shown = _vessel_masks(self._world, self._scale)
-        self._error_px, self._is_blind = rng.normal(0.0, 1.0, 2), False
+        self._picture: int | None = None
+        self._error_px: float | None = None
         self._fed: list[FedMoment] = []
 
     def run(self) -> Row:
@@ -105,20 +179,21 @@ class Rehearsal(Trial):
         return Frame(len(self._log.forces_n), self._world.physics.time_s, _BLANK)
 
     def _perceive(self, frame: Frame) -> Scene:
-        """The true scene, with errors."""
+        """The true scene, with the errors of a picture."""
         config, world = self._plan.config.perception, self._world
-        period_s = 1.0 / world.config.frames_per_second
-        missing = min(self._eye.missing, 0.9)
-        change = period_s / _GAP_S * (1.0 if self._is_blind else missing / (1.0 - missing))
-        self._is_blind ^= bool(self._rng.random() < change)
-        scene = Scene(frame.index, frame.captured_s, world.view.size, self._scale)
-        radius_mm = world.appearance.robot_radius_mm
+        scene, seen = Scene(frame.index, frame.captured_s, world.view.size, self._scale), self._eye.seen
+        radius_mm, head_mm = world.appearance.robot_radius_mm, world.physics.head_mm
+        px_per_mm = world.view.pixels_per_mm(head_mm) * self._scale
         path = visible_path(with_caps(world.physics.robot_points_mm(), radius_mm), world.view, self._scale)
-        if path is None or self._is_blind:
+        error_mm, confidence, self._error_px = np.zeros(2), 1.0, None
+        if seen is not None:
+            picture = self._picture_near(seen, head_mm)
+            error_mm, confidence = seen.errors_mm[picture], float(seen.confidence[picture])
+        if path is None or np.isnan(error_mm[0]):
             return replace(scene, refusal=Refusal(Reason.LOW_CONFIDENCE))
-        path = self._with_error(path, period_s)
-        radius_px = radius_mm * world.view.pixels_per_mm(world.physics.head_mm) * self._scale
-        robot = RobotPath(path, 1.0, None, True, 0.0, radius_px)
+        self._error_px = float(np.hypot(*error_mm)) * px_per_mm
+        path = _displaced(path, px_per_mm * error_mm)
+        robot = RobotPath(path, 1.0, None, True, 0.0, radius_mm * px_per_mm)
         line = fit_robot_vector(path, config.vectors.robot_length_px)
         route = plan_route(self._graph, robot.head, scene.to_working(self.target.click_px))
         centerline = None
@@ -128,23 +203,30 @@ class Rehearsal(Trial):
         scene = replace(scene, masks=self._masks_shown, path=robot, vessel_graph=self._graph, route=route, centerline=centerline)
         if line is None or vessel is None:
             return replace(scene, refusal=Refusal(Reason.NO_VESSEL))
-        return replace(scene, robot_vector=line, vessel_vector=vessel, pose=measure_pose(line, vessel, config.pose))
+        pose = replace(measure_pose(line, vessel, config.pose), confidence=confidence)
+        return replace(scene, robot_vector=line, vessel_vector=vessel, pose=pose)
+
+    def _picture_near(self, seen: SeenHeads, head_mm: Point) -> int:
+        """The number of a picture with the head nearby: the same one for a while, as errors stay."""
+        near = np.argsort(np.linalg.norm(seen.heads_mm - head_mm, axis=1))
+        fades = self._rng.random() < 1.0 / (_MEMORY_S * self._world.config.frames_per_second)
+        if self._picture is None or fades or self._picture not in near[: 2 * _NEAREST]:
+            self._picture = int(self._rng.choice(near[:_NEAREST]))
+        return self._picture
 
     def _measure(self, scene: Scene, time_s: float, insertion_mm: float, wall_contact_n: float) -> None:
         """Without the truth of pose and vessel, which takes a third of a run's time."""
         head_mm = self._world.physics.head_mm
-        error_px = float(np.hypot(*self._error_px)) * self._eye.head_px / _MEDIAN if scene.path is not None else None
-        self._log.measures.append(TrialSample(time_s, head_mm, insertion_mm, wall_contact_n, head_error_px=error_px))
+        self._log.measures.append(TrialSample(time_s, head_mm, insertion_mm, wall_contact_n, head_error_px=self._error_px))
         self._fed.append((time_s, geometry.nearest(self.target.route, head_mm)[1], self._world.command.advance_mm_s))
         self._update_progress(head_mm, time_s)
 
-    def _with_error(self, path: Points, period_s: float) -> Points:
-        """The robot's path with its end displaced."""
-        keep = math.exp(-period_s / _MEMORY_S)
-        self._error_px = keep * self._error_px + math.sqrt(1.0 - keep * keep) * self._rng.normal(0.0, 1.0, 2)
-        along = geometry.arc_length(path)
-        share = np.clip(1.0 - (along[-1] - along) / _LINE_PX, 0.0, 1.0)
-        return np.asarray(path + share[:, None] * self._error_px * (self._eye.head_px / _MEDIAN))
+
+def _displaced(path: Points, error_px: Points) -> Points:
+    """The robot's path (N, 2) with its end displaced along it and to its right."""
+    along = geometry.arc_length(path)
+    share = np.clip(1.0 - (along[-1] - along) / _LINE_PX, 0.0, 1.0)
+    return np.asarray(path + share[:, None] * (error_px @ _in_frame(heading(path, _HEADING_PX))))
 
 
 def _vessel_masks(world: TwinWorld, scale: float) -> Masks:

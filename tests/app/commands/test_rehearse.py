@@ -9,19 +9,29 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from app.cli import app
-from app.commands.rehearse import _print
+from app.commands.rehearse import _print, _seen
 from app.ui.i18n import FIXED
 from core.config.models import Config, load_config
 from core.config.rig_file import as_calibrated, find_rig, make_rig, with_rig, write_rig
 from core.devices import UserError
 from core.evaluation.rehearsal import RehearsalResult
+from hardware.twin.rehearsal import WANDERS, RehearsalPicture, SeenHeads
 
 TARGET = "430,400"
 """In the tree's lowest branch."""
+
+
+SEEN = SeenHeads(np.zeros((4, 2)), np.array([(0.1, 0.0), (0.0, 0.1), (np.nan, np.nan), (0.0, 0.0)]), np.ones(4))
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.commands.rehearse._seen", lambda *_: SEEN)
 
 
 def row(seed: int, *, reached: bool = True, force_n: float = 0.1) -> dict[str, Any]:
@@ -66,6 +76,22 @@ def test_a_good_way_is_told_with_its_band(rehearse: Callable[..., list[dict[str,
     assert found.way.runs == (20, 20) and found.way.wall_force_n == (0.0, 0.1) and found.way.time_s[1] == (3.0, 3.0, 3.0)
     assert found.way_per_feed == pytest.approx((0.9095, 0.995, 1.0805))
     assert found.target_xy == pytest.approx((430, 400), abs=12) and found.size_px == (640, 480)
+    assert found.assumed == {"pictures": 4, "missing": 0.25, "robot": "twin"}
+
+
+def test_pictures_of_several_ways_are_perceived_by_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+
+    def over(workers: int, function: partial[Any], wanders: Sequence[float]) -> Iterator[SeenHeads]:
+        asked.extend((workers, function.args, tuple(wanders)))
+        yield from (SEEN for _ in wanders)
+
+    monkeypatch.setattr("app.commands.rehearse.over_processes", over)
+    config = Config.model_validate({"twin": {"phantom": "tree"}})
+    picture = RehearsalPicture.of(config, (430.0, 400.0))
+    seen = _seen(config, picture, 2)
+    assert asked == [2, (config, picture.target), WANDERS]
+    assert len(seen.heads_mm) == len(seen.confidence) == 4 * len(WANDERS) and seen.missing == 0.25
 
 
 def test_a_slower_speed_is_tried_and_given_up_early(rehearse: Callable[..., list[dict[str, Any]]]) -> None:

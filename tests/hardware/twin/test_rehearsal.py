@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -10,19 +11,21 @@ import pytest
 
 from core.config.calibration import Estimate
 from core.config.models import Config, TwinConfig
-from core.types import GraphEdge, VesselGraph
+from core.types import Frame, GraphEdge, Image, Scene, VesselGraph
 from hardware.twin.phantom import Phantom
 from hardware.twin.rehearsal import (
-    HEAD_PX,
     Rehearsal,
     RehearsalPicture,
     RehearsalPlan,
+    SeenHeads,
     is_good,
     is_hopeless,
+    seen_heads,
     slowed,
 )
 from hardware.twin.trial import TargetError, TrialPlan, target_near
 from hardware.twin.view import CameraView
+from hardware.twin.world import TwinWorld
 from tests.hardware.twin.test_identification import behaviour
 
 VIEW = CameraView(np.diag([3.2, 3.2, 1.0]), (640, 480))
@@ -71,18 +74,73 @@ def test_a_branch_is_too_sharp_by_its_turn_and_the_lumen_s_width(turn_deg: float
     assert len(picture.sharp(Config(twin=TwinConfig(behaviour=stiff)))) == 1  # a robot that bends less
 
 
-def test_a_run_is_the_same_for_its_seed_and_perceives_with_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+def seen(heads_mm: list[tuple[float, float]], error_mm: tuple[float, float], confidence: float = 1.0) -> SeenHeads:
+    return SeenHeads(np.array(heads_mm), np.array([error_mm] * len(heads_mm)), np.full(len(heads_mm), confidence))
+
+
+HERE, NO_ANSWER = [(40.0 + x, 75.0) for x in range(16)], (math.nan, math.nan)
+
+
+@pytest.fixture
+def plan(monkeypatch: pytest.MonkeyPatch) -> RehearsalPlan:
     monkeypatch.setattr("hardware.twin.trial.make_phantom", lambda _name: forked(50.0, 5.0))
-    config = Config()
-    plan = RehearsalPlan(TrialPlan(config, max_seconds=0.7, look="bench", own=True, target_px=(320.0, 240.0)))
-    rows = [Rehearsal(replace(plan, missing=missing), 3).run() for missing in (0.0, 0.0, 0.9)]
+    return RehearsalPlan(TrialPlan(Config(), max_seconds=0.7, look="bench", own=True, target_px=(320.0, 240.0)))
+
+
+def test_a_run_is_the_same_for_its_seed_and_has_the_errors_of_pictures(plan: RehearsalPlan) -> None:
+    errors = SeenHeads.joined([seen(HERE, (0.5, 0.0)), seen(HERE, (0.0, -0.5)), seen(HERE, NO_ANSWER)])
+    rows = [Rehearsal(replace(plan, seen=one), 3).run() for one in (errors, errors, seen(HERE, NO_ANSWER), None)]
     assert rows[0] == rows[1] and rows[0]["outcome"] == "time out"
-    assert rows[0]["answered_share"] == 1.0 and rows[2]["answered_share"] < 0.5
-    assert 0.2 * HEAD_PX < rows[0]["head_error_median_px"] < 4.0 * HEAD_PX
-    run = Rehearsal(replace(plan, missing=0.0), 3)
-    run._world.insert(30.0, target=run.target.node)
-    scene = run._perceive(run._read())
+    assert 0.2 < rows[0]["answered_share"] < 1.0 and rows[0]["head_error_median_px"] == pytest.approx(0.5 * 3.2, abs=0.01)
+    assert rows[2]["answered_share"] == 0.0
+    assert rows[3]["answered_share"] == 1.0 and rows[3]["head_error_median_px"] == 0.0
+
+
+def test_a_run_perceives_as_in_the_pictures_of_its_place(plan: RehearsalPlan) -> None:
+    """A clip over the first part of the way: no answer there, and beyond it an end that is seen too short and to the left."""
+    covered, beyond = seen([(x - 40.0, y) for x, y in HERE], NO_ANSWER), seen([(x + 20.0, y) for x, y in HERE], (-1.0, -0.5), 0.4)
+    run = Rehearsal(replace(plan, seen=SeenHeads.joined([covered, beyond])), 3)
+    run._world.insert(10.0, target=run.target.node)
+    assert run._perceive(run._read()).refusal is not None
+    run._world.insert(65.0, target=run.target.node)
+    plain = Rehearsal(plan, 3)
+    plain._world = run._world
+    frame = run._read()
+    scene, true = run._perceive(frame), plain._perceive(frame)
+    assert scene.path is not None and true.path is not None and scene.pose is not None and scene.pose.confidence == 0.4
+    assert np.subtract(scene.path.head, true.path.head) == pytest.approx((-3.2, -1.6), abs=0.4)
+    assert scene.path.tail == true.path.tail
     assert scene.masks is not None and scene.masks.vessel[240, 320] and not scene.masks.vessel[5, 5], "what lies in sight counts"
+
+
+def test_perception_is_measured_in_pictures_along_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pipeline sees the true head of the picture 4 px to the right, and nothing beyond 50 mm."""
+    for module in ("world", "trial"):
+        monkeypatch.setattr(f"hardware.twin.{module}.make_phantom", lambda _name: forked(50.0, 5.0))
+    frames: list[Image] = []
+
+    class Watched(TwinWorld):
+        def frame(self, captured_s: float | None = None) -> Frame:
+            true_eye._world = self
+            return super().frame(captured_s)
+
+    def perceive(frame: Frame, _click: tuple[float, float]) -> Scene:
+        frames.append(frame.image)
+        scene = true_eye._perceive(frame)
+        if scene.path is None or true_eye._world.physics.head_mm[0] > 50.0:
+            return replace(scene, pose=None)
+        return replace(scene, path=replace(scene.path, points=scene.path.points + (0.0, 4.0)))
+
+    config = Config()
+    true_eye = Rehearsal(RehearsalPlan(TrialPlan(config, look="bench", own=True, target_px=(230.0, 240.0))), 0)
+    monkeypatch.setattr("hardware.twin.rehearsal.TwinWorld", Watched)
+    monkeypatch.setattr("hardware.twin.rehearsal.open_pipeline", lambda _config: perceive)
+    found = seen_heads(config, target_near(forked(50.0, 5.0), VIEW, (230.0, 240.0)), 0.0)
+    answered = ~np.isnan(found.errors_mm[:, 0])
+    assert len(frames) == len(found.confidence) > 20 and frames[0].std() > 10.0
+    assert answered.tolist() == (found.heads_mm[:, 0] <= 50.0).tolist() and 0.3 < found.missing < 0.9
+    assert found.errors_mm[answered] == pytest.approx(np.array([(0.0, 4.0 / 3.2)] * answered.sum()), abs=0.25)
+    assert (found.confidence[answered] == 1.0).all() and np.diff(found.heads_mm[:, 0]).max() < 3.0
 
 
 def test_another_robot_of_each_run_is_within_what_was_identified(monkeypatch: pytest.MonkeyPatch) -> None:
