@@ -63,6 +63,7 @@ def evaluate(
     study: Annotated[
         str | None, typer.Option(help='this study of images annotated by hand, its raters and repeats too; "": outside studies')
     ] = None,
+    explain: Annotated[bool, typer.Option("--explain", help="as session info does, for a session's rehearsed runs")] = False,
     seed: Annotated[int, typer.Option(min=0, help="of the drawn images, their manual errors and the bootstrap")] = 0,
     model: ModelOption = None,
     preset: PresetOption = None,
@@ -78,6 +79,8 @@ def evaluate(
         report_progress()
     if (labelled is None) == (csv is None):
         raise EvaluationError("give either a labelled set (evaluate DIR) or a table (evaluate --csv FILE)")
+    if explain and (labelled is None or _annotation_file(labelled, study) is None):
+        raise EvaluationError("--explain needs the annotated pictures of a session (evaluate DIR)")
     if study is not None and (csv is not None or like_paper):
         raise EvaluationError("--study needs images annotated by hand (evaluate DIR), not --csv or --like-paper")
     if csv is not None:
@@ -95,6 +98,8 @@ def evaluate(
         recorded = _recorded(annotations.parent, settings, model) if config is None and preset is None else None
         found = _perceive_annotated(annotations, *(recorded or (settings, [])), study, seed)
         found.source["preset"] = preset
+        if explain:
+            _explain(annotations.parent, found)
     elif labelled is not None:
         if study is not None:
             begin = f"{COMMAND} annotate {labelled} --study {study}"
@@ -231,6 +236,19 @@ def _session_of(folder: Path) -> dict[str, Any]:
         return {"session": {"recorded_by": manifest.program} | about}
     except SessionError:  # damaged: the annotations are evaluated without it
         return {}
+
+
+def _explain(folder: Path, found: _Study) -> None:
+    """Add to the runs in the source which parameter of the robot explains them; a note says why not."""
+    from app.commands.session import explain_runs
+    from core.session.reader import SessionReader
+
+    try:
+        with SessionReader(folder) as reader:
+            reader.wait()
+            explain_runs(reader, found.source.get("session", {}).get("rehearsals", []))
+    except UserError as error:  # what was perceived is not lost
+        found.notes.append(f"Not explained: {error}")
 
 
 def _places_of(annotations: Path) -> list[Path]:

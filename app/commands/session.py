@@ -70,7 +70,7 @@ def info(
         reader.wait()
         result, is_cut = describe(reader), _is_cut(reader)
         if explain:
-            _explain(reader, result["rehearsals"])
+            explain_runs(reader, result["rehearsals"])
     if as_json:
         sys.stdout.write(json.dumps(result, allow_nan=False) + "\n")
         return
@@ -90,8 +90,11 @@ def info(
         sys.stderr.write(f"note: it did not end properly; repair it with: session recover {session}\n")
 
 
-def _explain(reader: SessionReader, runs: list[dict[str, Any]]) -> None:
-    """Add to each run beside its rehearsal how far its replay is off, and which parameter would explain that."""
+def explain_runs(reader: SessionReader, runs: list[dict[str, Any]]) -> None:
+    """Add to each run beside its rehearsal how far its replay is off, and which parameter would explain that.
+
+    Raises UserError: no run was rehearsed, or the robot was not identified, or the bench is not known.
+    """
     from hardware.twin.identification import RUNS, JogError, bench_of_session, explained, motion_of_session
 
     if reader.manifest is None or not runs:

@@ -10,6 +10,8 @@ import sys
 from collections.abc import Iterator
 from math import atan, degrees
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import cv2
 import numpy as np
@@ -19,10 +21,11 @@ from app.commands import evaluate as command
 from app.commands.evaluation_report import render_report
 from core.config.models import TwinConfig
 from core.devices import UserError
-from core.evaluation.evaluation import Measurement, read_measurements, write_measurements
+from core.evaluation.evaluation import EvaluationError, Measurement, read_measurements, write_measurements
 from core.evaluation.paper import PAPER_CONFUSION
 from core.learning.dataset import write_png
 from core.session.manifest import event_of_target
+from hardware.twin.identification import Explanation
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
 from tests.app.program import MAIN, run
@@ -146,7 +149,9 @@ def test_the_report_is_one_page_that_needs_nothing_else(drawn: Path) -> None:
         assert words in text
 
 
-def test_the_report_has_a_session_s_runs_beside_their_rehearsals(paper_csv: Path, tmp_path: Path) -> None:
+def test_the_report_has_a_session_s_runs_beside_their_rehearsals(
+    paper_csv: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     xs = (10.0, 20.0, 30.0, 40.0, 48.0)
     sides = {name: tuple((x, y) for x in xs) for name, y in (("xy", 32.0), ("low_xy", 36.0), ("high_xy", 28.0))}
     found = FOUND.model_copy(update={"target_xy": (49.0, 32.0), "way": FOUND.way.model_copy(update=sides)})
@@ -157,6 +162,18 @@ def test_the_report_has_a_session_s_runs_beside_their_rehearsals(paper_csv: Path
     metrics = evaluate(csv=paper_csv, out=tmp_path / "out")
     page = render_report(metrics | {"source": metrics["source"] | about}, {})
     assert "A run beside its rehearsal: to (49, 32) arrived; 0.0 s (rehearsed 0.0, -1.0 to 1.0); 100% in the band" in page
+    monkeypatch.setattr("app.commands.session.has_rig", lambda _name: True)
+    monkeypatch.setattr("app.commands.session.find_rig", lambda name: (Path(name), SimpleNamespace(behaviour=MagicMock())))
+    for name in ("bench_of_session", "motion_of_session"):
+        monkeypatch.setattr(f"hardware.twin.identification.{name}", lambda *_: MagicMock())
+    monkeypatch.setattr("hardware.twin.identification.explained", lambda *_: Explanation(1.5, 0.2, {"play_mm": 0.3}))
+    command._explain(session, command._Study([], about, []))
+    page = render_report(metrics | {"source": metrics["source"] | about}, {})
+    assert "its replay in the identified twin is 1.5 mm off: play_mm = 0.3 would explain it (0.2 mm left)" in page
+    with pytest.raises(EvaluationError, match="--explain needs the annotated pictures of a session"):
+        evaluate(csv=paper_csv, out=tmp_path / "out", explain=True)
+    command._explain(session, without := command._Study([], {}, []))
+    assert without.notes[0].startswith("Not explained: no run of this session was rehearsed")
 
 
 def test_names_in_a_table_cannot_change_the_report(tmp_path: Path) -> None:
