@@ -167,6 +167,36 @@ def test_a_mark_beside_the_robot_is_no_end_of_it(bench: Bench) -> None:
     assert dice(difference.probability >= 0.5, line(*ROBOT)) > 0.9
 
 
+def banded(image: Image, first: int = 0) -> Image:
+    """A black robot with two gaps of 14 px in which nothing of it is seen."""
+    for start, end in ((first, 76), (98, 126), (148, 196)):
+        image = with_line(image, (start, round(122 + start / 25)), (end, round(122 + end / 25)))
+    return image
+
+
+def test_bands_that_look_like_the_bench_belong_to_the_robot(bench: Bench) -> None:
+    assert dice(line(*ROBOT), found(noisy(banded(board()), 2.0, 3), bench).probability >= 0.5) > 0.93
+
+
+def test_two_robots_side_by_side_are_not_joined(bench: Bench) -> None:
+    image = with_line(with_line(board(), (0, 114), (200, 114), width=5), (0, 132), (200, 132), width=5)
+    view = register(noisy(board(), 2.0, 4), bench)
+    assert isinstance(view, BenchView)
+    robots = robot_by_difference(noisy(image, 2.0, 3), view).probability >= 0.5
+    assert robots.sum() > 1500
+    assert not robots[120:127, 20:190].any()
+
+
+def test_where_an_edge_of_the_bench_is_seen_there_is_no_robot() -> None:
+    with_clip = cv2.rectangle(board(), (80, 90), (92, 160), (60, 60, 60), cv2.FILLED)
+    bench = bench_from_pictures([noisy(np.asarray(with_clip, np.uint8), 2.0, 1)], tube(), "b", 320)
+    image = cv2.rectangle(with_line(board(), *ROBOT), (80, 90), (92, 160), (60, 60, 60), cv2.FILLED)
+    robot = found(noisy(np.asarray(image, np.uint8), 2.0, 3), bench).probability >= 0.5
+    assert robot[:, 20:70].any(), "it is seen on both sides of the clip"
+    assert robot[:, 110:190].any()
+    assert not robot[:, 84:89].any()
+
+
 def seen_by_network(robot: Mask) -> np.ndarray:
     return np.where(robot, np.float32(0.97), np.float32(0.02))
 
