@@ -18,6 +18,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from core.bench.registration import MAX_ROTATION_DEG, MAX_SHIFT_PX
 from core.config.models import PerceptionConfig
 from core.evaluation.accuracy import FrameScore, TrueMasks, score_frame
 from core.evaluation.confidence import (
@@ -45,8 +46,8 @@ PRIOR_WEIGHT, PRIOR_OFFSET = 20.0, 0.3
 _EDGES = (0.0, 0.5, 0.8, 0.9, 0.95, 1.0)
 """Bins of the calibration error."""
 _LOOKS = 5
-"""Views of a frame from which the kind of pictures is learnt: as it is, and in usual changes of light, focus and noise."""
-_FARTHER = 0.2
+"""Views of a frame from which the kind of pictures is learnt: as it is, and in usual changes of light, focus, noise and place."""
+_FARTHER = 0.3
 """The limit lies at this share of the way, in logarithms, from the known pictures to the nearest of another kind."""
 _MOST_WIDER = 1.5
 """Nor is it wider than the known pictures' by more than this factor."""
@@ -105,6 +106,14 @@ def usual_look(image: Image, rng: Generator) -> Image:
         pixels = np.asarray(cv2.GaussianBlur(pixels, (0, 0), float(rng.uniform(0.4, 1.1))), np.float32)
     pixels += rng.normal(0, rng.uniform(0.5, 3.0), pixels.shape).astype(np.float32)
     return np.asarray(np.clip(pixels, 0, 255), np.uint8)
+
+
+def moved(image: Image, rng: Generator) -> Image:
+    """The picture as the same camera gives it when it has moved by what the bench is realigned to."""
+    height, width = image.shape[:2]
+    matrix = cv2.getRotationMatrix2D((width / 2, height / 2), rng.uniform(-MAX_ROTATION_DEG, MAX_ROTATION_DEG), 1.0)
+    matrix[:, 2] += rng.uniform(-MAX_SHIFT_PX, MAX_SHIFT_PX, 2) / np.sqrt(2.0)
+    return np.asarray(cv2.warpAffine(image, matrix, (width, height), borderMode=cv2.BORDER_REPLICATE), np.uint8)
 
 
 def bad_look(image: Image, vessel: Mask, robot: Mask, rng: Generator) -> Image:
@@ -296,7 +305,7 @@ class BenchCalibration:
             for look in range(_LOOKS):
                 if should_stop():
                     break
-                signature = segment.segment_signed([usual_look(image, rng) if look else image])[0][2]
+                signature = segment.segment_signed([usual_look(moved(image, rng), rng) if look else image])[0][2]
                 if signature is not None:
                     known.append((KnownPicture(sample.image, sample.image.parent, sample.stem), signature))
                 self._advance()

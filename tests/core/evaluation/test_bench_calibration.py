@@ -5,13 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from core.bench.bench import bench_from_pictures
+from core.bench.registration import BenchView, register
 from core.config.models import PerceptionConfig
 from core.evaluation import bench_calibration as calibrating
 from core.evaluation.accuracy import FrameScore
-from core.evaluation.bench_calibration import bad_look, fit_to_prior, poses_of_masks, usual_look
+from core.evaluation.bench_calibration import bad_look, fit_to_prior, moved, poses_of_masks, usual_look
 from core.evaluation.confidence import KnownPicture
 from core.learning.dataset import Sample, write_mask, write_png
 from core.perception.quality import BASIC_FEATURES, ConfidenceCalibration
+from tests.core.bench.drawn_bench import board, tube
 from tests.core.learning.toy_bench import SIZE, toy_picture, toy_robot, toy_vessel
 
 COUNT = len(BASIC_FEATURES)
@@ -71,6 +74,12 @@ def test_looks_change_the_picture_and_not_its_kind() -> None:
     changes = [np.mean([np.corrcoef(one.ravel(), image.ravel())[0, 1] for one in looks]) for looks in (usual, bad)]
     assert changes[0] > 0.8
     assert changes[1] < changes[0]
+
+
+def test_a_moved_camera_is_one_that_is_realigned() -> None:
+    bench, rng = bench_from_pictures([board()], tube(), "b", 320), np.random.default_rng(0)
+    views = [register(moved(board(), rng), bench) for _ in range(8)]
+    assert all(isinstance(view, BenchView) for view in views)
 
 
 def test_the_truth_is_the_pose_of_the_masks(tmp_path: Path) -> None:
