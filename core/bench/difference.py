@@ -198,10 +198,13 @@ def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> M
             peaks[label] = -peaks[label]  # taken
     clear = [-peak for peak in peaks.values() if peak < 0.0]
     if clear:
-        near = cv2.dilate(result.view(np.uint8), _square(2 * _GAP_PX + 1)) > 0
         least = max(high, _CLEAR_SHARE * float(np.median(clear)))
-        for label in {label for label in np.unique(labels[near]).tolist() if peaks.get(label, 0.0) >= least}:
-            result |= labels == label
+        added = result
+        while added.any():  # from one band of a banded robot to the next
+            near = cv2.dilate(added.view(np.uint8), _square(2 * _GAP_PX + 1)) > 0
+            names = [label for label in np.unique(labels[near]).tolist() if peaks.pop(label, 0.0) >= least]
+            added = np.isin(labels, names) if names else np.zeros_like(result)
+            result |= added
     return result
 
 
