@@ -386,7 +386,7 @@ def _width_px(mask: Mask) -> float:
 def _check_empty(frames: Sequence[TeachingFrame], bench: Bench) -> None:
     """Raise TeachingError where the empty picture shows the robot.
 
-    Nearly all frames differ from it in a place then, where it stands out from the vessel around more than the frames do.
+    Nearly all frames differ from it in a place then, where it stands out clearly from the vessel around, and more than they do.
     """
     vessel = bench.vessel
     if vessel is None:
@@ -403,7 +403,7 @@ def _check_empty(frames: Sequence[TeachingFrame], bench: Bench) -> None:
             continue
         # of each frame by itself: the bands of a robot are in other places in each
         apart = [float(np.abs(image[part].mean(axis=0) - image[ring].mean(axis=0)).max()) for image in (bench.empty, *pictures)]
-        if apart[0] > np.median(apart[1:]):
+        if apart[0] > max(_GONE_LEVELS, float(np.median(apart[1:]))):
             x, y = (int(statistics[index, key]) for key in (cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP))
             raise TeachingError(f"the empty picture shows the robot near ({x}, {y}): take it again without the robot")
 
