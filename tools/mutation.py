@@ -78,20 +78,36 @@ EXPLAINED = {
         "without term 2"): "a request of another source is refused, whatever its envelope",
     ("kept_zero", "turns = (away + TICKS_PER_TURN // 2) // TICKS_PER_TURN", "2 -> 3"):
         "what was moved by more than a quarter of a turn is not offered, and nearer both round alike",
-    ("direction_monitor", "is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE * WRONG_TURN_DEG", "GtE -> Gt"): TIE,
-    ("direction_monitor", "is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE * WRONG_TURN_DEG", "LtE -> Lt"): TIE,
-    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_DEG and -min(turned) <= _LITTLE * WRONG_TURN_DEG", "GtE -> Gt"): TIE,
-    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_MM and -gone <= _LITTLE * WRONG_FEED_MM", "GtE -> Gt"): TIE,
+    ("direction_monitor", "is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE_DEG", "GtE -> Gt"): TIE,
+    ("direction_monitor", "is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE_DEG", "LtE -> Lt"): TIE,
+    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_DEG and -min(turned) <= _LITTLE_DEG", "GtE -> Gt"): TIE,
+    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_DEG and -min(turned) <= _LITTLE_DEG", "LtE -> Lt"): TIE,
+    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_MM and -gone <= _LITTLE_MM", "GtE -> Gt"): TIE,
+    ("direction_monitor", "is_held = abs(asked) >= _ENOUGH_MM and -gone <= _LITTLE_MM", "LtE -> Lt"): TIE,
+    ("direction_monitor", "turns = turns or is_held or followed >= _RIGHT_TURN_DEG", "GtE -> Gt"): TIE,
+    ("direction_monitor", "feeds = feeds or is_held or min(gone - noise_mm, abs(asked)) >= _RIGHT_FEED_MM", "GtE -> Gt"): TIE,
     ("direction_monitor", "if against > wrong_deg:", "Gt -> GtE"): TIE,
     ("direction_monitor", "if against > wrong_mm:", "Gt -> GtE"): TIE,
+    ("direction_monitor", "return turned_deg, theta_deg, way_mm if abs(way_mm) <= _JUMP_MM else 0.0", "LtE -> Lt"): TIE,
     ("direction_monitor", "if age_s <= _WINDOW_S and (age_s <= _DENSE_S or is_apart):", "LtE -> Lt of age_s <= _WINDOW_S"): MOMENT,
+    ("direction_monitor", "if age_s <= _WINDOW_S and (age_s <= _DENSE_S or is_apart):", "LtE -> Lt of age_s <= _DENSE_S"): MOMENT,
     ("direction_monitor", "is_apart = not kept or one.head.captured_s - kept[-1].head.captured_s >= _APART_S", "GtE -> Gt"): MOMENT,
     ("direction_monitor", "if not self.sent or head.captured_s < self.sent[0].time_s:", "Lt -> LtE"): MOMENT,
     ("direction_monitor", "is_early = head.captured_s < self.sent[0].time_s + _LAGS_S[-1]", "Lt -> LtE"): MOMENT,
-    ("direction_monitor", "return replace(self, sent=(*(one for one in self.sent if one.time_s >= oldest_s), now))",
+    ("direction_monitor", "if before is None or not 0.0 <= motion.time_s - before.time_s <= _GAP_S:",
+        "LtE -> Lt before _GAP_S"): MOMENT,
+    ("direction_monitor", "is_next = bool(self.seen) and 0.0 < head.captured_s - self.seen[-1].head.captured_s <= _GAP_S",
+        "Lt -> LtE before head.captured_s - self.seen[-1].head.captured_s"): MOMENT,
+    ("direction_monitor", "is_next = bool(self.seen) and 0.0 < head.captured_s - self.seen[-1].head.captured_s <= _GAP_S",
+        "LtE -> Lt before _GAP_S"): MOMENT,
+    ("direction_monitor", "return replace(self, sent=(*(one for one in self.sent if one.time_s >= motion.time_s - _KEPT_S), now))",
         "GtE -> Gt"): MOMENT,
     ("direction_monitor", 'side = "right" if self.commanded[0] > 0.0 else "left"',
         "Gt -> GtE"): "no turn is wrong without a command",
+    ("direction_monitor", "head, tail = fit_robot_vector(points, _LINE_PX), fit_robot_vector(points[::-1], _LINE_PX)", "1 -> 2"):
+        "every second point gives the same line",
+    ("direction_monitor", "return least if all(change * least > 0.0 for change in changes) else 0.0", "Gt -> GtE"):
+        "where the smallest is 0, it is what is returned",
     ("bus_guard", "if silent_s <= servos.heartbeat_timeout_s + LINGER_S + servos.watchdog_s + _TRIPPED_S:", "LtE -> Lt"): MOMENT,
     ("bus_guard", "fresh = beat is not None and now_s - beat.time_s <= self._safety.command_max_age_s", "LtE -> Lt"): MOMENT,
     ("bus_guard",
@@ -102,6 +118,11 @@ EXPLAINED = {
     ("bus_guard", "if order is None or order.command is None or self._measurement is None or order.issued_s < self._armed_s:",
         "Lt -> LtE"): MOMENT,
     ("bus_guard", "if silence_s > self._servos.heartbeat_timeout_s:", "Gt -> GtE"): MOMENT,
+    ("bus_guard", "if not 0.0 <= gap_s <= self._safety.clock_gap_s:", "LtE -> Lt before self._safety.clock_gap_s"): MOMENT,
+    ("bus_guard", "is_valid = found is not None and 0.0 <= now_s - found.issued_s <= self._safety.command_max_age_s",
+        "LtE -> Lt before now_s - found.issued_s"): MOMENT,
+    ("bus_guard", "is_valid = found is not None and 0.0 <= now_s - found.issued_s <= self._safety.command_max_age_s",
+        "LtE -> Lt before self._safety.command_max_age_s"): MOMENT,
     ("bus_guard",
         "told[place][0] if place in told and told[place][1] >= oldest_s else None for place in range(len(self._servos.joints))",
         "GtE -> Gt"): MOMENT,
@@ -206,7 +227,8 @@ def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             if (other := COMPARISONS.get(type(op))) is not None:
                 changed = copy.deepcopy(new)
                 changed.ops[place] = other()
-                yield f"{type(op).__name__} -> {other.__name__}", changed
+                where = f" before {ast.unparse(new.comparators[place])}" if len(new.ops) > 1 else ""
+                yield f"{type(op).__name__} -> {other.__name__}{where}", changed
     elif isinstance(new, ast.BoolOp):
         other_op = ast.Or() if isinstance(new.op, ast.And) else ast.And()
         yield f"{type(new.op).__name__} -> {type(other_op).__name__}", ast.BoolOp(other_op, new.values)

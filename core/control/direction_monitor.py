@@ -4,9 +4,9 @@ In a vessel the head does not simply turn as it is bent: a wall holds or turns i
 where the vessel turns away, theta grows without a turn of the head. So a turn counts as wrong where the head turned against the
 command in the picture and also against the vessel's direction, or did not follow a large command there, beyond what feeding a
 bent head and the poses' noise explain. A head that springs free turns by what was commanded before and had no effect: that is no
-wrong turn either. The same holds for the way of the robot against the feed: its length in the picture where it comes in from the
-border, which a head that straightens does not change; else the way of the head along itself. Robots wired right stay far below the
-limits, swapped tendons and a reversed feed reach them within a second.
+wrong turn either. The same holds for the way of the robot against the feed: the way of its tail along itself and the change of its
+length, so neither a head that straightens nor a tail that is covered is a way, and all of the robot may be in the picture. Robots
+wired right stay far below the limits, swapped tendons and a reversed feed reach them within a second.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-
-import numpy as np
+from operator import add, sub
 
 from core.control.faults import Cause, Fault
+from core.geometry import arc_length
 from core.messages import message
 from core.perception.vectors import fit_robot_vector
 from core.types import Point, Scene
@@ -31,6 +31,8 @@ _LINE_PX = 32.0
 """End of the robot whose direction is compared: the 40 px of theta turn by half of what the tip does, 16 px are not steady."""
 _WINDOW_S, _DENSE_S, _APART_S = 4.0, 0.3, 0.12
 """Longest time over which a turn or a way is compared; the time in which every frame is kept, and the distance of those before."""
+_KEPT_S = 5.0
+"""Commands are kept for so long: longer than poses, which follow them late."""
 _LAGS_S = (0.0, 0.12, 0.25)
 """Times from a command to its motion, shortest to longest: the command must have had one direction at all of them."""
 _BENDING_MM = 15.0
@@ -38,16 +40,15 @@ _BENDING_MM = 15.0
 _FOLLOWED, _FOLLOWED_LEAST = 1.5, (0.5, 0.5, 0.1)
 """Heading (deg), theta (deg) and way (mm) are followed from frame to frame by so many times the commanded motion and so much more:
 a pose that flickers hardly moves them."""
-_CUT_MM = 2.0
-"""A length that changes by so much more than that from one frame to the next is no way: the robot was covered or cut."""
+_JUMP_MM = 5.0
+"""A longer way from one frame to the next is none: the robot was covered, or tail and head were mistaken."""
 _RIGHT_TURN_DEG, _RIGHT_FEED_MM = 3.0, 1.0
 """Motion with the command that shows its direction to be right."""
-_ENOUGH_DEG, _ENOUGH_MM, _LITTLE = 10.0, 3.0, 0.25
-"""A command of so much without more than this share of a wrong motion: the head is held, and not driven the wrong way."""
-_NOISES = 2.5
-"""So many standard deviations of the poses' noise count as no motion."""
-_NOISE_OF_CHANGE = 1.0 / (math.sqrt(6.0) * math.sqrt(2.0 / math.pi))
-"""Standard deviation of normal noise per mean amount of its second difference; a steady motion has none of it."""
+_ENOUGH_DEG, _ENOUGH_MM, _LITTLE_DEG, _LITTLE_MM = 10.0, 3.0, 1.0, 0.4
+"""A command of so much without more than so little motion against it: the head is held, and not driven the wrong way."""
+_NOISE = 1.28
+"""Per mean amount of the poses' second difference so much counts as no motion: 2.5 standard deviations of normal noise, that
+is sqrt(6) sqrt(2 / pi) of them; a steady motion has none of it."""
 _GAP_S = 0.3
 """A longer pause of commands or poses begins another comparison."""
 
@@ -59,15 +60,16 @@ class HeadSeen:
     Attributes
     ----------
     heading_deg, theta_deg : direction in the picture, and against the vessel's.
-    place_mm : in the picture.
-    length_mm : of the robot in the picture; None where its tail is not where it comes in.
+    length_mm : of the robot in the picture.
+    tail_mm, tail_along : of the robot's tail: place in the picture, and unit vector along the robot, to the head.
     """
 
     captured_s: float
     heading_deg: float
     theta_deg: float
-    place_mm: Point
-    length_mm: float | None = None
+    length_mm: float
+    tail_mm: Point
+    tail_along: Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +85,15 @@ def head_seen(scene: Scene, pixels_per_mm: float) -> HeadSeen | None:
     """The head of a scene; None without a pose."""
     if scene.pose is None or scene.path is None or scene.vessel_vector is None:
         return None
-    line = fit_robot_vector(scene.path.points, _LINE_PX)
-    if line is None:
+    points = scene.path.points
+    head, tail = fit_robot_vector(points, _LINE_PX), fit_robot_vector(points[::-1], _LINE_PX)
+    if head is None or tail is None:
         return None
-    heading_deg, vessel_deg = (math.degrees(math.atan2(y, x)) for x, y in (line.direction, scene.vessel_vector.direction))
-    place = scene.path.head[0] / pixels_per_mm, scene.path.head[1] / pixels_per_mm
-    length_px = float(np.linalg.norm(np.diff(scene.path.points, axis=0), axis=1).sum())
-    length_mm = length_px / pixels_per_mm if scene.path.entry_on_border else None
-    return HeadSeen(scene.captured_s, heading_deg, _wrapped(heading_deg - vessel_deg), place, length_mm)
+    heading_deg, vessel_deg = (math.degrees(math.atan2(y, x)) for x, y in (head.direction, scene.vessel_vector.direction))
+    length_mm = float(arc_length(points)[-1]) / pixels_per_mm
+    tail_mm = float(points[0, 0]) / pixels_per_mm, float(points[0, 1]) / pixels_per_mm
+    along = -tail.direction[0], -tail.direction[1]
+    return HeadSeen(scene.captured_s, heading_deg, _wrapped(heading_deg - vessel_deg), length_mm, tail_mm, along)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +109,7 @@ class _Sent:
 
 _Motion = tuple[float, float, float]
 """Heading (deg), theta (deg), and way (mm)."""
+_STILL: _Motion = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,13 +123,20 @@ class _Seen:
     """
 
     head: HeadSeen
-    turns_deg: tuple[float, ...]
-    feds_mm: tuple[float, ...]
-    drifts_deg: tuple[float, ...]
-    raw: _Motion = (0.0, 0.0, 0.0)
-    moved: _Motion = (0.0, 0.0, 0.0)
-    step: _Motion = (0.0, 0.0, 0.0)
-    change: _Motion = (0.0, 0.0, 0.0)
+    sent: tuple[_Sent, ...]
+    raw: _Motion = _STILL
+    moved: _Motion = _STILL
+    step: _Motion = _STILL
+    change: _Motion = _STILL
+
+    @property
+    def ahead_deg(self) -> float:
+        """By how much the commanded turn is ahead of the head's: this may spring free later."""
+        return self.sent[0].turn_deg - self.moved[0]
+
+    @property
+    def ahead_mm(self) -> float:
+        return self.sent[0].fed_mm - self.moved[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,10 +161,9 @@ class DirectionMonitor:
     def drive(self, motion: MotionSent) -> DirectionMonitor:
         """The state after a command was sent."""
         before = self.sent[-1] if self.sent else None
-        elapsed_s = motion.time_s - before.time_s if before is not None else 0.0
-        if before is None or not 0.0 <= elapsed_s <= _GAP_S:
+        if before is None or not 0.0 <= motion.time_s - before.time_s <= _GAP_S:
             return replace(self, sent=(_Sent(motion.time_s, motion.advance_mm_s, motion.turn_deg),), seen=())
-        way_mm = before.advance_mm_s * elapsed_s
+        way_mm = before.advance_mm_s * (motion.time_s - before.time_s)
         now = _Sent(
             motion.time_s,
             motion.advance_mm_s,
@@ -161,8 +171,7 @@ class DirectionMonitor:
             before.fed_mm + way_mm,
             before.drift_deg + before.turn_deg * way_mm / _BENDING_MM,
         )
-        oldest_s = motion.time_s - _WINDOW_S - _LAGS_S[-1] - _GAP_S
-        return replace(self, sent=(*(one for one in self.sent if one.time_s >= oldest_s), now))
+        return replace(self, sent=(*(one for one in self.sent if one.time_s >= motion.time_s - _KEPT_S), now))
 
     def observe(self, head: HeadSeen) -> DirectionMonitor:
         """The state after a frame with a pose; poses before the first command say nothing."""
@@ -170,41 +179,40 @@ class DirectionMonitor:
             return self
         is_next = bool(self.seen) and 0.0 < head.captured_s - self.seen[-1].head.captured_s <= _GAP_S
         kept = _kept(self.seen, head.captured_s) if is_next else ()
-        # what was commanded before the first command may act until the longest lag has passed: that motion is not followed later
+        # until the longest lag has passed, what was commanded before the first command may act: that motion does not count
         is_early = head.captured_s < self.sent[0].time_s + _LAGS_S[-1]
-        now = _next(kept, head, [_at(self.sent, head.captured_s - lag_s) for lag_s in _LAGS_S], is_early)
+        now = _next(() if is_early else kept, head, tuple(_at(self.sent, head.captured_s - lag_s) for lag_s in _LAGS_S))
         return replace(self, seen=(*kept, now))._compared(kept, now)
 
     def _compared(self, earlier: tuple[_Seen, ...], now: _Seen) -> DirectionMonitor:
-        noise_deg, _, noise_mm = (_noise([*earlier, now], which) for which in range(3))
+        noise_deg, noise_mm = (_noise([*earlier, now], which) for which in (0, 2))
         wrong_deg = wrong_mm = turn_deg = fed_mm = 0.0
         turns, feeds = self.turns, self.feeds
         for then in earlier:
-            asked = _common([a - b for a, b in zip(now.turns_deg, then.turns_deg, strict=True)])
-            if asked:
-                sign = math.copysign(1.0, asked)
-                turned = sign * (now.moved[0] - then.moved[0]), sign * (now.moved[1] - then.moved[1])
-                drifts = [sign * (a - b) for a, b in zip(now.drifts_deg, then.drifts_deg, strict=True)]
-                held = sign * ((then.turns_deg[0] - earlier[0].turns_deg[0]) - (then.moved[0] - earlier[0].moved[0]))
-                # bent by so much, a robot that is wired right is turned on by a wall only where theta follows the bend
-                is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE * WRONG_TURN_DEG
-                back = -turned[0] if is_deaf else -max(turned)
-                against = min(back - max(0.0, -min(drifts)) - max(0.0, -held) - noise_deg, abs(asked))
-                followed = min(min(turned) - max(0.0, *drifts) - noise_deg, abs(asked))
-                is_held = abs(asked) >= _ENOUGH_DEG and -min(turned) <= _LITTLE * WRONG_TURN_DEG
-                turns = turns or is_held or followed >= _RIGHT_TURN_DEG
-                if against > wrong_deg:
-                    wrong_deg, turn_deg = against, asked
-            asked = _common([a - b for a, b in zip(now.feds_mm, then.feds_mm, strict=True)])
-            if asked:
-                sign = math.copysign(1.0, asked)
-                gone = sign * (now.moved[2] - then.moved[2])
-                held = sign * ((then.feds_mm[0] - earlier[0].feds_mm[0]) - (then.moved[2] - earlier[0].moved[2]))
-                against = min(-gone - max(0.0, -held) - noise_mm, abs(asked))
-                is_held = abs(asked) >= _ENOUGH_MM and -gone <= _LITTLE * WRONG_FEED_MM
-                feeds = feeds or is_held or min(gone - noise_mm, abs(asked)) >= _RIGHT_FEED_MM
-                if against > wrong_mm:
-                    wrong_mm, fed_mm = against, asked
+            heading_deg, theta_deg, way_mm = _each(sub, now.moved, then.moved)
+            asked = _common([a.turn_deg - b.turn_deg for a, b in zip(now.sent, then.sent, strict=True)])
+            sign = math.copysign(1.0, asked)
+            turned = sign * heading_deg, sign * theta_deg
+            drifts = [sign * (a.drift_deg - b.drift_deg) for a, b in zip(now.sent, then.sent, strict=True)]
+            # bent by so much, a robot that is wired right is turned on by a wall only where theta follows the bend
+            is_deaf = abs(asked) >= _ENOUGH_DEG and turned[1] <= _LITTLE_DEG
+            back = -turned[0] if is_deaf else -max(turned)
+            springs = max(0.0, sign * (earlier[0].ahead_deg - then.ahead_deg))
+            against = min(back - max(0.0, -min(drifts)) - springs - noise_deg, abs(asked))
+            followed = min(min(turned) - max(0.0, *drifts) - noise_deg, abs(asked))
+            is_held = abs(asked) >= _ENOUGH_DEG and -min(turned) <= _LITTLE_DEG
+            turns = turns or is_held or followed >= _RIGHT_TURN_DEG
+            if against > wrong_deg:
+                wrong_deg, turn_deg = against, asked
+            asked = _common([a.fed_mm - b.fed_mm for a, b in zip(now.sent, then.sent, strict=True)])
+            sign = math.copysign(1.0, asked)
+            gone = sign * way_mm
+            springs = max(0.0, sign * (earlier[0].ahead_mm - then.ahead_mm))
+            against = min(-gone - springs - noise_mm, abs(asked))
+            is_held = abs(asked) >= _ENOUGH_MM and -gone <= _LITTLE_MM
+            feeds = feeds or is_held or min(gone - noise_mm, abs(asked)) >= _RIGHT_FEED_MM
+            if against > wrong_mm:
+                wrong_mm, fed_mm = against, asked
         return replace(
             self, wrong_turn_deg=wrong_deg, wrong_feed_mm=wrong_mm, commanded=(turn_deg, fed_mm), turns=turns, feeds=feeds
         )
@@ -235,22 +243,17 @@ def _kept(seen: tuple[_Seen, ...], now_s: float) -> tuple[_Seen, ...]:
     return tuple(kept)
 
 
-def _next(earlier: tuple[_Seen, ...], head: HeadSeen, commands: list[_Sent], is_early: bool) -> _Seen:
-    turns_deg = tuple(command.turn_deg for command in commands)
-    feds_mm = tuple(command.fed_mm for command in commands)
-    now = _Seen(head, turns_deg, feds_mm, tuple(command.drift_deg for command in commands))
+def _next(earlier: tuple[_Seen, ...], head: HeadSeen, sent: tuple[_Sent, ...]) -> _Seen:
     if not earlier:
-        return now
+        return _Seen(head, sent)
     before = earlier[-1]
-    turned_deg = max(abs(a - b) for a, b in zip(turns_deg, before.turns_deg, strict=True))
-    fed_mm = max(abs(a - b) for a, b in zip(feds_mm, before.feds_mm, strict=True))
-    step = _step(before.head, head, _CUT_MM + _FOLLOWED * fed_mm)
-    raw = _each(lambda a, b: a + b, before.raw, step)
+    turned_deg = max(abs(a.turn_deg - b.turn_deg) for a, b in zip(sent, before.sent, strict=True))
+    fed_mm = max(abs(a.fed_mm - b.fed_mm) for a, b in zip(sent, before.sent, strict=True))
+    step = _step(before.head, head)
+    raw = _each(add, before.raw, step)
     most = _each(lambda least, commanded: least + _FOLLOWED * commanded, _FOLLOWED_LEAST, (turned_deg, turned_deg, fed_mm))
-    way = _each(lambda to, at: to - at, raw, before.moved)
-    moved = _each(lambda at, by: at + by, before.moved, _each(lambda by, limit: max(-limit, min(limit, by)), way, most))
-    raw = moved if is_early else raw
-    return replace(now, raw=raw, moved=moved, step=step, change=_each(lambda a, b: abs(a - b), step, before.step))
+    by = _each(lambda way, limit: max(-limit, min(limit, way)), _each(sub, raw, before.moved), most)
+    return _Seen(head, sent, raw, _each(add, before.moved, by), step, _each(lambda a, b: abs(a - b), step, before.step))
 
 
 def _each(function: Callable[[float, float], float], one: _Motion, other: _Motion) -> _Motion:
@@ -258,21 +261,17 @@ def _each(function: Callable[[float, float], float], one: _Motion, other: _Motio
     return function(one[0], other[0]), function(one[1], other[1]), function(one[2], other[2])
 
 
-def _step(before: HeadSeen, now: HeadSeen, most_mm: float) -> _Motion:
-    """The motion from one frame to the next; a length that changes by more than `most_mm` is not used."""
-    turned_deg = _wrapped(now.heading_deg - before.heading_deg)
-    if before.length_mm is not None and now.length_mm is not None and abs(now.length_mm - before.length_mm) <= most_mm:
-        way_mm = now.length_mm - before.length_mm
-    else:
-        x, y = (a - b for a, b in zip(now.place_mm, before.place_mm, strict=True))
-        along = math.radians(before.heading_deg + turned_deg / 2.0)
-        way_mm = x * math.cos(along) + y * math.sin(along)
-    return turned_deg, _wrapped(now.theta_deg - before.theta_deg), way_mm
+def _step(before: HeadSeen, now: HeadSeen) -> _Motion:
+    """The motion from one frame to the next."""
+    x, y = (a - b for a, b in zip(now.tail_mm, before.tail_mm, strict=True))
+    way_mm = now.length_mm - before.length_mm + x * now.tail_along[0] + y * now.tail_along[1]
+    turned_deg, theta_deg = _wrapped(now.heading_deg - before.heading_deg), _wrapped(now.theta_deg - before.theta_deg)
+    return turned_deg, theta_deg, way_mm if abs(way_mm) <= _JUMP_MM else 0.0
 
 
 def _noise(seen: list[_Seen], which: int) -> float:
     """What the noise of the poses alone may make a motion seem to be."""
-    return _NOISES * _NOISE_OF_CHANGE * sum(one.change[which] for one in seen) / len(seen)
+    return _NOISE * sum(one.change[which] for one in seen) / len(seen)
 
 
 def _at(sent: tuple[_Sent, ...], time_s: float) -> _Sent:
@@ -292,9 +291,8 @@ def _at(sent: tuple[_Sent, ...], time_s: float) -> _Sent:
 
 def _common(changes: list[float]) -> float:
     """The smallest of changes in one direction; 0 where they differ in it."""
-    if all(change > 0.0 for change in changes):
-        return min(changes)
-    return max(changes) if all(change < 0.0 for change in changes) else 0.0
+    least = min(changes, key=abs)
+    return least if all(change * least > 0.0 for change in changes) else 0.0
 
 
 def _wrapped(angle_deg: float) -> float:

@@ -185,7 +185,7 @@ def _wrong_way(turn_deg: float, feed_mm_s: float) -> Inject:
 
     def inject(bench: Bench) -> None:
         for k in range(60):
-            head = HeadSeen(0.0, -turn_deg * k, -turn_deg * k, (-feed_mm_s * k * TICK_S, 0.0))
+            head = HeadSeen(0.0, -turn_deg * k, -turn_deg * k, 80.0 - feed_mm_s * k * TICK_S, (0.0, 0.0), (1.0, 0.0))
             bench.frame = lambda report, head=head: replace(report, head=replace(head, captured_s=report.captured_s))
             decision = bench.tick(MotionSent(bench.now_s, turn_deg * k, feed_mm_s))
             if decision.latched is not None and bench.state.mode is not S:
