@@ -25,7 +25,7 @@ from core.control.health import (
     ServosBusy,
 )
 from core.control.modes import ARMED_MODES, Act, AgainstProgram, Decision, Event, Hindrance, Mode, RequestRefused, SupervisorState
-from core.control.supervisor import supervise
+from core.control.supervisor import hindrances, supervise
 from core.types import Reason
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S, Bench
 
@@ -384,10 +384,14 @@ def test_one_refused_frame_starts_the_second_again_for_perception_only(benches: 
     assert bench.tick(Act.ARM).mode is R
 
 
-def test_a_camera_fault_starts_the_second_again_for_the_camera(benches: dict[Mode, Bench]) -> None:
+@pytest.mark.parametrize(
+    ("cause", "hindrance"),
+    [(Cause.CAMERA_MOVED, Hindrance.CAMERA_SETTLING), (Cause.POOR_VIEW, Hindrance.PERCEPTION_SETTLING)],
+)
+def test_a_fault_starts_the_second_again_for_its_area(cause: Cause, hindrance: Hindrance, benches: dict[Mode, Bench]) -> None:
     bench = benches[V].copy()
-    bench.tick(Fault(Cause.CAMERA_MOVED))
-    assert _refused(bench.tick(Act.ARM), Act.ARM) == {Hindrance.CAMERA_SETTLING}
+    bench.tick(Fault(cause))
+    assert _refused(bench.tick(Act.ARM), Act.ARM) == {hindrance}
     bench.tick(Fault(Cause.FRAMES_DROPPED))  # a warning does not
     bench.run(0.9375)
     assert bench.tick(Act.ARM).mode is R
@@ -426,6 +430,7 @@ def test_a_missing_port_at_start_is_a_reason_not_a_latched_stop() -> None:
     assert decision.mode is V
     assert decision.latched is None
     assert Cause.PORT_LOST in _refused(bench.tick(Act.ARM), Act.ARM)
+    assert bench.tick(after_s=5.0).latched is None, "nor is a jump of the clock, with servos that are not in use"
 
 
 # --- hand-over -------------------------------------------------------------------------------------
@@ -478,6 +483,8 @@ def test_a_hand_over_in_the_tick_in_which_the_servos_become_unchecked_is_refused
 def test_a_hand_over_needs_the_deadman(benches: dict[Mode, Bench]) -> None:
     for mode in (R, H):
         assert _refused(benches[mode].copy().tick(Act.HAND_OVER), Act.HAND_OVER) == {Hindrance.DEADMAN_NOT_HELD}
+    bench = benches[R]
+    assert hindrances(bench.state, bench.now_s, SAFETY) == ((Hindrance.ALREADY_ARMED,), ()), "it is pressed with the hand-over"
 
 
 def test_a_deadman_that_was_down_before_arming_does_not_count() -> None:
@@ -856,6 +863,7 @@ def test_the_first_cause_stays_until_acknowledged(benches: dict[Mode, Bench]) ->
     decision = bench.tick(Act.STOP)
     assert decision.mode is S
     assert decision.latched == Fault(Cause.SEVERAL_ROBOTS, "two")
+    assert decision.refused == ()
     bench.run(3.0)
     assert bench.state.latched.cause is Cause.SEVERAL_ROBOTS
     assert bench.tick(Act.ACKNOWLEDGE).latched is None
@@ -1037,6 +1045,6 @@ def test_a_first_time_that_is_no_number_is_not_kept() -> None:
 def test_after_a_jump_of_the_clock_camera_and_perception_must_prove_themselves_anew(benches: dict[Mode, Bench]) -> None:
     """Also when the tick of the jump itself brings good reports."""
     bench = benches[V].copy()
-    bench.tick(after_s=5.0)
+    assert bench.tick(after_s=5.0).latched.cause is Cause.CLOCK
     decision = bench.tick(Act.ARM, Act.ACKNOWLEDGE, ServoCheckReport())
     assert _refused(decision, Act.ARM) == {Hindrance.CAMERA_SETTLING, Hindrance.PERCEPTION_SETTLING}
