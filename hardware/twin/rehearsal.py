@@ -48,9 +48,8 @@ PLAY_MM, SLACK_MM, START_MM = (0.03, 0.2), (0.0, 0.06), 5.0
 """Spread of the play and of the slack of the wires, and of the insertion at the start to both sides; uniform."""
 WANDERS = (0.0, 0.4, 0.8)
 """How far the robot sways on the ways on which it is perceived in pictures (``RouteFollower``)."""
-_PICTURE_S, _PICTURE_MM_S = 0.1, 10.0
-_NEAREST, _MEMORY_S = 8, 0.3
-"""A run perceives as in one of so many pictures whose heads were nearest, and for so long on average as in the same one."""
+_PICTURE_S, _PICTURE_MM_S, _NEAREST = 0.1, 10.0, 8
+"""Time between the pictures, and speed; a run perceives as in one of so many nearest ones, and another one after that time."""
 _LINE_PX = 40.0
 """Length of the robot's end over which an error of the head fades out."""
 _HEADING_PX = 10.0
@@ -207,9 +206,9 @@ class Rehearsal(Trial):
         return replace(scene, robot_vector=line, vessel_vector=vessel, pose=pose)
 
     def _picture_near(self, seen: SeenHeads, head_mm: Point) -> int:
-        """The number of a picture with the head nearby: the same one for a while, as errors stay."""
+        """The number of a picture with the head nearby."""
         near = np.argsort(np.linalg.norm(seen.heads_mm - head_mm, axis=1))
-        fades = self._rng.random() < 1.0 / (_MEMORY_S * self._world.config.frames_per_second)
+        fades = self._rng.random() < 1.0 / (_PICTURE_S * self._world.config.frames_per_second)
         if self._picture is None or fades or self._picture not in near[: 2 * _NEAREST]:
             self._picture = int(self._rng.choice(near[:_NEAREST]))
         return self._picture
