@@ -192,12 +192,12 @@ def _open_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
 def _open_remote_twin(config: Config, ahead: PrestartedProcesses | None) -> Rig:
     """The twin and its software servos in a process of their own, the real driver in another; zeroed, not armed."""
     from hardware.servos.servo_robot import ServoRobot
-    from hardware.twin.process import PrestartedProcesses, RemoteTwin
+    from hardware.twin.process import PrestartedProcesses
 
     loading = ahead or PrestartedProcesses()
     with ExitStack() as undo:
         undo.callback(loading.end)
-        twin = RemoteTwin(config, START_INSERTION_MM, loading.twin)
+        twin = loading.open_twin(config, START_INSERTION_MM)
         undo.callback(twin.close)
         servos = config.servos.model_copy(update={"port": twin.port, "driver": "dynamixel"})
         name, safety = "bench twin with servos", config.safety

@@ -20,7 +20,6 @@ import av
 import av.error
 import numpy as np
 
-from app.commands.progress import progress_bar
 from core.annotation.model import AnnotationError
 from core.annotation.store import DEFAULT_NAME, AnnotationStore, FoundImage, StoredAnnotation, find_images, image_sha256
 from core.files import ImageError, read_image
@@ -156,6 +155,8 @@ def extract_frames(video: Path, choose: Choose) -> list[Path]:
     AnnotationError
         The video cannot be read, the folder beside it cannot be written, or holds another video's pictures.
     """
+    from app.commands.progress import progress_bar  # loads rich, which no window needs
+
     folder = _frames_folder(video)
     written: list[Path] = []
     try:
@@ -404,6 +405,8 @@ def _existing(path: Path) -> list[Path]:
 
 def listed_images(files: Sequence[Path], store: AnnotationStore) -> list[FoundImage]:
     """Enter the files into the store as images, with a warning for each unreadable one. Raises AnnotationError if all are."""
+    from app.commands.progress import progress_bar
+
     with progress_bar() as bar:
         task = bar.add_task("images looked at", total=len(files))
         images, problems = find_images(files, store, lambda: bar.advance(task))

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from threading import Lock
 from typing import TYPE_CHECKING
 
 from core.bench.bench import BenchError
 from core.config.models import Config, PerceptionConfig
-from core.config.rig_file import as_calibrated, calibration_of
+from core.config.rig_file import RigFileError, as_calibrated, calibration_of
 from core.control.engine import Engine, Perceive
 from core.control.frame_reports import view_picture
 from core.control.health import ModelReport
 from core.control.pilot import LeftOver, Pilot
 from core.control.policies import make_policy
 from core.control.readiness import READY, RigRecords, read_records
+from core.devices import DeviceError
 from core.perception.inference import cores
 from core.perception.model_file import ModelError
 from core.perception.pipeline import NoPerception, Pipeline, open_pipeline
 from core.system import lower_priority, return_free_memory
 from core.types import Frame, Image, Point, Scene
-from hardware.rig import Rig, RigKind, open_rig
+from hardware.rig import START_INSERTION_MM, Rig, RigKind, open_rig
 from hardware.servos.bus_ipc import BusStatus
 from hardware.servos.servo_robot import ServoRobot
 
@@ -97,6 +99,20 @@ class EngineMaker:
         self._left_over: LeftOver | None = None
         self._perceive: Perceive | None = None
         self._loaded: PerceptionConfig | None = None
+        self._one_loads = Lock()
+
+    def begin_twin(self, config: Config) -> None:
+        """Let the twin that was started ahead build its bench; an error is reported when the rig is opened."""
+        if self._ahead is not None:
+            with suppress(RigFileError, DeviceError):
+                self._ahead.begin(as_calibrated(config), START_INSERTION_MM)
+
+    def begin_network(self, config: Config) -> None:
+        """Begin to load the network; an error is reported when the rig is opened."""
+        with suppress(RigFileError):
+            beside = ThreadPoolExecutor(1, "network", lower_priority)
+            beside.submit(self._perception, leaving_a_core(as_calibrated(config).perception))
+            beside.shutdown(wait=False)
 
     def __call__(self, config: Config) -> RigEngine:
         """Raises DeviceError. A model that cannot be loaded is no error: the engine runs and refuses every frame, with why."""
@@ -133,13 +149,14 @@ class EngineMaker:
 
     def _perception(self, config: PerceptionConfig) -> tuple[Perceive, ModelReport]:
         try:
-            if isinstance(self._perceive, Pipeline) and self._loaded is not None and _same_network(self._loaded, config):
-                self._perceive = self._perceive.with_config(config)
-                self._loaded = config
-            elif self._perceive is None or self._loaded != config:
-                self._perceive = open_pipeline(config)
-                self._perceive.warm_up()
-                self._loaded = config
+            with self._one_loads:
+                if isinstance(self._perceive, Pipeline) and self._loaded is not None and _same_network(self._loaded, config):
+                    self._perceive = self._perceive.with_config(config)
+                    self._loaded = config
+                elif self._perceive is None or self._loaded != config:
+                    self._perceive = open_pipeline(config)
+                    self._perceive.warm_up()
+                    self._loaded = config
         except (ModelError, BenchError) as error:
             # Not kept: once the model or the bench is restored, starting the rig again is enough.
             return NoPerception(str(error)), ModelReport(False, str(error))

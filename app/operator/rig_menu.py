@@ -15,8 +15,6 @@ from PySide6.QtWidgets import QFileDialog, QMenu
 from app.operator.engine_thread import EnginePhase
 from app.operator.rig_engine import quick_sight
 from app.operator.window import OperatorWindow
-from app.rig_wizard.model import MakeSight, OpenBench, RigWizardModel
-from app.rig_wizard.wizard import RigWizard
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.opening import ask_path
@@ -31,6 +29,8 @@ from hardware.cameras.registry import FoundCamera
 from hardware.rig import RigKind, find_devices, kind_of, with_camera, with_source
 
 if TYPE_CHECKING:
+    from app.rig_wizard.model import MakeSight, OpenBench
+    from app.rig_wizard.wizard import RigWizard
     from hardware.calibration.bench import CalibrationBench
 
 _CLOSING = mark("Waiting for the wizard to give camera and servos back; where a driver hangs, start the program again")
@@ -302,6 +302,9 @@ class RigMenuController(QObject):
         return phase is EnginePhase.FAULT and self._rig.message == _LENT
 
     def _show(self, request: _WizardRequest) -> None:
+        from app.rig_wizard.model import RigWizardModel  # few starts of the window need it
+        from app.rig_wizard.wizard import RigWizard
+
         desk = RigWizardModel(request.config, request.known, self._open_bench, self._make_sight)
         wizard = RigWizard(desk, request.name, self._window)
         wizard.saved.connect(self._on_saved)

@@ -21,8 +21,6 @@ from app.operator.recording import AfterSession, DescriptionController, Recovery
 from app.operator.rig_engine import leaving_a_core
 from app.operator.rig_session import StopOutcome
 from app.operator.window import OperatorWindow
-from app.training.dialog import TrainingDialog
-from app.training.model import collect_from_file
 from app.ui.actions import MenuEntry, add_menu
 from app.ui.crash_report import Crash, CrashWatch, crash_of_last_run
 from app.ui.i18n import mark, tr
@@ -42,6 +40,7 @@ from hardware.twin.catalog import look_of
 
 if TYPE_CHECKING:
     from app.teaching.window import TeachingWindow
+    from app.training.dialog import TrainingDialog
     from core.config.models import Config, PerceptionConfig
     from core.learning.teaching import Segment
 
@@ -243,6 +242,9 @@ class WindowServices(QObject):
 
     def open_training(self, store: Path) -> None:
         """The dialog for an annotation file."""
+        from app.training.dialog import TrainingDialog
+        from app.training.model import collect_from_file
+
         if self.training is not None:
             self.training.end()
             self.training.deleteLater()

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def finish_loading() -> None:
     """Load what a window needs before it is made, and keep it out of later garbage collections.
 
-    Loading holds the interpreter's lock, and so blocks the window, for up to a quarter of a second, mostly for such collections.
+    Loading holds the interpreter's lock: beside the window it would block that for a quarter of a second.
     """
     compiled.load()
     gc.freeze()
@@ -66,6 +66,7 @@ def run_window(
     if bench is not None and kind is not RigKind.SIM:
         raise UserError("--bench is for the twin: leave --rig and --source out")
     outputs = _open_outputs(config, is_asked=stream is not None or lsl)
+    gc.disable()  # collections would be a fifth of the time that loading takes from here on
     ahead = start_ahead(config)  # before all that is slow to load here; it is told the configuration later
 
     from app.operator.live_menu import LiveMenuController
@@ -87,9 +88,12 @@ def run_window(
         config = with_kept_twin(config)
     if bench is not None:
         config = with_own_phantom(config, bench)
-    finish_loading()
-    application = make_application(config.window)
     maker = EngineMaker(ahead)
+    maker.begin_twin(config)
+    finish_loading()
+    gc.enable()
+    maker.begin_network(config)  # beside the window, but not beside what loads here: the window would come later
+    application = make_application(config.window)
     window = make_window(config, kind, maker)
     watch = CrashWatch(state_folder() / "crashes", lambda: window.rig.config.model_dump(mode="json"))
     watch.install()

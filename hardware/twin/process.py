@@ -13,7 +13,7 @@ import os
 import select
 import struct
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -76,19 +76,24 @@ def start_twin() -> DeviceProcess:
     return DeviceProcess("hardware.twin.server", "the bench twin", writes_pipe=False)
 
 
+def _order(config: Config, insertion_mm: float) -> dict[str, Any]:
+    return {"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm}
+
+
 class RemoteTwin:
     """A running twin process as a ``Camera``. ``read`` and ``close`` belong to one thread, ``status`` to any.
 
     Parameters
     ----------
     prestarted : a process from ``start_twin``; a new one is started when it is missing or has ended.
+    waits : False: it is not ready before ``await_start``.
 
     Raises DeviceError when it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
 
-    def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None) -> None:
+    def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None, *, waits: bool = True) -> None:
+        self.order = _order(config, insertion_mm)
         self._number = 0
-        self._heard_s = time.monotonic()
         self._closed = False
         sizes = slot_sizes(config.twin)
         self._process, memory = DeviceProcess.claim(prestarted, start_twin, sum(map(SharedSlot.size, sizes)))
@@ -98,8 +103,15 @@ class RemoteTwin:
             self.clock = SimulatedClock()
             undo.callback(self.clock.close)
             with contextlib.suppress(OSError):  # a process that has ended gives no answer either
-                about = {"config": config.model_dump(mode="json"), "insertion_mm": insertion_mm}
-                self._process.send({**about, "clock": self.clock.file})
+                self._process.send({**self.order, "clock": self.clock.file})
+            undo.pop_all()
+        if waits:
+            self.await_start()
+
+    def await_start(self) -> None:
+        """Wait until it is ready; raises DeviceError, and is closed then."""
+        with contextlib.ExitStack() as undo:
+            undo.callback(self.close)
             answer = self._receive(_START_S)
             if "error" in answer:
                 raise DeviceError(answer["error"])
@@ -107,6 +119,7 @@ class RemoteTwin:
                 raise DeviceError("the bench twin did not start: free memory, then start the rig again (F5)")
             self.port = answer["port"]
             self.name = f"bench twin: {answer['title']}"
+            self._heard_s = time.monotonic()
             undo.pop_all()
 
     def _receive(self, timeout_s: float) -> dict[str, str]:
@@ -200,12 +213,29 @@ class PrestartedProcesses:
 
     def __init__(self) -> None:
         self.twin = start_twin()  # first, because it loads longer
+        self._begun: RemoteTwin | None = None
         with contextlib.ExitStack() as undo:
             undo.callback(self.twin.discard)
             self.bus = start_bus()
             undo.pop_all()
 
+    def begin(self, config: Config, insertion_mm: float) -> None:
+        """Let the twin build its bench, which takes half a second, before the rig is opened. Raises DeviceError."""
+        self._begun = RemoteTwin(config, insertion_mm, self.twin, waits=False)
+
+    def open_twin(self, config: Config, insertion_mm: float) -> RemoteTwin:
+        """The one that has begun where it is what is asked for, else another one; the caller's to close. Raises DeviceError."""
+        begun, self._begun = self._begun, None
+        if begun is not None:
+            if begun.order == _order(config, insertion_mm):
+                begun.await_start()
+                return begun
+            begun.close()
+        return RemoteTwin(config, insertion_mm, self.twin)
+
     def end(self) -> None:
         """End the processes that no rig has claimed."""
         self.bus.discard()
         self.twin.discard()
+        if self._begun is not None:
+            self._begun.close()

@@ -62,6 +62,18 @@ def test_a_help_page_waits_for_nothing_slow() -> None:
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_the_window_waits_for_nothing_that_it_does_not_show_at_once() -> None:
+    """Neither for what few starts need, nor for what is loaded beside it."""
+    others = ("matplotlib", "jinja2", "rich", "mujoco", "openvino", "numba", "app.rig_wizard.wizard", "app.training.dialog")
+    code = f"""
+import sys
+from app.operator import rehearsing, rig_menu, services, startup, triggers
+from app.settings import apply
+print([name for name in {others} if name in sys.modules])"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.stdout.strip() == "[]", done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from math import atan, degrees
 from pathlib import Path
@@ -28,7 +26,7 @@ from core.session.manifest import event_of_target
 from hardware.twin.identification import Explanation
 from hardware.twin.world import TwinWorld
 from tests.app.annotated import measure, tube
-from tests.app.program import MAIN, run
+from tests.app.program import run
 from tests.core.evaluation.test_metrics import label_pairs
 from tests.core.session.test_rehearsed_run import FOUND
 from tests.core.session_data import record, tick_of
@@ -334,12 +332,6 @@ def test_a_set_with_a_hole_is_one_clear_line(labelled: Path, tmp_path: Path) -> 
     (broken / "truth.jsonl").write_text('{"stem": "a", "theta_deg": 3, "state": "A"}\n')
     with pytest.raises(UserError, match="no image of the states B, C and D"):
         evaluate(broken, out=tmp_path / "out", like_paper=True)
-
-
-def test_the_window_does_not_load_matplotlib_or_jinja() -> None:
-    code = "import sys, app.cli, app.operator.window; print([m for m in ('matplotlib', 'jinja2') if m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=MAIN.parent)
-    assert done.stdout.strip() == "[]", done.stderr
 
 
 def test_a_study_is_evaluated_with_its_raters_and_repeats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

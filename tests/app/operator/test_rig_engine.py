@@ -7,12 +7,12 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import NoReturn, cast
 
 import pytest
 
 from app.operator import rig_engine
-from app.operator.rig_engine import EngineMaker, RigEngine
+from app.operator.rig_engine import EngineMaker, RigEngine, leaving_a_core
 from core.config.calibration import CalibrationConfig, ScaleConfig
 from core.config.models import Config, PerceptionConfig, PolicyName, PoseConfig
 from core.config.rig_file import make_rig, read_rig, with_rig, write_rig
@@ -24,9 +24,10 @@ from core.control.modes import OF_THE_RIG, Act, Hindrance, Mode
 from core.control.pilot import Pilot
 from core.control.policies import Policy, make_policy
 from core.devices import DeviceError
+from core.perception.model_file import ModelError
 from core.perception.pipeline import Pipeline
 from core.types import Frame, Point, Reason, Refusal, Scene
-from hardware.rig import Rig, RigKind
+from hardware.rig import START_INSERTION_MM, Rig, RigKind
 from hardware.twin.process import PrestartedProcesses
 from tests.core.control.test_engine import _Camera
 from tests.core.control.test_frame_reports import BOARD, moved
@@ -224,3 +225,28 @@ def test_what_was_started_ahead_is_the_first_rigs_and_is_ended_where_none_is_ope
     assert given == [ahead, None]
     _Maker(ahead).close()
     assert given[2:] == ["ended"]
+
+
+def test_twin_and_network_begin_before_the_rig_is_opened_which_reports_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded: list[PerceptionConfig] = []
+    begun: list[object] = []
+
+    def open_pipeline(config: PerceptionConfig) -> NoReturn:
+        loaded.append(config)
+        raise ModelError("no such model")
+
+    def begin(config: Config, insertion_mm: float) -> NoReturn:
+        begun.append((config, insertion_mm))
+        raise DeviceError("no memory")
+
+    monkeypatch.setattr(rig_engine, "open_pipeline", open_pipeline)
+    monkeypatch.setattr(rig_engine, "open_rig", lambda *_: Rig("twin", RigKind.SIM, _Camera([]), Robot()))
+    maker = EngineMaker(cast(PrestartedProcesses, SimpleNamespace(begin=begin, end=lambda: None)))
+    maker.begin_twin(Config())
+    maker.begin_network(Config())
+    engine = maker(Config())
+    assert begun == [(Config(), START_INSERTION_MM)]
+    assert loaded == [leaving_a_core(Config().perception)] * 2, "one that is not there is looked for again"
+    assert engine.pilot is not None
+    assert engine._perceive(frame()).refusal.reason is Reason.NO_MODEL
+    engine.close()

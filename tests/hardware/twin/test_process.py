@@ -21,7 +21,7 @@ from core.control.gate import Source
 from core.devices import DeviceError
 from core.types import Command, Frame, RobotStatus
 from hardware.processes import DeviceProcess
-from hardware.rig import RigKind, open_rig, start_ahead
+from hardware.rig import START_INSERTION_MM, RigKind, open_rig, start_ahead
 from hardware.servos.bus_ipc import start_bus
 from hardware.servos.dynamixel_port import BusProcessLost
 from hardware.servos.servo_robot import ServoRobot
@@ -100,8 +100,11 @@ def test_an_application_that_was_ended_is_no_error_of_the_twin() -> None:
 
 @pytest.mark.real_time
 @pytest.mark.usefixtures("no_process_stays_behind")
-def test_what_was_started_ahead_becomes_the_rig() -> None:
+@pytest.mark.parametrize("begins", [False, True])
+def test_what_was_started_ahead_becomes_the_rig(begins: bool) -> None:
     ahead = start_ahead(CONFIG)
+    if begins:
+        ahead.begin(CONFIG, START_INSERTION_MM)
     rig = open_rig(CONFIG, ahead)
     try:
         assert {child.pid for child in psutil.Process().children()} >= {ahead.twin.pid, ahead.bus.pid}
@@ -113,6 +116,33 @@ def test_what_was_started_ahead_becomes_the_rig() -> None:
         assert rig.robot._client.pid != ahead.bus.pid, "the second connection has a process of its own"
     finally:
         rig.close()
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_a_twin_that_began_with_another_configuration_is_replaced() -> None:
+    ahead = start_ahead(CONFIG)
+    ahead.begin(CONFIG, 30.0)
+    twin = ahead.open_twin(CONFIG, 40.0)
+    try:
+        assert twin._process.pid != ahead.twin.pid
+        next_frame(twin)
+        assert twin.status().insertion_mm == pytest.approx(40.0, abs=2.0)
+    finally:
+        twin.close()
+        ahead.end()
+
+
+@pytest.mark.usefixtures("no_process_stays_behind")
+def test_a_twin_that_began_and_is_not_needed_ends_and_what_is_wrong_is_said_when_it_is_opened() -> None:
+    wrong = CONFIG.model_copy(update={"twin": CONFIG.twin.model_copy(update={"wiring": "1,2"})})
+    ahead = start_ahead(CONFIG)
+    ahead.begin(wrong, 40.0)
+    with pytest.raises(DeviceError, match=r"twin\.wiring 1,2"):
+        ahead.open_twin(wrong, 40.0)
+    ahead.end()
+    ahead = start_ahead(CONFIG)
+    ahead.begin(CONFIG, 40.0)
+    ahead.end()
 
 
 @pytest.mark.usefixtures("no_process_stays_behind")
