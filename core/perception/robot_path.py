@@ -315,6 +315,9 @@ TRIM_RADII = 1.2
 """Thinning bends the skeleton's last radius towards a corner of a blunt end."""
 END_HEADING_PX = 16.0
 """The end's direction and bend are taken over this length."""
+MOST_CUT_PX, SURE_BEYOND = 5, 0.75
+"""Width of what cuts a piece off the robot's end without hiding it (the rim of a clip, a scratch, the shadow of a wall), and the
+probability there that it is robot: a less likely one is as often a bubble or a reflection."""
 
 
 def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, extend: bool) -> tuple[Points, float]:
@@ -360,22 +363,29 @@ def _to_edge(line: Points, masks: Masks, radius_px: float) -> Points:
 
 
 def edge_distance(places: Points, mask: Mask, probability: NDArray[np.float32]) -> float:
-    """Length of a line of points, 1 px apart, within a mask: to a fraction of a pixel, where the probability falls through 0.5."""
+    """Length of a line of points, 1 px apart, within a mask: to a fraction of a pixel, where the probability falls through 0.5.
+
+    It goes on where the probability is ``SURE_BEYOND`` beyond at most ``MOST_CUT_PX``: that piece may be too small for the mask.
+    """
     height, width = mask.shape
-    inside = 0
-    for x, y in places.tolist():
-        column, row = round(x), round(y)
-        if not (0 <= column < width and 0 <= row < height and mask[row, column]):
-            break
-        inside += 1
+    in_image = np.all((np.rint(places) >= 0) & (np.rint(places) < (width, height)), axis=1)
+    shown = len(places) if in_image.all() else int(np.argmin(in_image))
+    columns, rows = np.rint(places[:shown]).astype(np.intp).T
+    within = mask[rows, columns]
+    inside = shown if within.all() else int(np.argmin(within))
     if inside in (0, len(places)):  # it never was in the mask, or never leaves it
         return 0.0
-    first = max(inside - 2, 0)
-    level = geometry.sample(probability, places[first : inside + 2]).tolist()
-    for k, (here, there) in enumerate(pairwise(level)):
+    level = geometry.sample(probability, places).tolist()
+    last = inside - 1
+    while seen := [k for k in range(last + 1, min(last + 2 + MOST_CUT_PX, shown)) if level[k] >= SURE_BEYOND]:
+        last = seen[0]
+    if last == shown - 1:
+        last = inside - 1
+    first = max(last - 1, 0)
+    for k, (here, there) in enumerate(pairwise(level[first : max(shown, inside + 2)]), first):
         if here >= 0.5 > there:
-            return float(first + k + (here - 0.5) / (here - there))
-    return float(inside - 1)
+            return float(k + (here - 0.5) / (here - there))
+    return float(last)
 
 
 MAX_CHAINS = 80

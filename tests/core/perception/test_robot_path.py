@@ -98,6 +98,13 @@ def test_several_breaks_are_bridged() -> None:
     assert path.tail[0] < 3.0
 
 
+@pytest.mark.parametrize(("cut_px", "ends_at"), [(2, HEAD[0]), (6, 393.5)])
+def test_a_tip_that_a_narrow_cut_parts_from_the_robot_is_its_tip(cut_px: int, ends_at: float) -> None:
+    robot = probability(depth(S_CURVE, 2.5))
+    robot[:, 394 : 394 + cut_px] = 0.1  # what is beyond is as small as specks, which cleaning takes away
+    assert path_of(robot).head[0] == pytest.approx(ends_at, abs=1.0)
+
+
 def test_a_gap_too_long_to_bridge_is_no_reason_to_put_the_head_there() -> None:
     robot = without(probability(depth(S_CURVE, 4.0)), (270, 261, 35))
     assert reason_of(robot) is Reason.GAP_TOO_LONG
