@@ -277,9 +277,9 @@ def test_a_vessel_that_turned_before_hides_no_wrong_turn() -> None:
 
 def test_a_bent_head_that_was_turned_by_its_feed_before_hides_no_wrong_turn() -> None:
     def head(now_s: float) -> HeadSeen:
-        return _head(now_s, 16.0 * min(now_s, 2.0) + 10.0 * max(0.0, now_s - 2.0))
+        return _head(now_s, 16.0 * min(now_s, 5.0) + 10.0 * max(0.0, now_s - 5.0))
 
-    course = _seen(lambda now_s: 30.0 - 10.0 * max(0.0, now_s - 2.0), lambda now_s: 8.0 if now_s < 2.0 else 0.0, head, 3.2)
+    course = _seen(lambda now_s: 30.0 - 10.0 * max(0.0, now_s - 5.0), lambda now_s: 8.0 if now_s < 5.0 else 0.0, head, 6.2)
     assert course[-1].wrong_turn_deg >= WRONG_TURN_DEG
 
 
