@@ -41,7 +41,8 @@ _FOLLOWED, _FOLLOWED_LEAST = 1.5, (0.5, 0.5, 0.1)
 """Heading (deg), theta (deg) and way (mm) are followed from frame to frame by so many times the commanded motion and so much more:
 a pose that flickers hardly moves them."""
 _JUMP_MM = 5.0
-"""A longer way from one frame to the next is none: the robot was covered, or tail and head were mistaken."""
+"""A longer way from one frame to the next begins another comparison: the robot was covered, or tail and head mistaken. (To leave
+out that frame's way alone would add up to a way where a head flickers: what it goes at once may come back in two steps.)"""
 _RIGHT_TURN_DEG, _RIGHT_FEED_MM = 3.0, 1.0
 """Motion with the command that shows its direction to be right."""
 _ENOUGH_DEG, _ENOUGH_MM, _LITTLE_DEG, _LITTLE_MM = 10.0, 3.0, 1.0, 0.4
@@ -177,7 +178,8 @@ class DirectionMonitor:
         """The state after a frame with a pose; poses before the first command say nothing."""
         if not self.sent or head.captured_s < self.sent[0].time_s:
             return self
-        is_next = bool(self.seen) and 0.0 < head.captured_s - self.seen[-1].head.captured_s <= _GAP_S
+        last = self.seen[-1].head if self.seen else head
+        is_next = 0.0 < head.captured_s - last.captured_s <= _GAP_S and abs(_step(last, head)[2]) <= _JUMP_MM
         kept = _kept(self.seen, head.captured_s) if is_next else ()
         # until the longest lag has passed, what was commanded before the first command may act: that motion does not count
         is_early = head.captured_s < self.sent[0].time_s + _LAGS_S[-1]
@@ -265,8 +267,7 @@ def _step(before: HeadSeen, now: HeadSeen) -> _Motion:
     """The motion from one frame to the next."""
     x, y = (a - b for a, b in zip(now.tail_mm, before.tail_mm, strict=True))
     way_mm = now.length_mm - before.length_mm + x * now.tail_along[0] + y * now.tail_along[1]
-    turned_deg, theta_deg = _wrapped(now.heading_deg - before.heading_deg), _wrapped(now.theta_deg - before.theta_deg)
-    return turned_deg, theta_deg, way_mm if abs(way_mm) <= _JUMP_MM else 0.0
+    return _wrapped(now.heading_deg - before.heading_deg), _wrapped(now.theta_deg - before.theta_deg), way_mm
 
 
 def _noise(seen: list[_Seen], which: int) -> float:

@@ -246,6 +246,14 @@ def test_the_way_is_that_of_the_robot_whatever_is_seen_of_it(feed: float, shown_
     assert max(one.wrong_feed_mm for one in course) < (0.1 if feed > 0.0 else math.inf)
 
 
+def test_a_head_that_flickers_has_not_gone_back() -> None:
+    """Now and then it seems to go by 8 mm at once, and back in two steps."""
+    course = _seen(
+        _ramp(0.0), 3.0, lambda now_s: _head(now_s, way_mm=3.0 * now_s + {0: 8.0, 1: 4.0}.get(round(now_s / FRAME_S) % 8, 0.0))
+    )
+    assert not any(one.faults() for one in course)
+
+
 def test_a_robot_that_is_cut_around_a_bend_has_not_gone_back() -> None:
     """What is covered is no straight piece, so that its length is more than the way of its end."""
     course = _seen(_ramp(0.0), 8.0, lambda now_s: _head(now_s, way_mm=8.0 * now_s - (25.0 if now_s > 2.0 else 0.0)))
@@ -285,8 +293,9 @@ def test_a_bent_head_that_was_turned_by_its_feed_before_hides_no_wrong_turn() ->
 
 @pytest.mark.parametrize(("share", "is_held"), [(0.05, True), (0.15, False)])
 def test_a_head_that_gives_way_a_little_is_held_and_one_that_goes_the_wrong_way_is_not(share: float, is_held: bool) -> None:
-    course = _course(Robot(turn=-share, feed=-share), _ramp(15.0), lambda _: 3.5, seconds=1.2)
-    assert not any(one.faults() for one in course)
+    """After a command of 10 degrees or 3 mm."""
+    course = _course(Robot(turn=-share, feed=-share), _ramp(15.0), lambda _: 4.6, seconds=1.0)
+    assert not any(one.faults() or one.turns or one.feeds for one in course[:-2])
     assert (course[-1].turns, course[-1].feeds) == (is_held, is_held)
 
 
@@ -304,7 +313,7 @@ def test_noise_that_is_taken_off_is_two_and_a_half_deviations() -> None:
     """A pose that alternates by 0.2 degrees has second differences of 0.8, as noise with a deviation of 0.41 has."""
 
     def head(now_s: float) -> HeadSeen:
-        return _head(now_s, -5.0 * now_s + (0.2 if round(now_s / FRAME_S) % 2 == 0 else -0.2))
+        return _head(now_s, -5.0 * now_s + (0.2 if round(now_s / FRAME_S) % 2 == 0 else -0.2), -10.0 * now_s)
 
     assert _seen(_ramp(10.0), 0.0, head, 1.32)[-1].wrong_turn_deg == pytest.approx(5.4 - 2.5 * 0.41, abs=0.1)
 
@@ -330,6 +339,8 @@ def test_a_pose_that_flickers_moves_the_head_by_little_more_than_what_was_comman
         monitor = monitor.drive(MotionSent(k * 0.1, 1.0 * k**2, 1.0 * k))
     pose = monitor.observe(_head(0.5, 150.0)).observe(_head(0.6, -120.0, way_mm=4.0)).seen[-1]
     assert pose.step == pytest.approx((90.0, 90.0, 4.0))
+    for way_mm, frames in ((4.5, 2), (5.5, 1), (-5.5, 1)):
+        assert len(monitor.observe(_head(0.5)).observe(_head(0.6, way_mm=way_mm)).seen) == frames, "too far to be a way"
     assert pose.moved == pytest.approx((0.5 + 1.5 * (36.0 - 25.0), 0.5 + 1.5 * (36.0 - 25.0), 0.1 + 1.5 * (1.5 - 1.0)))
     assert (pose.ahead_deg, pose.ahead_mm) == pytest.approx((36.0 - 17.0, 1.5 - 0.85))
 
@@ -384,6 +395,15 @@ def test_a_bent_head_that_is_turned_on_by_its_feed_was_not_seen_to_turn() -> Non
 
     monitor = _seen(lambda now_s: 30.0 + 4.0 * now_s, 8.0, head, 1.6)[-1]
     assert (monitor.turns, monitor.feeds) == (False, True)
+
+
+def test_a_bent_head_that_is_turned_on_at_once_by_a_feed_that_begins_does_not_turn_the_wrong_way() -> None:
+    def head(now_s: float) -> HeadSeen:
+        fed_s = max(0.0, now_s - 1.0)
+        return _head(now_s, (2.6 * fed_s - 24.0) * fed_s, way_mm=8.0 * fed_s)
+
+    course = _seen(lambda now_s: 10.0 * now_s - 55.0, lambda now_s: 8.0 if now_s >= 1.0 else 0.0, head, 2.0)
+    assert _first_s(course, Cause.WRONG_TURN) == math.inf
 
 
 def test_with_few_pictures_a_reversed_feed_shows_by_long_steps() -> None:
