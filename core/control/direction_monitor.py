@@ -179,7 +179,7 @@ class DirectionMonitor:
         if not self.sent or head.captured_s < self.sent[0].time_s:
             return self
         last = self.seen[-1].head if self.seen else head
-        is_next = 0.0 < head.captured_s - last.captured_s <= _GAP_S and abs(_step(last, head)[2]) <= _JUMP_MM
+        is_next = 0.0 <= head.captured_s - last.captured_s <= _GAP_S and abs(_step(last, head)[2]) <= _JUMP_MM
         kept = _kept(self.seen, head.captured_s) if is_next else ()
         # until the longest lag has passed, what was commanded before the first command may act: that motion does not count
         is_early = head.captured_s < self.sent[0].time_s + _LAGS_S[-1]

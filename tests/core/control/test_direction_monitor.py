@@ -187,6 +187,7 @@ def test_a_pause_of_commands_or_poses_begins_again() -> None:
     assert resumed.seen == ()
     again = monitor.drive(MotionSent(monitor.sent[-1].time_s, 7.0, 0.0))
     assert again.seen == monitor.seen, "one that is reported twice is no pause"
+    assert len(monitor.observe(monitor.seen[-1].head).seen) == len(monitor.seen) + 1, "nor is such a pose"
     assert resumed.observe(_head(2.3, -90.0)).wrong_turn_deg == 0.0
     late = monitor.observe(_head(0.9, -40.0))
     assert (late.wrong_turn_deg, len(late.seen)) == (0.0, 1)
