@@ -110,7 +110,7 @@ class EngineMaker:
     def begin_network(self, config: Config) -> None:
         """Begin to load the network; an error is reported when the rig is opened."""
         with suppress(RigFileError):
-            beside = ThreadPoolExecutor(1, "network", lower_priority)
+            beside = ThreadPoolExecutor(1, "network")
             beside.submit(self._perception, leaving_a_core(as_calibrated(config).perception))
             beside.shutdown(wait=False)
 
@@ -120,7 +120,7 @@ class EngineMaker:
         if self._pilot is not None:  # nor does a rig that cannot be opened acknowledge anything
             self._left_over, self._pilot = self._pilot.left_over, None
             return_free_memory()  # garbage is collected in the window's thread alone
-        with ExitStack() as undo, ThreadPoolExecutor(1, "network", lower_priority) as beside:
+        with ExitStack() as undo, ThreadPoolExecutor(1, "network") as beside:
             loading = beside.submit(self._perception, leaving_a_core(config.perception))  # both take seconds
             ahead, self._ahead = self._ahead, None
             rig = self._open(config, ahead)
@@ -155,7 +155,9 @@ class EngineMaker:
                     self._loaded = config
                 elif self._perceive is None or self._loaded != config:
                     self._perceive = open_pipeline(config)
-                    self._perceive.warm_up()
+                    # At low priority only what leaves the interpreter free: for the rest the window would have to wait.
+                    with ThreadPoolExecutor(1, "warm-up", lower_priority) as behind:
+                        behind.submit(self._perceive.warm_up).result()
                     self._loaded = config
         except (ModelError, BenchError) as error:
             # Not kept: once the model or the bench is restored, starting the rig again is enough.

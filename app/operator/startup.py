@@ -90,9 +90,9 @@ def run_window(
         config = with_own_phantom(config, bench)
     maker = EngineMaker(ahead)
     maker.begin_twin(config)
+    maker.begin_network(config)
     finish_loading()
     gc.enable()
-    maker.begin_network(config)  # beside the window, but not beside what loads here: the window would come later
     application = make_application(config.window)
     window = make_window(config, kind, maker)
     watch = CrashWatch(state_folder() / "crashes", lambda: window.rig.config.model_dump(mode="json"))

@@ -155,7 +155,6 @@ class Pipeline:
         roi: CalibratedSegmenter | None = None,
         bench: Bench | None = None,
     ) -> None:
-        compiled.load()  # not with the first picture
         self._stream = stream if isinstance(stream, CalibratedSegmenter) else CalibratedSegmenter(stream)
         self._single = single or self._stream
         self._offered_roi = roi
@@ -200,7 +199,10 @@ class Pipeline:
             self._state.tracked, self._state.shape = before._state.tracked, before._state.shape
 
     def warm_up(self) -> None:
-        """Compile the networks for a stream of 4:3 pictures. Otherwise the first pictures wait for it, up to a second each."""
+        """Compile the networks for a stream of 4:3 pictures, and load the inner loops.
+
+        Otherwise the first pictures wait for it, up to a second each.
+        """
         side, window = self._config.working_size_px, self._config.tracking.window_px
         segment = self._stream.segment
         segment(np.zeros((round(0.75 * side), side, 3), np.uint8))
@@ -211,6 +213,7 @@ class Pipeline:
                 beside.warm_up(beside=True)
         if isinstance(segment, TipRefinement):
             segment.warm_up()
+        compiled.load()  # last: another thread can do it meanwhile, as compiling leaves the interpreter free
 
     def reset(self) -> None:
         """Begin another stream."""
