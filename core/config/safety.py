@@ -60,7 +60,7 @@ class SafetyConfig(ConfigSection):
     frame_loss_warn_share: float = Field(0.1, gt=0.0, le=0.1, description="share of frames lost that warns")
     frame_loss_hold_share: float = Field(0.2, gt=0.0, le=0.2, description="share of frames lost that holds")
     frame_loss_disarm_s: float = Field(0.5, ge=0.0, le=0.5, description="loss above the hold share for so long disarms")
-    min_confidence: float = Field(0.5, ge=0.5, le=1.0, description="an answer with less confidence holds the program")
+    min_confidence: float = Field(0.5, ge=0.5, le=1.0, description="on less confidence the program rests, then holds")
     confidence_hysteresis: float = Field(0.05, ge=0.0, le=0.5, description="how much more confidence is needed to go on")
     max_drift_px: float = Field(6.0, gt=0.0, le=10.0, description="movement of the landmarks that means a moved camera")
     missed_answers: int = Field(3, ge=1, le=3, description="in a row, of one servo")

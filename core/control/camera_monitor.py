@@ -75,6 +75,7 @@ class CameraMonitor:
     equal_run, refusal_run, broken_run : frames in a row with the same picture, the same refusal, a result that is not finite.
     refusal_since_s : capture of the last frame before this run of refusals.
     unsure : the confidence is below the limit, with hysteresis.
+    sure_s : capture of the newest pose that was sure enough.
     counts : (time, frames delivered, frames lost) of the reports in the window of frame loss.
     """
 
@@ -87,6 +88,7 @@ class CameraMonitor:
     refusal_since_s: float = 0.0
     broken_run: int = 0
     unsure: bool = False
+    sure_s: float = -math.inf
     route: RouteState = RouteState.NONE
     counts: tuple[tuple[float, int, int], ...] = ()
     loss_since_s: float | None = None
@@ -132,7 +134,9 @@ class CameraMonitor:
         if report.refusal is not None:
             return replace(state, well=False)
         needed = safety.min_confidence + (safety.confidence_hysteresis if state.unsure else 0.0)
-        return replace(state, pose_captured_s=report.captured_s, well=True, unsure=report.confidence < needed, route=report.route)
+        unsure = report.confidence < needed
+        sure_s = state.sure_s if unsure else report.captured_s
+        return replace(state, pose_captured_s=report.captured_s, well=True, unsure=unsure, sure_s=sure_s, route=report.route)
 
     def faults(self, now_s: float, safety: SafetyConfig) -> list[Fault]:
         """The active faults of camera and perception."""
@@ -176,7 +180,7 @@ class CameraMonitor:
             faults.append(Fault(Cause.NOT_FINITE))
         refusal = newest.refusal
         if refusal is None:
-            if self.unsure:
+            if self.unsure and now_s - self.sure_s > safety.pose_hold_s:
                 least = f"at least {100 * safety.min_confidence:.0f} %"
                 faults.append(Fault(Cause.CONFIDENCE_LOW, f"{100 * newest.confidence:.0f} % ({least})"))
             return faults

@@ -315,7 +315,7 @@ TRIM_RADII = 1.2
 """Thinning bends the skeleton's last radius towards a corner of a blunt end."""
 END_HEADING_PX = 16.0
 """The end's direction and bend are taken over this length."""
-MOST_CUT_PX, SURE_BEYOND = 5, 0.75
+MOST_CUT_PX, SURE_BEYOND = 5, 0.6
 """Width of what cuts a piece off the robot's end without hiding it (the rim of a clip, a scratch, the shadow of a wall), and the
 probability there that it is robot: a less likely one is as often a bubble or a reflection."""
 

@@ -13988,8 +13988,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>
-        <source>an answer with less confidence holds the program</source>
-        <translation>置信度低于此值时程序保持不动</translation>
+        <source>on less confidence the program rests, then holds</source>
+        <translation>置信度低于此值时程序先静止，随后保持</translation>
     </message>
     <message>
         <location filename="../../app/ui/i18n.py"/>

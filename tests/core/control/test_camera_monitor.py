@@ -136,6 +136,17 @@ def test_confidence_has_hysteresis() -> None:
     assert not after(0.499, 0.55, 0.5)
 
 
+def test_only_poses_that_stay_unsure_hold_the_program() -> None:
+    doubt = [replace(report, confidence=0.4) for report in _good(20, first=1)]
+    assert Cause.CONFIDENCE_LOW in _causes(_watch(doubt[0]))  # there was no sure one
+    watch = _watch(*_good(1), doubt[0])
+    assert _causes(watch, 0.15) == set()
+    assert Cause.CONFIDENCE_LOW in _causes(watch, 0.151)
+    assert _causes(_watch(*_good(1), *doubt[:4])) == set()
+    assert _causes(_watch(*_good(1), *doubt)) == {Cause.CONFIDENCE_LOW}
+    assert _causes(_watch(*_good(1), *doubt, *_good(1, first=21))) == set()
+
+
 def test_a_refusal_keeps_the_route_and_the_age_of_the_last_pose() -> None:
     watch = _watch(*_good(1), replace(_good(1, first=1)[0], refusal=Reason.HEAD_JUMP, route=RouteState.NONE))
     assert watch.route is RouteState.READY

@@ -381,6 +381,25 @@ def test_one_report_from_before_arming_is_no_fault(bench: Bench) -> None:
     assert bench.pilot.view.latched is None
 
 
+def test_an_unsure_pose_is_not_followed_and_the_next_sure_one_goes_on(bench: Bench) -> None:
+    bench.handed_over().turn(20)
+    assert bench.robot.sent[-1][1].advance_mm_s > 0.0
+    bench.scene = lambda scene: replace(scene, pose=replace(scene.pose, confidence=0.49))
+    bench.turn(4)
+    bend = bench.robot.sent[-1][1].bend
+    bench.turn(2)
+    assert bench.mode is Mode.AUTONOMOUS
+    assert (bench.robot.sent[-1][1].advance_mm_s, bench.robot.sent[-1][1].bend) == (0.0, bend)
+    assert bench.shown is ADVICE
+    bench.scene = lambda scene: scene
+    bench.turn(10)
+    assert bench.robot.sent[-1][1].advance_mm_s > 0.0
+    bench.scene = lambda scene: replace(scene, pose=replace(scene.pose, confidence=0.49))
+    bench.seconds(0.3)
+    assert bench.mode is Mode.HOLD
+    assert Cause.CONFIDENCE_LOW in {fault.cause for fault in bench.pilot.view.active}
+
+
 def test_advice_that_is_no_number_is_neither_driven_nor_shown(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     bench.handed_over()
     bend = bench.robot.sent[-1][1].bend
