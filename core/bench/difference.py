@@ -466,11 +466,27 @@ def disagreement(network: Probability, difference: Difference, robot: Mask) -> M
     signs = (network > np.float32(_WEAK_SIGN)) | (cv2.blur(difference.evidence, (5, 5)) > np.float32(_WEAK_EVIDENCE))
     unsure |= is_beyond & signs
     unsure &= cv2.dilate(robot.view(np.uint8), _square(2 * round(width) + 1)) > 0
+    return np.asarray(unsure & ~_overlooked(network, robot, width))
+
+
+def without_rim(network: Probability, difference: Difference, robot: Mask) -> Mask:
+    """The `robot` (h, w) without the rim in which neither the `network` (h, w) nor the difference shows it clearly."""
+    if not robot.any():
+        return robot
+    unseen = network + difference.evidence < np.float32(_UNSEEN)
+    return robot & ~(unseen & ~_overlooked(network, robot, _width_px(robot)))
+
+
+def _overlooked(network: Probability, robot: Mask, width: float) -> Mask:
+    """What the network overlooks of the robot in half of its `width` and more."""
     overlooked = robot & (network < np.float32(0.5))
     wide = cv2.morphologyEx(overlooked.view(np.uint8), cv2.MORPH_OPEN, _disc(max(3, 2 * round(width / 4.0) + 1)))
-    return np.asarray(unsure & ~(overlooked & (cv2.dilate(wide, _disc(3)) > 0)))
+    return overlooked & (cv2.dilate(wide, _disc(3)) > 0)
 
 
+_UNSEEN = 0.6
+"""Sum of the network's probability and the difference's evidence below which a rim is no robot: the union of both is too wide.
+To 0.8 the masks of robots that the network sees half become too thin."""
 _CONTRADICT = 0.5
 """Difference of the network's probability and the difference's evidence above which they contradict each other."""
 _BEYOND, _WEAK_SIGN, _WEAK_EVIDENCE = 0.22, 0.05, 0.2

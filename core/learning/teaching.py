@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from core.bench.bench import Bench, read_bench, write_bench
-from core.bench.difference import combined, disagreement, distance_to_empty, robot_by_difference
+from core.bench.difference import combined, disagreement, distance_to_empty, robot_by_difference, without_rim
 from core.bench.registration import register
 from core.config.section import first_problem
 from core.devices import UserError
@@ -254,7 +254,8 @@ def propose(picture: TeachingPicture, bench: Bench, segment: Segment | None = No
         network = segment(picture.image)[1]
         both = combined(network, difference, view) >= np.float32(0.5)
         core = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
-        robot = cv2.morphologyEx((both & (view.known & ~difference.unusable)).view(np.uint8), cv2.MORPH_OPEN, core) > 0
+        both = without_rim(network, difference, both & view.known & ~difference.unusable)
+        robot = cv2.morphologyEx(both.view(np.uint8), cv2.MORPH_OPEN, core) > 0
         doubtful = doubtful | disagreement(network, difference, robot)
     specks = _specks(robot)
     robot, doubtful = robot & ~specks, doubtful | _widened(specks, 2)

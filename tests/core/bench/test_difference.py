@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core.bench.bench import Bench, BenchError, bench_from_pictures
-from core.bench.difference import Difference, check_without_robot, combined, disagreement, robot_by_difference
+from core.bench.difference import Difference, check_without_robot, combined, disagreement, robot_by_difference, without_rim
 from core.bench.registration import BenchView, register
 from core.types import Image, Mask
 from tests.core.bench.drawn_bench import SIZE, board, noisy, tube, with_line
@@ -209,6 +209,15 @@ def test_a_shadow_beside_the_robot_is_unsure_and_the_robot_is_not(bench: Bench) 
     unsure = disagreement(seen_by_network(robot), difference, mask)
     assert (mask & ~robot & ~unsure).sum() < 0.01 * robot.sum()
     assert (mask & robot & ~unsure).sum() > 0.9 * robot.sum(), "there is a robot to learn from"
+
+
+def test_a_rim_that_neither_sees_is_no_robot_and_a_body_that_the_network_overlooks_is(bench: Bench) -> None:
+    difference = found(noisy(with_line(board(), *ROBOT), 2.0, 3), bench)
+    wide = cv2.dilate((difference.probability >= 0.5).astype(np.uint8), np.ones((5, 5))) > 0
+    for network in (seen_by_network(line(*ROBOT)), np.zeros(wide.shape, np.float32)):
+        trimmed = without_rim(network, difference, wide)
+        assert (trimmed & line(*ROBOT)).sum() > 0.98 * line(*ROBOT).sum()
+    assert dice(without_rim(seen_by_network(line(*ROBOT)), difference, wide), line(*ROBOT)) > 0.93 > dice(wide, line(*ROBOT))
 
 
 def test_what_the_network_overlooks_in_the_whole_width_is_sure(bench: Bench) -> None:
