@@ -165,7 +165,8 @@ def _at_size(mask: Mask, size: tuple[int, int]) -> Mask:
     return np.asarray(cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA) > 127)
 
 
-def _is_wrong(score: FrameScore) -> bool:
+def is_wrong(score: FrameScore) -> bool:
+    """Whether an answer is beyond ``WRONG_DEG`` or ``WRONG_PX``."""
     return score.theta_error_deg is not None and (abs(score.theta_error_deg) > WRONG_DEG or (score.head_error_px or 0) > WRONG_PX)
 
 
@@ -209,9 +210,9 @@ def summarise(scores: Sequence[FrameScore], confident_from: float = _CONFIDENT_F
         "state_kappa": kappa([str(a) for a, _ in pairs], [str(b) for _, b in pairs]),
         "state_toss_up_share": 1.0 - len(clear) / len(told) if told else None,
         "state_agreement_but_toss_ups": sum(s.state == s.true_state for s in clear) / len(clear) if clear else None,
-        "answered_and_wrong_share": sum(map(_is_wrong, expected)) / len(pairs) if pairs else None,
+        "answered_and_wrong_share": sum(map(is_wrong, expected)) / len(pairs) if pairs else None,
         "confident_share": len(confident) / len(expected) if expected else None,
-        "confident_and_wrong_share": sum(map(_is_wrong, confident)) / len(confident) if confident else None,
+        "confident_and_wrong_share": sum(map(is_wrong, confident)) / len(confident) if confident else None,
         "empty_frames": len(empty),
         "answers_on_empty_frames": sum(s.answered for s in empty),
         # The robot is seen, but its head is outside the picture or has no vessel beside it: what is answered there is wrong.

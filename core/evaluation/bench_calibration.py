@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from core.bench.registration import MAX_ROTATION_DEG, MAX_SHIFT_PX
 from core.config.models import PerceptionConfig
-from core.evaluation.accuracy import FrameScore, TrueMasks, score_frame
+from core.evaluation.accuracy import FrameScore, TrueMasks, is_wrong, score_frame
 from core.evaluation.confidence import (
     KnownPicture,
     auroc,
@@ -322,7 +322,7 @@ class BenchCalibration:
     def _result(self, answers: _Answers, calibration: ConfidenceCalibration | None, refused: float | None) -> TeachingResult:
         expected = [score for score in answers.plain if score.expected]
         answered = [score for score in expected if score.answered]
-        everything = [score for score in (*answers.plain, *answers.usual, *answers.bad) if score.answered and score.expected]
+        everything = [score for score in (*answers.plain, *answers.usual, *answers.bad) if _is_proof(score)]
         right = np.array([is_right(score) for score in everything], np.bool_)
         promised = np.array([_confidence(score, calibration) for score in everything])
         plain = [_confidence(score, calibration) for score in answered]
@@ -359,13 +359,18 @@ def _confidence(score: FrameScore, calibration: ConfidenceCalibration | None) ->
     return calibration.confidence(ConfidenceFeatures(*score.evidence))
 
 
+def _is_proof(score: FrameScore) -> bool:
+    """Whether an answer is right or wrong: one in between tells nothing, since masks by difference have errors of their own."""
+    return score.answered and score.expected and (is_right(score) or is_wrong(score))
+
+
 def _examples(answers: _Answers, features: int) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64]]:
     """Evidence (N, features), whether right, and weight of all answers: a bad look counts less, it is rare at a bench."""
     rows = [
         (score.evidence, is_right(score), weight)
         for scores, weight in ((answers.plain, 1.0), (answers.usual, 1.0), (answers.bad, 0.5))
         for score in scores
-        if score.answered and score.expected and score.evidence is not None
+        if _is_proof(score) and score.evidence is not None
     ]
     evidence, right, weight = zip(*rows, strict=True) if rows else ((), (), ())
     return np.array(evidence, np.float64).reshape(-1, features), np.array(right, np.bool_), np.array(weight, np.float64)

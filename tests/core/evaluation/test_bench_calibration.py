@@ -1,5 +1,6 @@
 """Calibration on the few frames of one bench: the fit to a prior, the looks, and the limit of the kind of pictures."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,9 @@ def test_the_evidence_of_answers_is_what_the_prior_is_computed_from() -> None:
     assert right.all()
     assert weight.tolist() == [1.0, 1.0, 0.5]
     assert fit_to_prior(evidence, right, weight, PRIOR).offset > PRIOR.offset
+    between, wrong = (replace(score, theta_error_deg=error) for error in (7.0, 12.0))
+    _, right, _ = calibrating._examples(calibrating._Answers((score, between, wrong), (), ()), COUNT)
+    assert right.tolist() == [True, False], "7 degrees off a mask by difference may be the mask's error"
 
 
 def test_answers_move_the_offset_first_and_the_weights_when_there_are_many() -> None:
