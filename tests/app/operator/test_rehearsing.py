@@ -141,6 +141,11 @@ def test_slower_speeds_are_named_while_they_are_tried(make: MakeController, give
     controller._window.set_target(TARGET)
     controller.toggle()
     until(qtbot, lambda: card.text == "At 70 % of the set speeds: 3 of 50")
+    controller.forget()
+    card = card_of(controller := make(said({"done": 1, "total": 3}, then=f"exec {WAITS}")))  # pictures of the way, before the runs
+    controller._window.set_target(TARGET)
+    controller.toggle()
+    until(qtbot, lambda: card.text == "Rehearsing: 1 of 3")
 
 
 def test_what_prevents_it_is_one_line(make: MakeController, given: Path, qtbot: QtBot) -> None:
