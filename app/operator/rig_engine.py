@@ -90,7 +90,7 @@ class EngineMaker:
     The network is loaded once and kept. What the operator has not acknowledged when a rig is closed is kept, too, or F5 would clear
     a latched STOP.
 
-    `ahead` is what ``start_ahead`` gave for the first rig.
+    `ahead` is what ``start_ahead`` gave for the first rig; the caller's to end where none is opened.
     """
 
     def __init__(self, ahead: PrestartedProcesses | None = None) -> None:
@@ -138,12 +138,6 @@ class EngineMaker:
         self._pilot = engine.pilot
         return engine
 
-    def close(self) -> None:
-        """End what was started ahead, where no rig was opened with it."""
-        ahead, self._ahead = self._ahead, None
-        if ahead is not None:
-            ahead.end()
-
     def _open(self, config: Config, ahead: PrestartedProcesses | None) -> Rig:
         return open_rig(config, ahead)
 
@@ -154,11 +148,11 @@ class EngineMaker:
                     self._perceive = self._perceive.with_config(config)
                     self._loaded = config
                 elif self._perceive is None or self._loaded != config:
-                    self._perceive = open_pipeline(config)
+                    pipeline = open_pipeline(config)
                     # At low priority only what leaves the interpreter free: for the rest the window would have to wait.
                     with ThreadPoolExecutor(1, "warm-up", lower_priority) as behind:
-                        behind.submit(self._perceive.warm_up).result()
-                    self._loaded = config
+                        behind.submit(pipeline.warm_up).result()
+                    self._perceive, self._loaded = pipeline, config
         except (ModelError, BenchError) as error:
             # Not kept: once the model or the bench is restored, starting the rig again is enough.
             return NoPerception(str(error)), ModelReport(False, str(error))

@@ -7,12 +7,13 @@ import json
 import logging
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.commands.options import with_outputs
 from app.ui.display import check_display
-from core.config.files import settings_of_windows
+from core.config.files import SettingsFile, settings_of_windows
 from core.config.models import Config
 from core.devices import UserError
 from core.perception import compiled
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from app.operator.rig_engine import EngineMaker
     from app.operator.window import OperatorWindow
     from core.session.live_output import LiveOutput, OutputKind
+    from hardware.twin.process import PrestartedProcesses
 
 
 def finish_loading() -> None:
@@ -66,9 +68,33 @@ def run_window(
     if bench is not None and kind is not RigKind.SIM:
         raise UserError("--bench is for the twin: leave --rig and --source out")
     outputs = _open_outputs(config, is_asked=stream is not None or lsl)
-    gc.disable()  # collections would be a fifth of the time that loading takes from here on
-    ahead = start_ahead(config)  # before all that is slow to load here; it is told the configuration later
+    with ExitStack() as at_end:
+        gc.disable()  # collections would be a fifth of the time that loading takes from here on
+        at_end.callback(gc.enable)
+        ahead = start_ahead(config)  # before all that is slow to load here; it is told the configuration later
+        if ahead is not None:
+            at_end.callback(ahead.end)  # what a rig has claimed goes on
 
+        from app.operator.twin_menu import with_kept_twin
+        from hardware.twin.own_phantom import with_own_phantom
+
+        if is_own and kind is RigKind.SIM and "twin" not in file.data:
+            config = with_kept_twin(config)
+        if bench is not None:
+            config = with_own_phantom(config, bench)
+        return _show_window(config, kind, file, outputs, ahead, until_first_frame=until_first_frame, tour=tour)
+
+
+def _show_window(
+    config: Config,
+    kind: RigKind,
+    file: SettingsFile,
+    outputs: dict[OutputKind, LiveOutput],
+    ahead: PrestartedProcesses | None,
+    *,
+    until_first_frame: bool,
+    tour: bool,
+) -> int:
     from app.operator.live_menu import LiveMenuController
     from app.operator.manual_drive import OperatorDevices
     from app.operator.rehearsing import RehearsalController
@@ -76,23 +102,16 @@ def run_window(
     from app.operator.rig_menu import RigMenuController
     from app.operator.services import WindowServices, tour_at_start
     from app.operator.triggers import TriggerServer
-    from app.operator.twin_menu import with_kept_twin
     from app.settings.apply import SettingsController
     from app.ui.actions import MenuEntry, add_menu
     from app.ui.crash_report import CrashWatch, state_folder
     from app.ui.i18n import tr
     from app.ui.window_base import make_application, run_until_closed
-    from hardware.twin.own_phantom import with_own_phantom
 
-    if is_own and kind is RigKind.SIM and "twin" not in file.data:
-        config = with_kept_twin(config)
-    if bench is not None:
-        config = with_own_phantom(config, bench)
     maker = EngineMaker(ahead)
     maker.begin_twin(config)
     maker.begin_network(config)
     finish_loading()
-    gc.enable()
     application = make_application(config.window)
     window = make_window(config, kind, maker)
     watch = CrashWatch(state_folder() / "crashes", lambda: window.rig.config.model_dump(mode="json"))
@@ -120,10 +139,7 @@ def run_window(
             triggers.listen()
             tour_at_start(window, asked=tour)
 
-    try:
-        code = run_until_closed(application, window, window.say, begin)
-    finally:
-        maker.close()
+    code = run_until_closed(application, window, window.say, begin)
     watch.remove()
     return code
 

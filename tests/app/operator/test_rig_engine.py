@@ -209,7 +209,7 @@ def test_a_rig_that_cannot_be_opened_acknowledges_nothing(open_engine: Open, mon
     engine.close()
 
 
-def test_what_was_started_ahead_is_the_first_rigs_and_is_ended_where_none_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_started_ahead_is_the_first_rigs(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[object] = []
 
     def open_rig(config: Config, ahead: object) -> Rig:
@@ -217,14 +217,28 @@ def test_what_was_started_ahead_is_the_first_rigs_and_is_ended_where_none_is_ope
         return Rig("twin", RigKind.SIM, _Camera([]), Robot())
 
     monkeypatch.setattr(rig_engine, "open_rig", open_rig)
-    ahead = cast(PrestartedProcesses, SimpleNamespace(end=lambda: given.append("ended")))
+    ahead = cast(PrestartedProcesses, SimpleNamespace())
     maker = _Maker(ahead)
     for _ in range(2):
         maker(Config()).close()
-    maker.close()
     assert given == [ahead, None]
-    _Maker(ahead).close()
-    assert given[2:] == ["ended"]
+
+
+def test_a_network_that_cannot_be_warmed_up_does_not_take_the_place_of_the_one_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    good, broken = PerceptionConfig(), PerceptionConfig.model_validate({"segmentation": {"model": "b"}})
+
+    def warm_up(pipeline: Pipeline) -> None:
+        if pipeline._config == broken:
+            raise ModelError("wrong outputs")
+
+    monkeypatch.setattr(Pipeline, "warm_up", warm_up)
+    monkeypatch.setattr(rig_engine, "open_pipeline", lambda config: Pipeline(DrawnNetwork(), config))
+    maker = EngineMaker()
+    first, _ = maker._perception(good)
+    assert maker._perception(broken)[1] == ModelReport(False, "wrong outputs")
+    again, report = maker._perception(good)
+    assert isinstance(first, Pipeline) and isinstance(again, Pipeline)
+    assert again._stream is first._stream and report == ModelReport(True)
 
 
 def test_twin_and_network_begin_before_the_rig_is_opened_which_reports_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -241,7 +255,7 @@ def test_twin_and_network_begin_before_the_rig_is_opened_which_reports_what_is_w
 
     monkeypatch.setattr(rig_engine, "open_pipeline", open_pipeline)
     monkeypatch.setattr(rig_engine, "open_rig", lambda *_: Rig("twin", RigKind.SIM, _Camera([]), Robot()))
-    maker = EngineMaker(cast(PrestartedProcesses, SimpleNamespace(begin=begin, end=lambda: None)))
+    maker = EngineMaker(cast(PrestartedProcesses, SimpleNamespace(begin=begin)))
     maker.begin_twin(Config())
     maker.begin_network(Config())
     engine = maker(Config())

@@ -1,16 +1,19 @@
-"""Whom the STOP after an unforeseen error reaches, and that the box says no more than what was reached."""
+"""An error before the window is shown; whom the STOP after an unforeseen one reaches, and what its box says."""
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
 
+from app.operator import startup
 from app.operator.engine_thread import EnginePhase
 from app.operator.rig_menu import RigMenuController
 from app.operator.services import WindowServices
@@ -20,7 +23,7 @@ from core.config.models import Config
 from core.control.drive_view import DriveView
 from core.control.gate import Source
 from core.control.modes import Act, Mode
-from core.devices import DeviceError
+from core.devices import DeviceError, UserError
 from hardware.calibration.bench import CalibrationBench
 from tests.app.conftest import MakeWindow
 from tests.app.fakes import FakeBench, FakeEngine, make_scene, until
@@ -54,6 +57,16 @@ def box_of(window: OperatorWindow, qtbot: QtBot) -> str:
     until(qtbot, lambda: bool(window.findChildren(QMessageBox)))
     (box,) = window.findChildren(QMessageBox)
     return box.informativeText()
+
+
+def test_an_error_before_the_window_ends_what_was_started_ahead(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    ended: list[str] = []
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    monkeypatch.setattr(startup, "check_display", lambda: None)
+    monkeypatch.setattr(startup, "start_ahead", lambda _config: SimpleNamespace(end=lambda: ended.append("ahead")))
+    with pytest.raises(UserError):
+        startup.run_window(None, None, None, bench=str(tmp_path / "none"))
+    assert ended == ["ahead"] and gc.isenabled()
 
 
 def test_a_running_rig_is_stopped(
