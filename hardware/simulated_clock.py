@@ -52,20 +52,20 @@ class SimulatedClock:
     ----------
     file : that of another reader; None makes one, until ``close``.
 
-    Raises DeviceError: no file can be made.
+    Raises DeviceError: no file can be made or opened.
     """
 
     def __init__(self, file: str | None = None) -> None:
         self._made = file is None
-        if file is None:
-            try:
+        try:
+            if file is None:
                 descriptor, file = tempfile.mkstemp(prefix="lumenpilot_clock_")
                 os.write(descriptor, bytes(_SIZE))
                 os.close(descriptor)
-            except OSError as error:
-                raise DeviceError(f"the bench twin cannot be started ({error.strerror}): free memory, then try again") from None
-        self.file = file
-        self._time, self._grant = _open(self.file)
+            self.file = file
+            self._time, self._grant = _open(file)
+        except OSError as error:
+            raise DeviceError(f"the bench twin cannot be started ({error.strerror}): free memory, then try again") from None
         self._lock = threading.Lock()
         self._last_s = 0.0
         self._mark: tuple[float, float] | None = None

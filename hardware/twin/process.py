@@ -227,7 +227,8 @@ class PrestartedProcesses:
         """The one that has begun where it is what is asked for, else another one; the caller's to close. Raises DeviceError."""
         begun, self._begun = self._begun, None
         if begun is not None:
-            if begun.order == _order(config, insertion_mm):
+            was_killed = (begun._process.exit_code() or 0) < 0
+            if begun.order == _order(config, insertion_mm) and not was_killed:
                 begun.await_start()
                 return begun
             begun.close()

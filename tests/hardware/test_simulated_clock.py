@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from core.devices import DeviceError
 from hardware import simulated_clock
 from hardware.simulated_clock import STEP_S, SimulatedClock, WorldClock
 
@@ -87,3 +89,8 @@ def test_the_speed_of_the_simulation_is_told(bench: Bench) -> None:
         bench.pass_s(0.1)
         speed = bench.program.speed
     assert speed == pytest.approx(0.4, abs=0.05), "whole steps of 20 ms"
+
+
+def test_a_file_that_cannot_be_made_or_opened_is_a_device_error(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match=r"the bench twin cannot be started \(No such file"):
+        SimulatedClock(str(tmp_path / "gone"))

@@ -119,9 +119,13 @@ def test_what_was_started_ahead_becomes_the_rig(begins: bool) -> None:
 
 
 @pytest.mark.usefixtures("no_process_stays_behind")
-def test_a_twin_that_began_with_another_configuration_is_replaced() -> None:
+@pytest.mark.parametrize(("begun_mm", "is_killed"), [(30.0, False), (40.0, True)])
+def test_a_twin_that_began_with_another_configuration_or_died_is_replaced(begun_mm: float, is_killed: bool) -> None:
     ahead = start_ahead(CONFIG)
-    ahead.begin(CONFIG, 30.0)
+    ahead.begin(CONFIG, begun_mm)
+    if is_killed:
+        os.kill(ahead.twin.pid, signal.SIGKILL)
+        assert ahead.twin.wait(60.0)
     twin = ahead.open_twin(CONFIG, 40.0)
     try:
         assert twin._process.pid != ahead.twin.pid
