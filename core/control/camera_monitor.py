@@ -75,7 +75,7 @@ class CameraMonitor:
     equal_run, refusal_run, broken_run : frames in a row with the same picture, the same refusal, a result that is not finite.
     refusal_since_s : capture of the last frame before this run of refusals.
     unsure : the confidence is below the limit, with hysteresis.
-    sure_s : capture of the newest pose that was sure enough.
+    sure_s : capture of the newest pose that was sure enough, as was the one before.
     counts : (time, frames delivered, frames lost) of the reports in the window of frame loss.
     """
 
@@ -135,8 +135,9 @@ class CameraMonitor:
             return replace(state, well=False)
         needed = safety.min_confidence + (safety.confidence_hysteresis if state.unsure else 0.0)
         unsure = report.confidence < needed
-        sure_s = state.sure_s if unsure else report.captured_s
-        return replace(state, pose_captured_s=report.captured_s, well=True, unsure=unsure, sure_s=sure_s, route=report.route)
+        sure_s = state.sure_s if unsure or state.unsure else report.captured_s
+        route = state.route if unsure else report.route
+        return replace(state, pose_captured_s=report.captured_s, well=True, unsure=unsure, sure_s=sure_s, route=route)
 
     def faults(self, now_s: float, safety: SafetyConfig) -> list[Fault]:
         """The active faults of camera and perception."""
@@ -181,8 +182,8 @@ class CameraMonitor:
         refusal = newest.refusal
         if refusal is None:
             if self.unsure and now_s - self.sure_s > safety.pose_hold_s:
-                least = f"at least {100 * safety.min_confidence:.0f} %"
-                faults.append(Fault(Cause.CONFIDENCE_LOW, f"{100 * newest.confidence:.0f} % ({least})"))
+                least = 100 * (safety.min_confidence + safety.confidence_hysteresis)
+                faults.append(Fault(Cause.CONFIDENCE_LOW, f"{100 * newest.confidence:.0f} % (at least {least:.0f} % to go on)"))
             return faults
         if (cause := AT_ONCE.get(refusal)) is not None:
             return [*faults, Fault(cause)]

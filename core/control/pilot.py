@@ -44,11 +44,10 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LatestAdvice:
-    """The newest perceived frame: capture, advice, whether its pose is sure enough to be followed, and the target reached."""
+    """The newest perceived frame: its capture, the advice for it, whether the target is reached."""
 
     captured_s: float
     advice: Advice | None
-    is_sure: bool
     arrived: bool
 
 
@@ -345,14 +344,15 @@ class Pilot:
         if must_reset:
             self._policy.reset()
         sound = is_sound(scene)
-        advice = self._policy(scene, status, followed=followed) if sound else None
+        is_sure = scene.pose is None or scene.pose.confidence >= self._config.safety.min_confidence
+        # a policy that saw an unsure pose would remember it when it steers by the next one
+        advice = self._policy(scene, status, followed=followed) if sound and is_sure else None
         report = self._reports.report(frame, scene, advice, has_target=has_target, sound=sound)
         advice = advice if is_finite(advice) else None
         if turns_back and report.route is RouteState.BEHIND:
             report = replace(report, route=RouteState.READY)  # a policy backs out of a branch that it missed by itself
-        arrived = sound and scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
-        is_sure = scene.pose is not None and scene.pose.confidence >= self._config.safety.min_confidence
-        self._inputs.set_advice(LatestAdvice(frame.captured_s, advice, is_sure, arrived), report, Beat(Part.PERCEPTION))
+        arrived = sound and is_sure and scene.route is not None and scene.route.length_px <= self._config.policy.pursuit.arrive_px
+        self._inputs.set_advice(LatestAdvice(frame.captured_s, advice, arrived), report, Beat(Part.PERCEPTION))
         self._perceived_s = frame.captured_s
         return advice if not blanked or blanked in _ENDED_BY_A_FRAME else None
 
@@ -513,7 +513,7 @@ class Pilot:
                 robot.send(self._operator_command, source=Source.OPERATOR, retracts=retracts)
             elif permitted is Source.PROGRAM and latest is not None:
                 known = self._state.health.direction
-                followed = latest.advice if latest.is_sure else None  # at rest until the next sure one, or the hold
+                followed = latest.advice if decision.blanked is None else None  # unsure: at rest until it is sure, or the hold
                 program_command = self._following.command(followed, now_s, turns=known.turns, feeds=known.feeds)
                 robot.send(program_command, source=Source.PROGRAM, captured_s=latest.captured_s)
             else:

@@ -151,7 +151,7 @@ def _note_unwell(state: SupervisorState, now_s: float) -> SupervisorState:
     areas = {fault.cause.area for fault in state.active if fault.holds}
     if Area.CAMERA in areas:
         state = replace(state, camera_unwell_s=now_s)
-    if Area.PERCEPTION in areas or not state.health.frames.well:
+    if Area.PERCEPTION in areas or state.health.frames.unsure or not state.health.frames.well:
         state = replace(state, perception_unwell_s=now_s)
     return state
 
@@ -260,7 +260,7 @@ def _decide(
     return Decision(
         mode=state.mode,
         permitted=_permitted(state),
-        blanked=first_fault(blank),
+        blanked=first_fault(blank) or (Fault(Cause.CONFIDENCE_LOW) if state.health.frames.unsure else None),
         hold_expired=_hold_expired(state, now_s, safety),
         latched=state.latched,
         active=state.active,

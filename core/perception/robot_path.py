@@ -315,9 +315,9 @@ TRIM_RADII = 1.2
 """Thinning bends the skeleton's last radius towards a corner of a blunt end."""
 END_HEADING_PX = 16.0
 """The end's direction and bend are taken over this length."""
-MOST_CUT_PX, SURE_BEYOND = 5, 0.6
-"""Width of what cuts a piece off the robot's end without hiding it (the rim of a clip, a scratch, the shadow of a wall), and the
-probability there that it is robot: a less likely one is as often a bubble or a reflection."""
+MOST_CUT_PX, MOST_BEYOND_PX, SURE_BEYOND = 5, 12, 0.6
+"""Width of what cuts a piece off the robot's end without hiding it (the rim of a clip, a scratch, the shadow of a wall); length of
+the piece: a longer one is in the mask; and its probability: a less likely one is as often a bubble or a reflection."""
 
 
 def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, extend: bool) -> tuple[Points, float]:
@@ -376,13 +376,13 @@ def edge_distance(places: Points, mask: Mask, probability: NDArray[np.float32]) 
     if inside in (0, len(places)):  # it never was in the mask, or never leaves it
         return 0.0
     level = geometry.sample(probability, places).tolist()
-    last = inside - 1
-    while seen := [k for k in range(last + 1, min(last + 2 + MOST_CUT_PX, shown)) if level[k] >= SURE_BEYOND]:
+    last, most = inside - 1, min(inside + MOST_CUT_PX + MOST_BEYOND_PX, shown)
+    while seen := [k for k in range(last + 1, min(last + 2 + MOST_CUT_PX, most)) if level[k] >= SURE_BEYOND and not within[k]]:
         last = seen[0]
-    if last == shown - 1:
+    if last == most - 1:  # no small piece
         last = inside - 1
     first = max(last - 1, 0)
-    for k, (here, there) in enumerate(pairwise(level[first : max(shown, inside + 2)]), first):
+    for k, (here, there) in enumerate(pairwise(level[first : min(last + 3 + MOST_CUT_PX, max(shown, inside + 2))]), first):
         if here >= 0.5 > there:
             return float(k + (here - 0.5) / (here - there))
     return float(last)

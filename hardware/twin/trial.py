@@ -210,8 +210,9 @@ class Trial:
         frame = self._read()
         scene = self._perceive(frame)
         status = self._world.physics.status()
-        advice = self._policy(scene, replace(status, wall_contact_n=None))  # no real rig measures it
-        if scene.pose is not None and (scene.route is None or scene.pose.confidence < self._plan.config.safety.min_confidence):
+        is_sure = scene.pose is None or scene.pose.confidence >= self._plan.config.safety.min_confidence
+        advice = self._policy(scene, replace(status, wall_contact_n=None)) if is_sure else None  # no real rig measures it
+        if scene.pose is not None and scene.route is None:
             advice = None  # autonomy has to hold
         self._watch_direction(scene)
         self._delayed.append(self._command(advice, frame.captured_s))

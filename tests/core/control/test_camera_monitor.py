@@ -145,6 +145,9 @@ def test_only_poses_that_stay_unsure_hold_the_program() -> None:
     assert _causes(_watch(*_good(1), *doubt[:4])) == set()
     assert _causes(_watch(*_good(1), *doubt)) == {Cause.CONFIDENCE_LOW}
     assert _causes(_watch(*_good(1), *doubt, *_good(1, first=21))) == set()
+    mixed = [one for n in range(8) for one in (doubt[2 * n], *_good(1, first=2 * n + 2))]
+    assert _causes(_watch(*_good(1), *mixed, *_good(1, first=17, confidence=0.4))) == {Cause.CONFIDENCE_LOW}  # one sure is none
+    assert _watch(*_good(1), replace(doubt[0], route=RouteState.NONE)).route is RouteState.READY
 
 
 def test_a_refusal_keeps_the_route_and_the_age_of_the_last_pose() -> None:
@@ -200,7 +203,7 @@ def test_the_details_are_measured_values() -> None:
         Fault(Cause.POSE_STALE, "200 ms old"),
         Fault(Cause.CAMERA_MOVED, "by 9 px (at most 6 px)"),
         Fault(Cause.FRAMES_LOST, "50 %"),
-        Fault(Cause.CONFIDENCE_LOW, "30 % (at least 50 %)"),
+        Fault(Cause.CONFIDENCE_LOW, "30 % (at least 55 % to go on)"),
     ]
     assert [fault.detail for fault in watch.faults(0.6, SAFETY)][:2] == ["newest frame 600 ms old", "600 ms old"]
     dropped = _watch(*_good(1, delivered=26, lost=4)).faults(0.0, SAFETY)

@@ -390,9 +390,10 @@ def test_an_unsure_pose_is_not_followed_and_the_next_sure_one_goes_on(bench: Ben
     bench.turn(2)
     assert bench.mode is Mode.AUTONOMOUS
     assert (bench.robot.sent[-1][1].advance_mm_s, bench.robot.sent[-1][1].bend) == (0.0, bend)
-    assert bench.shown is ADVICE
+    assert (bench.shown, bench.pilot.view.advice, bench.pilot.view.blanked) == (None, None, Cause.CONFIDENCE_LOW.value)
     bench.scene = lambda scene: scene
     bench.turn(10)
+    assert bench.shown is ADVICE
     assert bench.robot.sent[-1][1].advance_mm_s > 0.0
     bench.scene = lambda scene: replace(scene, pose=replace(scene.pose, confidence=0.49))
     bench.seconds(0.3)

@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 
@@ -374,9 +374,10 @@ def test_arming_needs_a_whole_second_of_healthy_camera_and_perception() -> None:
     assert _refused(early.tick(Act.ARM), Act.ARM) == {Hindrance.CAMERA_SETTLING, Hindrance.PERCEPTION_SETTLING}
 
 
-def test_one_refused_frame_starts_the_second_again_for_perception_only(benches: dict[Mode, Bench]) -> None:
+@pytest.mark.parametrize("bad", [{"refusal": Reason.NO_ROBOT}, {"confidence": 0.49}])
+def test_one_bad_frame_starts_the_second_again_for_perception_only(bad: dict[str, Any], benches: dict[Mode, Bench]) -> None:
     bench = benches[V].copy()
-    bench.bad_frame(refusal=Reason.NO_ROBOT)
+    bench.bad_frame(**bad)
     bench.tick()
     bench.bad_frame()
     bench.run(0.96875)

@@ -105,6 +105,29 @@ def test_a_tip_that_a_narrow_cut_parts_from_the_robot_is_its_tip(cut_px: int, en
     assert path_of(robot).head[0] == pytest.approx(ends_at, abs=1.0)
 
 
+@pytest.mark.parametrize(
+    ("pieces", "length_px"),
+    [
+        ([], 9.5),
+        ([(13, 22, 0.9)], 21.5),
+        ([(13, 22, 0.55)], 9.5),  # not sure enough
+        ([(17, 22, 0.9)], 9.5),  # too far
+        ([(14, 29, 0.65)], 9.5),  # too long to be missing in the mask
+        ([(14, 16, 0.7), (20, 22, 0.7), (26, 28, 0.7)], 9.5),
+        ([(8, 10, 0.4), (30, 34, 0.9)], 9.0),  # the mask is larger than what is likely
+    ],
+)
+def test_only_a_small_near_sure_piece_beyond_the_mask_belongs_to_the_end(
+    pieces: list[tuple[int, int, float]], length_px: float
+) -> None:
+    probability, mask = np.full((20, 60), 0.02, np.float32), np.zeros((20, 60), bool)
+    probability[8:12, :10], mask[8:12, :10] = 0.95, True
+    for first, end, value in pieces:
+        probability[8:12, first:end] = value
+    places = np.array([[x, 9.5] for x in range(40)], float)
+    assert robot_path.edge_distance(places, mask, probability) == pytest.approx(length_px, abs=0.1)
+
+
 def test_a_gap_too_long_to_bridge_is_no_reason_to_put_the_head_there() -> None:
     robot = without(probability(depth(S_CURVE, 4.0)), (270, 261, 35))
     assert reason_of(robot) is Reason.GAP_TOO_LONG
