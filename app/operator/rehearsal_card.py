@@ -72,10 +72,15 @@ class RehearsalCard(QFrame):
         """The target can be rehearsed."""
         self._show(tr("Rehearse  ({key})", key=KEY), "", None)
 
-    def show_running(self, done: int, total: int, result: RehearsalResult | None, speed: float = 1.0) -> None:
-        """How many runs have ended at this share of the set speeds, and what those at the set ones say."""
+    def show_running(self, done: int, total: int, result: RehearsalResult | None, speed: float | None) -> None:
+        """How many runs have ended at this share of the set speeds, and what those at the set ones say.
+
+        No `speed`: before the runs, how far the pictures of the way are perceived.
+        """
         title = tr("Rehearsing: {done} of {total}", done=done, total=total)
-        if speed < 1.0:
+        if speed is None:
+            title = tr("Looking at the way: {share:.0f} %", share=100 * done / max(1, total))
+        elif speed < 1.0:
             title = tr("At {share:.0f} % of the set speeds: {done} of {total}", share=100 * speed, done=done, total=total)
         self._show(tr("Cancel"), title, result, done / max(1, total))
 

@@ -48,7 +48,9 @@ class RehearsalController(QObject):
         self._child: ChildProcess | None = None
         self._bench: tuple[tuple[str, ...], int] | None = None
         """Options that name the phantom, and when it was made; None: no phantom."""
-        self._done, self._total, self._speed = 0, RUNS, 1.0
+        self._done, self._total = 0, RUNS
+        self._speed: float | None = None
+        """A share; None: the way is still perceived in pictures."""
         self._so_far: RehearsalResult | None = None
         self.result: RehearsalResult | None = None
         """Of the present target; None: it was not rehearsed."""
@@ -131,8 +133,8 @@ class RehearsalController(QObject):
         child = ChildProcess(self._command("rehearse", *options), self, given=given)
         child.told.connect(self._on_told)
         child.ended.connect(self._on_ended)
-        self._child, self._done, self._speed, self._so_far, self.result = child, 0, 1.0, None, None
-        self._card.show_running(0, RUNS, None)
+        self._child, self._done, self._speed, self._so_far, self.result = child, 0, None, None, None
+        self._card.show_running(0, RUNS, None, None)
         child.start()
 
     def _on_told(self, record: dict[str, Any]) -> None:

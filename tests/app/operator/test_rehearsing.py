@@ -45,7 +45,7 @@ FOUND: dict[str, Any] = {
     "sharp": [{"xy": [200.0, 180.0], "turn_deg": 74.0, "limit_deg": 61.0}],
     "speed_mm_s": 8.0,
     "recommended_speed_mm_s": 5.6,
-    "assumed": {"head_px": 1.5, "missing": 0.05, "robot": "twin"},
+    "assumed": {"pictures": 240, "missing": 0.05, "robot": "twin"},
 }
 WAITS = "sleep 60"
 TARGET: Point = (300.0, 200.0)
@@ -127,7 +127,7 @@ def test_it_is_cancelled_at_once(make: MakeController, given: Path, qtbot: QtBot
     window.set_target(TARGET)
     controller.toggle()
     until(qtbot, lambda: window.panels.live._marks.rehearsal is not None)
-    assert "Rehearsing: 0 of 50" in card.text
+    assert "Looking at the way: 0 %" in card.text
     child = controller._child
     assert child is not None and child.pid is not None and os.getpriority(os.PRIO_PROCESS, child.pid) > 10
     card.button.click()
@@ -145,7 +145,9 @@ def test_slower_speeds_are_named_while_they_are_tried(make: MakeController, give
     card = card_of(controller := make(said({"done": 1, "total": 3}, then=f"exec {WAITS}")))  # pictures of the way, before the runs
     controller._window.set_target(TARGET)
     controller.toggle()
-    until(qtbot, lambda: card.text == "Rehearsing: 1 of 3")
+    until(qtbot, lambda: card.text == "Looking at the way: 33 %")
+    controller._on_told({"speed": 1.0})
+    assert card.text == "Rehearsing: 0 of 50"
 
 
 def test_what_prevents_it_is_one_line(make: MakeController, given: Path, qtbot: QtBot) -> None:
