@@ -184,10 +184,16 @@ _NOTHING_SEEN = frozenset({Reason.BLACK, Reason.WHITE, Reason.UNREADABLE})
 
 
 class FrameReports:
-    """Makes reports; it keeps the frame before for comparison. `view`: a picture of the rig's calibration."""
+    """Makes reports; it keeps the frame before for comparison.
 
-    def __init__(self, config: PursuitConfig, view: Image | None = None) -> None:
-        self._config = config
+    Parameters
+    ----------
+    view : a picture of the rig's calibration.
+    min_confidence : a pose with less says nothing of where the target lies.
+    """
+
+    def __init__(self, config: PursuitConfig, view: Image | None = None, min_confidence: float = 0.0) -> None:
+        self._config, self._min_confidence = config, min_confidence
         self._before: Frame | None = None
         self._shape: tuple[int, ...] | None = None
         self._landmarks = Landmarks(view)
@@ -219,8 +225,10 @@ class FrameReports:
     def _route(self, scene: Scene, has_target: bool) -> RouteState:
         if not has_target or scene.route is None or scene.pose is None:
             return RouteState.NONE
-        way = look_ahead(scene, self._config.look_ahead_px, self._config)
-        behind = way is not None and way.behind
+        behind = None
+        if scene.pose.confidence >= self._min_confidence:
+            way = look_ahead(scene, self._config.look_ahead_px, self._config)
+            behind = way is not None and way.behind
         return RouteState.BEHIND if self._direction.is_behind(behind, scene.route.target, scene.captured_s) else RouteState.READY
 
 
@@ -235,9 +243,14 @@ class _Direction:
         self._dwell_s = dwell_s
         self._target: Point | None = None
         self._behind = False
-        self._agreed_s = -math.inf
+        self._agreed_s, self._before_s = -math.inf, 0.0
 
-    def is_behind(self, seen: bool, target: Point, captured_s: float) -> bool:
+    def is_behind(self, seen: bool | None, target: Point, captured_s: float) -> bool:
+        """`seen` None: not known, for a time that does not count."""
+        elapsed_s, self._before_s = captured_s - self._before_s, captured_s
+        if seen is None:
+            self._agreed_s += elapsed_s
+            return self._behind and target == self._target
         backwards = captured_s < self._agreed_s  # the camera's clock was reset
         if target != self._target or seen == self._behind or backwards or captured_s - self._agreed_s >= self._dwell_s:
             self._target, self._behind, self._agreed_s = target, seen, captured_s

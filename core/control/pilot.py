@@ -161,7 +161,7 @@ class Pilot:
         self._release = TorqueRelease(is_enabled=config.servos.torque_off_on_stop)
         self._simulated = config.rig.camera == "twin"
         self._alerts = AlertReporter(simulated=self._simulated)
-        self._reports = FrameReports(config.policy.pursuit, view)
+        self._reports = FrameReports(config.policy.pursuit, view, config.safety.min_confidence)
         self._state = SupervisorState(against_program=readiness.hindrances)
         if left_over is not None:
             mode = Mode.STOPPED if left_over.stopped else Mode.ADVISORY

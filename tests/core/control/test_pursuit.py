@@ -365,6 +365,20 @@ def test_a_frame_that_is_refused_says_nothing_of_where_the_target_lies() -> None
     assert told == [RouteState.NONE, RouteState.BEHIND, *[RouteState.NONE] * 5, RouteState.BEHIND, RouteState.BEHIND]
 
 
+def test_an_unsure_pose_changes_nothing_of_where_the_target_lies_and_is_no_first_look_at_another_one() -> None:
+    reports = FrameReports(PursuitConfig(behind_s=0.25), min_confidence=0.5)
+    image, ahead, back = np.zeros((480, 640, 3), np.uint8), (380.0, 100.0), (20.0, 100.0)
+    told = []
+    looks = [(ahead, 0, 0.9), *[(ahead, 180, 0.4)] * 5, *[(ahead, 180, 0.9)] * 3, (back, 0, 0.4), (back, 0, 0.9), (ahead, 180, 0.4)]
+    for index, (target, heading_deg, confidence) in enumerate(looks):
+        scene = scene_at(STRAIGHT, (200, 100), target, heading_deg, 0.1 * index)
+        assert scene.pose is not None
+        scene = replace(scene, pose=replace(scene.pose, confidence=confidence))
+        told.append(reports.report(Frame(index, 0.1 * index, image), scene, None, has_target=True).route)
+    assert told[:9] == [RouteState.READY] * 8 + [RouteState.BEHIND], "the time of unsure ones does not count"
+    assert told[9:] == [RouteState.READY, RouteState.BEHIND, RouteState.READY]
+
+
 def fed(feed: FeedMonitor, frames_s: list[float], bus_s: float, speed_mm_s: float = 6.0) -> list[tuple[float, float]]:
     """What is known of a feed of `speed_mm_s` at each frame, of statuses that come every `bus_s`."""
     found, before_s = [], frames_s[0]
