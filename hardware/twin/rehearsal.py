@@ -1,7 +1,7 @@
 """Rehearsal: many runs to one target of a bench's own phantom, with other friction, stiffness, start and play in each.
 
 Before the runs, the robot is perceived in the twin's pictures all along the way. A run then paints nothing, which takes a tenth of
-the time: it perceives the truth with the errors, and without the answers, of pictures that had the head nearby. The geometry alone
+the time: it perceives the truth with the errors, or without an answer, as in the picture whose head was nearest. The geometry alone
 tells which branches on the way turn off more sharply than the head bends.
 """
 
@@ -48,8 +48,8 @@ PLAY_MM, SLACK_MM, START_MM = (0.03, 0.2), (0.0, 0.06), 5.0
 """Spread of the play and of the slack of the wires, and of the insertion at the start to both sides; uniform."""
 WANDERS = (0.0, 0.4, 0.8)
 """How far the robot sways on the ways on which it is perceived in pictures (``RouteFollower``)."""
-_PICTURE_S, _PICTURE_MM_S, _NEAREST = 0.1, 10.0, 8
-"""Time between the pictures, and speed; a run perceives as in one of so many nearest ones, and another one after that time."""
+_PICTURE_S, _PICTURE_MM_S = 0.1, 10.0
+"""Time between the pictures, and speed."""
 _LINE_PX = 40.0
 """Length of the robot's end over which an error of the head fades out."""
 _HEADING_PX = 10.0
@@ -160,12 +160,11 @@ class Rehearsal(Trial):
         trial = replace(plan.trial, config=config)
         super().__init__(trial, seed, trial.config.policy.name, None, drive=drive)
         self._start_mm = max(5.0, self._start_mm + float(rng.uniform(-START_MM, START_MM)))
-        self._eye, self._rng = plan, rng
+        self._eye = plan
         view = self._world.view
         self._scale = trial.config.perception.working_size_px / max(view.size)
         self._graph = true_graph(self._world.phantom, view, self._scale)
         self._masks_shown = _vessel_masks(self._world, self._scale)
-        self._picture: int | None = None
         self._error_px: float | None = None
         self._fed: list[FedMoment] = []
 
@@ -186,7 +185,7 @@ class Rehearsal(Trial):
         path = visible_path(with_caps(world.physics.robot_points_mm(), radius_mm), world.view, self._scale)
         error_mm, confidence, self._error_px = np.zeros(2), 1.0, None
         if seen is not None:
-            picture = self._picture_near(seen, head_mm)
+            picture = int(np.argmin(np.linalg.norm(seen.heads_mm - head_mm, axis=1)))  # so a head that rests sees the same again
             error_mm, confidence = seen.errors_mm[picture], float(seen.confidence[picture])
         if path is None or np.isnan(error_mm[0]):
             return replace(scene, refusal=Refusal(Reason.LOW_CONFIDENCE))
@@ -204,14 +203,6 @@ class Rehearsal(Trial):
             return replace(scene, refusal=Refusal(Reason.NO_VESSEL))
         pose = replace(measure_pose(line, vessel, config.pose), confidence=confidence)
         return replace(scene, robot_vector=line, vessel_vector=vessel, pose=pose)
-
-    def _picture_near(self, seen: SeenHeads, head_mm: Point) -> int:
-        """The number of a picture with the head nearby."""
-        near = np.argsort(np.linalg.norm(seen.heads_mm - head_mm, axis=1))
-        fades = self._rng.random() < 1.0 / (_PICTURE_S * self._world.config.frames_per_second)
-        if self._picture is None or fades or self._picture not in near[: 2 * _NEAREST]:
-            self._picture = int(self._rng.choice(near[:_NEAREST]))
-        return self._picture
 
     def _measure(self, scene: Scene, time_s: float, insertion_mm: float, wall_contact_n: float) -> None:
         """Without the truth of pose and vessel, which takes a third of a run's time."""

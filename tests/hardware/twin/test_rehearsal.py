@@ -88,7 +88,7 @@ def plan(monkeypatch: pytest.MonkeyPatch) -> RehearsalPlan:
 
 
 def test_a_run_is_the_same_for_its_seed_and_has_the_errors_of_pictures(plan: RehearsalPlan) -> None:
-    errors = SeenHeads.joined([seen(HERE, (0.5, 0.0)), seen(HERE, (0.0, -0.5)), seen(HERE, NO_ANSWER)])
+    errors = SeenHeads.joined([seen(HERE[::3], (0.5, 0.0)), seen(HERE[1::3], (0.0, -0.5)), seen(HERE[2::3], NO_ANSWER)])
     rows = [Rehearsal(replace(plan, seen=one), 3).run() for one in (errors, errors, seen(HERE, NO_ANSWER), None)]
     assert rows[0] == rows[1] and rows[0]["outcome"] == "time out"
     assert 0.2 < rows[0]["answered_share"] < 1.0 and rows[0]["head_error_median_px"] == pytest.approx(0.5 * 3.2, abs=0.01)
@@ -111,6 +111,16 @@ def test_a_run_perceives_as_in_the_pictures_of_its_place(plan: RehearsalPlan) ->
     assert np.subtract(scene.path.head, true.path.head) == pytest.approx((-3.2, -1.6), abs=0.4)
     assert scene.path.tail == true.path.tail
     assert scene.masks is not None and scene.masks.vessel[240, 320] and not scene.masks.vessel[5, 5], "what lies in sight counts"
+
+
+def test_a_head_that_rests_sees_the_same_again(plan: RehearsalPlan) -> None:
+    mixed = SeenHeads.joined([seen(HERE[::2], NO_ANSWER), seen(HERE[1::2], (0.0, 0.0))])
+    run = Rehearsal(replace(plan, seen=mixed), 3)
+    told = []
+    for place_mm in (45.0, 46.0):
+        run._world.insert(place_mm, target=run.target.node)
+        told.append({run._perceive(run._read()).refusal is None for _ in range(8)})
+    assert sorted(map(list, told)) == [[False], [True]]
 
 
 def test_perception_is_measured_in_pictures_along_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
