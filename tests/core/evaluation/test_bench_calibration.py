@@ -14,6 +14,7 @@ from core.evaluation.accuracy import FrameScore
 from core.evaluation.bench_calibration import bad_look, fit_to_prior, moved, poses_of_masks, usual_look
 from core.evaluation.confidence import KnownPicture
 from core.learning.dataset import Sample, write_mask, write_png
+from core.perception.model_file import ModelInfo
 from core.perception.quality import BASIC_FEATURES, ConfidenceCalibration
 from tests.core.bench.drawn_bench import board, tube
 from tests.core.learning.toy_bench import SIZE, toy_picture, toy_robot, toy_vessel
@@ -28,6 +29,20 @@ def _features(first: np.ndarray) -> np.ndarray:
     return np.column_stack([first, np.zeros((len(first), COUNT - 1))])
 
 
+def scored(**different: float) -> FrameScore:
+    pose = {"expected": True, "answered": True, "reason": None, "head_error_px": 1.0, "theta_error_deg": 1.0}
+    angle = {"theta_deg": 5.0, "true_theta_deg": 4.0, "state": "A", "true_state": "A", "confidence": 0.8}
+    return FrameScore("a", 1.0, 1.0, **pose | angle | different, evidence=(0.5,) * COUNT)
+
+
+def toy_sample(folder: Path) -> Sample:
+    names = [folder / name for name in ("a.png", "a_vessel.png", "a_robot.png")]
+    write_png(names[0], toy_picture(toy_robot(0, 0.7)))
+    write_mask(names[1], toy_vessel())
+    write_mask(names[2], toy_robot(0, 0.7))
+    return Sample("a", *names)
+
+
 def test_without_answers_the_fit_is_the_prior() -> None:
     fitted = fit_to_prior(np.zeros(0), np.zeros(0, bool), np.zeros(0), PRIOR)
     assert fitted.weights == pytest.approx(PRIOR.weights)
@@ -40,17 +55,30 @@ def test_a_model_that_answers_no_held_out_frame_keeps_the_prior() -> None:
 
 
 def test_the_evidence_of_answers_is_what_the_prior_is_computed_from() -> None:
-    pose = {"expected": True, "answered": True, "reason": None, "head_error_px": 1.0, "theta_error_deg": 1.0}
-    angle = {"theta_deg": 5.0, "true_theta_deg": 4.0, "state": "A", "true_state": "A", "confidence": 0.8}
-    score = FrameScore("a", 1.0, 1.0, **pose, **angle, evidence=(0.5,) * COUNT)
+    score = scored()
     evidence, right, weight = calibrating._examples(calibrating._Answers((score,), (score,), (score,)), COUNT)
     assert evidence.shape == (3, COUNT)
-    assert right.all()
+    assert right.tolist() == [1.0] * 3
     assert weight.tolist() == [1.0, 1.0, 0.5]
     assert fit_to_prior(evidence, right, weight, PRIOR).offset > PRIOR.offset
-    between, wrong = (replace(score, theta_error_deg=error) for error in (7.0, 12.0))
-    _, right, _ = calibrating._examples(calibrating._Answers((score, between, wrong), (), ()), COUNT)
-    assert right.tolist() == [True, False], "7 degrees off a mask by difference may be the mask's error"
+
+
+def test_between_right_and_wrong_an_answer_is_right_by_a_share_but_in_the_figures(tmp_path: Path) -> None:
+    errors = (0.0, -5.0, 7.0, -9.0, 10.0, 12.0)
+    scores = tuple(scored(theta_error_deg=error) for error in errors)
+    evidence, right, weight = calibrating._examples(calibrating._Answers(scores, (), ()), COUNT)
+    assert right == pytest.approx([1.0, 1.0, 0.6, 0.2, 0.0, 0.0]), "a mask by difference is off by some degrees itself"
+    far = calibrating._examples(calibrating._Answers((scored(head_error_px=16.0),), (), ()), COUNT)
+    assert far[1].tolist() == [0.0]
+    fitted = fit_to_prior(evidence, right, weight, PRIOR)
+    lowest, highest = (fit_to_prior(evidence, (right > least).astype(float), weight, PRIOR) for least in (0.9, 0.1))
+    assert lowest.offset < fitted.offset < highest.offset
+    assert fitted.fitted_on["right"] == 2
+    info = ModelInfo(name="drawn", shape={"fold": 1}, stride=16, weights_sha256="0" * 64, onnx_sha256="0" * 64)
+    model = calibrating.BenchCalibration(tmp_path, info, [], [toy_sample(tmp_path)], [], PerceptionConfig())
+    shown = model._result(calibrating._Answers(scores, (), ()), None, None)
+    assert (shown.answered, shown.right) == (6, 2)
+    assert shown.calibration_error == pytest.approx(0.8 - 2 / 6), "right answers are 2 of 6, whatever is in between"
 
 
 def test_answers_move_the_offset_first_and_the_weights_when_there_are_many() -> None:
@@ -87,14 +115,11 @@ def test_a_moved_camera_is_one_that_is_realigned() -> None:
 
 
 def test_the_truth_is_the_pose_of_the_masks(tmp_path: Path) -> None:
-    names = [tmp_path / name for name in ("a.png", "a_vessel.png", "a_robot.png")]
-    write_png(names[0], toy_picture(toy_robot(0, 0.7)))
-    write_mask(names[1], toy_vessel())
-    write_mask(names[2], toy_robot(0, 0.7))
+    sample = toy_sample(tmp_path)
     empty = tmp_path / "none.png"
     write_mask(empty, np.zeros(SIZE[::-1], bool))
     config = PerceptionConfig(working_size_px=SIZE[0])
-    truth = poses_of_masks([Sample("a", *names), Sample("b", *names[:2], empty)], config)
+    truth = poses_of_masks([sample, replace(sample, stem="b", robot=empty)], config)
     assert truth["b"]["state"] is None
     true = np.argwhere(toy_robot(0, 0.7))
     head = true[np.argmax(true[:, 1])][::-1]
