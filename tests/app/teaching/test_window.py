@@ -382,10 +382,10 @@ import sys
 import app.commands.teach as teach
 from app.cli import main
 teach._EXAMPLES, teach._REMEMBER, teach._MOST_STEPS = 2, 4, 6
-sys.argv = ["main.py", "teach", *sys.argv[1:], "--init", {model!r}]
+sys.argv = ["main.py", "teach", *sys.argv[1:], "--init", {model!r}, "--minutes", "60"]
 sys.exit(main())
 """
-"""The real command with few steps of a small network."""
+"""The real command with few steps of a small network, which no slow computer cuts short."""
 
 
 @pytest.mark.slow
