@@ -2153,8 +2153,8 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
-        <source>At {share:.0f} % of the set speeds: {done} of {total}</source>
-        <translation>设定速度的 {share:.0f} %：{done} / {total}</translation>
+        <source>Looking at the way: {share:.0f} %</source>
+        <translation>正在查看路径：{share:.0f} %</translation>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
@@ -2195,6 +2195,11 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/rehearsal_card.py"/>
         <source>The set speed is good</source>
         <translation>设定的速度合适</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>At {share:.0f} % of the set speeds: {done} of {total}</source>
+        <translation>设定速度的 {share:.0f} %：{done} / {total}</translation>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
