@@ -34,8 +34,11 @@ if TYPE_CHECKING:
     from hardware.twin.rehearsal import RehearsalPicture, RehearsalPlan, SeenHeads
 
 _FIRST_SHARE = 0.7
-"""Of the time, for the set speeds; slower ones are tried in the rest."""
+"""Of the time, for the pictures and the set speeds; slower ones are tried in the rest."""
+_MANY_MISSING = 0.5
+"""A larger share of the pictures without an answer is told."""
 _SHOWN_EVERY_S = 2.0
+Show = Callable[[Sequence[Row]], None]
 
 
 def rehearse(
@@ -59,8 +62,8 @@ def rehearse(
 
     --json has the band of the heads' paths and the wall force along the way, too: "way" (core/evaluation/rehearsal.py).
     """
-    from hardware.twin.own_phantom import with_own_phantom
-    from hardware.twin.rehearsal import SPEEDS, RehearsalPicture, RehearsalPlan, figures, is_good
+    from hardware.twin.own_phantom import with_own_perception, with_own_phantom
+    from hardware.twin.rehearsal import RehearsalPicture, RehearsalPlan, figures
     from hardware.twin.trial import TrialPlan
 
     if kept_in is not None and not tune:
@@ -70,11 +73,12 @@ def rehearse(
     end_like_an_interrupt()
     told = json.loads(sys.stdin.read()) if given else {}
     config = Config.model_validate(told["config"]) if given else load_config(config_path, None, {})
-    config = with_own_phantom(config, bench) if bench is not None else config
+    config = with_own_perception(with_own_phantom(config, bench), bench) if bench is not None else config
     picture = RehearsalPicture.of(config, point_option(target), told.get("size_px"))
     trial = TrialPlan(config, max_seconds=max_seconds, look="bench", own=True, target_px=picture.trial_px)
     sharp = picture.sharp(config)
-    for turn in sharp if not (as_json or progress_json) else ():
+    is_read = not (as_json or progress_json)
+    for turn in sharp if is_read else ():
         x, y = turn.xy
         console.print(
             f"too sharp: the branch at ({x:.0f}, {y:.0f}) turns by {turn.turn_deg:.0f} degrees, the head bends by "
@@ -82,7 +86,12 @@ def rehearse(
             soft_wrap=True,
         )
     began_s, writer = time.monotonic(), progress_writer()
-    seen = _seen(config, picture, workers)
+    seen = _seen(config, picture, workers, 60.0 * minutes * _FIRST_SHARE)
+    if seen is None:
+        raise _late(given=given)
+    if seen.missing > _MANY_MISSING and is_read:
+        no_answer = f"{seen.missing:.0%} of the pictures of the way give no answer: teach the bench (python main.py teach)"
+        console.print(no_answer, soft_wrap=True)
     plan = RehearsalPlan(trial, seen)
     if tune:
         _tune(plan, runs, seed, workers, kept_in, as_json=as_json)
@@ -99,42 +108,55 @@ def rehearse(
             "robot": "identified" if config.twin.behaviour else "twin",
         },
     }
-    tried: list[tuple[float, list[Row]]] = []
-    good: float | None = None
-    for speed in SPEEDS:
-        ends_s = began_s + 60.0 * minutes * (1.0 if tried else _FIRST_SHARE)
-        show = None if tried or writer is None else _shows(writer, about, picture)
-        rows = _run(replace(plan, speed=speed), range(seed, seed + runs), workers, (ends_s, began_s + 60.0 * minutes), show)
-        if not rows:
-            break
-        tried.append((speed, rows))
-        if len(rows) >= min(runs, FEWEST_RUNS) and is_good(summarise(rows)):
-            good = speed
-            break
+    show = _shows(writer, about, picture) if writer is not None else None
+    tried, good = _at_speeds(plan, range(seed, seed + runs), workers, (began_s, 60.0 * minutes), show)
     if not tried:
-        busy = "the computer is too busy; close other programs, and rehearse again"  # translated in the window
-        raise UserError(busy if given else "no run has ended in this time; give more --minutes")
+        raise _late(given=given)
     about |= picture.found(tried[0][1])
     about["recommended_speed_mm_s"] = round(good * config.advice.fast_mm_s, 2) if good is not None else None
     about["at_speeds"] = [{"share": speed, **figures(rows)} for speed, rows in tried]
-    if as_json or progress_json:
-        sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
-    else:
+    if is_read:
         _print(about, runs)
+    else:
+        sys.stdout.write(json.dumps(about, allow_nan=False) + "\n")
 
 
-def _seen(config: Config, picture: RehearsalPicture, workers: int) -> SeenHeads:
-    """How perception does in pictures of the way."""
+def _late(*, given: bool) -> UserError:
+    busy = "the computer is too busy; close other programs, and rehearse again"  # translated in the window
+    return UserError(busy if given else "no run has ended in this time; give more --minutes")
+
+
+def _at_speeds(
+    plan: RehearsalPlan, seeds: range, workers: int, began_within_s: tuple[float, float], show: Show | None
+) -> tuple[list[tuple[float, list[Row]]], float | None]:
+    """The rows at each speed that was tried, and the good one; `show` is for the set speeds."""
+    from hardware.twin.rehearsal import SPEEDS, is_good
+
+    tried: list[tuple[float, list[Row]]] = []
+    began_s, within_s = began_within_s
+    for speed in SPEEDS:
+        ends_s = began_s + within_s * (1.0 if tried else _FIRST_SHARE), began_s + within_s
+        rows = _run(replace(plan, speed=speed), seeds, workers, ends_s, None if tried else show)
+        if not rows:
+            break
+        tried.append((speed, rows))
+        if len(rows) >= min(len(seeds), FEWEST_RUNS) and is_good(summarise(rows)):
+            return tried, speed
+    return tried, None
+
+
+def _seen(config: Config, picture: RehearsalPicture, workers: int, within_s: float) -> SeenHeads | None:
+    """How perception does in pictures of the way, of which it takes what is done in this time; None: nothing."""
     from hardware.twin.rehearsal import WANDERS, SeenHeads, seen_heads
 
     look = partial(seen_heads, config, picture.target)
-    with progress_bar() as bar, closing(over_processes(workers, look, WANDERS)) as results:
+    with progress_bar() as bar, closing(over_processes(workers, look, WANDERS, within_s)) as results:
         task = bar.add_task("perceiving the way in pictures", total=len(WANDERS))
         parts = []
         for part in results:
             parts.append(part)
             bar.advance(task)
-    return SeenHeads.joined(parts)
+    return SeenHeads.joined(parts) if parts else None
 
 
 def _tune(plan: RehearsalPlan, runs: int, seed: int, workers: int, rig: str | None, *, as_json: bool) -> None:
@@ -181,7 +203,7 @@ def _print_tuned(about: dict[str, Any], *, is_better: bool) -> None:
         console.print(line, soft_wrap=True)
 
 
-def _shows(writer: ProgressWriter, about: dict[str, Any], picture: RehearsalPicture) -> Callable[[Sequence[Row]], None]:
+def _shows(writer: ProgressWriter, about: dict[str, Any], picture: RehearsalPicture) -> Show:
     """Tells a window what was found so far, every two seconds."""
     shown_s = time.monotonic()
 
@@ -199,7 +221,7 @@ def _run(
     seeds: range,
     workers: int,
     ends_s: tuple[float, float],
-    show: Callable[[Sequence[Row]], None] | None,
+    show: Show | None,
 ) -> list[Row]:
     """The rows by seed, of the first ones where the time was too short; a slower speed is given up once it cannot be good.
 

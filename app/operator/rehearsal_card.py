@@ -130,13 +130,16 @@ class RehearsalCard(QFrame):
 
 
 def figures_of(result: RehearsalResult) -> str:
-    """Interval, time, force, and how many branches are too sharp."""
+    """Interval, time, force, pictures without an answer, and whether a branch is too sharp."""
     arrived, time_s, force = result.arrived, result.time_s, result.wall_force_n
     parts = [tr("95 % interval {low:.0f} to {high:.0f} %", low=100 * arrived.low, high=100 * arrived.high)]
     if time_s.median is not None:
         parts.append(tr("{time:.0f} s (median)", time=time_s.median))
     if force.p95 is not None and force.max is not None:
         parts.append(tr("wall force {p95:.2f} N, {max:.2f} N at most", p95=force.p95, max=force.max))
+    missing = result.assumed.get("missing")
+    if isinstance(missing, float) and missing >= 0.005:
+        parts.append(tr("no answer in {share:.0f} % of the pictures", share=100 * missing))
     words = ", ".join(parts)
     return words + "\n" + tr("A branch on the way turns off more sharply than the head bends") if result.sharp else words
 

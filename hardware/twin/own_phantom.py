@@ -31,6 +31,7 @@ from core.files import write_atomic
 from core.learning.dataset import WORKING_SIZE_PX
 from core.messages import message
 from core.perception.model_file import BENCH, own_models
+from core.perception.model_file import INFO as MODEL_INFO
 from core.perception.segmentation import clean_mask
 from core.perception.skeleton import end_pixels, thin
 from core.perception.vessel_graph import build_graph
@@ -124,6 +125,20 @@ def with_own_phantom(config: Config, bench: str) -> Config:
     pursuit = config.policy.pursuit.model_copy(update={"pixels_per_mm": zoom} | (rig.pursuit or {} if rig is not None else {}))
     policy = config.policy.model_copy(update={"pursuit": pursuit})
     return config.model_copy(update={"twin": config.twin.model_copy(update=twin), "policy": policy})
+
+
+def with_own_perception(config: Config, bench: str) -> Config:
+    """The configuration as it is at a bench: it is known, with the model that was taught on it, and the twin has its look.
+
+    A bench that is configured stays, with its model. Raises PhantomError.
+    """
+    folder, rig, perception = bench_folder(bench), _rig_of(bench), config.perception
+    if perception.bench is None and (folder / INFO).is_file():
+        taught = str(folder.parent) if folder.name == BENCH and (folder.parent / MODEL_INFO).is_file() else None
+        model = (rig.model if rig is not None else None) or taught or perception.segmentation.model
+        segmentation = perception.segmentation.model_copy(update={"model": model})
+        perception = perception.model_copy(update={"bench": str(folder), "segmentation": segmentation})
+    return config.model_copy(update={"perception": perception, "twin": config.twin.model_copy(update={"look": OWN_LOOK})})
 
 
 def _rig_of(bench: str) -> RigFile | None:

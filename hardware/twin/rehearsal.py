@@ -90,10 +90,11 @@ class SeenHeads:
 
 
 def seen_heads(config: Config, target: Target, wander: float) -> SeenHeads:
-    """Drive the twin's robot to `target` in its pictures, a picture every millimetre, and perceive each.
+    """Drive the twin's robot to `target` in its pictures, a picture every millimetre, and perceive each; at low priority.
 
     Raises UserError where the model or the bench cannot be opened, and TargetError where the camera never sees the head.
     """
+    _give_way()
     one = config.perception.segmentation.model_copy(update={"threads": 1})
     pipeline = open_pipeline(config.perception.model_copy(update={"segmentation": one}))
     world = TwinWorld(config.twin, perception=config.perception, servos=config.servos, safety=config.safety)
@@ -127,6 +128,11 @@ def seen_heads(config: Config, target: Target, wander: float) -> SeenHeads:
     return SeenHeads(np.array(heads), np.array(errors), np.array(confidence))
 
 
+def _give_way() -> None:
+    """Other processes go first from now on."""
+    os.setpriority(os.PRIO_PROCESS, 0, max(os.getpriority(os.PRIO_PROCESS, 0), _NICENESS))
+
+
 def _in_frame(ahead: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turns a vector of the picture into its parts along a unit vector and to the right of it."""
     return np.array([ahead, [-ahead[1], ahead[0]]])
@@ -143,7 +149,7 @@ class RehearsalPlan:
 
 def rehearse_once(plan: RehearsalPlan, seed: int) -> Row:
     """One run, at low priority."""
-    os.setpriority(os.PRIO_PROCESS, 0, max(os.getpriority(os.PRIO_PROCESS, 0), _NICENESS))
+    _give_way()
     return Rehearsal(plan, seed).run()
 
 

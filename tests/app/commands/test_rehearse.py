@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -82,16 +83,48 @@ def test_a_good_way_is_told_with_its_band(rehearse: Callable[..., list[dict[str,
 def test_pictures_of_several_ways_are_perceived_by_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Any] = []
 
-    def over(workers: int, function: partial[Any], wanders: Sequence[float]) -> Iterator[SeenHeads]:
-        asked.extend((workers, function.args, tuple(wanders)))
-        yield from (SEEN for _ in wanders)
+    def over(workers: int, function: partial[Any], wanders: Sequence[float], within_s: float) -> Iterator[SeenHeads]:
+        asked.extend((workers, function.args, tuple(wanders), within_s))
+        yield from (SEEN for _ in wanders[: round(within_s)])
 
     monkeypatch.setattr("app.commands.rehearse.over_processes", over)
     config = Config.model_validate({"twin": {"phantom": "tree"}})
     picture = RehearsalPicture.of(config, (430.0, 400.0))
-    seen = _seen(config, picture, 2)
-    assert asked == [2, (config, picture.target), WANDERS]
+    seen = _seen(config, picture, 2, 60.0)
+    assert seen is not None and asked == [2, (config, picture.target), WANDERS, 60.0]
     assert len(seen.heads_mm) == len(seen.confidence) == 4 * len(WANDERS) and seen.missing == 0.25
+    part = _seen(config, picture, 2, 1.0)
+    assert part is not None and len(part.heads_mm) == 4, "what was seen in this time"
+    assert _seen(config, picture, 2, 0.0) is None
+
+
+def test_no_picture_in_time_is_an_error_and_many_without_an_answer_are_told(
+    rehearse: Callable[..., list[dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.commands.rehearse._seen", lambda *_: None)
+    result = CliRunner().invoke(app, ["rehearse", "--target", TARGET])
+    assert isinstance(result.exception, UserError) and "give more --minutes" in str(result.exception)
+    shown: list[str] = []
+    monkeypatch.setattr("app.commands.rehearse.console.print", lambda *lines, **_: shown.extend(map(str, lines)))
+    for missing in (2, 3):
+        errors = np.array([(np.nan, np.nan)] * missing + [(0.0, 0.0)] * (4 - missing))
+        monkeypatch.setattr("app.commands.rehearse._seen", lambda *_, _errors=errors: replace(SEEN, errors_mm=_errors))
+        rehearse(lambda _speed, seed: row(seed), "--runs", "5")
+    assert [line for line in shown if "no answer" in line] == [
+        "75% of the pictures of the way give no answer: teach the bench (python main.py teach)"
+    ]
+
+
+def test_the_way_on_a_bench_is_perceived_with_the_bench(
+    rehearse: Callable[..., list[dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_bench = Config.model_validate({"twin": {"phantom": "tree"}, "perception": {"bench": "glass"}})
+    perceived: list[Config] = []
+    monkeypatch.setattr("hardware.twin.own_phantom.with_own_phantom", lambda config, _bench: config)
+    monkeypatch.setattr("hardware.twin.own_phantom.with_own_perception", lambda _config, _bench: at_bench)
+    monkeypatch.setattr("app.commands.rehearse._seen", lambda config, *_: perceived.append(config) or SEEN)
+    rehearse(lambda _speed, seed: row(seed), "--bench", "glass", "--json", "--runs", "5")
+    assert perceived == [at_bench]
 
 
 def test_a_slower_speed_is_tried_and_given_up_early(rehearse: Callable[..., list[dict[str, Any]]]) -> None:

@@ -205,13 +205,13 @@ def test_the_card_says_whose_robot_it_was_and_what_to_do(make: MakeController) -
     card = card_of(make(said(FOUND)))
     result = RehearsalResult.model_validate(FOUND)
     card.show_result(result)
-    assert "rig identify" not in card.text
+    assert "rig identify" not in card.text and ", no answer in 5 % of the pictures" in card.text
     for runs, advice in ((50, "No speed that was tried is good"), (12, "Too few runs ended to recommend a speed")):
         assert advice_of(result.model_copy(update={"runs": runs, "recommended_speed_mm_s": None}))[0].startswith(advice)
     card.show_result(result, is_real=True)
     assert "With the nominal robot: rig identify measures yours" in card.text
     card.show_result(result.model_copy(update={"assumed": {"robot": "identified"}}), is_real=True)
-    assert "rig identify" not in card.text
+    assert "rig identify" not in card.text and "no answer" not in card.text
 
 
 def test_a_real_bench_is_rehearsed_on_its_own_phantom(make: MakeController, tmp_path: Path) -> None:

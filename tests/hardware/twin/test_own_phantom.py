@@ -25,6 +25,7 @@ from hardware.twin.own_phantom import (
     phantom_of_mask,
     read_phantom,
     view_of_scale,
+    with_own_perception,
     with_own_phantom,
     write_phantom,
 )
@@ -133,6 +134,16 @@ def test_it_is_kept_with_its_bench_and_seen_as_the_bench_is(tmp_path: Path) -> N
     view = make_view(Appearance(), (320, 240), phantom)
     middle = view.project(np.array([BOARD_MM]) / 2)[0]
     assert middle == pytest.approx([159.5, 119.5]) and view.pixels_per_mm((100, 75)) == pytest.approx(2.0)
+    perceived = with_own_perception(Config(), str(folder)).perception
+    assert (perceived.bench, perceived.segmentation.model) == (str(folder), "default")
+    (tmp_path / "model.json").write_text("{}")
+    drawn_in_tank = Config.model_validate({"twin": {"look": "tank"}})
+    for place in (str(folder), str(tmp_path)):
+        taught = with_own_perception(drawn_in_tank, place)
+        perceived = taught.perception
+        assert (perceived.bench, perceived.segmentation.model, taught.twin.look) == (str(folder), str(tmp_path), "own")
+    known = Config.model_validate({"perception": {"bench": "other"}})
+    assert with_own_perception(known, str(folder)).perception == known.perception, "a bench that is configured stays"
     config = with_own_phantom(Config(), str(folder))
     assert (config.twin.phantom, config.policy.pursuit.pixels_per_mm) == (name, pytest.approx(4.0))
     assert config.twin.look == "own"

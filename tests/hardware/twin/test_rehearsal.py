@@ -145,8 +145,11 @@ def test_perception_is_measured_in_pictures_along_the_way(monkeypatch: pytest.Mo
     true_eye = Rehearsal(RehearsalPlan(TrialPlan(config, look="bench", own=True, target_px=(230.0, 240.0))), 0)
     monkeypatch.setattr("hardware.twin.rehearsal.TwinWorld", Watched)
     monkeypatch.setattr("hardware.twin.rehearsal.open_pipeline", lambda _config: perceive)
+    nices: list[int] = []
+    monkeypatch.setattr("hardware.twin.rehearsal.os.setpriority", lambda _which, _who, nice: nices.append(nice))
     found = seen_heads(config, target_near(forked(50.0, 5.0), VIEW, (230.0, 240.0)), 0.0)
     answered = ~np.isnan(found.errors_mm[:, 0])
+    assert nices[0] >= 10, "at low priority"
     assert len(frames) == len(found.confidence) > 20 and frames[0].std() > 10.0
     assert answered.tolist() == (found.heads_mm[:, 0] <= 50.0).tolist() and 0.3 < found.missing < 0.9
     assert found.errors_mm[answered] == pytest.approx(np.array([(0.0, 4.0 / 3.2)] * answered.sum()), abs=0.25)
