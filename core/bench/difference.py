@@ -56,13 +56,15 @@ class Difference:
     ``probability``: of the robot, float32 (h, w). ``evidence``: how much a pixel differs, whatever is around it, float32 (h, w):
     0.5 at an edge of the robot. ``doubtful``: bool (h, w), places that count neither as robot nor as background
     when a network is trained. ``unusable``: bool (h, w), where a difference says nothing: around a lamp's reflection, and
-    over what goes on outside the drawn vessel, such as a cable or a hand. ``is_noisy``: it was smoothed, and its edges with it.
+    over what goes on outside the drawn vessel, such as a cable or a hand. ``chained``: bool (h, w), short parts of the robot that
+    are near others only, bands or a row of bubbles. ``is_noisy``: it was smoothed, and its edges with it.
     """
 
     probability: NDArray[np.float32]
     evidence: NDArray[np.float32]
     doubtful: Mask
     unusable: Mask
+    chained: Mask
     is_noisy: bool = False
 
 
@@ -85,11 +87,11 @@ def distance_to_empty(image: Image, view: BenchView, *, with_gone: bool = False,
         return np.asarray(distance, np.float32)
     # nor the outline of what lay on the empty bench and is gone: a robot has edges of its own
     before, now = cv2.blur(slack, (_GONE_PX, _GONE_PX)), cv2.blur(drawn, (_GONE_PX, _GONE_PX))
-    distance[(before > _GONE_TIMES * now) & (before > _GONE_LEVELS)] = 0.0
+    distance[(before > _GONE_TIMES * now) & (before > _GONE_EDGE)] = 0.0
     return np.asarray(distance, np.float32)
 
 
-_GONE_PX, _GONE_TIMES, _GONE_LEVELS = 7, 2.0, 2.0
+_GONE_PX, _GONE_TIMES, _GONE_EDGE = 7, 2.0, 2.0
 """Side of the square in which edges are compared, how much stronger the empty picture's must be, and their least mean in it."""
 
 
@@ -110,7 +112,7 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     probability, evidence, doubtful = np.zeros(image.shape[:2], np.float32), np.zeros(image.shape[:2], np.float32), ~view.known
     x, y, width, height = cv2.boundingRect(view.reachable.view(np.uint8))
     if not width:
-        return Difference(probability, evidence, doubtful, np.zeros_like(doubtful))
+        return Difference(probability, evidence, doubtful, np.zeros_like(doubtful), np.zeros_like(doubtful))
     distance = distance_to_empty(image, view)
     unusable = _glare(image)
     box = np.s_[y : y + height, x : x + width]
@@ -128,8 +130,8 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
         differs[box] |= strong > cut
         unusable |= (foreign := _foreign(differs, view.reachable))
         strong[foreign[box]] = 0.0
-    mask = _robot_parts(strong, strong > cut, high)
-    mask = _with_ends(mask, strong, cut, high)
+    parts, hopped = _robot_parts(strong, strong > cut, high)
+    mask = _with_ends(parts, strong, cut, high)
     mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0
     shadow = np.zeros(image.shape[:2], np.bool_)
     shadow[box] = _shadow_beside(mask, image[box], view.lab[box])
@@ -140,7 +142,7 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
     values[shadow[box]] = 0.0
     bridge = _bridge(mask, view.gradient[box]) & allowed & ~mask
     mask |= bridge
-    values[bridge] = np.maximum(values[bridge], 0.6)
+    values[bridge] = np.maximum(values[bridge], np.float32(_UNSEEN))
     evidence[box] = values
     around = cv2.dilate(mask.view(np.uint8), _disc(5)) > 0
     probability[box] = np.where(mask, np.maximum(values, 0.6), np.where(around, np.minimum(values, 0.49), 0.0))
@@ -148,7 +150,13 @@ def robot_by_difference(image: Image, view: BenchView) -> Difference:
         _continue_to_border(probability, view.reachable)
     rim = cv2.dilate((probability >= np.float32(0.5)).view(np.uint8), _disc(_RIM_PX)) > 0
     doubtful |= (distance > np.where(view.reachable, low, high)) & ~rim & ~shadow | unusable
-    return Difference(probability, evidence, doubtful, unusable, is_noisy)
+    chained = np.zeros_like(doubtful)
+    if hopped.any():  # with its bridges
+        count, labels, _, _ = _components((probability[box] >= np.float32(0.5)) & ~(parts & ~hopped))
+        is_chained = np.bincount(labels[hopped], minlength=count) > 0
+        is_chained[0] = False
+        chained[box] = is_chained[labels]
+    return Difference(probability, evidence, doubtful, unusable, chained, is_noisy)
 
 
 def _deviation(distance: NDArray[np.float32], allowed: Mask) -> float:
@@ -175,8 +183,11 @@ _OUTSIDE_SHARE = 0.3
 """Of what differs: a robot's shadow, or a reflection of it, lies outside the drawn vessel to a lesser share."""
 
 
-def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> Mask:
-    """Of what differs (h, w), the long parts that are clear somewhere, and the short ones near them that are as clear."""
+def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> tuple[Mask, Mask]:
+    """Of what differs (h, w), the long parts that are clear somewhere, and the short ones near them that are as clear.
+
+    The second mask is of the short ones that are near other short ones only.
+    """
     count, labels, stats, _ = _components(candidate)
     has_clear = np.bincount(labels[candidate & (strong >= high)], minlength=count) > 0
     peaks, result = {}, np.zeros(candidate.shape, np.bool_)
@@ -197,15 +208,20 @@ def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> M
             result[box] |= part
             peaks[label] = -peaks[label]  # taken
     clear = [-peak for peak in peaks.values() if peak < 0.0]
-    if clear:
-        least = max(high, _CLEAR_SHARE * float(np.median(clear)))
-        added = result
-        while added.any():  # from one band of a banded robot to the next
-            near = cv2.dilate(added.view(np.uint8), _square(2 * _GAP_PX + 1)) > 0
-            names = [label for label in np.unique(labels[near]).tolist() if peaks.pop(label, 0.0) >= least]
-            added = np.isin(labels, names) if names else np.zeros_like(result)
-            result |= added
-    return result
+    least = max(high, _CLEAR_SHARE * float(np.median(clear))) if clear else high
+    added, hopped = result, None
+    while True:  # from one band of a banded robot to the next
+        x, y, width, height = cv2.boundingRect(added.view(np.uint8))
+        if not width:
+            return result, added if hopped is None else hopped
+        box = np.s_[max(0, y - _GAP_PX) : y + height + _GAP_PX, max(0, x - _GAP_PX) : x + width + _GAP_PX]
+        near = cv2.dilate(added[box].view(np.uint8), _square(2 * _GAP_PX + 1)) > 0
+        names = np.flatnonzero(np.bincount(labels[box][near], minlength=count)).tolist()
+        is_added = np.zeros(count, np.bool_)
+        is_added[[label for label in names if peaks.pop(label, 0.0) >= least]] = True
+        added = is_added[labels]
+        result = result | added
+        hopped = np.zeros_like(result) if hopped is None else hopped | added
 
 
 def _with_ends(mask: Mask, strong: NDArray[np.float32], cut: NDArray[np.float32], high: float) -> Mask:
@@ -302,25 +318,41 @@ def _bridge(mask: Mask, gradient: NDArray[np.float32]) -> Mask:
     wide = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, _disc(max(3, round(_WIDE_SHARE * width))))
     found = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
     pieces = [(np.asarray(outline[:, 0], np.int32), cv2.boundingRect(outline)) for outline in found]
-    for (outline, box), (next_outline, next_box) in itertools.combinations(pieces, 2):
+    hulls = []
+    for first, second in itertools.combinations(range(len(pieces)), 2):
+        (outline, box), (next_outline, next_box) = pieces[first], pieces[second]
+        if any(
+            abs(2 * (box[k] - next_box[k]) + box[k + 2] - next_box[k + 2]) > box[k + 2] + next_box[k + 2] + 2 * _BRIDGE_PX
+            for k in (0, 1)
+        ):
+            continue
         one, other = _points_near(outline, next_box, _BRIDGE_PX + width), _points_near(next_outline, box, _BRIDGE_PX + width)
         if not len(one) or not len(other):
             continue
         apart = cv2.magnitude(*(np.subtract.outer(one[:, axis], other[:, axis]).astype(np.float32) for axis in (0, 1)))
         gap = float(apart.min())
+        if gap > _BRIDGE_PX:
+            continue
         near = gap + width / 2.0
         ends = one[apart.min(axis=1) <= near], other[apart.min(axis=0) <= near]
         hull = cv2.convexHull(np.concatenate(ends))
         along = ends[1].mean(axis=0) - ends[0].mean(axis=0)
         across = hull[:, 0] @ np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1.0)
-        if gap > _BRIDGE_PX or np.ptp(across) > _BRIDGE_WIDTHS * width:
-            continue
+        if np.ptp(across) <= _BRIDGE_WIDTHS * width:
+            hulls.append((gap, first, second, hull))
+    strand, bridges = list(range(len(pieces))), [0] * len(pieces)
+    for _, first, second, hull in sorted(hulls, key=lambda one: one[:3]):
         x, y, columns, rows = cv2.boundingRect(hull)
         place = np.s_[y : y + rows, x : x + columns]
-        between = cv2.fillConvexPoly(np.zeros((rows, columns), np.uint8), hull - (x, y), 1) > 0
-        edges = gradient[place][between & ~mask[place]]
-        if edges.size and np.quantile(edges, 0.9) < _BRIDGE_EDGE:
+        between = (cv2.fillConvexPoly(np.zeros((rows, columns), np.uint8), hull - (x, y), 1) > 0) & ~mask[place]
+        if not between.any() or np.quantile(gradient[place][between], 0.9) >= _BRIDGE_EDGE:
+            continue
+        is_wider = strand[first] == strand[second] and bridge[place][between].mean() > _BRIDGED_SHARE
+        if is_wider or (strand[first] != strand[second] and max(bridges[first], bridges[second]) < 2):
             bridge[place] |= between
+            if not is_wider:
+                strand = [strand[first] if name == strand[second] else name for name in strand]
+                bridges[first], bridges[second] = bridges[first] + 1, bridges[second] + 1
     return bridge
 
 
@@ -334,6 +366,8 @@ _WIDE_QUANTILE, _WIDE_SHARE = 0.95, 0.6
 """Of the depths in a mask, half of the robot's width; a wide piece has this share of that width everywhere."""
 _BRIDGE_PX, _BRIDGE_WIDTHS = 24.0, 1.4
 """Greatest gap between two pieces that is bridged, and the greatest width of the bridge in widths of the robot."""
+_BRIDGED_SHARE = 0.3
+"""Of a bridge between pieces that are joined already: it makes that wider, and is no ladder between two strands of the robot."""
 _BRIDGE_EDGE = 25.0
 """Of the bench, grey levels per px: at most 23 in 160 gaps between bands of robots, 30 and more in 22 at opaque clips."""
 
@@ -437,7 +471,7 @@ def combined(network: Probability, difference: Difference, view: BenchView, *, i
     only where the robot is about; its outline is the network's. With `is_taught`, a network that was taught on a bench, both are
     averaged: what that network does not see, such as a shadow beside the robot, must differ more.
     """
-    differs = difference.probability >= np.float32(0.5)
+    differs = (difference.probability >= np.float32(0.5)) & ~_unsupported(network, difference)
     near = cv2.dilate(differs.view(np.uint8), _square(_NEAR_PX)) > 0 if difference.is_noisy or is_taught else differs
     outline = np.asarray(np.where(near | ~view.known | difference.unusable, network, np.float32(0.0)), np.float32)
     if difference.is_noisy:
@@ -454,7 +488,7 @@ def disagreement(network: Probability, difference: Difference, robot: Mask) -> M
 
     A shadow beside the robot differs from the empty bench, and a tip as bright as the bench hardly does: beyond an end of it a
     weak sign is enough. What the network overlooks in half of the robot's width and more is no outline: there the difference
-    is believed.
+    is believed, but for chained parts that it supports nowhere.
     """
     if not robot.any():
         return robot
@@ -466,7 +500,15 @@ def disagreement(network: Probability, difference: Difference, robot: Mask) -> M
     signs = (network > np.float32(_WEAK_SIGN)) | (cv2.blur(difference.evidence, (5, 5)) > np.float32(_WEAK_EVIDENCE))
     unsure |= is_beyond & signs
     unsure &= cv2.dilate(robot.view(np.uint8), _square(2 * round(width) + 1)) > 0
-    return np.asarray(unsure & ~_overlooked(network, robot, width))
+    return np.asarray(unsure & ~_overlooked(network, robot, width) | _unsupported(network, difference))
+
+
+def _unsupported(network: Probability, difference: Difference) -> Mask:
+    """Of the chained parts, what is not near one of which the `network` (h, w) sees a little."""
+    if not difference.chained.any():
+        return difference.chained
+    seen = difference.chained & (network >= np.float32(_SUPPORT))
+    return difference.chained & ~(cv2.dilate(seen.view(np.uint8), _square(2 * _GAP_PX + 1)) > 0)
 
 
 def without_rim(network: Probability, difference: Difference, robot: Mask) -> Mask:
@@ -486,7 +528,9 @@ def _overlooked(network: Probability, robot: Mask, width: float) -> Mask:
 
 _UNSEEN = 0.6
 """Sum of the network's probability and the difference's evidence below which a rim is no robot: the union of both is too wide.
-To 0.8 the masks of robots that the network sees half become too thin."""
+A bridge's evidence is that. To 0.8 the masks of robots that the network sees half become too thin."""
+_SUPPORT = 0.3
+"""Probability by the network at which a chained part, and what is near it, is robot."""
 _CONTRADICT = 0.5
 """Difference of the network's probability and the difference's evidence above which they contradict each other."""
 _BEYOND, _WEAK_SIGN, _WEAK_EVIDENCE = 0.22, 0.05, 0.2

@@ -186,6 +186,39 @@ def test_two_robots_side_by_side_are_not_joined(bench: Bench) -> None:
     assert not robots[120:127, 20:190].any()
 
 
+def test_bands_side_by_side_are_joined_along_the_robots_and_at_most_once_across() -> None:
+    columns, strands = np.arange(SIZE[0]), [line((0, y), (SIZE[0], y), 8) for y in (112, 136)]
+    is_seen = (columns < 60) | (columns % 20 < 8)
+    picture, lumen = board(), np.zeros((SIZE[1], SIZE[0]), bool)
+    lumen[90:160] = True
+    picture[lumen] = (200, 190, 180)
+    bench = bench_from_pictures([noisy(picture, 1.0, 1)], lumen, "b", 320)
+    picture[np.logical_or(*strands) & is_seen] = 20
+    view = register(noisy(picture, 1.0, 4), bench)
+    assert isinstance(view, BenchView)
+    robots = robot_by_difference(noisy(picture, 1.0, 3), view).probability >= 0.5
+    assert all(robots[y, 70:300].mean() > 0.98 for y in (112, 136))
+    assert robots[124].sum() < 30, "columns of one bridge; a ladder has 229"
+
+
+def test_a_row_of_bubbles_ahead_is_robot_only_where_the_network_sees_a_little(bench: Bench) -> None:
+    short = line((0, 122), (120, 126))
+    image = with_line(board(), (0, 122), (120, 126))
+    for x in range(138, 280, 24):
+        cv2.circle(image, (x, 122 + x // 32), 4, (60, 60, 60), cv2.FILLED)
+    view = register(image := noisy(image, 1.0, 3), bench)
+    assert isinstance(view, BenchView)
+    difference = robot_by_difference(image, view)
+    row = (difference.probability >= 0.5) & (np.arange(SIZE[0]) > 150)
+    assert row.sum() > 600
+    assert (difference.chained == row)[:, 160:].all()
+    alone, seen = seen_by_network(short), np.where(row, np.float32(0.4), seen_by_network(short))
+    for is_taught in (False, True):
+        assert not (combined(alone, difference, view, is_taught=is_taught) >= 0.5)[:, 160:].any()
+    assert (combined(seen, difference, view) >= 0.5)[row].all()
+    assert disagreement(alone, difference, short)[row & difference.chained].all()
+
+
 def test_where_an_edge_of_the_bench_is_seen_there_is_no_robot() -> None:
     with_clip = cv2.rectangle(board(), (80, 90), (92, 160), (60, 60, 60), cv2.FILLED)
     bench = bench_from_pictures([noisy(np.asarray(with_clip, np.uint8), 2.0, 1)], tube(), "b", 320)
