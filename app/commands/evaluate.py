@@ -63,7 +63,12 @@ def evaluate(
     study: Annotated[
         str | None, typer.Option(help='this study of images annotated by hand, its raters and repeats too; "": outside studies')
     ] = None,
-    explain: Annotated[bool, typer.Option("--explain", help="as session info does, for a session's rehearsed runs")] = False,
+    explain: Annotated[
+        bool,
+        typer.Option(
+            "--explain", help="replay a session's rehearsed runs in the identified twin and name the parameter that explains them"
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="of the drawn images, their manual errors and the bootstrap")] = 0,
     model: ModelOption = None,
     preset: PresetOption = None,
