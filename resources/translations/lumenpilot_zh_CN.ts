@@ -2178,6 +2178,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/rehearsal_card.py"/>
+        <source>no answer in {share:.0f} % of the pictures</source>
+        <translation>{share:.0f} % 的图像没有结果</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/rehearsal_card.py"/>
         <source>A branch on the way turns off more sharply than the head bends</source>
         <translation>途中有一个分支的转角超过头部的弯曲能力</translation>
     </message>
