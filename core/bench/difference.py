@@ -512,11 +512,15 @@ def _unsupported(network: Probability, difference: Difference) -> Mask:
 
 
 def without_rim(network: Probability, difference: Difference, robot: Mask) -> Mask:
-    """The `robot` (h, w) without the rim in which neither the `network` (h, w) nor the difference shows it clearly."""
+    """The `robot` (h, w) without the rim in which neither the `network` (h, w) nor the difference shows it clearly.
+
+    Narrow gaps across it are no rim.
+    """
     if not robot.any():
         return robot
     unseen = network + difference.evidence < np.float32(_UNSEEN)
-    return robot & ~(unseen & ~_overlooked(network, robot, _width_px(robot)))
+    kept = robot & ~(unseen & ~_overlooked(network, robot, _width_px(robot)))
+    return robot & (cv2.morphologyEx(kept.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSE_PX)) > 0)
 
 
 def _overlooked(network: Probability, robot: Mask, width: float) -> Mask:

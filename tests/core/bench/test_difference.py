@@ -253,6 +253,19 @@ def test_a_rim_that_neither_sees_is_no_robot_and_a_body_that_the_network_overloo
     assert dice(without_rim(seen_by_network(line(*ROBOT)), difference, wide), line(*ROBOT)) > 0.93 > dice(wide, line(*ROBOT))
 
 
+@pytest.mark.parametrize("gap_px", [5, 6])
+def test_narrow_gaps_between_bands_are_no_rim(bench: Bench, gap_px: int) -> None:
+    columns = np.arange(SIZE[0])
+    is_seen = (columns < 40) | ((columns - 40) % (25 + gap_px) >= gap_px)
+    image = np.where(is_seen[None, :, None], with_line(board(), *ROBOT), board()).astype(np.uint8)
+    difference = found(noisy(image, 1.0, 3), bench)
+    network = np.where(is_seen, seen_by_network(line(*ROBOT)), np.float32(0.2))
+    mask = (difference.probability >= 0.5) & line(*ROBOT)
+    gaps = mask & ~is_seen
+    assert gaps[:, 40:190].sum() > 60
+    assert (without_rim(network, difference, mask) & gaps).sum() > 0.95 * gaps.sum()
+
+
 def test_what_the_network_overlooks_in_the_whole_width_is_sure(bench: Bench) -> None:
     image = noisy(with_line(board(), *ROBOT), 2.0, 3)
     difference = found(image, bench)
