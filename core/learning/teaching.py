@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from core.bench.bench import Bench, read_bench, write_bench
 from core.bench.difference import combined, disagreement, distance_to_empty, robot_by_difference, without_rim
-from core.bench.registration import register
+from core.bench.registration import lab_of, register
 from core.config.section import first_problem
 from core.devices import UserError
 from core.files import write_atomic
@@ -394,7 +394,7 @@ def _check_empty(frames: Sequence[TeachingFrame], bench: Bench) -> None:
         return
     common = np.mean([frame.robot if frame.differs is None else frame.differs for frame in frames], axis=0) >= _GHOST_SHARE
     count, labels, statistics, _ = cv2.connectedComponentsWithStats((common & vessel).view(np.uint8), connectivity=8)
-    pictures = [frame.picture.image for frame in frames]
+    pictures = [bench.empty, *(frame.picture.image for frame in frames)]
     for index in range(1, count):
         if statistics[index, cv2.CC_STAT_AREA] < _GHOST_PX:
             continue
@@ -403,7 +403,7 @@ def _check_empty(frames: Sequence[TeachingFrame], bench: Bench) -> None:
         if ring.sum() < _GHOST_PX:
             continue
         # of each frame by itself: the bands of a robot are in other places in each
-        apart = [float(np.abs(image[part].mean(axis=0) - image[ring].mean(axis=0)).max()) for image in (bench.empty, *pictures)]
+        apart = [float(np.abs(lab[part].mean(axis=0) - lab[ring].mean(axis=0)).max()) for lab in map(lab_of, pictures)]
         if apart[0] > max(_GONE_LEVELS, float(np.median(apart[1:]))):
             x, y = (int(statistics[index, key]) for key in (cv2.CC_STAT_LEFT, cv2.CC_STAT_TOP))
             raise TeachingError(f"the empty picture shows the robot near ({x}, {y}): take it again without the robot")

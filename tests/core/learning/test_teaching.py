@@ -175,11 +175,13 @@ def test_an_empty_picture_with_the_robot_in_it_is_one_line() -> None:
         check([propose(picture, only) for picture in pictures], only)
 
 
-@pytest.mark.parametrize(("levels", "is_named"), [(5, False), (40, True)])
-def test_a_bench_that_is_a_little_darker_where_all_frames_have_the_robot_does_not_show_it(levels: int, is_named: bool) -> None:
+@pytest.mark.parametrize(("ground", "levels", "is_named"), [(120, 5, False), (120, 40, True), (44, 13, True)])
+def test_a_bench_that_is_a_little_darker_where_all_frames_have_the_robot_does_not_show_it(
+    ground: int, levels: int, is_named: bool
+) -> None:
     vessel, robot = toy_vessel(), toy_robot(0, 0.4)
-    blank, board = np.zeros_like(robot), np.full((*robot.shape, 3), 120, np.uint8)
-    bands = np.where((np.arange(robot.shape[1]) // 8 % 2 > 0)[None, :, None], np.uint8(150), np.uint8(90))
+    blank, board = np.zeros_like(robot), np.full((*robot.shape, 3), ground, np.uint8)
+    bands = np.where((np.arange(robot.shape[1]) // 8 % 2 > 0)[None, :, None], np.uint8(ground + 30), np.uint8(ground - 30))
     banded, empty = (np.where(robot[..., None], inside, board).astype(np.uint8) for inside in (bands, board - np.uint8(levels)))
     frames = [TeachingFrame(TeachingPicture(name, name, banded), vessel, robot, blank) for name in "abcde"]
     if not is_named:
