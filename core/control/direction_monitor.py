@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import add, sub
+from statistics import fmean, median
 
 from core.control.faults import Cause, Fault
 from core.geometry import arc_length
@@ -40,16 +41,16 @@ _BENDING_MM = 15.0
 _FOLLOWED, _FOLLOWED_LEAST = 1.5, (0.5, 0.5, 0.1)
 """Heading (deg), theta (deg) and way (mm) are followed from frame to frame by so many times the commanded motion and so much more:
 a pose that flickers hardly moves them."""
-_JUMP_MM = 5.0
-"""A longer way from one frame to the next begins another comparison: the robot was covered, or tail and head mistaken. (To leave
-out that frame's way alone would add up to a way where a head flickers: what it goes at once may come back in two steps.)"""
+_JUMP_MM, _JUMP_S = 1.0, 0.15
+"""By so much further from one frame to the next than it is fed, robots do not go: it was covered, or tail and head mistaken. Such
+a pose is left out, since a head that flickers comes back, perhaps in two steps; after so long it is kept, and ways begin again."""
 _RIGHT_TURN_DEG, _RIGHT_FEED_MM = 3.0, 1.0
 """Motion with the command that shows its direction to be right."""
 _ENOUGH_DEG, _ENOUGH_MM, _LITTLE_DEG, _LITTLE_MM = 10.0, 3.0, 1.0, 0.4
 """A command of so much without more than so little motion against it: the head is held, and not driven the wrong way."""
-_NOISE = 1.28
-"""Per mean amount of the poses' second difference so much counts as no motion: 2.5 standard deviations of normal noise, that
-is sqrt(6) sqrt(2 / pi) of them; a steady motion has none of it."""
+_NOISE_DEG, _NOISE_MM = 1.28, 1.51
+"""Per mean, or median, amount of the poses' second difference so much counts as no motion: 2.5 standard deviations of normal noise,
+of which that is sqrt(6) sqrt(2 / pi), or sqrt(6) 0.6745. A steady motion has none of it, a flicker now and then no median."""
 _GAP_S = 0.3
 """A longer pause of commands or poses begins another comparison."""
 
@@ -121,6 +122,7 @@ class _Seen:
     ----------
     raw, moved : the motion as seen, and as followed.
     step, change : since the frame before, as seen, and the amount by which it differs from the step before.
+    run : number of jumps before; ways are compared between two of them only.
     """
 
     head: HeadSeen
@@ -129,6 +131,7 @@ class _Seen:
     moved: _Motion = _STILL
     step: _Motion = _STILL
     change: _Motion = _STILL
+    run: int = 0
 
     @property
     def ahead_deg(self) -> float:
@@ -179,15 +182,15 @@ class DirectionMonitor:
         if not self.sent or head.captured_s < self.sent[0].time_s:
             return self
         last = self.seen[-1].head if self.seen else head
-        is_next = 0.0 <= head.captured_s - last.captured_s <= _GAP_S and abs(_step(last, head)[2]) <= _JUMP_MM
+        is_next = 0.0 <= head.captured_s - last.captured_s <= _GAP_S
         kept = _kept(self.seen, head.captured_s) if is_next else ()
         # until the longest lag has passed, what was commanded before the first command may act: that motion does not count
         is_early = head.captured_s < self.sent[0].time_s + _LAGS_S[-1]
         now = _next(() if is_early else kept, head, tuple(_at(self.sent, head.captured_s - lag_s) for lag_s in _LAGS_S))
-        return replace(self, seen=(*kept, now))._compared(kept, now)
+        return self if now is None else replace(self, seen=(*kept, now))._compared(kept, now)
 
     def _compared(self, earlier: tuple[_Seen, ...], now: _Seen) -> DirectionMonitor:
-        noise_deg, noise_mm = (_noise([*earlier, now], which) for which in (0, 2))
+        noise_deg, noise_mm = _NOISE_DEG * fmean(one.change[0] for one in (*earlier, now)), _noise_mm((*earlier, now))
         wrong_deg = wrong_mm = turn_deg = fed_mm = 0.0
         turns, feeds = self.turns, self.feeds
         for then in earlier:
@@ -206,12 +209,14 @@ class DirectionMonitor:
             turns = turns or is_held or followed >= _RIGHT_TURN_DEG
             if against > wrong_deg:
                 wrong_deg, turn_deg = against, asked
+            if then.run != now.run:
+                continue
             asked = _common([a.fed_mm - b.fed_mm for a, b in zip(now.sent, then.sent, strict=True)])
             sign = math.copysign(1.0, asked)
             gone = sign * way_mm
             springs = max(0.0, sign * (earlier[0].ahead_mm - then.ahead_mm))
             against = min(-gone - springs - noise_mm, abs(asked))
-            is_held = abs(asked) >= _ENOUGH_MM and -gone <= _LITTLE_MM
+            is_held = abs(asked) >= _ENOUGH_MM and noise_mm - gone <= _LITTLE_MM
             feeds = feeds or is_held or min(gone - noise_mm, abs(asked)) >= _RIGHT_FEED_MM
             if against > wrong_mm:
                 wrong_mm, fed_mm = against, asked
@@ -245,17 +250,22 @@ def _kept(seen: tuple[_Seen, ...], now_s: float) -> tuple[_Seen, ...]:
     return tuple(kept)
 
 
-def _next(earlier: tuple[_Seen, ...], head: HeadSeen, sent: tuple[_Sent, ...]) -> _Seen:
+def _next(earlier: tuple[_Seen, ...], head: HeadSeen, sent: tuple[_Sent, ...]) -> _Seen | None:
+    """The head after `earlier`; None: it seems to have jumped, and may come back."""
     if not earlier:
         return _Seen(head, sent)
     before = earlier[-1]
     turned_deg = max(abs(a.turn_deg - b.turn_deg) for a, b in zip(sent, before.sent, strict=True))
     fed_mm = max(abs(a.fed_mm - b.fed_mm) for a, b in zip(sent, before.sent, strict=True))
-    step = _step(before.head, head)
-    raw = _each(add, before.raw, step)
     most = _each(lambda least, commanded: least + _FOLLOWED * commanded, _FOLLOWED_LEAST, (turned_deg, turned_deg, fed_mm))
+    step, run = _step(before.head, head), before.run
+    if abs(step[2]) > _JUMP_MM + fed_mm + _noise_mm(earlier):
+        if head.captured_s - before.head.captured_s < _JUMP_S:
+            return None
+        step, run = _each(lambda way, limit: way if abs(way) <= limit else 0.0, step, (most[0], most[1], 0.0)), run + 1
+    raw = _each(add, before.raw, step)
     by = _each(lambda way, limit: max(-limit, min(limit, way)), _each(sub, raw, before.moved), most)
-    return _Seen(head, sent, raw, _each(add, before.moved, by), step, _each(lambda a, b: abs(a - b), step, before.step))
+    return _Seen(head, sent, raw, _each(add, before.moved, by), step, _each(lambda a, b: abs(a - b), step, before.step), run)
 
 
 def _each(function: Callable[[float, float], float], one: _Motion, other: _Motion) -> _Motion:
@@ -270,9 +280,9 @@ def _step(before: HeadSeen, now: HeadSeen) -> _Motion:
     return _wrapped(now.heading_deg - before.heading_deg), _wrapped(now.theta_deg - before.theta_deg), way_mm
 
 
-def _noise(seen: list[_Seen], which: int) -> float:
-    """What the noise of the poses alone may make a motion seem to be."""
-    return _NOISE * sum(one.change[which] for one in seen) / len(seen)
+def _noise_mm(seen: Sequence[_Seen]) -> float:
+    """What the noise of the poses alone may make a way seem to be."""
+    return _NOISE_MM * median(one.change[2] for one in seen)
 
 
 def _at(sent: tuple[_Sent, ...], time_s: float) -> _Sent:

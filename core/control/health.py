@@ -190,7 +190,8 @@ class Health:
         """The state after a report. Only while `armed` does a new press of a deadman count, and the gate's answer."""
         match report:
             case FrameReport():
-                direction = self.direction.observe(report.head) if report.head is not None else self.direction
+                head = report.head if report.confidence >= safety.min_confidence else None
+                direction = self.direction.observe(head) if head is not None else self.direction
                 return replace(self, frames=self.frames.update(report, now_s, safety), direction=direction)
             case MotionSent():
                 return replace(self, direction=self.direction.drive(report)) if armed else self
@@ -241,6 +242,11 @@ class Health:
         """The state after disarming: presses of deadmen, rejected commands and motions from before do not count the next time."""
         deadmen = {source: replace(deadman, counts=False) for source, deadman in self.deadmen.items()}
         return replace(self, deadmen=deadmen, rejection=None, rejected_run=0, direction=DirectionMonitor())
+
+    def not_driven(self) -> Health:
+        """The state while the program does not drive: what moves the robot then is no motion against the program."""
+        direction = DirectionMonitor(turns=self.direction.turns, feeds=self.direction.feeds)
+        return replace(self, direction=direction) if self.direction.sent else self
 
     def deadman_held(self, now_s: float, safety: SafetyConfig) -> bool:
         """Whether a deadman that is enough by itself is held, by a press that began while armed."""

@@ -70,6 +70,8 @@ def supervise(
     if Act.ACKNOWLEDGE in acts and state.latched is not None:
         refused.append(RequestRefused(Act.ACKNOWLEDGE, (state.latched.cause,)))
     state, denied = _handle_requests(state, acts, now_s, safety)
+    if state.mode is not Mode.AUTONOMOUS:
+        state = replace(state, health=state.health.not_driven())
     return state, _decide(state, before, (*refused, *denied), now_s, safety)
 
 

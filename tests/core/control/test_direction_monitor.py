@@ -247,18 +247,66 @@ def test_the_way_is_that_of_the_robot_whatever_is_seen_of_it(feed: float, shown_
     assert max(one.wrong_feed_mm for one in course) < (0.1 if feed > 0.0 else math.inf)
 
 
-def test_a_head_that_flickers_has_not_gone_back() -> None:
-    """Now and then it seems to go by 8 mm at once, and back in two steps."""
-    course = _seen(
-        _ramp(0.0), 3.0, lambda now_s: _head(now_s, way_mm=3.0 * now_s + {0: 8.0, 1: 4.0}.get(round(now_s / FRAME_S) % 8, 0.0))
-    )
+_BAD_POSES = [
+    pytest.param(1.0, {0: 8.0, 1: 4.0}, 8, id="a head flickers by 8 mm, and comes back in two steps"),
+    pytest.param(1.0, {0: -1.5}, 6, id="it flickers by little"),
+    pytest.param(1.0, {0: -4.0}, 6, id="it flickers by more"),
+    pytest.param(8.0, {0: -4.0}, 6, id="it flickers while it is fed fast"),
+    pytest.param(1.0, {0: -25.0, 1: -25.0, 2: -25.0}, 6, id="tail and head are mistaken half of the time"),
+]
+
+
+@pytest.mark.parametrize(("feed", "off_mm", "frames"), _BAD_POSES)
+def test_poses_that_flicker_are_no_way_back_and_hide_none(feed: float, off_mm: dict[int, float], frames: int) -> None:
+    for sign in (1.0, -1.0):
+
+        def head(now_s: float, sign: float = sign) -> HeadSeen:
+            way_mm = sign * feed * max(0.0, now_s - LATE_S)
+            return _head(now_s, way_mm=way_mm + off_mm.get(round(now_s / FRAME_S) % frames, 0.0))
+
+        course = _seen(_ramp(0.0), feed, head)
+        assert (_first_s(course, Cause.WRONG_FEED) < 1.2) is (sign < 0.0)
+        assert course[-1].feeds is (sign > 0.0)
+
+
+@pytest.mark.parametrize("cut_mm", [1.5, 3.0, 4.6, 25.0])
+@pytest.mark.parametrize(("feed", "at_s"), [(1.0, 0.4), (1.0, 0.8), (1.0, 2.0), (8.0, 2.0)])
+def test_a_robot_that_is_covered_at_once_has_not_gone_back(feed: float, at_s: float, cut_mm: float) -> None:
+    """As at the edge of a clip, or around a bend, where what is covered is longer than the way of its end."""
+
+    def head(now_s: float) -> HeadSeen:
+        return _head(now_s, way_mm=feed * max(0.0, now_s - LATE_S) - (cut_mm if now_s > at_s else 0.0))
+
+    course = _seen(_ramp(0.0), feed, head)
     assert not any(one.faults() for one in course)
 
 
-def test_a_robot_that_is_cut_around_a_bend_has_not_gone_back() -> None:
-    """What is covered is no straight piece, so that its length is more than the way of its end."""
-    course = _seen(_ramp(0.0), 8.0, lambda now_s: _head(now_s, way_mm=8.0 * now_s - (25.0 if now_s > 2.0 else 0.0)))
-    assert max(one.wrong_feed_mm for one in course) < 0.1
+@pytest.mark.parametrize("frames", [8, 12, 25])
+@pytest.mark.parametrize("once", [False, True])
+def test_a_tail_that_jumps_hides_no_wrong_turn_and_makes_none(frames: int, once: bool) -> None:
+    """By 25 mm, for as long as it stays or for one frame; where head and tail are mistaken, the heading is another, too."""
+    for turn, is_wrong in ((-1.0, True), (1.0, False)):
+
+        def head(now_s: float, turn: float = turn) -> HeadSeen:
+            frame = round(now_s / FRAME_S)
+            is_off = frame % frames == 0 if once else frame // frames % 2 == 1
+            other_deg = 0.0 if turn < 0.0 or not is_off else -160.0
+            return _head(now_s, turn * 10.0 * max(0.0, now_s - LATE_S) + other_deg, way_mm=now_s - (25.0 if is_off else 0.0))
+
+        assert (_first_s(_seen(_ramp(10.0), 1.0, head), Cause.WRONG_TURN) <= 0.8) is is_wrong
+
+
+@pytest.mark.parametrize(("feed", "noise_mm", "within_s"), [(1.0, 0.1, 1.3), (1.0, 0.4, 2.4), (3.0, 0.4, 1.1), (8.0, 0.4, 0.7)])
+def test_noise_of_the_length_is_no_way_and_hides_none_for_long(feed: float, noise_mm: float, within_s: float) -> None:
+    for sign in (1.0, -1.0):
+        rng = np.random.default_rng(5)
+
+        def head(now_s: float, sign: float = sign, rng: np.random.Generator = rng) -> HeadSeen:
+            return _head(now_s, way_mm=sign * feed * max(0.0, now_s - LATE_S) + noise_mm * rng.normal())
+
+        course = _seen(_ramp(0.0), feed, head, 4.0)
+        assert (_first_s(course, Cause.WRONG_FEED) <= within_s) is (sign < 0.0)
+        assert course[-1].feeds is (sign > 0.0)
 
 
 def test_what_was_commanded_before_the_program_is_no_motion_against_it() -> None:
@@ -338,9 +386,9 @@ def test_a_pose_that_flickers_moves_the_head_by_little_more_than_what_was_comman
     monitor = DirectionMonitor()
     for k in range(7):
         monitor = monitor.drive(MotionSent(k * 0.1, 1.0 * k**2, 1.0 * k))
-    pose = monitor.observe(_head(0.5, 150.0)).observe(_head(0.6, -120.0, way_mm=4.0)).seen[-1]
-    assert pose.step == pytest.approx((90.0, 90.0, 4.0))
-    for way_mm, frames in ((4.5, 2), (5.5, 1), (-5.5, 1)):
+    pose = monitor.observe(_head(0.5, 150.0)).observe(_head(0.6, -120.0, way_mm=1.4)).seen[-1]
+    assert pose.step == pytest.approx((90.0, 90.0, 1.4))
+    for way_mm, frames in ((1.4, 2), (1.6, 1), (-1.4, 2), (-1.6, 1)):
         assert len(monitor.observe(_head(0.5)).observe(_head(0.6, way_mm=way_mm)).seen) == frames, "too far to be a way"
     assert pose.moved == pytest.approx((0.5 + 1.5 * (36.0 - 25.0), 0.5 + 1.5 * (36.0 - 25.0), 0.1 + 1.5 * (1.5 - 1.0)))
     assert (pose.ahead_deg, pose.ahead_mm) == pytest.approx((36.0 - 17.0, 1.5 - 0.85))

@@ -5,13 +5,15 @@ from dataclasses import replace
 import pytest
 
 from core.config.safety import SafetyConfig
+from core.control.camera_monitor import FrameReport
+from core.control.direction_monitor import HeadSeen, MotionSent
 from core.control.faults import Cause, Fault, Reaction, worst
 from core.control.gate import RejectReason
 from core.control.health import FORGOTTEN_S, Beat, Deadman, DeadmanReport, GateReport, Health, Part, ServoCheckReport, ServosBusy
 from tests.core.healthy import GOOD_BUS, SAFETY, SERVOS, TICK_S
 
 
-def _take(health: Health, *reports: Beat | GateReport, now_s: float = 0.0, armed: bool = True) -> Health:
+def _take(health: Health, *reports: Beat | GateReport | FrameReport | MotionSent, now_s: float = 0.0, armed: bool = True) -> Health:
     for report in reports:
         health = health.update(report, armed=armed, now_s=now_s, servos=SERVOS, safety=SAFETY)
     return health
@@ -71,6 +73,13 @@ def test_the_bus_may_be_silent_over_a_request_only_while_the_servos_are_off() ->
     for health, is_excused in ((heard, True), (on, False)):
         busy = health.update(ServosBusy(), armed=False, now_s=5.0, servos=SERVOS, safety=SAFETY)
         assert (Cause.BUS_DEAD not in _host_faults(busy, 5.0)) is is_excused
+
+
+def test_only_poses_that_are_sure_enough_show_the_direction() -> None:
+    health = _take(Health(), MotionSent(0.0, 0.0, 1.0))
+    head = HeadSeen(0.0, 0.0, 0.0, 80.0, (0.0, 0.0), (1.0, 0.0))
+    for confidence, seen in ((SAFETY.min_confidence - 0.01, 0), (SAFETY.min_confidence, 1)):
+        assert len(_take(health, FrameReport(1, 0.0, confidence=confidence, head=head)).direction.seen) == seen
 
 
 def _bus_goes_quiet(health: Health, ended: Fault | None) -> Health:

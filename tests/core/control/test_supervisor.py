@@ -288,12 +288,17 @@ REACTIONS = {
 }  # fmt: skip
 
 
+WRONG_WAYS = {Cause.WRONG_TURN, Cause.WRONG_FEED}  # of the program alone
+
+
 @pytest.mark.parametrize("cause", Cause)
 def test_the_reactions_are_those_of_the_fault_table(cause: Cause) -> None:
     assert cause.reaction is next((r for r, causes in REACTIONS.items() if cause in causes), Reaction.DISARM)
 
 
 def _after(before: Mode, cause: Cause) -> Mode:
+    if cause in WRONG_WAYS and before is not U:
+        return before
     match cause.reaction:
         case Reaction.HOLD:
             return H if before is U else before
@@ -312,11 +317,12 @@ def test_every_fault_in_every_mode(cause: Cause, before: Mode, benches: dict[Mod
     assert decision.mode is _after(before, cause)
     driving_only = cause in {Cause.DEADMAN, Cause.NO_TARGET}
     kept = cause.reaction is not Reaction.DISARM or before not in {R, U, H}
-    if cause in {Cause.COMMAND_REJECTED, Cause.COMMANDS_REJECTED, Cause.WRONG_TURN, Cause.WRONG_FEED}:
-        assert (cause in [fault.cause for fault in decision.active]) == (before in {R, U, H})
+    if cause in {Cause.COMMAND_REJECTED, Cause.COMMANDS_REJECTED, *WRONG_WAYS}:
+        judged = {U} if cause in WRONG_WAYS else {R, U, H}
+        assert (cause in [fault.cause for fault in decision.active]) == (before in judged)
     elif kept and not (driving_only and before not in {U, H}):
         assert cause in [fault.cause for fault in decision.active]
-    if cause.reaction >= Reaction.DISARM and before in {R, U, H}:
+    if cause.reaction >= Reaction.DISARM and before in {R, U, H} and (before is U or cause not in WRONG_WAYS):
         assert decision.latched.cause is cause
         assert decision.permitted is None or decision.permitted is Source.OPERATOR
     if cause.reaction < Reaction.DISARM and before is not S:
@@ -338,6 +344,22 @@ def test_every_fault_in_every_mode(cause: Cause, before: Mode, benches: dict[Mod
 
 def _refused(decision: Decision, act: Act) -> set[Hindrance | Cause]:
     return {reason for refused in decision.refused if refused.act is act for reason in refused.reasons}
+
+
+@pytest.mark.parametrize("ends", [Act.INPUT, Act.TAKE_BACK, DeadmanReport(False)])
+def test_what_moves_the_robot_when_the_program_does_not_drive_is_no_wrong_way(ends: Event) -> None:
+    """The program bends and feeds for two seconds; then the robot goes back, by hand or in a hold."""
+    bench, way = Bench().in_mode(U), 0.0
+    for k in range(round(5.0 / TICK_S)):
+        drives = k * TICK_S < 2.0
+        way += TICK_S if drives else -3.0 * TICK_S
+        head = HeadSeen(bench.now_s + 0.5 * TICK_S, 10.0 * way, 10.0 * way, 80.0 + 3.0 * way, (0.0, 0.0), (1.0, 0.0))
+        bench.frame = lambda report, head=head: replace(report, head=head)
+        bench.held = drives or not isinstance(ends, DeadmanReport)
+        bench.tick(MotionSent(bench.now_s + TICK_S, 10.0 * way, 3.0) if drives else ends)
+        assert not WRONG_WAYS & {fault.cause for fault in bench.state.active}
+    direction = bench.state.health.direction
+    assert (direction.turns, direction.feeds) == (True, True), "a hold that clears itself need not find out again"
 
 
 def test_the_program_boots_disarmed_and_nothing_may_move() -> None:
