@@ -209,19 +209,19 @@ def _robot_parts(strong: NDArray[np.float32], candidate: Mask, high: float) -> t
             peaks[label] = -peaks[label]  # taken
     clear = [-peak for peak in peaks.values() if peak < 0.0]
     least = max(high, _CLEAR_SHARE * float(np.median(clear))) if clear else high
-    added, hopped = result, None
-    while True:  # from one band of a banded robot to the next
-        x, y, width, height = cv2.boundingRect(added.view(np.uint8))
-        if not width:
-            return result, added if hopped is None else hopped
-        box = np.s_[max(0, y - _GAP_PX) : y + height + _GAP_PX, max(0, x - _GAP_PX) : x + width + _GAP_PX]
-        near = cv2.dilate(added[box].view(np.uint8), _square(2 * _GAP_PX + 1)) > 0
-        names = np.flatnonzero(np.bincount(labels[box][near], minlength=count)).tolist()
-        is_added = np.zeros(count, np.bool_)
-        is_added[[label for label in names if peaks.pop(label, 0.0) >= least]] = True
-        added = is_added[labels]
-        result = result | added
-        hopped = np.zeros_like(result) if hopped is None else hopped | added
+    hops, box, added = np.zeros(count, np.int32), np.s_[:, :], result
+    for hop in itertools.count(1):  # from one band of a banded robot to the next
+        near = cv2.dilate(added.view(np.uint8), _square(2 * _GAP_PX + 1)) > 0
+        beside = np.flatnonzero(np.bincount(labels[box][near], minlength=count)).tolist()
+        names = [label for label in beside if peaks.pop(label, 0.0) >= least]
+        if not names:
+            break
+        hops[names] = hop
+        (x, y), (right, bottom) = stats[names, :2].min(axis=0).tolist(), (stats[names, :2] + stats[names, 2:4]).max(axis=0).tolist()
+        box = np.s_[max(0, y - _GAP_PX) : bottom + _GAP_PX, max(0, x - _GAP_PX) : right + _GAP_PX]
+        added = (hops == hop)[labels[box]]
+    taken = hops[labels]
+    return result | (taken > 0), taken > 1
 
 
 def _with_ends(mask: Mask, strong: NDArray[np.float32], cut: NDArray[np.float32], high: float) -> Mask:
@@ -345,12 +345,12 @@ def _bridge(mask: Mask, gradient: NDArray[np.float32]) -> Mask:
         x, y, columns, rows = cv2.boundingRect(hull)
         place = np.s_[y : y + rows, x : x + columns]
         between = (cv2.fillConvexPoly(np.zeros((rows, columns), np.uint8), hull - (x, y), 1) > 0) & ~mask[place]
-        if not between.any() or np.quantile(gradient[place][between], 0.9) >= _BRIDGE_EDGE:
+        is_new = strand[first] != strand[second]
+        if not between.any() or (is_new and max(bridges[first], bridges[second]) > 1):
             continue
-        is_wider = strand[first] == strand[second] and bridge[place][between].mean() > _BRIDGED_SHARE
-        if is_wider or (strand[first] != strand[second] and max(bridges[first], bridges[second]) < 2):
+        if (is_new or bridge[place][between].mean() > _BRIDGED_SHARE) and np.quantile(gradient[place][between], 0.9) < _BRIDGE_EDGE:
             bridge[place] |= between
-            if not is_wider:
+            if is_new:
                 strand = [strand[first] if name == strand[second] else name for name in strand]
                 bridges[first], bridges[second] = bridges[first] + 1, bridges[second] + 1
     return bridge
