@@ -114,6 +114,16 @@ def evaluate(
         manual_sd_deg = (1.5 if manual_sd is None else manual_sd) if like_paper else None
         found = _perceive_set(labelled, truth, load_config(config, preset, choose_model(model)), manual_sd_deg, seed)
         found.source["preset"] = preset
+    metrics = _metrics(found, seed, csv)
+    if like_paper:
+        metrics["against_paper"] = against_paper(metrics)
+    _report(out, found, metrics, as_json)
+    if found.interrupted:
+        raise KeyboardInterrupt
+
+
+def _metrics(found: _Study, seed: int, csv: Path | None) -> dict[str, Any]:
+    """What metrics.json holds of a study; `csv` is the table that it was read from."""
     metrics: dict[str, Any] = {"source": found.source, "seed": seed, "program": program_id()}
     metrics |= evaluation.evaluate(found.rows, seed)
     if csv is not None and not metrics["angle"]["n"] and not metrics["state"]["n"]:
@@ -125,11 +135,7 @@ def evaluate(
     if found.agreement is not None:
         _insert_repeatability(metrics, found.agreement["within"])
         metrics["agreement"] = {key: value for key, value in found.agreement.items() if key != "measures"}
-    if like_paper:
-        metrics["against_paper"] = against_paper(metrics)
-    _report(out, found, metrics, as_json)
-    if found.interrupted:
-        raise KeyboardInterrupt
+    return metrics
 
 
 def _report(out: Path, found: _Study, metrics: dict[str, Any], as_json: bool) -> None:
