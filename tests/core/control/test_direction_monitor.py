@@ -306,7 +306,9 @@ def test_a_tail_that_jumps_hides_no_wrong_turn_and_makes_none(frames: int, once:
         assert (_first_s(_seen(_ramp(10.0), 1.0, head), Cause.WRONG_TURN) <= 0.8) is is_wrong
 
 
-@pytest.mark.parametrize(("feed", "noise_mm", "within_s"), [(1.0, 0.1, 1.3), (1.0, 0.4, 2.4), (3.0, 0.4, 1.1), (8.0, 0.4, 0.7)])
+@pytest.mark.parametrize(
+    ("feed", "noise_mm", "within_s"), [(1.0, 0.1, 1.3), (1.0, 0.4, 2.4), (3.0, 0.4, 1.1), (3.0, 0.8, 1.0), (8.0, 0.4, 0.7)]
+)
 def test_noise_of_the_length_is_no_way_and_hides_none_for_long(feed: float, noise_mm: float, within_s: float) -> None:
     for sign in (1.0, -1.0):
         rng = np.random.default_rng(5)

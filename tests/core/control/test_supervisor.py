@@ -396,6 +396,15 @@ def test_arming_needs_a_whole_second_of_healthy_camera_and_perception() -> None:
     assert _refused(early.tick(Act.ARM), Act.ARM) == {Hindrance.CAMERA_SETTLING, Hindrance.PERCEPTION_SETTLING}
 
 
+def test_an_unsure_pose_blanks_the_advice_before_it_is_a_fault(benches: dict[Mode, Bench]) -> None:
+    bench = benches[U].copy()
+    assert bench.tick().blanked is None
+    bench.bad_frame(confidence=0.49)
+    decision = bench.tick()
+    assert (decision.mode, decision.active) == (U, ())
+    assert decision.blanked == Fault(Cause.CONFIDENCE_LOW)
+
+
 @pytest.mark.parametrize("bad", [{"refusal": Reason.NO_ROBOT}, {"confidence": 0.49}])
 def test_one_bad_frame_starts_the_second_again_for_perception_only(bad: dict[str, Any], benches: dict[Mode, Bench]) -> None:
     bench = benches[V].copy()
