@@ -55,6 +55,7 @@ MISTRUST = "without a trusted measurement there is an objection already; it stan
 MOVING = "what moves has goals and a time; it stands there for the type checker"
 TIE = "differs only where two numbers are equal to the last bit, a billionth of a millimetre apart"
 MOMENT = "differs only at the very moment, to the last bit of the clock"
+NUMBER = "a number is as good as another"
 EXPLAINED = {
     ("gate", "if objection is not None or request is None or believed is None:", "without term 3"): MISTRUST,
     ("gate", "believed = tuple(measurement.positions_mm) if measurement is not None and mistrust is None else None",
@@ -96,7 +97,13 @@ EXPLAINED = {
     ("direction_monitor", "if before is None or not 0.0 <= motion.time_s - before.time_s <= _GAP_S:",
         "LtE -> Lt before _GAP_S"): MOMENT,
     ("direction_monitor", "is_next = 0.0 <= head.captured_s - last.captured_s <= _GAP_S", "LtE -> Lt before _GAP_S"): MOMENT,
-    ("direction_monitor", "run: int = 0", "0 -> 1"): "a number is as good as another",
+    ("direction_monitor", "run: int = 0", "0 -> 1"): NUMBER,
+    ("direction_monitor", "run += 1", "1 -> 2"): NUMBER,
+    ("direction_monitor", "step = _each(lambda by, limit: by if abs(by) <= limit else 0.0, step, (*most[:2], -math.inf))",
+        "LtE -> Lt"): TIE,
+    ("direction_monitor", "step = _each(lambda by, limit: by if abs(by) <= limit else 0.0, step, (*most[:2], -math.inf))",
+        "2 -> 3"):
+        "a jump is longer than what is followed from frame to frame",
     ("direction_monitor", "if abs(step[2]) > _JUMP_MM + fed_mm + _noise_mm(earlier):", "Gt -> GtE"): TIE,
     ("direction_monitor", "if head.captured_s - before.head.captured_s < _JUMP_S:", "Lt -> LtE"): MOMENT,
     ("direction_monitor", "return replace(self, sent=(*(one for one in self.sent if one.time_s >= motion.time_s - _KEPT_S), now))",

@@ -262,7 +262,8 @@ def _next(earlier: tuple[_Seen, ...], head: HeadSeen, sent: tuple[_Sent, ...]) -
     if abs(step[2]) > _JUMP_MM + fed_mm + _noise_mm(earlier):
         if head.captured_s - before.head.captured_s < _JUMP_S:
             return None
-        step, run = _each(lambda way, limit: way if abs(way) <= limit else 0.0, step, (most[0], most[1], 0.0)), run + 1
+        step = _each(lambda by, limit: by if abs(by) <= limit else 0.0, step, (*most[:2], -math.inf))
+        run += 1
     raw = _each(add, before.raw, step)
     by = _each(lambda way, limit: max(-limit, min(limit, way)), _each(sub, raw, before.moved), most)
     return _Seen(head, sent, raw, _each(add, before.moved, by), step, _each(lambda a, b: abs(a - b), step, before.step), run)
