@@ -99,7 +99,7 @@ FAULTS = {
         "a warning, then DISARM before the servo shuts itself down", quick=False),
     25: FaultText("tracking error, jam, slack wire",
         "the advance servo's horn is blocked while the program feeds; is pulled back; drifts while nobody drives",
-        "STOP after 200 ms beyond the envelope", quick=False),
+        "STOP: 200 ms off its way, or by current", quick=False),
     26: FaultText("USB serial vanishes", "the pseudo-terminal is closed, and comes back two seconds later",
         "STOP; opened again and checked by itself, never armed by itself", quick=False),
     27: FaultText("servo rebooted", "a servo loses its power for a moment: RAM and turn count are gone",

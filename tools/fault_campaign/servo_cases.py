@@ -65,6 +65,15 @@ def _run(kit: Kit, inject: Callable[[FaultBench], list[str]], expected: Expected
         return judge(bench, expected, *inject(bench))
 
 
+def _held(kit: Kit, inject: Callable[[FaultBench], list[str]]) -> Observation:
+    """A servo that is held stops all by its way or by its current, whichever limit comes first."""
+    with open_bench(kit, live=True) as bench:
+        bench.hand_over().mark()
+        problems = inject(bench)
+        cause = Cause.STRAINED if bench.latched is Cause.STRAINED else Cause.TRACKING
+        return judge(bench, _expect(_STOP, cause), *problems)
+
+
 servo_fault = partial(bench_fault, live=True)
 
 
@@ -153,9 +162,7 @@ def jam(kit: Kit) -> Observation:
             problems = pull(bench, _CARRIED_TICKS_S / 4)
             return judge(bench, ExpectedReaction(_STOP, (Cause.TRACKING,), Cause.TRACKING), *problems)
 
-    expected = _expect(_STOP, Cause.TRACKING)
-    jammed, pulled = partial(_run, inject=block, expected=expected), partial(_run, inject=pull, expected=expected)
-    return run_parts(kit, ("jam", jammed), ("pulled", pulled), ("drift", drift))
+    return run_parts(kit, ("jam", partial(_held, inject=block)), ("pulled", partial(_held, inject=pull)), ("drift", drift))
 
 
 @servo_fault(44, _expect(_STOP, Cause.STRAINED))
