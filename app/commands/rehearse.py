@@ -102,7 +102,7 @@ def rehearse(
         "size_px": picture.view.size,
         "sharp": [turn.model_dump(mode="json") for turn in sharp],
         "speed_mm_s": config.advice.fast_mm_s,
-        "assumed": {
+        "based_on": {
             "pictures": len(seen.confidence),
             "missing": round(seen.missing, 4),
             "robot": "identified" if config.twin.behaviour else "twin",

@@ -88,7 +88,7 @@ class RehearsalCard(QFrame):
         """`is_real`: the bench has a robot of its own."""
         title = tr("{share:.0f} % of {runs} runs arrived", share=100 * result.arrived.share, runs=result.runs)
         self._show("", title, result)
-        if is_real and result.assumed.get("robot") != "identified":
+        if is_real and result.based_on.get("robot") != "identified":
             note = tr("With the nominal robot: rig identify measures yours")
             self._detail.setText(f"{self._detail.text()}\n{note}")
         said, colour = advice_of(result)
@@ -137,7 +137,7 @@ def figures_of(result: RehearsalResult) -> str:
         parts.append(tr("{time:.0f} s (median)", time=time_s.median))
     if force.p95 is not None and force.max is not None:
         parts.append(tr("wall force {p95:.2f} N, {max:.2f} N at most", p95=force.p95, max=force.max))
-    missing = result.assumed.get("missing")
+    missing = result.based_on.get("missing")
     if isinstance(missing, float) and missing >= 0.005:
         parts.append(tr("no answer in {share:.0f} % of the pictures", share=100 * missing))
     words = ", ".join(parts)

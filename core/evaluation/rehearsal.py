@@ -102,7 +102,7 @@ class RehearsalResult(_Part):
     sharp: tuple[SharpBranch, ...] = ()
     speed_mm_s: float
     recommended_speed_mm_s: float | None = None
-    assumed: dict[str, float | str] = Field({}, description="pictures perceived, share without an answer, and whose robot")
+    based_on: dict[str, float | str] = Field({}, description="pictures perceived, share without an answer, and whose robot")
 
 
 def rehearsal_of(event: Event) -> RehearsalResult | None:

@@ -1,8 +1,9 @@
 """Rehearsal: many runs to one target of a bench's own phantom, with other friction, stiffness, start and play in each.
 
 Before the runs, the robot is perceived in the twin's pictures all along the way. A run then paints nothing, which takes a tenth of
-the time: it perceives the truth with the errors, or without an answer, as in the picture whose head was nearest. The geometry alone
-tells which branches on the way turn off more sharply than the head bends.
+the time: it perceives the truth with the errors, or without an answer, as in a picture whose head was nearest. Where one was not
+sure, more are taken, since only another noise may move a head on that rests there. The geometry alone tells which branches on the
+way turn off more sharply than the head bends.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ WANDERS = (0.0, 0.4, 0.8)
 """How far the robot sways on the ways on which it is perceived in pictures (``RouteFollower``)."""
 _PICTURE_S, _PICTURE_MM_S = 0.1, 10.0
 """Time between the pictures, and speed."""
+_LOOKS = 5
+"""At one place, until perception is sure."""
 _LINE_PX = 40.0
 """Length of the robot's end over which an error of the head fades out."""
 _HEADING_PX = 10.0
@@ -70,7 +73,7 @@ class SeenHeads:
 
     Attributes
     ----------
-    heads_mm : true heads (N, 2), on the board.
+    heads_mm : true heads (N, 2), on the board; several pictures may have the same.
     errors_mm : of the perceived ones, along the robot and to its right (N, 2); NaN: no answer.
     confidence : (N,).
     """
@@ -85,8 +88,9 @@ class SeenHeads:
 
     @property
     def missing(self) -> float:
-        """Share of the pictures without an answer."""
-        return float(np.isnan(self.errors_mm[:, 0]).mean())
+        """Share of the pictures without an answer, mean over the places."""
+        place = np.unique(self.heads_mm, axis=0, return_inverse=True)[1].ravel()
+        return float((np.bincount(place, np.isnan(self.errors_mm[:, 0])) / np.bincount(place)).mean())
 
 
 def seen_heads(config: Config, target: Target, wander: float) -> SeenHeads:
@@ -103,7 +107,7 @@ def seen_heads(config: Config, target: Target, wander: float) -> SeenHeads:
     follower = RouteFollower(world.phantom, target.node, wander=wander)
     first_mm = max(5.0, start_mm(world.phantom, target) - START_MM)
     world.insert(first_mm, target=target.node)
-    heads, errors, confidence = [], [], []
+    heads, errors, confidence, looks = [], [], [], 0
     for _ in range(round(1.2 * (target.at_mm - first_mm) / (_PICTURE_S * _PICTURE_MM_S))):
         for _ in range(_COMMANDS):
             dt_s = _PICTURE_S / _COMMANDS
@@ -113,14 +117,19 @@ def seen_heads(config: Config, target: Target, wander: float) -> SeenHeads:
         path = visible_path(with_caps(robot, world.appearance.robot_radius_mm), view, scale)
         if path is None:
             continue
-        scene, head_mm = pipeline(world.frame(), (x, y)), world.physics.head_mm
-        error = np.full(2, np.nan)
-        if scene.pose is not None and scene.path is not None and scene.route is not None:
-            px_per_mm = view.pixels_per_mm(head_mm) * scale
-            error = _in_frame(heading(path, _HEADING_PX)) @ np.subtract(scene.path.head, path[-1]) / px_per_mm
-        heads.append(head_mm)
-        errors.append(error)
-        confidence.append(scene.pose.confidence if scene.pose is not None else 0.0)
+        head_mm, ahead = world.physics.head_mm, _in_frame(heading(path, _HEADING_PX))
+        px_per_mm = view.pixels_per_mm(head_mm) * scale
+        for _ in range(_LOOKS):
+            looks += 1  # each at a later time, though the robot rests
+            scene = pipeline(world.frame(world.physics.time_s + looks / config.twin.frames_per_second), (x, y))
+            error = np.full(2, np.nan)
+            if scene.pose is not None and scene.path is not None and scene.route is not None:
+                error = ahead @ np.subtract(scene.path.head, path[-1]) / px_per_mm
+            heads.append(head_mm)
+            errors.append(error)
+            confidence.append(scene.pose.confidence if scene.pose is not None else 0.0)
+            if not np.isnan(error[0]) and confidence[-1] >= config.safety.min_confidence:
+                break
         if math.dist(head_mm, target.point_mm) < _STEP_MM:
             break
     if not heads:
@@ -140,10 +149,10 @@ def _in_frame(ahead: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class RehearsalPlan:
-    """``trial`` has phantom and target; ``seen`` is how perception does on the way, None: without errors; ``speed`` is a share."""
+    """``trial`` has phantom and target; ``seen`` is how perception does on the way; ``speed`` is a share."""
 
     trial: TrialPlan
-    seen: SeenHeads | None = None
+    seen: SeenHeads
     speed: float = 1.0
 
 
@@ -166,7 +175,7 @@ class Rehearsal(Trial):
         trial = replace(plan.trial, config=config)
         super().__init__(trial, seed, trial.config.policy.name, None, drive=drive)
         self._start_mm = max(5.0, self._start_mm + float(rng.uniform(-START_MM, START_MM)))
-        self._eye = plan
+        self._eye, self._rng = plan, rng
         view = self._world.view
         self._scale = trial.config.perception.working_size_px / max(view.size)
         self._graph = true_graph(self._world.phantom, view, self._scale)
@@ -189,10 +198,9 @@ class Rehearsal(Trial):
         radius_mm, head_mm = world.appearance.robot_radius_mm, world.physics.head_mm
         px_per_mm = world.view.pixels_per_mm(head_mm) * self._scale
         path = visible_path(with_caps(world.physics.robot_points_mm(), radius_mm), world.view, self._scale)
-        error_mm, confidence, self._error_px = np.zeros(2), 1.0, None
-        if seen is not None:
-            picture = int(np.argmin(np.linalg.norm(seen.heads_mm - head_mm, axis=1)))  # so a head that rests sees the same again
-            error_mm, confidence = seen.errors_mm[picture], float(seen.confidence[picture])
+        away = np.linalg.norm(seen.heads_mm - head_mm, axis=1)
+        picture = int(self._rng.choice(np.flatnonzero(away == away.min())))
+        error_mm, confidence, self._error_px = seen.errors_mm[picture], float(seen.confidence[picture]), None
         if path is None or np.isnan(error_mm[0]):
             return replace(scene, refusal=Refusal(Reason.LOW_CONFIDENCE))
         self._error_px = float(np.hypot(*error_mm)) * px_per_mm

@@ -77,7 +77,7 @@ def test_a_good_way_is_told_with_its_band(rehearse: Callable[..., list[dict[str,
     assert found.way.runs == (20, 20) and found.way.wall_force_n == (0.0, 0.1) and found.way.time_s[1] == (3.0, 3.0, 3.0)
     assert found.way_per_feed == pytest.approx((0.9095, 0.995, 1.0805))
     assert found.target_xy == pytest.approx((430, 400), abs=12) and found.size_px == (640, 480)
-    assert found.assumed == {"pictures": 4, "missing": 0.25, "robot": "twin"}
+    assert found.based_on == {"pictures": 4, "missing": 0.25, "robot": "twin"}
 
 
 def test_pictures_of_several_ways_are_perceived_by_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:

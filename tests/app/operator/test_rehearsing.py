@@ -45,7 +45,7 @@ FOUND: dict[str, Any] = {
     "sharp": [{"xy": [200.0, 180.0], "turn_deg": 74.0, "limit_deg": 61.0}],
     "speed_mm_s": 8.0,
     "recommended_speed_mm_s": 5.6,
-    "assumed": {"pictures": 240, "missing": 0.05, "robot": "twin"},
+    "based_on": {"pictures": 240, "missing": 0.05, "robot": "twin"},
 }
 WAITS = "sleep 60"
 TARGET: Point = (300.0, 200.0)
@@ -210,7 +210,7 @@ def test_the_card_says_whose_robot_it_was_and_what_to_do(make: MakeController) -
         assert advice_of(result.model_copy(update={"runs": runs, "recommended_speed_mm_s": None}))[0].startswith(advice)
     card.show_result(result, is_real=True)
     assert "With the nominal robot: rig identify measures yours" in card.text
-    card.show_result(result.model_copy(update={"assumed": {"robot": "identified"}}), is_real=True)
+    card.show_result(result.model_copy(update={"based_on": {"robot": "identified"}}), is_real=True)
     assert "rig identify" not in card.text and "no answer" not in card.text
 
 

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from core.config.models import Config, PursuitConfig
-from hardware.twin.rehearsal import RehearsalPlan
+from hardware.twin.rehearsal import RehearsalPlan, SeenHeads
 from hardware.twin.trial import TrialPlan
 from hardware.twin.tuning import CALM, SEARCH_RUNS, SEARCH_SEEDS, SETTINGS, Task, candidates, compared, rank, search
+
+NOTHING = SeenHeads(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0))
 
 
 def row(seed: int, *, reached: bool = True, time_s: float = 10.0, force_n: float = 0.1) -> dict[str, Any]:
@@ -53,11 +55,11 @@ def test_the_search_keeps_to_its_runs_and_all_candidates_get_the_same_seeds() ->
             seen.append(task)
             yield task[0], row(task[2], time_s=10.0 + abs(task[1]["gain"] - 1.5))
 
-    found = search(RehearsalPlan(TrialPlan(Config())), 100, spread)
+    found = search(RehearsalPlan(TrialPlan(Config()), NOTHING), 100, spread)
     assert len(seen) == SEARCH_RUNS and {task[2] for task in seen} == set(range(100, 100 + SEARCH_SEEDS))
     assert {task[2] for task in seen if task[0] == 0} == {task[2] for task in seen}  # the configured ones stay in
     assert found == min((task[1] for task in seen), key=lambda one: abs(one["gain"] - 1.5))
-    alike = search(RehearsalPlan(TrialPlan(Config())), 100, lambda _, tasks: ((task[0], row(task[2])) for task in tasks))
+    alike = search(RehearsalPlan(TrialPlan(Config()), NOTHING), 100, lambda _, tasks: ((task[0], row(task[2])) for task in tasks))
     assert alike == {name: getattr(PursuitConfig(), name) for name in SETTINGS}
 
 
