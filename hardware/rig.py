@@ -138,12 +138,7 @@ def _open_live(config: Config, zero: ZeroConfig | None) -> Rig:
             from hardware.servos.servo_robot import ServoRobot
 
             robot = ServoRobot(
-                config.servos,
-                config.safety,
-                name=rig.name,
-                keep=kept_zeros_file(rig),
-                searched=zero,
-                backups=backups_folder(),
+                config.servos, config.safety, name=rig.name, keep=kept_zeros_file(rig), searched=zero, backups=backups_folder()
             )
             robot.connect()
         undo.pop_all()

@@ -153,10 +153,7 @@ class OwnFrames:
 
 
 def split_own_frames(
-    annotations: Sequence[StoredAnnotation],
-    images: Sequence[FoundImage],
-    out: Path,
-    go_on: Callable[[], bool] = lambda: True,
+    annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage], out: Path, go_on: Callable[[], bool] = lambda: True
 ) -> OwnFrames:
     """Write a set to train on and one to judge by below `out`: a fifth of the images, two at least, is held out.
 

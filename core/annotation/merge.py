@@ -350,11 +350,7 @@ def _readable(source: sqlite3.Connection, table: str, problems: list[str]) -> tu
     return names, rows
 
 
-_INDEXED = {
-    "images": ("sha256",),
-    "annotations": ("image_id", "study", "rater", "repeat"),
-    "journal": ("annotation_id", "number"),
-}
+_INDEXED = {"images": ("sha256",), "annotations": ("image_id", "study", "rater", "repeat"), "journal": ("annotation_id", "number")}
 
 
 def _astray(source: sqlite3.Connection, table: str) -> set[int]:

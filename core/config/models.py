@@ -295,10 +295,7 @@ class QualityConfig(ConfigSection):
     min_confidence: Share = Field(0.3, description="an answer with less confidence is not given")
     confident_from: Share = Field(0.5, description="an answer with less confidence is shown as unsure")
     max_novelty: float = Field(
-        1.25,
-        gt=0.0,
-        le=1000.0,
-        description="distance from the pictures that the model knows; 1: hardly any of them is farther",
+        1.25, gt=0.0, le=1000.0, description="distance from the pictures that the model knows; 1: hardly any of them is farther"
     )
     several_robots_share: Share = Field(0.5, description="a second robot this large against the first one")
 
@@ -310,11 +307,7 @@ class TrackingConfig(ConfigSection):
     max_head_speed_px_s: float = Field(600.0, gt=0.0, le=100_000.0, description="a head that jumps faster is not believed")
     memory_s: float = Field(0.5, ge=0.0, le=10.0, description="older frames tell at most which end is the head")
     window_px: int = Field(
-        256,
-        ge=0,
-        le=4096,
-        multiple_of=32,
-        description="side of what is looked at anew between two whole looks; 0 = always all",
+        256, ge=0, le=4096, multiple_of=32, description="side of what is looked at anew between two whole looks; 0 = always all"
     )
     refresh_s: float = Field(
         1.5, ge=0.0, le=60.0, description="longest time between two whole looks, the last four of which tell the vessel"

@@ -184,10 +184,7 @@ def _handle_requests(
     refused = []
     if Act.INPUT in acts:
         state = replace(state, input_s=now_s)
-    for act, against, mode in (
-        (Act.ARM, _against_arming, Mode.ARMED),
-        (Act.HAND_OVER, _against_hand_over, Mode.AUTONOMOUS),
-    ):
+    for act, against, mode in ((Act.ARM, _against_arming, Mode.ARMED), (Act.HAND_OVER, _against_hand_over, Mode.AUTONOMOUS)):
         if act in acts:
             if reasons := against(state, now_s, safety):
                 refused.append(RequestRefused(act, reasons))

@@ -236,9 +236,7 @@ _PER_LOOK = (
 
 
 def summarise_looks(
-    scores: Sequence[FrameScore],
-    looks: Mapping[str, str],
-    confident_from: float = _CONFIDENT_FROM,
+    scores: Sequence[FrameScore], looks: Mapping[str, str], confident_from: float = _CONFIDENT_FROM
 ) -> dict[str, Any]:
     """The main figures of every family of looks, errors as medians, and their means over the looks.
 

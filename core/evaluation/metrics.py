@@ -91,10 +91,7 @@ def too_few_words(what: str, groups: int) -> str:
 
 
 def bootstrap_rows(
-    statistics: Callable[..., Mapping[str, Floats]],
-    columns: tuple[Floats, ...],
-    seed: int,
-    group: Group = None,
+    statistics: Callable[..., Mapping[str, Floats]], columns: tuple[Floats, ...], seed: int, group: Group = None
 ) -> dict[str, list[float] | None]:
     """95 % intervals of statistics of rows.
 
@@ -222,11 +219,7 @@ def _repeat_statistics(first_deg: Floats, second_deg: Floats, spread: Floats) ->
     difference = second_deg - first_deg
     mean = difference.mean(-1)
     sd = np.sqrt(((difference / spread) ** 2).mean(-1)) if difference.shape[-1] > 1 else np.full(mean.shape, np.nan)
-    return {
-        "mean_difference_deg": mean,
-        "repeatability_sd_deg": sd,
-        "icc": icc_absolute(np.stack([first_deg, second_deg], -1)),
-    }
+    return {"mean_difference_deg": mean, "repeatability_sd_deg": sd, "icc": icc_absolute(np.stack([first_deg, second_deg], -1))}
 
 
 def within_subject(measures: Sequence[Sequence[Sequence[float]]], seed: int = 0, group: Group = None) -> dict[str, Any]:

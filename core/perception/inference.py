@@ -18,16 +18,7 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
 from core.config.models import SegmentationConfig
-from core.perception.model_file import (
-    INFO,
-    ONNX,
-    ONNX_INT8,
-    ModelError,
-    check_files,
-    model_folder,
-    read_model_info,
-    second_look_of,
-)
+from core.perception.model_file import INFO, ONNX, ONNX_INT8, ModelError, check_files, model_folder, read_model_info, second_look_of
 from core.perception.out_of_distribution import signature_of
 from core.perception.segmentation import Probability, Segmentation, Segmenter
 from core.program import import_problem
@@ -185,11 +176,7 @@ class OpenVinoSegmenter(Segmenter):
 
     def _compile(self, size: tuple[int, ...], robot_alone: bool) -> Any:
         # Where a processor can, OpenVINO computes fp32 networks with 16 bits; the answers are to be the same everywhere.
-        options = {
-            "PERFORMANCE_HINT": "LATENCY",
-            "INFERENCE_NUM_THREADS": self._threads,
-            "INFERENCE_PRECISION_HINT": "f32",
-        }
+        options = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self._threads, "INFERENCE_PRECISION_HINT": "f32"}
         model = (self._robot_model if robot_alone else self._model).clone()
         try:
             model.reshape([*size, self.info.planes])

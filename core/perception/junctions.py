@@ -64,14 +64,7 @@ def gate_of(arm: Arm, along: NDArray[np.float64], at_least_px: float, *, wider: 
     `along` is its arc length (N,); the gate lies at least `at_least_px` along it; `wider` scales the opening.
     """
     found, x, y, across, down, position_px, radius_px = compiled.find_gate(
-        arm.points,
-        arm.radius,
-        arm.half_width,
-        along,
-        wider * arm.opening_px,
-        at_least_px,
-        arm.far_is_junction,
-        STEP_PX,
+        arm.points, arm.radius, arm.half_width, along, wider * arm.opening_px, at_least_px, arm.far_is_junction, STEP_PX
     )
     return Gate((x, y), (across, down), position_px, radius_px) if found else None
 
@@ -293,11 +286,7 @@ def _mark(index: int, trunk: Trunk, bridges: dict[int, tuple[int, Points]]) -> i
 
 
 def _assembled(
-    arms: list[Arm],
-    along: list[NDArray[np.float64]],
-    gates: dict[int, Gate],
-    trunk: Trunk,
-    bridges: dict[int, tuple[int, Points]],
+    arms: list[Arm], along: list[NDArray[np.float64]], gates: dict[int, Gate], trunk: Trunk, bridges: dict[int, tuple[int, Points]]
 ) -> Rebuilt:
     for index in range(len(arms)):
         if index not in gates:  # too short to have a gate

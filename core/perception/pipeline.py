@@ -462,13 +462,7 @@ class Pipeline:
             if robot is None or refusal is not None:
                 return refusal or Refusal(Reason.TOO_SHORT, "it has no direction")
             centerline = find_centerline(
-                graph,
-                structures.skeletons.vessel,
-                path.head,
-                robot.direction,
-                config.vectors,
-                run.scene.route,
-                masks.vessel,
+                graph, structures.skeletons.vessel, path.head, robot.direction, config.vectors, run.scene.route, masks.vessel
             )
             vessel = fit_vessel_vector(centerline, config.vectors.line_fit) if centerline is not None else None
             run.add(centerline=centerline, vessel_vector=vessel)

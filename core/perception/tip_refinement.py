@@ -124,12 +124,7 @@ class TipRefinement(Segmenter):
 
 
 def refine_tips(
-    image: Image,
-    seen: tuple[Probability, Probability],
-    near: Segmenter,
-    shift_px: Point = (0.0, 0.0),
-    *,
-    robot_alone: bool = False,
+    image: Image, seen: tuple[Probability, Probability], near: Segmenter, shift_px: Point = (0.0, 0.0), *, robot_alone: bool = False
 ) -> tuple[Probability, Probability]:
     """Probabilities of vessel and robot, refined at the robot's ends in the probabilities `seen`.
 

@@ -270,14 +270,7 @@ class SessionFiles:
     """
 
     def __init__(
-        self,
-        parent: Path,
-        about: About,
-        config: RecordConfig,
-        *,
-        first_s: float,
-        now_s: float,
-        origin: Origin = "recorded",
+        self, parent: Path, about: About, config: RecordConfig, *, first_s: float, now_s: float, origin: Origin = "recorded"
     ) -> None:
         self._split_s = config.split_s
         self.started_s = first_s

@@ -170,12 +170,7 @@ class FoxgloveServer:
         self._messages = FoxgloveMessages(self._context, video=False)
         try:
             self._server = start_server(
-                name="LumenPilot",
-                host=_HOST,
-                port=port,
-                capabilities=[],
-                context=self._context,
-                message_backlog_size=_BACKLOG,
+                name="LumenPilot", host=_HOST, port=port, capabilities=[], context=self._context, message_backlog_size=_BACKLOG
             )
         except RuntimeError as error:
             raise UserError(f"port {port}: the stream cannot be opened ({error})") from None

@@ -123,10 +123,7 @@ class Sketch:
 
 
 def smooth_channel(
-    waypoints: Points,
-    radii: NDArray[np.float64],
-    first: NDArray[np.float64] | None = None,
-    last: NDArray[np.float64] | None = None,
+    waypoints: Points, radii: NDArray[np.float64], first: NDArray[np.float64] | None = None, last: NDArray[np.float64] | None = None
 ) -> Channel:
     """A cubic spline through `waypoints` at even spacing, `radii` interpolated without overshoot.
 

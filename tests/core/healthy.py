@@ -16,11 +16,7 @@ SERVOS, SAFETY = ServosConfig(), SafetyConfig()
 TICK_S = 0.03125  # a power of two: sums are exact
 
 GOOD_BUS = BusReport(
-    misses=(0,) * 7,
-    hardware_errors=(0,) * 7,
-    temperatures_c=(40.0,) * 7,
-    voltages_v=(12.0,) * 7,
-    tracking_mm=(0.1,) * 7,
+    misses=(0,) * 7, hardware_errors=(0,) * 7, temperatures_c=(40.0,) * 7, voltages_v=(12.0,) * 7, tracking_mm=(0.1,) * 7
 )
 
 

@@ -21,13 +21,7 @@ from hardware.rig import RigKind, find_devices, open_rig, with_camera, with_port
 from hardware.servos.registers import ServoState
 from hardware.servos.servo_robot import ServoRobot
 from hardware.twin.servos.bus import SoftServoBus
-from tests.hardware.soft_cameras import (
-    CONFIG,
-    HEIGHT,
-    WIDTH,
-    SoftRealSense,
-    take_frames,
-)
+from tests.hardware.soft_cameras import CONFIG, HEIGHT, WIDTH, SoftRealSense, take_frames
 
 LENS = LensConfig(k1=-0.12, center_px=(319.5, 239.5), size_px=(640, 480), residual_px=0.1, pictures=3)
 

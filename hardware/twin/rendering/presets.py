@@ -143,10 +143,7 @@ _ROBOT_LOOKS: dict[str, Table] = {
     "ringed": {},
     "plain_dark": {},
     "white": {"robot_rgb": grey(0.82, 1.0, 0.03)},
-    "blue_gold": {
-        "robot_rgb": hue(0.6, 0.05, (0.55, 0.95), (0.3, 0.75)),
-        "tip_rgb": hue(0.12, 0.02, (0.45, 0.8), (0.65, 0.95)),
-    },
+    "blue_gold": {"robot_rgb": hue(0.6, 0.05, (0.55, 0.95), (0.3, 0.75)), "tip_rgb": hue(0.12, 0.02, (0.45, 0.8), (0.65, 0.95))},
     "metallic": {"robot_rgb": grey(0.4, 0.7, 0.03), "robot_gloss": uniform(0.5, 1.0)},
     "black_wire": {"robot_rgb": grey(0.0, 0.1, 0.01), "robot_radius_mm": uniform(0.5, 0.8), "tip_contrast": 1.0},
     "translucent": {"robot_rgb": grey(0.3, 0.85, 0.08), "robot_opacity": uniform(0.45, 0.75)},

@@ -11,13 +11,7 @@ import pytest
 
 from core.annotation.exchange import FEWEST, export_training_set, merged, split_own_frames
 from core.annotation.masks import fill
-from core.annotation.model import (
-    Annotation,
-    AnnotationError,
-    ImageView,
-    MaskPolygon,
-    MaskTarget,
-)
+from core.annotation.model import Annotation, AnnotationError, ImageView, MaskPolygon, MaskTarget
 from core.annotation.store import AnnotationStore, FoundImage, ImageRecord, ItemKey, StoredAnnotation, find_images
 from core.learning.dataset import UNMEASURED, find_labelled, find_samples, read_truth, write_png
 from core.types import PoseState

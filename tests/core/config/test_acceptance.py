@@ -113,10 +113,7 @@ def _servos(**changes: Any) -> Config:
         (_servos(max_pull_mm=2.5), "max_pull_mm was 2 and is 2.5"),
         (_servos(torque_off_on_stop=True), "torque_off_on_stop was False and is True"),
         (_servos(port="/dev/serial/by-id/other"), "adapter was /dev/serial/by-id/u2d2 and is /dev/serial/by-id/other"),
-        (
-            CONFIG.model_copy(update={"rig": CONFIG.rig.model_copy(update={"name": "b"})}),
-            f"rig was {CONFIG.rig.name} and is b",
-        ),
+        (CONFIG.model_copy(update={"rig": CONFIG.rig.model_copy(update={"name": "b"})}), f"rig was {CONFIG.rig.name} and is b"),
         (
             CONFIG.model_copy(update={"safety": CONFIG.safety.model_copy(update={"deadman_timeout_s": 0.06})}),
             "deadman_timeout_s was 0.08 and is 0.06",

@@ -50,10 +50,7 @@ def test_a_users_file_wins_over_the_preset_and_keeps_the_rest(tmp_path: Path) ->
             ["servos: ", "heartbeat_timeout_s must be 0.5 at most with real servos"],
         ),
         ("[servos]\nport = '/dev/ttyUSB0'\nwatchdog_s = 2.0\n", ["watchdog_s must be 0.5 at most with real servos"]),
-        (
-            "[servos]\nport = '/dev/ttyUSB0'\nbus_hz = 5.0\nwatchdog_s = 0.4\n",
-            ["bus_hz must be 20 at least with real servos"],
-        ),
+        ("[servos]\nport = '/dev/ttyUSB0'\nbus_hz = 5.0\nwatchdog_s = 0.4\n", ["bus_hz must be 20 at least with real servos"]),
         ("perception = 3\n", ["perception"]),
         ("[[servos.joints]]\nname = 'right'\nid = 999\n", ["servos.joints.0.id: must be >= 0 and <= 252, got 999"]),
         ("[perception.pose]\nd_allow_px = true", ["d_allow_px: must be ", "got True"]),

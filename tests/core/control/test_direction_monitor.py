@@ -9,14 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.control.direction_monitor import (
-    FIRST_WRONG_FEED_MM,
-    WRONG_TURN_DEG,
-    DirectionMonitor,
-    HeadSeen,
-    MotionSent,
-    head_seen,
-)
+from core.control.direction_monitor import FIRST_WRONG_FEED_MM, WRONG_TURN_DEG, DirectionMonitor, HeadSeen, MotionSent, head_seen
 from core.control.faults import Cause
 from tests.core.driving_scenes import STRAIGHT, scene_at
 
@@ -54,10 +47,7 @@ def _seen(
 
 
 def _course(
-    robot: Robot,
-    bend_deg: Callable[[float], float],
-    feed_mm_s: Callable[[float], float] = lambda _: 0.0,
-    seconds: float = 3.0,
+    robot: Robot, bend_deg: Callable[[float], float], feed_mm_s: Callable[[float], float] = lambda _: 0.0, seconds: float = 3.0
 ) -> list[DirectionMonitor]:
     """The monitor after each frame."""
     rng, monitor, found = np.random.default_rng(3), DirectionMonitor(), []

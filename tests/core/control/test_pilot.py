@@ -772,8 +772,7 @@ def _spoilt(points: Points, value: float) -> Points:
 
 @pytest.mark.parametrize("value", [math.nan, -math.inf])
 @pytest.mark.parametrize(
-    "part",
-    ["path", "path radius", "bridged", "piece", "nearest", "radius", "ambiguity", "route", "length", "target", "theta"],
+    "part", ["path", "path radius", "bridged", "piece", "nearest", "radius", "ambiguity", "route", "length", "target", "theta"]
 )
 def test_any_number_that_is_none_holds_and_the_policy_is_not_asked(bench: Bench, part: str, value: float) -> None:
     def spoil(scene: Scene) -> Scene:
@@ -895,10 +894,7 @@ def _at_low(bench: Bench, **feeds_mm: float) -> None:
 
 @pytest.mark.parametrize(
     ("jog", "feed", "retracted"),
-    [
-        (Jog(advance=-1.0, delivery=-0.4), "advance", Retracted.ROBOT),
-        (Jog(delivery=-0.4), "delivery_2", Retracted.CATHETER),
-    ],
+    [(Jog(advance=-1.0, delivery=-0.4), "advance", Retracted.ROBOT), (Jog(delivery=-0.4), "delivery_2", Retracted.CATHETER)],
 )
 def test_the_operator_lets_go_at_the_end_and_pulls_again_to_go_beyond_it(
     bench: Bench, jog: Jog, feed: str, retracted: Retracted

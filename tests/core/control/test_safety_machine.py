@@ -353,8 +353,7 @@ HARMLESS = {
 def test_nothing_unsafe_ever_leaves_whatever_happens() -> None:
     SEEN.clear()
     run_state_machine_as_test(
-        Drive,
-        settings=settings(max_examples=100, stateful_step_count=50, suppress_health_check=list(HealthCheck)),
+        Drive, settings=settings(max_examples=100, stateful_step_count=50, suppress_health_check=list(HealthCheck))
     )
     assert SEEN["ticks"] >= 10_000
     # the machine went everywhere; how often depends on what else is imported, because Hypothesis takes constants from there

@@ -417,8 +417,7 @@ def test_one_bad_frame_starts_the_second_again_for_perception_only(bad: dict[str
 
 
 @pytest.mark.parametrize(
-    ("cause", "hindrance"),
-    [(Cause.CAMERA_MOVED, Hindrance.CAMERA_SETTLING), (Cause.POOR_VIEW, Hindrance.PERCEPTION_SETTLING)],
+    ("cause", "hindrance"), [(Cause.CAMERA_MOVED, Hindrance.CAMERA_SETTLING), (Cause.POOR_VIEW, Hindrance.PERCEPTION_SETTLING)]
 )
 def test_a_fault_starts_the_second_again_for_its_area(cause: Cause, hindrance: Hindrance, benches: dict[Mode, Bench]) -> None:
     bench = benches[V].copy()
@@ -483,8 +482,7 @@ def test_a_hand_over_with_all_in_place_is_granted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("route", "reason"),
-    [(RouteState.NONE, Hindrance.NO_TARGET), (RouteState.BEHIND, Hindrance.TARGET_BEHIND)],
+    ("route", "reason"), [(RouteState.NONE, Hindrance.NO_TARGET), (RouteState.BEHIND, Hindrance.TARGET_BEHIND)]
 )
 def test_a_hand_over_needs_a_target_ahead(route: RouteState, reason: Hindrance) -> None:
     bench = _ready_to_hand_over()

@@ -92,10 +92,7 @@ def test_blank_means_not_measured(table) -> None:
         (f"{HEADER}\n{ROW}\nb,1,2,B,14,B\n{ROW}", "line 4: image 'a.png' is in line 2 already; give it one row"),
         (HEADER + ",state\n" + ROW + ",B", "'state' occurs 2 times"),
         (f"{HEADER}\n{ROW}\nb,1_0,12,B,14,B", "line 3: angle_1 is '1_0'; must be an angle in degrees"),
-        (
-            f"{HEADER},count_1,count_2\n{ROW},{'9' * 5000},1",
-            "line 2: count_1 is '99999999999999999999'; must be of",
-        ),
+        (f"{HEADER},count_1,count_2\n{ROW},{'9' * 5000},1", "line 2: count_1 is '99999999999999999999'; must be of"),
         (f"{HEADER}\n{ROW}\nb,ten,12,B,14,B", "line 3: angle_1 is 'ten'; must be an angle in degrees"),
         (f"{HEADER}\nb,1,nan,B,14,B", "line 2: angle_2 is 'nan'"),
         (f"{HEADER}\nb,1,2,B,inf,B", "algorithm_angle is 'inf'"),

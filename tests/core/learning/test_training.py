@@ -9,11 +9,7 @@ import pytest
 
 from core.learning import training
 from core.learning.augmentation import FrameCrops
-from core.learning.dataset import (
-    DatasetError,
-    find_samples,
-    write_mask,
-)
+from core.learning.dataset import DatasetError, find_samples, write_mask
 from core.learning.training import LoaderLost, TrainingProgress, computes_in_bf16, loss_of, orthogonalised, train
 from core.learning.training_plan import TrainingPlan
 from core.perception.unet import DualUNet, UNetShape

@@ -9,10 +9,7 @@ from core.types import Image, Mask
 SIZE = (320, 240)
 """Width and height."""
 _TRUNK = np.array([[-5, 120], [60, 118], [120, 122], [160, 120]], np.float64)
-_BRANCHES = (
-    np.array([[200, 95], [240, 70], [290, 50]], np.float64),
-    np.array([[200, 145], [240, 170], [290, 190]], np.float64),
-)
+_BRANCHES = (np.array([[200, 95], [240, 70], [290, 50]], np.float64), np.array([[200, 145], [240, 170], [290, 190]], np.float64))
 
 
 def _line(points: np.ndarray, width: int) -> Mask:

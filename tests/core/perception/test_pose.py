@@ -92,10 +92,7 @@ def test_the_room_to_another_state_by_hand(c_head: float, c_tail: float, theta: 
 
 
 @given(
-    c_head=st.floats(-19.0, 19.0),
-    c_tail=st.floats(-19.0, 19.0),
-    head_share=st.floats(-1.0, 1.0),
-    tail_share=st.floats(-1.0, 1.0),
+    c_head=st.floats(-19.0, 19.0), c_tail=st.floats(-19.0, 19.0), head_share=st.floats(-1.0, 1.0), tail_share=st.floats(-1.0, 1.0)
 )
 def test_within_the_room_the_state_stays(c_head: float, c_tail: float, head_share: float, tail_share: float) -> None:
     def theta(head: float, tail: float) -> float:

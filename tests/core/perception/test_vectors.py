@@ -79,11 +79,7 @@ def test_the_vessel_vector_runs_along_its_piece() -> None:
     assert vector.center == pytest.approx((30.0, 20.0))
 
 
-@given(
-    angle=st.floats(-np.pi, np.pi),
-    shift=st.tuples(st.floats(-500, 500), st.floats(-500, 500)),
-    bend=st.floats(-0.01, 0.01),
-)
+@given(angle=st.floats(-np.pi, np.pi), shift=st.tuples(st.floats(-500, 500), st.floats(-500, 500)), bend=st.floats(-0.01, 0.01))
 def test_the_fit_turns_and_moves_with_the_path(angle: float, shift: tuple[float, float], bend: float) -> None:
     along = np.arange(45.0)
     path = np.column_stack([along, bend * along**2])

@@ -355,17 +355,11 @@ def losses(session: Path) -> list[tuple[str, int, float]]:
 @pytest.mark.parametrize(
     ("lost", "reported"),
     [
-        pytest.param(
-            [4, 4, 5, 5, 6] + [6] * 17 + [9] * 5,
-            [("2 frames", 6, 1.0), ("3 frames", 9, 2.2)],
-            id="once a second",
-        ),
+        pytest.param([4, 4, 5, 5, 6] + [6] * 17 + [9] * 5, [("2 frames", 6, 1.0), ("3 frames", 9, 2.2)], id="once a second"),
         pytest.param([50] * 3 + [0] * 12 + [2] * 12, [("2 frames", 2, 1.5)], id="counts from 0 again"),
         pytest.param([0] * 12 + [1, 4, 4, 9], [("1 frames", 1, 1.2), ("8 frames", 9, 1.5)], id="the rest at the end"),
         pytest.param(
-            [0] * 12 + [1, 4, 4, 0, 0, 2],
-            [("1 frames", 1, 1.2), ("3 frames", 4, 1.5), ("2 frames", 2, 1.7)],
-            id="at a reopening",
+            [0] * 12 + [1, 4, 4, 0, 0, 2], [("1 frames", 1, 1.2), ("3 frames", 4, 1.5), ("2 frames", 2, 1.7)], id="at a reopening"
         ),
     ],
 )

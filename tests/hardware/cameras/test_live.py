@@ -13,12 +13,7 @@ from core.control.engine import Engine
 from core.devices import CameraLost, DeviceError
 from core.types import Frame, Point, Scene
 from hardware.cameras.live import CaptureClock, LiveCamera, SensorFrame
-from tests.hardware.soft_cameras import (
-    CONFIG,
-    PERIOD_S,
-    until_back,
-    until_lost,
-)
+from tests.hardware.soft_cameras import CONFIG, PERIOD_S, until_back, until_lost
 
 # --- the clock -------------------------------------------------------------------------------------------------------------------
 

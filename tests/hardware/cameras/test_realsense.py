@@ -10,15 +10,7 @@ import pytest
 
 from core.devices import DeviceError
 from hardware.cameras.realsense import RealSenseInfo, RealSenseSensor, find_cameras, realsense_camera
-from tests.hardware.soft_cameras import (
-    CONFIG,
-    PERIOD_S,
-    SoftRealSense,
-    picture,
-    take_frames,
-    until_back,
-    until_lost,
-)
+from tests.hardware.soft_cameras import CONFIG, PERIOD_S, SoftRealSense, picture, take_frames, until_back, until_lost
 
 # --- RealSense -------------------------------------------------------------------------------------------------------------------
 

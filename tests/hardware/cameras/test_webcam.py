@@ -13,14 +13,7 @@ import pytest
 from core.devices import DeviceError
 from hardware.cameras.live import LiveCamera
 from hardware.cameras.webcam import WebcamSensor
-from tests.hardware.soft_cameras import (
-    CONFIG,
-    SoftWebcam,
-    picture,
-    take_frames,
-    until_back,
-    until_lost,
-)
+from tests.hardware.soft_cameras import CONFIG, SoftWebcam, picture, take_frames, until_back, until_lost
 
 
 @pytest.fixture

@@ -27,10 +27,7 @@ def test_all_looks_have_a_title() -> None:
         ({"look": "bench", "appearance_seed": 7}, Appearance()),
         ({"look": "fluoroscopy"}, random_appearance(0, "fluoroscopy")),
         ({"look": "tank", "appearance_seed": 7}, random_appearance(7, "tank")),
-        (
-            {"look": "tank", "appearance_seed": 3, "lens_distortion": -0.1},
-            replace(random_appearance(3, "tank"), distortion=-0.1),
-        ),
+        ({"look": "tank", "appearance_seed": 3, "lens_distortion": -0.1}, replace(random_appearance(3, "tank"), distortion=-0.1)),
     ],
 )
 def test_configured_look(config: dict[str, object], expected: Appearance) -> None:
