@@ -77,6 +77,7 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, roundi
             goal = float(points[0][0]), float(points[0][1])
             straight_deg = _angle_deg(heading, _step(head, goal))
             left_px = math.dist(head, goal) + float(geometry.arc_length(points)[-1])
+    preview = geometry.cut(points, 0.0, config.preview_px)
     return LookAhead(
         head=head,
         points=points,
@@ -84,8 +85,8 @@ def look_ahead(scene: Scene, look_ahead_px: float, config: PursuitConfig, roundi
         target=target,
         error_deg=straight_deg - limited(arc_deg, 45.0),
         behind=behind,
-        turn_deg=_turn_deg(points, config.preview_px),
-        junction_px=_junction_px(scene.vessel_graph, points, config.preview_px),
+        turn_deg=_turn_deg(preview),
+        junction_px=min((at for at, _ in _junctions(scene.vessel_graph, preview, _ON_ROUTE_PX)), default=None),
     )
 
 
@@ -129,18 +130,14 @@ def _in_sight(points: Points, head: Point, heading: Point, vessel: Mask, least_p
     return None
 
 
-def _turn_deg(points: Points, preview_px: float) -> float:
-    """Largest angle between the way's first direction and any later one within the preview."""
-    line = geometry.resample(geometry.cut(points, 0.0, preview_px), 5.0)
+def _turn_deg(preview: Points) -> float:
+    """Largest angle between the way's first direction and any later one."""
+    line = geometry.resample(preview, 5.0)
     if len(line) < 4:
         return 0.0
     steps = line[2:] - line[:-2]
     headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     return float(np.degrees(headings.max() - headings.min()))
-
-
-def _junction_px(graph: VesselGraph | None, points: Points, preview_px: float) -> float | None:
-    return min((at for at, _ in _junctions(graph, geometry.cut(points, 0.0, preview_px), _ON_ROUTE_PX)), default=None)
 
 
 def _junctions(graph: VesselGraph | None, line: Points, most_away: float) -> list[tuple[float, Point]]:

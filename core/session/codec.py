@@ -400,6 +400,8 @@ class _RowLayout(_TickLayout):
     dropped_rows: Count = 0
 
 
+_SAME = tuple(name for name in _SceneLayout.model_fields if name not in ("bridges", "graph"))
+"""Fields of a scene that have their own names in a row."""
 _POSE_KEYS = ("state", "theta_signed_deg", "c_head_px", "c_tail_px", "crossed", "confidence")
 
 
@@ -421,7 +423,7 @@ def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, with_masks: 
     `with_masks`: also outlines of the masks, and the vessel graph.
     """
     scene, pose = tick.scene, tick.scene.pose
-    parts: Row = {name: getattr(scene, name) for name in _SceneLayout.model_fields if name not in ("bridges", "graph")}
+    parts: Row = {name: getattr(scene, name) for name in _SAME}
     parts |= {"bridges": scene.skeletons.bridges if scene.skeletons else None, "graph": scene.vessel_graph}
     if not with_masks:
         parts["masks"] = parts["graph"] = None
@@ -519,21 +521,12 @@ def _scene(row: _RowLayout) -> Scene:
     return Scene(
         row.index,
         row.captured_s,
-        scene.source_size,
-        scene.scale,
-        masks=scene.masks,
+        **{name: getattr(scene, name) for name in _SAME},
         skeletons=Skeletons(blank, blank, tuple(scene.bridges)) if scene.bridges is not None else None,
-        path=scene.path,
         vessel_graph=scene.graph,
-        route=scene.route,
-        centerline=scene.centerline,
-        robot_vector=scene.robot_vector,
-        vessel_vector=scene.vessel_vector,
         pose=pose,
         refusal=row.refusal,
         latency_ms={stage: ms for stage, ms in row.latency_ms.items() if ms is not None},
-        route_problem=scene.route_problem,
-        scale_xy=scene.scale_xy,
         novelty=row.novelty,
     )
 

@@ -28,8 +28,7 @@ from core.session.manifest import (
     Description,
     EventKind,
     SessionError,
-    read_description,
-    read_manifest,
+    read_about,
 )
 from core.session.reader import SessionReader
 from core.session.recovery import unknown_manifest
@@ -121,16 +120,8 @@ def signature_of(folder: Path) -> str:
 
 def first_summary(folder: Path) -> SessionSummary:
     """What manifest and description say, read in less than a millisecond; never raises for a broken session."""
-    manifest, problem = None, ""
-    try:
-        manifest = read_manifest(folder)
-    except SessionError as error:
-        problem = str(error)
-    try:
-        description = read_description(folder, manifest)
-    except SessionError as error:
-        description = manifest.description if manifest is not None else Description()
-        problem = problem or str(error)
+    manifest, description, problems = read_about(folder)
+    problem = str(problems[0]) if problems else ""
     is_recording = is_being_written(folder)
     if manifest is not None and not manifest.closed and not is_recording:
         problem = problem or f"it did not end properly; repair it with: session recover {folder.name}"

@@ -25,6 +25,7 @@ from core.bench.bench import BenchError, bench_sha256, read_bench
 from core.config.calibration import CalibrationConfig
 from core.config.models import Config
 from core.config.rig_file import RigFileError, calibration_of
+from core.config.section import first_problem
 from core.control.alerts import Alert
 from core.control.drive_view import DriveView
 from core.control.gate import Source
@@ -285,6 +286,20 @@ def read_description(folder: Path, manifest: Manifest | None) -> Description:
     return manifest.description if manifest is not None else Description()
 
 
+def read_about(folder: Path) -> tuple[Manifest | None, Description, list[SessionError]]:
+    """Manifest (None: it cannot be read) and description as far as they can be read, and what is wrong with them."""
+    manifest: Manifest | None = None
+    problems: list[SessionError] = []
+    try:
+        manifest = read_manifest(folder)
+    except SessionError as error:
+        problems.append(error)
+    try:
+        return manifest, read_description(folder, manifest), problems
+    except SessionError as error:
+        return manifest, manifest.description if manifest is not None else Description(), [*problems, error]
+
+
 def write_description(folder: Path, description: Description) -> None:
     """Keep a description beside the manifest, atomically, also while the session is recorded; its other files stay as they are.
 
@@ -336,9 +351,7 @@ def _read(path: Path, kind: type[_Read]) -> _Read:
             raise NewerVersion(f"{path}: format {version} is of a newer version (this one knows {FORMAT}); update the program")
         return kind.model_validate(content)
     except ValidationError as error:
-        first: Any = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise SessionError(f"{path}: damaged ({key + ': ' if key else ''}{first['msg']})") from None
+        raise SessionError(f"{path}: damaged ({first_problem(error)})") from None
     except (ValueError, RecursionError):
         raise SessionError(f"{path}: damaged (not valid JSON)") from None
 

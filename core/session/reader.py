@@ -29,14 +29,11 @@ from core.session.files import FileLine, check_seal, is_sealed, lines_of, read_l
 from core.session.manifest import (
     EVENTS,
     FRAMES,
-    Description,
     Event,
-    Manifest,
     NewerVersion,
     SessionError,
     event_from_json,
-    read_description,
-    read_manifest,
+    read_about,
     was_added_later,
 )
 from core.session.video import RowOf, has_h264, open_video, packet_times, packets_of, sound_packets, upright, video_number
@@ -252,12 +249,7 @@ def row_columns(line: FileLine) -> RowColumns:
 
 
 class _RowIndex:
-    """Reads the places of the rows in a thread; what it has read so far can be used at once.
-
-    Parameters
-    ----------
-    on_problem : gets a line for each bad record, in the thread.
-    """
+    """Reads the places of the rows in a thread, names bad records there, and lets what it has read so far be used at once."""
 
     def __init__(self, path: Path, on_problem: Callable[[str], None]) -> None:
         self._path = path
@@ -360,21 +352,12 @@ class SessionReader:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._lock = threading.Lock()
-        self._problems: list[str] = []
         self._more_problems = 0
         check_is_session(folder)
-        self.manifest: Manifest | None = None
-        try:
-            self.manifest = read_manifest(folder)
-        except NewerVersion:
-            raise
-        except SessionError as error:
-            self._problem(str(error))
-        try:
-            self.description = read_description(folder, self.manifest)
-        except SessionError as error:
-            self.description = self.manifest.description if self.manifest is not None else Description()
-            self._problem(str(error))
+        self.manifest, self.description, problems = read_about(folder)
+        if self.manifest is None and isinstance(problems[0], NewerVersion):
+            raise problems[0]
+        self._problems = [str(problem) for problem in problems]
         self._rows: OrderedDict[int, RecordedRow | None] = OrderedDict()
         self._file: IO[bytes] | None = None
         with contextlib.suppress(OSError):  # the index names what cannot be opened

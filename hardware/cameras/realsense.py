@@ -205,7 +205,8 @@ class RealSenseSensor:
         self._set(sensor, rs.option.auto_exposure_priority, 0.0)
         self._set(sensor, rs.option.enable_auto_exposure, float(config.exposure_ms is None))
         if config.exposure_ms is not None:
-            steps_per_ms = _STEREO_STEPS_PER_MS if _is_stereo_module(sensor) else _RGB_STEPS_PER_MS
+            is_stereo = any(profile.stream_type() == rs.stream.depth for profile in sensor.get_stream_profiles())
+            steps_per_ms = _STEREO_STEPS_PER_MS if is_stereo else _RGB_STEPS_PER_MS
             self._set(sensor, rs.option.exposure, config.exposure_ms * steps_per_ms)
         if config.gain is not None:
             self._set(sensor, rs.option.gain, config.gain)
@@ -221,11 +222,6 @@ class RealSenseSensor:
         limits = sensor.get_option_range(option)
         steps = round((min(max(value, limits.min), limits.max) - limits.min) / limits.step) if limits.step else 0
         sensor.set_option(option, limits.min + steps * limits.step if limits.step else min(max(value, limits.min), limits.max))
-
-
-def _is_stereo_module(sensor: Any) -> bool:
-    """Whether the sensor has depth pictures as well."""
-    return any(profile.stream_type() == rs.stream.depth for profile in sensor.get_stream_profiles())
 
 
 def colour_image(frame: Any) -> Image:
