@@ -197,12 +197,7 @@ class DeviceProcess:
 
 
 class ParentLink:
-    """The child's ends of what ``DeviceProcess`` shares with it: ``pipe``, ``socket`` and the memory.
-
-    Parameters
-    ----------
-    arguments : of the command line: file descriptors of memory, pipe and socket, and the parent's process id.
-    """
+    """The child's ends of what ``DeviceProcess`` shares with it: ``pipe``, ``socket`` and the memory, from its command line."""
 
     def __init__(self, arguments: Sequence[str]) -> None:
         self._memory_fd, self.pipe, socket_fd, self._parent = map(int, arguments)

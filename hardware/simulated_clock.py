@@ -98,9 +98,7 @@ class SimulatedClock:
 class WorldClock:
     """The end of the world that sets the time; a call reads it, from any thread.
 
-    Parameters
-    ----------
-    file : of the program's ``SimulatedClock``; None: nothing else reads the time, and nothing is waited for.
+    Without the `file` of the program's ``SimulatedClock`` nothing else reads the time, and nothing is waited for.
     """
 
     def __init__(self, file: str | None = None) -> None:

@@ -377,14 +377,10 @@ class JournalEntry:
 
 
 class History:
-    """The edits of one annotation: what is in force, and what undo and redo lead to.
+    """The edits of one annotation: what is in force, and what undo and redo lead to, from the `entries` of its journal in order.
 
     A new edit after an undo starts a branch: redo no longer leads to what was undone, but its entries stay in the journal.
-
-    Parameters
-    ----------
-    entries : the journal, in order.
-    last : the highest number that is taken, also by an entry that is not among these because its record is damaged.
+    `last` is the highest number that is taken, also by an entry that is not there because its record is damaged.
     """
 
     def __init__(self, entries: Iterable[JournalEntry] = (), *, last: int = 0) -> None:

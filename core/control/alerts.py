@@ -218,13 +218,9 @@ class AlertReporter:
     ) -> None:
         """Report lines, (key, detail) each, most urgent first; the same line not again within its cooldown.
 
-        At most one of them sounds, the most urgent that has a sound: while disarmed only a stop, and a hold only while the program
-        drives.
-
-        Parameters
-        ----------
-        mode : before these lines.
-        changed : the mode has changed with them: what has ended a motion is reported each time.
+        At most one of them sounds, the most urgent that has a sound: while disarmed only a stop, and a hold only while the
+        program drives. The `mode` is that before these lines; it has `changed` with them: what has ended a motion is
+        reported each time.
         """
         with self._lock:
             alerts: list[Alert] = []

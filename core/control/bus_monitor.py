@@ -78,11 +78,8 @@ _ROUNDING_S = 1e-9
 def supply_cause(volts: Sequence[float], since_well_s: float, load_ma: float, servos: ServosConfig) -> Cause | None:
     """What is wrong with the supply: cut, by E-stop or switch, or too low; None: neither.
 
-    Parameters
-    ----------
-    volts : by joint; empty: not known. NaN counts as too low.
-    since_well_s : since all servos had enough, with some to spare; infinite: never.
-    load_ma : the amounts of all currents together.
+    Volts are by joint (empty: not known; NaN counts as too low); `since_well_s` since all servos had enough, with some to spare
+    (infinite: never); `load_ma` is the sum of the amounts of all currents.
     """
     low = [not v > servos.lowest_v(joint) for joint, v in zip(servos.joints, volts, strict=False)]
     if not any(low):

@@ -49,14 +49,9 @@ class SentGoals:
 def by_hand(servos: ServosConfig, at_mm: Sequence[float], last: SentGoals | None, *, retracts: Retracted) -> ServosConfig:
     """The servos with the envelope that holds while the operator drives.
 
-    A feed may be below the low end of its envelope, where a wrong zero or a retraction has left it: slowly, and not further down.
-    While the operator holds its retraction (`retracts`) it has no low end, so that a robot whose insertion is not known can be
-    pulled out.
-
-    Parameters
-    ----------
-    at_mm : measured positions, finite.
-    last : what the gate sent last in this motion.
+    A feed may be below the low end of its envelope, where a wrong zero or a retraction has left it: slowly, and not further
+    down. While the operator holds its retraction (`retracts`) it has no low end, so that a robot whose insertion is not known
+    can be pulled out. Measured positions are finite; `last` is what the gate sent last in this motion.
     """
     joints = list(servos.joints)
     for place, joint in enumerate(servos.joints):

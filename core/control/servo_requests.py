@@ -69,11 +69,9 @@ RETRY_S = 10.0
 
 
 class TorqueRelease:
-    """The torque-off that a stop requests (``servos.torque_off_on_stop``), until all servos confirm it or are switched on again.
+    """The torque-off that a stop requests, until all servos confirm it or are switched on again.
 
-    Parameters
-    ----------
-    is_enabled : whether a stop switches the torque off at all.
+    `is_enabled`: a stop switches the torque off at all (``servos.torque_off_on_stop``).
     """
 
     def __init__(self, *, is_enabled: bool) -> None:

@@ -157,11 +157,8 @@ def fit_to_prior(
 ) -> ConfidenceCalibration:
     """The calibration nearest to a `prior` that agrees with the answers: logistic regression with a Gaussian prior.
 
-    Parameters
-    ----------
-    evidence : features of N answers (N, F), of the prior's; without any answer it stays the prior.
-    right : of each 1 where it was right, 0 where it was wrong, or a share (N,).
-    weight : how much each counts (N,).
+    Of N answers: features (N, F) of the prior's, how right each was (N,), 0 to 1, and how much it counts (N,). Without any
+    answer it stays the prior.
     """
     if not len(right):
         return prior

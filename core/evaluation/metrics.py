@@ -138,11 +138,8 @@ def _draws(n: int, group: Group, rng: np.random.Generator) -> Iterator[NDArray[n
 def icc_absolute(ratings: Floats) -> Floats:
     """Intraclass correlation ICC(2,1): two-way random effects, absolute agreement, single measure.
 
-    Returns an array of shape (...); NaN where all ratings are equal, or there is only one subject.
-
-    Parameters
-    ----------
-    ratings : shape (..., n, k): n subjects, each measured by k raters.
+    Of n subjects, each measured by k raters (..., n, k), an array (...); NaN where all ratings are equal, or there is one
+    subject.
 
     References
     ----------

@@ -214,16 +214,10 @@ def are_together(arm: Arm, back: Arm) -> bool:
 
 
 def rebuild(arms: list[Arm], vessel: Mask, *, is_alone: bool) -> Rebuilt | None:
-    """Rebuild a junction, or some that belong together.
+    """Rebuild a junction, or some that belong together, from all branches that lead out of the opening, outwards.
 
-    None where too few arms have a gate, where an arm of several junctions does not lead to the trunk (it comes from a side branch,
-    or there is no single trunk), and where a place would lie outside the vessel.
-
-    Parameters
-    ----------
-    arms : all branches that lead out of the opening, outwards.
-    vessel : the vessel's mask (h, w).
-    is_alone : whether it is one junction.
+    None where too few arms have a gate, where an arm of several junctions does not lead to the trunk (it comes from a side
+    branch, or there is no single trunk), and where a place would lie outside the vessel's mask (h, w).
     """
     rebuilt = _rebuild(arms, vessel, is_alone)
     if rebuilt is None:

@@ -303,14 +303,7 @@ class _Lost:
 
 
 class Recording:
-    """What the recorder's thread does: the ring, and the session if there is one. For that thread only.
-
-    Parameters
-    ----------
-    parent : where sessions are made.
-    clock : the clock of the frames.
-    status : is kept up to date.
-    """
+    """What the recorder's thread does: the ring, and the session in `parent` if there is one; it keeps the `status` up to date."""
 
     def __init__(self, config: RecordConfig, about: About, parent: Path, clock: Callable[[], float], status: _SharedStatus) -> None:
         self._config = config
@@ -522,11 +515,8 @@ def _counted(kind: EventKind, time_s: float, count: int, total: int) -> Event:
 class SessionWriter:
     """Lives as long as a rig is open; sessions begin and end in it. All methods may be called from any thread and return at once.
 
-    Parameters
-    ----------
-    about : where the pictures come from; goes into the manifests.
-    folder : where sessions are made; None: the configured one.
-    clock : the clock of the frames.
+    Where the pictures come from goes into the manifests. Sessions are made in `folder`; None: the configured one. `clock` is
+    that of the frames.
     """
 
     def __init__(

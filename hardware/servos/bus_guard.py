@@ -118,12 +118,7 @@ class ReleaseRamp:
         return tuple(self._joints[place].name for place in places if self._last_mm.get(place, math.inf) > _SLACK_MM)
 
     def goals(self, at_mm: Sequence[float | None], now_s: float) -> tuple[float | None, ...] | None:
-        """The goals now, None for a joint that keeps its own; None altogether when it is over.
-
-        Parameters
-        ----------
-        at_mm : measured positions, None of a joint that does not tell.
-        """
+        """The goals now, None for a joint that keeps its own; None altogether when it is over. A position may be unknown (None)."""
         self._note(at_mm, now_s)
         tight = self.tight
         if not any(joint.name in tight and now_s <= self._end_s(place, joint) for place, joint in enumerate(self._joints)):

@@ -343,14 +343,11 @@ class ServoBus(JointBus[ServoLine]):
     ) -> None:
         """Set where joints are now; all or none of them.
 
-        Parameters
-        ----------
-        positions_mm : in millimetres from zero, 0 of a tendon where its wire is slack; None: all are at 0.
-        kept : joints whose kept zero holds.
-        basis : what the zeros of tendons in `positions_mm` rest on.
+        Positions are in millimetres from zero, 0 of a tendon where its wire is slack; None: all are at 0. Those of tendons
+        rest on `basis`. The kept zeros of the joints in `kept` hold.
 
-        Raises NoAnswer, and NotReady: when armed, as goals would jump; when a servo holds in a mode of another program; when a
-        tendon may be pulled; when a kept zero does not fit.
+        Raises NoAnswer, and NotReady: when armed, as goals would jump; when a servo holds in a mode of another program;
+        when a tendon may be pulled; when a kept zero does not fit.
         """
         if self.is_armed:
             raise NotReady("the servos are armed: disarm before zeroing")

@@ -102,10 +102,7 @@ class DriftMonitor:
     ) -> tuple[JointConfig, float] | None:
         """The first joint that runs away, and how far (mm); None when all go where they are sent.
 
-        Parameters
-        ----------
-        goals_mm : in force since the positions `before_mm` were measured.
-        at_mm : where that led.
+        The goals were in force since the positions `before_mm` were measured, and led to `at_mm`.
         """
         found = None
         for joint, goal, before, at in zip(self._joints, goals_mm, before_mm, at_mm, strict=True):
@@ -155,9 +152,7 @@ class TrackingMonitor:
     def update(self, goals_mm: Joints | None, measurement: JointMeasurement) -> str | None:
         """What is wrong with a joint; None when all follow.
 
-        Parameters
-        ----------
-        goals_mm : the last that were written; None when none were in this motion: then a joint belongs inside its envelope.
+        Where no goals were written in this motion (None) a joint belongs inside its envelope.
         """
         before, at_mm = self._before, measurement.positions_mm
         if before is not None and measurement.measured_s <= before.measured_s:

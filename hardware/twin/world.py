@@ -95,10 +95,7 @@ class TwinWorld:
     def send(self, command: Command) -> Command:
         """Apply a command from now on, clamped to the robot's limits; returns it clamped.
 
-        Raises
-        ------
-        ValueError
-            When a number is not finite; the command before stays.
+        Raises ValueError when a number is not finite; the command before stays.
         """
         values = (command.bend, command.pitch, command.advance_mm_s, command.delivery_mm_s, command.rotation_deg_s)
         if not all(math.isfinite(value) for value in values):
