@@ -10,13 +10,17 @@ import shutil
 import tempfile
 import threading
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import hypothesis
 import psutil
 import pytest
 from _pytest.runner import runtestprotocol
+
+if TYPE_CHECKING:
+    from hardware.twin.servos.bus import SoftServoBus
 
 # Before anything imports Qt or numpy. QT_QPA_PLATFORM=xcb make test shows real windows.
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -59,6 +63,24 @@ def no_thread_stays_behind() -> Iterator[None]:
     while (left := [t for t in threading.enumerate() if t not in before and not t.daemon]) and time.monotonic() < until:
         time.sleep(0.01)
     assert not left, f"threads left running: {[thread.name for thread in left]}"
+
+
+@pytest.fixture
+def start_servos() -> Iterator[Callable[..., SoftServoBus]]:
+    """Starts software servos, as ``SoftServoBus`` makes them, which run until the end of the test."""
+    from hardware.twin.servos.bus import SoftServoBus
+
+    made: list[SoftServoBus] = []
+
+    def start(*args: Any, **options: Any) -> SoftServoBus:
+        made.append(SoftServoBus(*args, **options))
+        made[-1].start()
+        return made[-1]
+
+    yield start
+    for bus in made:
+        bus.stop()
+    assert [bus.failure for bus in made if bus.failure is not None] == []
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -104,19 +104,17 @@ def test_a_live_rig_to_look_only(soft: SoftRealSense) -> None:
 
 
 @pytest.mark.real_time
-def test_a_live_rig_with_servos_that_are_checked_but_not_armed(soft: SoftRealSense) -> None:
-    bus = SoftServoBus(Config().servos, wire_time=True)
-    bus.start()
+def test_a_live_rig_with_servos_that_are_checked_but_not_armed(
+    soft: SoftRealSense, start_servos: Callable[..., SoftServoBus]
+) -> None:
+    bus = start_servos(Config().servos, wire_time=True)
+    rig = open_rig(_rig(robot="servos", servos={"port": bus.port}))
     try:
-        rig = open_rig(_rig(robot="servos", servos={"port": bus.port}))
-        try:
-            assert rig.kind is RigKind.LIVE
-            assert rig.robot is not None
-            assert [bus.servo(joint.id).answer(2, 64, 1).data for joint in Config().servos.joints] == [b"\0"] * 7
-        finally:
-            rig.close()
+        assert rig.kind is RigKind.LIVE
+        assert rig.robot is not None
+        assert [bus.servo(joint.id).answer(2, 64, 1).data for joint in Config().servos.joints] == [b"\0"] * 7
     finally:
-        bus.stop()
+        rig.close()
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +29,8 @@ runner = CliRunner()
 
 
 @pytest.fixture
-def servos() -> Iterator[SoftServoBus]:
-    servos = SoftServoBus(ServosConfig(), wire_time=True)
-    servos.start()
-    yield servos
-    servos.stop()
-    assert servos.failure is None
+def servos(start_servos: Callable[..., SoftServoBus]) -> SoftServoBus:
+    return start_servos(ServosConfig(), wire_time=True)
 
 
 @pytest.fixture
@@ -174,15 +170,13 @@ def _write(servos: ServosConfig) -> None:
 
 
 @pytest.mark.parametrize("shape", [TURNED], ids=["turned"])
-def test_a_robot_of_another_shape_is_accepted(shape: ServosConfig, moved: list[str]) -> None:
-    bus = SoftServoBus(shape)
-    bus.start()
+def test_a_robot_of_another_shape_is_accepted(
+    start_servos: Callable[..., SoftServoBus], shape: ServosConfig, moved: list[str]
+) -> None:
+    bus = start_servos(shape)
     _write(shape.model_copy(update={"port": bus.port}))
     forces = [f"--force={joint.name}={joint.max_force_n}" for joint in shape.joints]
-    try:
-        result = runner.invoke(cli.app, ["rig", "accept", "bench 1", "--operator", "Ada", *forces], input="\ny\n" * 4 + ENTERS)
-    finally:
-        bus.stop()
+    result = runner.invoke(cli.app, ["rig", "accept", "bench 1", "--operator", "Ada", *forces], input="\ny\n" * 4 + ENTERS)
     assert ": valid" in result.stdout, result.stderr
     assert "rotation 80 of 80 N mm" in result.stdout
     for question in (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -120,20 +121,16 @@ def test_a_live_rig_is_not_moved_before_its_drums_are_known(arguments: tuple[str
 
 
 @pytest.mark.real_time
-def test_servos_are_restored_as_they_were_before_the_program_changed_them() -> None:
-    twin = SoftServoBus(ServosConfig())
-    twin.start()
-    try:
-        config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": twin.port}})
-        write_rig(make_rig(config, "bench 1", None))
-        with pytest.raises(UserError, match="there is no backup of these servos"):
-            _run("restore-servos", "bench 1")
-        bus = ServoBus(config.servos, backups=backups_folder())
-        bus.open()
-        bus.close()
-        lines = _run("restore-servos", "bench 1").splitlines()
-    finally:
-        twin.stop()
+def test_servos_are_restored_as_they_were_before_the_program_changed_them(start_servos: Callable[..., SoftServoBus]) -> None:
+    twin = start_servos(ServosConfig())
+    config = load_config(overrides={"rig": {"camera": "webcam", "robot": "servos"}, "servos": {"port": twin.port}})
+    write_rig(make_rig(config, "bench 1", None))
+    with pytest.raises(UserError, match="there is no backup of these servos"):
+        _run("restore-servos", "bench 1")
+    bus = ServoBus(config.servos, backups=backups_folder())
+    bus.open()
+    bus.close()
+    lines = _run("restore-servos", "bench 1").splitlines()
     assert len(lines) == 7
     assert "operating mode" in lines[0]
     assert all(twin.servo(joint.id).table["operating_mode"] == 3 for joint in ServosConfig().joints)

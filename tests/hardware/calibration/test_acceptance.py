@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import pytest
 
@@ -27,12 +27,8 @@ def shape(request: pytest.FixtureRequest) -> ServosConfig:
 
 
 @pytest.fixture
-def servos(shape: ServosConfig) -> Iterator[SoftServoBus]:
-    servos = SoftServoBus(shape, wire_time=True)
-    servos.start()
-    yield servos
-    servos.stop()
-    assert servos.failure is None
+def servos(start_servos: Callable[..., SoftServoBus], shape: ServosConfig) -> SoftServoBus:
+    return start_servos(shape, wire_time=True)
 
 
 @pytest.fixture

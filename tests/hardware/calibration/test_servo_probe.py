@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,12 +31,8 @@ LIMITS = ProbeLimits(-2.0, 2.0)
 
 
 @pytest.fixture
-def servos() -> Iterator[SoftServoBus]:
-    servos = SoftServoBus(CONFIG, wire_time=True)
-    servos.start()
-    yield servos
-    servos.stop()
-    assert servos.failure is None
+def servos(start_servos: Callable[..., SoftServoBus]) -> SoftServoBus:
+    return start_servos(CONFIG, wire_time=True)
 
 
 def _config(servos: SoftServoBus, servo_id: int = 3, limits: ProbeLimits = LIMITS, sign: int = 1) -> ServosConfig:
@@ -146,14 +142,10 @@ def test_servos_are_found_by_asking_and_nothing_is_written(servos: SoftServoBus)
     assert {packet.instruction for packet in servos.log} == {1}  # pings
 
 
-def test_servos_at_another_speed_are_found() -> None:
-    servos = SoftServoBus(CONFIG.model_copy(update={"baud": 57_600}), wire_time=True)
-    servos.start()
+def test_servos_at_another_speed_are_found(start_servos: Callable[..., SoftServoBus]) -> None:
+    servos = start_servos(CONFIG.model_copy(update={"baud": 57_600}), wire_time=True)
     said: list[str] = []
-    try:
-        assert find_servos(servos.port, (1_000_000, 57_600), said.append).baud == 57_600
-    finally:
-        servos.stop()
+    assert find_servos(servos.port, (1_000_000, 57_600), said.append).baud == 57_600
     assert said == ["asking at 1000000 baud", "asking at 57600 baud"]
 
 

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -495,11 +495,8 @@ def test_whether_screen_lock_and_sleep_can_be_inhibited(tmp_path: Path, monkeypa
 
 
 @pytest.fixture
-def bus() -> Iterator[SoftServoBus]:
-    servos_ = SoftServoBus(ServosConfig(), wire_time=True)
-    servos_.start()
-    yield servos_
-    servos_.stop()
+def bus(start_servos: Callable[..., SoftServoBus]) -> SoftServoBus:
+    return start_servos(ServosConfig(), wire_time=True)
 
 
 @pytest.mark.real_time

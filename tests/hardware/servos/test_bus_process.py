@@ -47,12 +47,8 @@ STRAIN_MA = 700.0
 
 
 @pytest.fixture
-def servos() -> Iterator[SoftServoBus]:
-    servos = SoftServoBus(CONFIG, wire_time=True, positions=[1000 + joint.id for joint in CONFIG.joints])
-    servos.start()
-    yield servos
-    servos.stop()
-    assert servos.failure is None
+def servos(start_servos: Callable[..., SoftServoBus]) -> SoftServoBus:
+    return start_servos(CONFIG, wire_time=True, positions=[1000 + joint.id for joint in CONFIG.joints])
 
 
 def _robot(servos: SoftServoBus, **changes: object) -> ServoRobot:
@@ -626,13 +622,10 @@ def test_asked_to_end_it_holds_and_ends_with_zero(servos: SoftServoBus, armed: S
 
 
 @pytest.mark.parametrize(("victim", "number"), KINDS, ids=lambda value: getattr(value, "name", value))
-def test_fault_32_killed_or_stopped_every_servo_stops_in_time_and_within_one_step(victim: str, number: signal.Signals) -> None:
-    servos = SoftServoBus(ServosConfig(), wire_time=True)
-    servos.start()
-    try:
-        outcome = strike(servos, victim, number, delay_s=0.5)
-    finally:
-        servos.stop()
+def test_fault_32_killed_or_stopped_every_servo_stops_in_time_and_within_one_step(
+    start_servos: Callable[..., SoftServoBus], victim: str, number: signal.Signals
+) -> None:
+    outcome = strike(start_servos(ServosConfig(), wire_time=True), victim, number, delay_s=0.5)
     assert outcome.before_mm > 0.1
     assert outcome.stop_ms <= 1000.0 * BOUND_S
     assert outcome.steps <= BOUND_STEPS

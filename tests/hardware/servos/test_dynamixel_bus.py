@@ -67,12 +67,8 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def twin(clock: Clock) -> Iterator[SoftServoBus]:
-    twin = SoftServoBus(CONFIG, clock=clock, positions=[1000 + joint.id for joint in CONFIG.joints])
-    twin.start()
-    yield twin
-    twin.stop()
-    assert twin.failure is None
+def twin(start_servos: Callable[..., SoftServoBus], clock: Clock) -> SoftServoBus:
+    return start_servos(CONFIG, clock=clock, positions=[1000 + joint.id for joint in CONFIG.joints])
 
 
 @pytest.fixture
@@ -118,25 +114,25 @@ def _until(bus: ServoBus, index: int, wanted: Callable[[object], bool]) -> objec
 
 
 @contextmanager
-def _armed_with(clock: Clock, **tendon: object) -> Iterator[tuple[SoftServoBus, ServoBus]]:
+def _armed_with(
+    start_servos: Callable[..., SoftServoBus], clock: Clock, **tendon: object
+) -> Iterator[tuple[SoftServoBus, ServoBus]]:
     """Tendons of another kind than the rest; armed."""
     joints = tuple(j.model_copy(update=tendon) if j.id <= 4 else j for j in CONFIG.joints)
     config = ServosConfig.model_validate({**CONFIG.model_dump(), "joints": joints})
-    twin = SoftServoBus(config, clock=clock, positions=[1000] * 7)
-    twin.start()
+    twin = start_servos(config, clock=clock, positions=[1000] * 7)
     bus = ServoBus(config, twin.port)
     bus.open()
     bus.set_zero()
     bus.arm()
     yield twin, bus
     bus.close()
-    twin.stop()
 
 
 @pytest.fixture
-def mixed(clock: Clock) -> Iterator[tuple[SoftServoBus, ServoBus]]:
+def mixed(start_servos: Callable[..., SoftServoBus], clock: Clock) -> Iterator[tuple[SoftServoBus, ServoBus]]:
     """Four small servos of 5 V for the tendons, three strong ones of 12 V."""
-    with _armed_with(clock, model=1200) as armed:
+    with _armed_with(start_servos, clock, model=1200) as armed:
         yield armed
 
 
@@ -1042,11 +1038,12 @@ def _force_n(twin: SoftServoBus, joint: JointConfig) -> float:
     [(1020, 5.0, 40.0), (1020, 20.0, 62.8), (1020, 40.0, 20.0), (1130, 30.0, 40.0), (1200, 20.0, 40.0), (1060, 20.0, 40.0),
      (1160, 30.0, 20.0)],
 )  # fmt: skip
-def test_a_blocked_horn_gives_no_more_than_the_joints_force(clock: Clock, model: int, force_n: float, mm_per_turn: float) -> None:
+def test_a_blocked_horn_gives_no_more_than_the_joints_force(
+    start_servos: Callable[..., SoftServoBus], clock: Clock, model: int, force_n: float, mm_per_turn: float
+) -> None:
     changed = {"max_force_n": force_n, "mm_per_turn": mm_per_turn, "model": model}
     config = CONFIG.model_copy(update={"joints": tuple(joint.model_copy(update=changed) for joint in CONFIG.joints)})
-    twin = SoftServoBus(config, clock=clock, positions=[1000] * 7)
-    twin.start()
+    twin = start_servos(config, clock=clock, positions=[1000] * 7)
     bus = ServoBus(config, twin.port)
     try:
         bus.open()
@@ -1063,7 +1060,6 @@ def test_a_blocked_horn_gives_no_more_than_the_joints_force(clock: Clock, model:
         assert all(_force_n(twin, joint) > 0.5 * force_n for joint in config.joints), "they do pull"
     finally:
         bus.close()
-        twin.stop()
 
 
 # --- force is limited in the servo -----------------------------------------------------------------------------------------------
@@ -1109,8 +1105,8 @@ def test_a_force_limit_that_another_master_takes_away_is_seen(twin: SoftServoBus
     assert [state.is_limited for state in _states(armed)] == [True] * 5 + [False, True]
 
 
-def test_a_model_without_current_is_limited_by_its_duty(clock: Clock) -> None:
-    with _armed_with(clock, model=1080, max_force_n=40.0) as (twin, bus):
+def test_a_model_without_current_is_limited_by_its_duty(start_servos: Callable[..., SoftServoBus], clock: Clock) -> None:
+    with _armed_with(start_servos, clock, model=1080, max_force_n=40.0) as (twin, bus):
         # 40 N on a drum of 40 mm a turn: 0.2546 Nm of 1.9 Nm at 12 V, at 14.8 V 10.9 %: 96 of 885
         assert [twin.servo(joint.id).table["goal_pwm"] for joint in CONFIG.joints] == [96] * 4 + [885] * 3
         assert [twin.servo(joint.id).table["operating_mode"] for joint in CONFIG.joints] == [4] * 4 + [5] * 3

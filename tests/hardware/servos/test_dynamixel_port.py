@@ -7,7 +7,7 @@ import random
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -96,14 +96,11 @@ def test_an_answer_that_came_in_time_is_read_by_a_process_that_was_kept_waiting(
 
 
 @pytest.fixture
-def terminal() -> Iterator[str]:
+def terminal(start_servos: Callable[..., SoftServoBus]) -> str:
     """The software servos' pseudo-terminal itself, which any user may open."""
-    servos = SoftServoBus(ServosConfig())
-    servos.start()
-    terminal = os.path.realpath(servos.port)
+    terminal = os.path.realpath(start_servos(ServosConfig()).port)
     os.chmod(terminal, 0o666)
-    yield terminal
-    servos.stop()
+    return terminal
 
 
 _OPENED, _BUSY, _OTHER = 0, 16, 99

@@ -39,12 +39,8 @@ ALL_AT_ZERO = all_at_zero(CONFIG)
 
 
 @pytest.fixture
-def servos() -> Iterator[SoftServoBus]:
-    servos = SoftServoBus(CONFIG, wire_time=True, positions=[1000 + joint.id for joint in CONFIG.joints])
-    servos.start()
-    yield servos
-    servos.stop()
-    assert servos.failure is None
+def servos(start_servos: Callable[..., SoftServoBus]) -> SoftServoBus:
+    return start_servos(CONFIG, wire_time=True, positions=[1000 + joint.id for joint in CONFIG.joints])
 
 
 Connect = Callable[[], ServoRobot]

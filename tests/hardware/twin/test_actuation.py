@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -87,10 +88,9 @@ def test_the_head_goes_where_it_is_steered_on_the_screen(path: object) -> None:
 
 
 @pytest.mark.real_time
-def test_the_real_driver_turns_a_shaft_and_the_wires_load_their_servos() -> None:
+def test_the_real_driver_turns_a_shaft_and_the_wires_load_their_servos(start_servos: Callable[..., SoftServoBus]) -> None:
     servos = TURNED.model_copy(update={"watchdog_s": 2.0})
-    twin = SoftServoBus(servos, positions=[1000 + joint.id for joint in servos.joints])
-    twin.start()
+    twin = start_servos(servos, positions=[1000 + joint.id for joint in servos.joints])
     bus = ServoBus(servos, twin.port)
     try:
         bus.open()
@@ -106,4 +106,3 @@ def test_the_real_driver_turns_a_shaft_and_the_wires_load_their_servos() -> None
         assert turned.goal_mm == pytest.approx(5.0, abs=0.1)
     finally:
         bus.close()
-        twin.stop()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncWrite, PortHandler, Protocol2PacketHandler
@@ -285,12 +285,8 @@ def test_torque_goes_to_whatever_the_goal_register_says() -> None:
 
 
 @pytest.fixture
-def bus() -> Iterator[SoftServoBus]:
-    bus = SoftServoBus(CONFIG, positions=[100] * 7)
-    bus.start()
-    yield bus
-    bus.stop()
-    assert bus.failure is None
+def bus(start_servos: Callable[..., SoftServoBus]) -> SoftServoBus:
+    return start_servos(CONFIG, positions=[100] * 7)
 
 
 @pytest.fixture

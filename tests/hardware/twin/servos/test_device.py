@@ -300,9 +300,8 @@ def test_another_master_switches_all_torque_off() -> None:
     assert [bus.servo(joint.id).table["led"] for joint in CONFIG.joints] == [0, 0, 1, 0, 0, 0, 0]
 
 
-def test_latency_delays_every_transaction() -> None:
-    bus = SoftServoBus(CONFIG, positions=[100] * 7, latency_s=0.008)
-    bus.start()
+def test_latency_delays_every_transaction(start_servos: Callable[..., SoftServoBus]) -> None:
+    bus = start_servos(CONFIG, positions=[100] * 7, latency_s=0.008)
     port, sdk = PortHandler(bus.port), Protocol2PacketHandler()
     try:
         assert port.openPort()
@@ -312,7 +311,6 @@ def test_latency_delays_every_transaction() -> None:
         assert time.monotonic() - starts_s >= 7 * 0.008
     finally:
         port.closePort()
-        bus.stop()
 
 
 def test_a_brown_out_restarts_all() -> None:
