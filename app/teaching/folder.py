@@ -45,8 +45,8 @@ _NEW_CELLS = 2
 """A frame in which the robot covers so many new cells of the vessel is taken."""
 _OTHER_SHARE = 0.15
 """A frame whose robot differs this much (0..1) from that of each frame taken is taken, too."""
-_BENT_PX = 12
-"""Area, beyond unsure edges, that only one of two robots covers that are as far inserted, when one is bent otherwise."""
+_BENT_PX = 6
+"""Area, beyond unsure edges, that each of two robots covers alone that are as far inserted, when one is bent otherwise."""
 _SAME_CELLS, _SAME_AREA = 1, 0.06
 """Robots are as far inserted when so many cells, at most, are covered by one alone, and their areas differ by this share."""
 _STILL_LEVELS, _STILL_SHARE = 10, 4e-4
@@ -83,6 +83,7 @@ class LookKind(StrEnum):
     SEEN = "seen"
     PLACE = "place"
     BEND = "bend"
+    ABSENT = "absent"
     REJECTED = "rejected"
     FULL = "full"
 
@@ -199,6 +200,7 @@ class _Record(BaseModel):
     format: int = Field(FORMAT, ge=1)
     step: TeachingStep = TeachingStep.EMPTY
     computed: bool = False
+    robot_like: tuple[tuple[tuple[int, int], ...], ...] = ()
     frames: tuple[_FrameRow, ...] = ()
     next_stem: int = Field(0, ge=0)
     model: str = ""
@@ -233,7 +235,6 @@ class TeachingFolder:
         self._bench: Bench | None = None
         self._drawn: Mask | None = None
         self._places: list[Image] = []
-        self._robot_like: tuple[NDArray[np.int32], ...] = ()
         self._frames: list[TakenFrame] = []
         self._blurred: list[NDArray[np.float32]] = []
         self._coverage: VesselCoverage | None = None
@@ -309,7 +310,7 @@ class TeachingFolder:
             self._drawn,
             tuple(self._places),
             record.computed,
-            self._robot_like,
+            tuple(np.array(outline, np.int32) for outline in record.robot_like),
             tuple(self._frames),
             coverage.branches() if coverage is not None else (),
             coverage.tree() if coverage is not None else None,
@@ -345,7 +346,7 @@ class TeachingFolder:
             raise BenchError("something moved while the pictures were taken: keep hands and robot still, and take them again")
         bench = bench_from_pictures(images, None, self._name, WORKING_SIZE_PX)
         self._use_bench(bench, is_computed=False)
-        self._robot_like = self._look_for_robot(bench.empty)
+        self._keep(robot_like=self._look_for_robot(bench.empty))
 
     def add_place(self, picture: Image) -> None:
         """A picture with the robot in another place; from the third one on the empty bench is computed of them.
@@ -371,7 +372,6 @@ class TeachingFolder:
         self._keep()
         if bench is not None:
             self._use_bench(bench, is_computed=True)
-            self._robot_like = ()
 
     def _use_bench(self, bench: Bench, *, is_computed: bool) -> None:
         """Put another empty bench in force, with the vessel that was drawn, where it fits; frames get other masks."""
@@ -383,14 +383,14 @@ class TeachingFolder:
         self._bench = bench
         if self._drawn is not None and self._drawn.shape != bench.known.shape:
             self._drawn = None
-        self._keep(computed=is_computed, model="", used=False)
+        self._keep(computed=is_computed, robot_like=(), model="", used=False)
         self._propose_again()
 
-    def _look_for_robot(self, empty: Image) -> tuple[NDArray[np.int32], ...]:
-        """Outlines of what the model takes for a robot, where it is large."""
+    def _look_for_robot(self, empty: Image) -> tuple[tuple[tuple[int, int], ...], ...]:
+        """Outlines, as points, of what the model takes for a robot, where it is large."""
         _, robot = self._network()(empty)
         outlines, _ = cv2.findContours((robot >= 0.5).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        return tuple(np.asarray(one[:, 0], np.int32) for one in outlines if cv2.contourArea(one) >= _LEAST_ROBOT_PX)
+        return tuple(tuple((x, y) for x, y in one[:, 0].tolist()) for one in outlines if cv2.contourArea(one) >= _LEAST_ROBOT_PX)
 
     # ---- the vessel
 
@@ -456,6 +456,8 @@ class TeachingFolder:
         self._last = image
         stem = f"{self._record.next_stem:04d}"
         frame = teaching.propose(TeachingPicture(stem, stem, image), bench)
+        if frame.reason.startswith(Reason.NO_ROBOT.value):
+            return TakenLook(LookKind.ABSENT)
         if frame.reason:
             is_moved = frame.reason.startswith((Reason.BENCH_MOVED.value, Reason.OTHER_BENCH.value))
             return TakenLook(LookKind.REJECTED, frame.reason, needs_empty=is_moved)
@@ -520,20 +522,26 @@ class TeachingFolder:
             self._check()
         self._keep(frames=True, model="", used=False)
 
-    def teaching_set(self) -> Path:
+    def teaching_set(self, on_frame: Callable[[int, int], bool] = lambda _done, _count: True) -> Path:
         """Write the frames to learn from, a quarter of them held out, and return their folder.
+
+        `on_frame` gets how many of how many frames the network has completed, and says whether to go on.
 
         Raises
         ------
         TeachingError, BenchError
-            Too few frames are usable, the empty picture shows the robot, or the disk is full.
+            Too few frames are usable, the empty picture shows the robot, it was stopped, or the disk is full.
         """
         assert self._bench is not None
         self._check(raises=True)
         frames = [replace(taken.frame, reason=taken.frame.reason or _left_out(taken)) for taken in self._frames]
         corrected = {taken.stem for taken in self._frames if taken.is_corrected}
         chosen = teaching.choose(frames, WANTED)
-        completed = [one if one.picture.stem in corrected else self._completed(one) for one in chosen]
+        completed: list[TeachingFrame] = []
+        for one in chosen:
+            if not on_frame(len(completed), len(chosen)):
+                raise teaching.TeachingError("stopped before the training began; the frames are kept")
+            completed.append(one if one.picture.stem in corrected else self._completed(one))
         chosen = [was if one.reason else now for was, now, one in zip(chosen, completed, self._checked(completed), strict=True)]
         teaching.write_teaching_set(self.folder / _SET, self._bench, chosen, [one for one in frames if one.reason], len(frames))
         return self.folder / _SET
@@ -652,8 +660,9 @@ def _blurred(robot: Mask) -> NDArray[np.float32]:
 
 
 def _beside_px(one: Mask, other: Mask) -> int:
-    """Area of two masks (h, w) that only one of them covers, where it is wider than edges are unsure."""
-    return int(cv2.erode((one ^ other).view(np.uint8), np.ones((3, 3), np.uint8)).sum())
+    """The lesser of the areas that each of two masks (h, w) covers alone, without unsure edges; 0 where a robot only goes on."""
+    core = np.ones((3, 3), np.uint8)
+    return min(int(cv2.erode(alone.view(np.uint8), core).sum()) for alone in (one & ~other, other & ~one))
 
 
 def _apart(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:

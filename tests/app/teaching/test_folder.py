@@ -114,6 +114,17 @@ def test_a_bend_at_the_same_depth_is_taken_as_a_bend(work: TeachingFolder) -> No
     assert work.view().bends == 1
 
 
+def test_a_robot_that_only_goes_on_is_no_bend(work: TeachingFolder) -> None:
+    work.look(robot_picture(0, 0.6))
+    assert work.look(robot_picture(0, 0.63, seed=3)).kind is not LookKind.BEND
+    assert work.view().bends == 0
+
+
+def test_a_vessel_without_a_robot_is_no_rejected_frame(work: TeachingFolder) -> None:
+    assert work.look(toy_picture(seed=77)).kind is LookKind.ABSENT
+    assert work.view().frames == ()
+
+
 def test_frames_become_a_set_that_teach_reads(work: TeachingFolder) -> None:
     drive(work)
     made = read_teaching_set(work.teaching_set())
@@ -171,6 +182,18 @@ def test_everything_is_there_again_after_the_window_was_closed(work: TeachingFol
     assert again.frames[3].is_corrected
     assert np.array_equal(again.frames[3].frame.robot, mask)
     assert again.share == pytest.approx(work.view().share)
+
+
+def test_a_robot_that_is_seen_in_the_empty_picture_is_still_pointed_out_in_the_next_run(tmp_path: Path) -> None:
+    vessel, robot = segment(robot_picture(0, 0.9))[0], large(toy_robot(0, 0.9)).astype(np.float32)
+    work = TeachingFolder(tmp_path / "teaching", "toy", lambda: lambda _image: (vessel, robot))
+    work.load()
+    work.add_empty([robot_picture(0, 0.9, seed=number) for number in range(3)])
+    (before,) = work.view().robot_like
+    again = reopened(work, tmp_path)
+    assert np.array_equal(again.view().robot_like[0], before)
+    again.add_empty(empties())
+    assert again.view().robot_like == ()
 
 
 def test_places_are_taken_up_again(tmp_path: Path) -> None:
@@ -247,7 +270,7 @@ def test_an_empty_picture_with_the_robot_in_it_is_said_while_frames_are_taken_an
     with monkeypatch.context() as patch:
         patch.setattr(folder_module, "_CHECK_FROM", 1)
         patch.setattr(teaching, "check", finds_it)
-        look = work.look(robot_picture(1, 0.97, seed=40))
+        look = work.look(robot_picture(1, 0.76, seed=40))
     assert look.needs_empty
     assert look.reason.startswith("the empty picture shows the robot near")
     assert len(work.view().frames) == taken
@@ -304,6 +327,20 @@ def test_too_few_frames_are_said(work: TeachingFolder) -> None:
     work.look(robot_picture(0, 0.6))
     with pytest.raises(TeachingError, match="usable"):
         work.teaching_set()
+
+
+def test_the_writing_of_the_frames_can_be_stopped(work: TeachingFolder) -> None:
+    drive(work)
+    told: list[tuple[int, int]] = []
+
+    def stop_at_the_third(done: int, count: int) -> bool:
+        told.append((done, count))
+        return done < 2
+
+    with pytest.raises(TeachingError, match="the frames are kept"):
+        work.teaching_set(stop_at_the_third)
+    assert told == [(0, work.view().used), (1, work.view().used), (2, work.view().used)]
+    assert not (work.folder / "set").exists()
 
 
 # ---- what a person draws
