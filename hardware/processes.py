@@ -338,9 +338,12 @@ class SharedSlot:
 
 
 class DeviceThread:
-    """Runs `serve` in a thread until it returns; what it raises goes to `failed`, in the same thread.
+    """Runs `serve` until it returns; `serve` waits only by ``wait`` and returns soon after ``stopping`` turned True.
 
-    `serve` waits only by ``wait``, and returns soon after ``stopping`` turned True.
+    Parameters
+    ----------
+    serve : called in the thread.
+    failed : called in the thread with what `serve` raised.
     """
 
     def __init__(self, name: str, serve: Callable[[], None], failed: Callable[[Exception], None]) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,7 +14,7 @@ from typing import Any
 import platformdirs
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from app.teaching.folder import LookKind, TakenLook, TeachingFolder, TeachingStep, TeachingView
+from app.teaching.folder import ENOUGH_BENDS, LookKind, TakenLook, TeachingFolder, TeachingStep, TeachingView
 from app.training.model import TrainingPhase, TrainingState, name_problem, with_record
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import sentence
@@ -32,6 +34,7 @@ _SILENT_MS = 3000
 """Without a new picture for so long the camera gives none."""
 _LOOK_EVERY_MS = 250
 """A look takes a fifth of a second of a processor core, and perception goes on beside it."""
+_TIME_EVERY_MS = 2000
 _END_WITHIN_MS = 5000
 _INTERRUPTED = 130
 """Exit code of ``teach`` that was stopped."""
@@ -110,6 +113,7 @@ class TeachingModel(QObject):
     looked = Signal(object)
     proposed = Signal(object)
     trained = Signal(str)
+    _completed = Signal(int, int)
 
     def __init__(
         self,
@@ -140,13 +144,18 @@ class TeachingModel(QObject):
         self._child: ChildProcess | None = None
         self._name = ""
         self._is_stopping = False
+        self._is_dropped = threading.Event()
+        self._began_s = self._given_s = 0.0
         self._poll = QTimer(self, interval=_POLL_MS)
         self._poll.timeout.connect(self._collect)
+        self._pace = QTimer(self, interval=_TIME_EVERY_MS)  # a training is silent while it loads
+        self._pace.timeout.connect(self.changed)
         self._watch = QTimer(self, interval=_LOOK_EVERY_MS)
         self._watch.timeout.connect(self._look)
         self._work = Worker("teaching", self, behind=True)
         self._work.done.connect(self._on_done)
         self._work.failed.connect(self._on_failed)
+        self._completed.connect(self._on_completed)
 
     # ---- jobs
 
@@ -316,8 +325,18 @@ class TeachingModel(QObject):
             return
         self._name, self.result = name, None
         self.training = TrainingState(TrainingPhase.PREPARING, tr("Writing the frames"), name)
+        self._is_dropped.clear()
         start = partial(self._start_training, minutes)
-        self._run(tr("writing the frames"), self._folder.teaching_set, start)
+        self._run(tr("writing the frames"), partial(self._folder.teaching_set, self._on_frame), start)
+
+    def _on_frame(self, done: int, count: int) -> bool:
+        """From the thread: so many frames are completed; whether to go on."""
+        self._completed.emit(done, count)
+        return not self._is_dropped.is_set()
+
+    def _on_completed(self, done: int, count: int) -> None:
+        if self.training.phase is TrainingPhase.PREPARING:
+            self._show(replace(self.training, line=tr("Looks at frame {done} of {count}", done=done, count=count)))
 
     def _start_training(self, minutes: int, folder: object) -> None:
         out = own_models() / self._name
@@ -326,11 +345,23 @@ class TeachingModel(QObject):
         child.told.connect(self._on_progress)
         child.ended.connect(self._on_ended)
         self._child, self._is_stopping = child, False
+        self._began_s, self._given_s = time.monotonic(), 60.0 * minutes
         self._show(TrainingState(TrainingPhase.RUNNING, tr("Loading the network and frames of the twin"), self._name))
         child.start()
+        self._pace.start()
+
+    @property
+    def time_share(self) -> float:
+        """Share of the given minutes that a running training has used, 0..1: it keeps to them."""
+        return min(1.0, (time.monotonic() - self._began_s) / self._given_s) if self._given_s else 0.0
+
+    @property
+    def minutes_left(self) -> float:
+        return (1.0 - self.time_share) * self._given_s / 60
 
     def stop_training(self) -> None:
         """End it soon; frames and what was learnt are kept, and it can go on later."""
+        self._is_dropped.set()
         if self._child is not None and self.training.phase is TrainingPhase.RUNNING:
             self._is_stopping = True
             self._show(replace(self.training, phase=TrainingPhase.STOPPING, line=tr("Stopping; what was learnt is kept")))
@@ -344,10 +375,13 @@ class TeachingModel(QObject):
         if (result := taught_result(record)) is not None:
             self.result = result
         elif (state := with_record(self.training, record)) is not None:
-            self._show(state)
+            self._show(replace(state, line=tr("Learns the bench")))
+        elif record.get("what") == "calibration" and self.training.phase is TrainingPhase.RUNNING:
+            self._show(replace(self.training, line=tr("Has learnt; is judged on the frames that are held out")))
 
     def _on_ended(self, code: int, line: str) -> None:
         self._child = None
+        self._pace.stop()
         if code == 0:
             self._show(replace(self.training, phase=TrainingPhase.DONE, line="", left_s=None))
             self._run("", partial(self._keep_model, self._name), self._on_kept, quiet=True)
@@ -375,6 +409,7 @@ class TeachingModel(QObject):
         self._is_closed = True
         self._poll.stop()
         self._watch.stop()
+        self._pace.stop()
         if self._child is not None:
             self._child.leave()
             self._child.ask_to_end()
@@ -383,11 +418,13 @@ class TeachingModel(QObject):
             self._folder.release()
 
 
-def look_line(look: TakenLook, count: int) -> str:
-    """What became of a picture, for people; `count` frames are taken."""
+def look_line(look: TakenLook, view: TeachingView) -> str:
+    """What became of a picture, for people."""
+    count, on = view.used, view.bends >= ENOUGH_BENDS and bool(view.missing)
     texts = {
         LookKind.STILL: tr("The robot does not move"),
-        LookKind.SEEN: tr("Seen already: move on, or bend the head"),
+        LookKind.SEEN: tr("Seen already: go on to the orange branch") if on else tr("Seen already: move on, or bend the head"),
+        LookKind.ABSENT: tr("No robot is seen in the vessel: push it in"),
         LookKind.PLACE: tr("Frame {count} taken: a new place", count=count),
         LookKind.BEND: tr("Frame {count} taken: a new bend", count=count),
         LookKind.FULL: tr("Enough frames"),

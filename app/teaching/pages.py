@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +28,7 @@ from app.teaching.folder import (
     ENOUGH_BENDS,
     ENOUGH_FRAMES,
     PLACES,
+    WANTED,
     LookKind,
     TakenFrame,
     TakenLook,
@@ -78,30 +77,26 @@ class BenchPicture(WizardPicture):
 
     def __init__(self) -> None:
         super().__init__()
-        self._outlines: list[tuple[QPolygonF, str]] = []
+        self._outlines: list[QPolygonF] = []
         self._veil: QImage | None = None
         self._working = (1, 1)
-        self._caption = ""
+        self._caption = tr("Live")
 
     def show_bench(
         self,
         working: tuple[int, int],
         tree: NDArray[np.uint8] | None = None,
-        outlines: Sequence[NDArray[np.int32]] = (),
         unknown: Mask | None = None,
-        caption: str = "",
     ) -> None:
         """What is drawn over the picture, in pixels of a picture of size `working` (width, height).
 
         Parameters
         ----------
         tree : the vessel map, see ``VesselCoverage.tree``.
-        outlines : (N, 2), of what is pointed out.
         unknown : bool (h, w), what is not known of the empty bench.
-        caption : in the corner.
         """
-        self._working, self._caption = working, caption
-        self._outlines = [(_polygon(outline), ON_PICTURE.SIM) for outline in outlines]
+        self._working = working
+        self._outlines = []
         pixels = np.zeros((working[1], working[0], 4), np.uint8)
         if unknown is not None:
             pixels[unknown] = (0, 0, 0, _VEIL)
@@ -109,13 +104,19 @@ class BenchPicture(WizardPicture):
             for kind, (ink, opacity) in _INK_OF.items():
                 pixels[tree == kind] = (*theme.rgb(ink), opacity)
             walls, _ = cv2.findContours((tree > 0).view(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-            self._outlines += [(_polygon(np.asarray(wall[:, 0], np.int32)), ON_PICTURE.TEXT) for wall in walls]
+            self._outlines = [_polygon(np.asarray(wall[:, 0], np.int32)) for wall in walls]
         self._veil = QImage(pixels.tobytes(), *working, 4 * working[0], QImage.Format.Format_RGBA8888) if pixels.any() else None
         self.update()
 
     @property
     def caption(self) -> str:
+        """What is said in the corner."""
         return self._caption
+
+    def show_caption(self, text: str) -> None:
+        if text != self._caption:
+            self._caption = text
+            self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
@@ -129,9 +130,8 @@ class BenchPicture(WizardPicture):
             painter.drawImage(box, self._veil)
         scale = box.width() / self._working[0]
         to_widget = QTransform(scale, 0.0, 0.0, scale, box.left() + 0.5 * scale, box.top() + 0.5 * scale)
-        for outline, ink in self._outlines:
-            shape = to_widget.map(outline)
-            for pen in (QPen(QColor(0, 0, 0, 130), 3.0), QPen(theme.colour(ink, 0.9), 1.2 if ink == ON_PICTURE.TEXT else 2.0)):
+        for shape in map(to_widget.map, self._outlines):
+            for pen in (QPen(QColor(0, 0, 0, 130), 3.0), QPen(theme.colour(ON_PICTURE.TEXT, 0.9), 1.2)):
                 painter.setPen(pen)
                 painter.drawPolygon(shape)
         if self._caption:
@@ -252,15 +252,17 @@ class EmptyPage(TeachingPage):
         self.place.setText(numbered if count < PLACES else tr("Take one more &place"))
         self.take.setText(tr("&Take it again") if view.empty is not None else tr("&Take picture"))
         if view.empty is None:
-            self.thumb.setText(tr("not taken yet"))
+            self.thumb.setText("" if busy else tr("not taken yet"))  # what was taken before may just be read
         else:
-            pixmap = to_pixmap(view.empty)
+            marked = view.empty.copy()  # on what was taken: over the live picture it would hide the robot that is drawn back
+            cv2.drawContours(marked, view.robot_like, -1, theme.rgb(ON_PICTURE.SIM), 3)
+            pixmap = to_pixmap(marked)
             keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
             self.thumb.setPixmap(pixmap.scaled(self.thumb.size() - QSize(2, 2), keep, smooth))
         self.found.setText(self._words(view))
         size = (view.empty.shape[1], view.empty.shape[0]) if view.empty is not None else (640, 480)
         unknown = ~view.known if view.known is not None else None
-        self._picture.show_bench(size, outlines=view.robot_like, unknown=unknown, caption=tr("Live"))
+        self._picture.show_bench(size, unknown=unknown)
 
     def _words(self, view: TeachingView) -> str:
         if view.empty is None:
@@ -268,8 +270,8 @@ class EmptyPage(TeachingPage):
         if view.robot_like:
             x, y = middle_of(view.robot_like[0])
             return tr(
-                "The present model sees a robot near ({x:.0f}, {y:.0f}), outlined in the picture. If it is one, draw it back and "
-                "take the picture again; if not, go on.",
+                "The present model sees a robot near ({x:.0f}, {y:.0f}), outlined above. If it is one, draw it back and take the "
+                "picture again; if not, go on.",
                 x=x,
                 y=y,
             )
@@ -447,7 +449,7 @@ class MovePage(TeachingPage):
         if view.empty is None:
             return
         size = view.empty.shape[1], view.empty.shape[0]
-        self._picture.show_bench(size, view.tree, caption=tr("Live"))
+        self._picture.show_bench(size, view.tree)
         ends = [branch for branch in view.branches if branch.is_wanted and branch.is_end] or view.branches
         self.places.show_share(view.share, tr("{done} of {count}", done=sum(one.is_done for one in ends), count=len(ends)))
         bends = tr("{done} of {count}", done=min(view.bends, ENOUGH_BENDS), count=ENOUGH_BENDS)
@@ -465,7 +467,7 @@ class MovePage(TeachingPage):
         if look.kind is LookKind.STILL:
             return  # what was said last stays: nothing flickers while the robot rests
         taken = look.kind in (LookKind.PLACE, LookKind.BEND)
-        text = look_line(look, self.view.used)
+        text = look_line(look, self.view)
         if look.needs_empty:
             text += tr(" (Back leads to the empty picture; the frames stay)")
         self._say(text, "ALLOWED" if taken else "SIM" if look.kind is LookKind.REJECTED else "TEXT_DIM")
@@ -681,11 +683,13 @@ class TrainPage(TeachingPage):
     def refresh(self) -> None:
         state = self.model.training
         enable(not state.is_busy and not self.model.is_busy, self.start, self.model_name, self.minutes)
-        self.stop.setEnabled(state.phase is TrainingPhase.RUNNING)
+        self.stop.setEnabled(state.phase in (TrainingPhase.PREPARING, TrainingPhase.RUNNING))
         if state.phase is TrainingPhase.DONE and self.model_name.text() == state.name:
             self.model_name.setText(free_name(self.model.rig))
-        self.bar.setRange(0, state.steps if state.step or not state.is_busy else 0)
-        self.bar.setValue(state.steps if state.phase is TrainingPhase.DONE else state.step)
+        is_known = state.phase is TrainingPhase.RUNNING or not state.is_busy
+        self.bar.setRange(0, 1000 if is_known else 0)
+        done = self.model.time_share if state.is_busy else float(state.phase is TrainingPhase.DONE)
+        self.bar.setValue(round(1000 * done))
         self.words.setText(self._words(state))
         self.table.setText(self._table())
         if state.held_out:
@@ -693,15 +697,16 @@ class TrainPage(TeachingPage):
             self._pictures.show_pictures(state.held_out[0].pictures, after)
 
     def _words(self, state: TrainingState) -> str:
-        if state.is_busy and state.step:
-            left = tr(", about {minutes:.0f} min left", minutes=max(1.0, state.left_s / 60)) if state.left_s is not None else ""
-            return tr("Step {step} of {steps}{left}", step=state.step, steps=state.steps, left=left)
+        if state.phase is TrainingPhase.RUNNING:
+            minutes = max(1.0, self.model.minutes_left)
+            return tr("{what}, about {minutes:.0f} min left", what=tr_text(state.line), minutes=minutes)
         if state.line:
             return tr_text(state.line)
         if self.view.model:
             used = tr(" It is in use.") if self.view.is_used else tr(" Use it puts it into force, with this bench.")
             return tr("Model {name} is there.{more}", name=self.view.model, more=used)
-        return tr("{count} frames to learn from; a quarter of them is held out, to judge by.", count=self.view.used)
+        counts = {"count": min(WANTED, self.view.used), "all": self.view.used}
+        return tr("{count} of {all} frames are learnt from; a quarter of them is held out, to judge by.", **counts)
 
     def _table(self) -> str:
         result = self.model.result

@@ -29,7 +29,7 @@ from app.teaching.pages import (
 from app.training.dialog import BeforeAfter
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.ui.texts import OperatorStep
+from app.ui.texts import OperatorStep, next_step, who_drives
 from app.widgets.alerts import AlertStrip
 from app.widgets.basics import Card, StillWheel, column, line, takes_enter
 from app.widgets.messages import QuestionStrip
@@ -43,6 +43,8 @@ _FRAME = QSize(16, 56)
 _STEPS_PX, _CONTROLS_PX = 156, 352
 _STEP_LINE_PX = 30
 _PICTURE_EVERY_MS = 50
+_ASKED = OperatorStep.SERVOS_ON, OperatorStep.ACKNOWLEDGE
+"""What moving the robot may ask for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +108,7 @@ class TeachingWindow(QDialog):
         self.steps, self.stack, self.right = QListWidget(), QStackedWidget(), QStackedWidget()
         self.stop_button = StopButton()
         self.stop_button.asked.connect(driver.stop)
-        for step in (OperatorStep.SERVOS_ON, OperatorStep.ACKNOWLEDGE):  # what moving the robot may ask for
+        for step in _ASKED:
             QShortcut(step.value.key, self, partial(driver.ask, step))
         self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
         self.over_button = button(tr("Start &over"), self._ask_to_start_over, tr("Forget what was taken of this bench"))
@@ -283,8 +285,11 @@ class TeachingWindow(QDialog):
 
     @Slot(object)
     def show_news(self, news: DriveNews) -> None:
-        """Show over the live picture why the robot does not move, or was stopped."""
+        """Show over the live picture who moves the robot, and why it does not move, or was stopped."""
         if self.isVisible():
+            step, who = next_step(news.view).step, who_drives(news.view)
+            key = f" ({step.value.key})" if step in _ASKED else ""
+            self.picture.show_caption(tr("Live: {who}{key}", who=who, key=key))
             self.alerts.show_view(news.view)
             self.alerts.show_alerts(news.alerts)
 

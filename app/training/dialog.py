@@ -90,8 +90,9 @@ def _pen(colour: str, width: float, style: Qt.PenStyle = Qt.PenStyle.SolidLine) 
 class _Picture(QLabel):
     """A file's picture, as large as fits."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, waiting: str) -> None:
         super().__init__(alignment=Qt.AlignmentFlag.AlignCenter)
+        self._waiting = waiting
         self.setAccessibleName(name)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self.setMinimumSize(200, 130)
@@ -110,7 +111,7 @@ class _Picture(QLabel):
 
     def _fit(self) -> None:
         if self._pixmap.isNull():
-            self.setText(tr("shown when the training has begun"))
+            self.setText(self._waiting)
             return
         smooth = Qt.TransformationMode.SmoothTransformation
         self.setPixmap(self._pixmap.scaled(self.size(), Qt.AspectRatioMode.KeepAspectRatio, smooth))
@@ -125,7 +126,8 @@ class BeforeAfter(QWidget):
         self._before: tuple[str, ...] = ()
         self._after: tuple[str, ...] = ()
         self._place = 0
-        self._left, self._right = _Picture(tr("Before")), _Picture(tr("After"))
+        self._left = _Picture(tr("Before"), tr("shown when the training has begun"))
+        self._right = _Picture(tr("After"), tr("shown when it has learnt"))
         self._title = QLabel()
         self._title.setObjectName("card_note")
         self._next = QPushButton(tr("&Next picture"), autoDefault=False)

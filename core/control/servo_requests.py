@@ -111,7 +111,10 @@ class Interrupted(DeviceError):
 class ServoRequests:
     """Carries requests out in a thread of its own. A request that fails posts the driver's message as a problem of the servos.
 
-    `post` takes the outcome, from that thread.
+    Parameters
+    ----------
+    robot : whose servos.
+    post : takes the outcome, from another thread.
     """
 
     def __init__(self, robot: GuardedRobot, post: Callable[[Event], None]) -> None:

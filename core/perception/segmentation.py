@@ -51,9 +51,12 @@ class Segmenter:
 
 
 class OrientationAverage(Segmenter):
-    """The mean over a picture (h, w, channels) and its mirror image, each in some quarter turns (test-time augmentation).
+    """The mean over a picture and its mirror image, each in some quarter turns (test-time augmentation).
 
-    Each of the `turns` asks `segmenter` twice; (0,) is the picture and its mirror image.
+    Parameters
+    ----------
+    segmenter : takes images (h, w, channels).
+    turns : quarter turns; each asks `segmenter` twice. (0,): the picture and its mirror image.
     """
 
     def __init__(self, segmenter: Segmenter, turns: Sequence[int] = (0, 1, 2, 3)) -> None:
@@ -170,7 +173,13 @@ MAX_EDGE_SHARE = 0.08
 
 
 def clean(vessel_probability: Probability, robot_probability: Probability, config: PerceptionConfig) -> Masks:
-    """Masks of vessel and robot without specks and pinholes, from their probabilities (h, w), 0..1, at working resolution."""
+    """Masks of vessel and robot without specks and pinholes.
+
+    Parameters
+    ----------
+    vessel_probability, robot_probability : shape (h, w), 0..1, at working resolution.
+    config : thresholds (``segmentation``) and limits of area (``cleaning``).
+    """
     vessel = vessel_probability >= config.segmentation.vessel_threshold
     return Masks(
         vessel=clean_mask(vessel, config.cleaning.min_vessel_area_px, config.cleaning.max_hole_area_px),

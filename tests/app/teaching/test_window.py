@@ -22,6 +22,7 @@ from app.ui.texts import OperatorStep
 from core.bench.bench import read_bench
 from core.control.alerts import Alert, alert_of
 from core.control.drive_view import DriveNews, DriveView
+from core.control.gate import Source
 from core.control.modes import Hindrance
 from core.learning.model_writer import save_model
 from core.perception.model_file import own_models
@@ -210,6 +211,9 @@ def test_the_servos_are_switched_on_and_alerts_are_seen_in_this_window(open_hand
     alert = Alert(Hindrance.SERVOS_UNCHECKED, alert_of(Hindrance.SERVOS_UNCHECKED, simulated=True))
     hand.window.show_news(DriveNews(DriveView(1.0), (alert,)))
     assert "Switch them on" in hand.window.alerts.texts[0]
+    assert hand.window.picture.caption == "Live: servos not in use (F3)"
+    hand.window.show_news(DriveNews(DriveView(1.0, servos_on=True, permitted=Source.OPERATOR)))
+    assert hand.window.picture.caption == "Live: you steer"
 
 
 def test_three_places_make_an_empty_picture(open_hand: OpenHand) -> None:
@@ -369,6 +373,7 @@ def test_a_training_is_stopped_and_goes_on_while_the_window_is_closed(
     hand.window.close()
     assert hand.model.is_training
     hand.window.open()
+    assert hand.window.train_page.words.text() == "Loading the network and frames of the twin, about 5 min left"
     hand.click(hand.window.train_page.stop)
     qtbot.waitUntil(lambda: not hand.model.is_training, timeout=LONG_MS)
     assert hand.model.training.line.startswith("Stopped")
