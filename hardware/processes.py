@@ -338,12 +338,9 @@ class SharedSlot:
 
 
 class DeviceThread:
-    """Runs `serve` until it returns; `serve` waits only by ``wait`` and returns soon after ``stopping`` turned True.
+    """Runs `serve` in a thread until it returns; what it raises goes to `failed`, in the same thread.
 
-    Parameters
-    ----------
-    serve : called in the thread.
-    failed : called in the thread with what `serve` raised.
+    `serve` waits only by ``wait``, and returns soon after ``stopping`` turned True.
     """
 
     def __init__(self, name: str, serve: Callable[[], None], failed: Callable[[Exception], None]) -> None:

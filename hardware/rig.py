@@ -260,11 +260,8 @@ def rig_config(
 ) -> tuple[Config, RigKind]:
     """The configuration of a rig or of a recorded source, and its kind.
 
-    Parameters
-    ----------
-    rig : a built-in rig or a rig file's name; None: the one that the configuration names.
-    source : a recording, file or folder of pictures, instead of a rig.
-    own : settings of the user, over the defaults.
+    `rig` is a built-in one or a rig file's name; None: the one that the configuration names. `source` is a recording, file or
+    folder of pictures, instead of a rig; `own` are settings of the user, over the defaults.
 
     Raises UserError: for contradicting or unknown names; DeviceError for a source that cannot be read.
     """

@@ -46,11 +46,7 @@ def _now_s(world_s: float, behind_s: float) -> float:
 
 
 class SimulatedClock:
-    """Seconds; never goes back. From any thread.
-
-    Parameters
-    ----------
-    file : that of another reader; None makes one, until ``close``.
+    """Seconds; never goes back. From any thread. `file` is that of another reader; None makes one, until ``close``.
 
     Raises DeviceError: no file can be made or opened.
     """

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from core.annotation.merge import raters_alike
 from core.annotation.model import ANSWERED, AnnotationError, Status, measure_lines, status_of
-from core.annotation.store import ImageRecord, StoredAnnotation
+from core.annotation.store import MEASURED, ImageRecord, StoredAnnotation
 from core.config.models import PerceptionConfig
 from core.evaluation.evaluation import Measurement
 from core.evaluation.metrics import (
@@ -309,11 +309,8 @@ def measured_alike(
 ) -> tuple[list[StoredAnnotation], list[str]]:
     """The annotations with angle, side and distances of their lines as `config` fits them; states stay as they were given.
 
-    Returns the annotations, and a note for the reader where some of the angles were others when they were drawn.
-
-    Parameters
-    ----------
-    images : by SHA-256; annotations of others stay as they were kept.
+    Also a note for the reader where some of the angles were others when they were drawn. Annotations of images that `images`
+    (by SHA-256) does not have stay as they were kept.
     """
     alike = [_measured(one, images[one.key.sha256].size, config) if one.key.sha256 in images else one for one in annotations]
     others = sum(not _is_same(was.theta_deg, now.theta_deg) for was, now in zip(annotations, alike, strict=True))
@@ -330,18 +327,8 @@ def measured_alike(
 
 def _measured(one: StoredAnnotation, size: tuple[int, int], config: PerceptionConfig) -> StoredAnnotation:
     readout = measure_lines(one.content, size, config)
-    pose = readout.pose
-    if pose is None:
-        return replace(one, theta_deg=None, theta_signed_deg=None, d_head_px=None, d_tail_px=None, crossed=None)
-    return replace(
-        one,
-        is_short=readout.is_short,
-        theta_deg=pose.theta_deg,
-        theta_signed_deg=pose.theta_signed_deg,
-        d_head_px=pose.d_head_px,
-        d_tail_px=pose.d_tail_px,
-        crossed=pose.crossed,
-    )
+    measured: dict[str, Any] = {name: getattr(readout.pose, name, None) for name in MEASURED}
+    return replace(one, is_short=readout.is_short if readout.pose is not None else one.is_short, **measured)
 
 
 def _is_same(one_deg: float | None, other_deg: float | None) -> bool:

@@ -41,16 +41,12 @@ def export_training_set(
 ) -> tuple[int, list[str]]:
     """Write ``images/``, ``masks/`` and ``truth.jsonl`` as ``train --data`` and ``evaluate`` read them.
 
-    Raises AnnotationError: the folder is not empty or cannot be written, or there is nothing to write; the images were measured in
+    Returns the number of frames written, and one line for each annotated image that was left out. An image with only one of the
+    two masks is left out: without its mask a robot that is there would be taught as background. `measured` are finished answers
+    of one study, whose angles and states go along; None: those among `annotations`.
+
+    Raises AnnotationError: `out` is not empty or cannot be written; there is nothing to write; the images were measured in
     several studies; or `go_on`, asked before each image, is False.
-
-    Returns the number of frames written, and one line for each annotated image that was left out. An image with only one of the two
-    masks is left out: without its mask a robot that is there would be taught as background.
-
-    Parameters
-    ----------
-    annotations : whose masks count, of any study.
-    measured : finished answers of one study, whose angles and states go along; None: those among `annotations`.
     """
     sources = mask_source(annotations)
     here = {image.sha256: image for image in images}
@@ -186,18 +182,14 @@ def split_own_frames(
 def trainable(annotations: Sequence[StoredAnnotation], images: Sequence[FoundImage]) -> list[str]:
     """SHA-256 of the images with both masks, in the order of their paths. Raises AnnotationError: too few."""
     here = {image.sha256: image for image in images}
-    complete = sorted((sha256 for sha256 in _complete(annotations) if sha256 in here), key=lambda one: str(here[one].path))
+    whole = [sha256 for sha256, one in mask_source(annotations).items() if sha256 in here and not _lacking(one.content)]
+    complete = sorted(whole, key=lambda one: str(here[one].path))
     if len(complete) < FEWEST:
         missing = FEWEST - len(complete)
         have = f"{len(complete)} {'image has' if len(complete) == 1 else 'images have'} both a vessel and a robot mask"
         how = "draw them with keys 3 and 4, or take over and correct the algorithm's with G"
         raise AnnotationError(f"{have}, and training needs {FEWEST}: {missing} more ({how})")
     return complete
-
-
-def _complete(annotations: Sequence[StoredAnnotation]) -> list[str]:
-    """SHA-256 of the images whose masks that count are there for both targets."""
-    return [sha256 for sha256, one in mask_source(annotations).items() if not _lacking(one.content)]
 
 
 _LINE_PX = 60.0  # length of the proposed robot line, working px: the 40 px that count and some before

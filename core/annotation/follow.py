@@ -54,11 +54,8 @@ def followed_lines(
 ) -> Iterator[tuple[int, Line, Line]]:
     """The lines of robot and vessel of all pictures without lines of their own.
 
-    Parameters
-    ----------
-    read : the n-th of the `count` pictures of a clip, RGB (H, W, 3), all of one size. Raises ImageError, which goes through.
-    keys : by place, pictures with lines of their own, at least one.
-    go_on : asked before each picture; when it is False, no more come.
+    `read` gives the n-th of the `count` pictures of a clip, RGB (H, W, 3), all of one size; its ImageError goes through. `keys`
+    are the pictures with lines, by place, one at least. `go_on` is asked before each picture; when it is False, no more come.
     """
     places = sorted(keys)
     for number, key in enumerate(places):

@@ -69,14 +69,9 @@ class Format:
 
 
 def read_files(paths: Iterable[Path], images: Iterable[FoundImage]) -> tuple[list[Imported], list[str]]:
-    """Read files of the formats in ``FORMATS``, told apart by ending and content.
+    """Read files of the formats in ``FORMATS``, told apart by ending and content; and one line for each thing that was not read.
 
-    Returns what was read, and one line for each thing that was not.
-
-    Parameters
-    ----------
-    paths : files.
-    images : those that the annotations may belong to; a file's image is found among them by its name.
+    The image of an annotation is found by its name among `images`.
     """
     read = _Reading(images)
     for path in paths:

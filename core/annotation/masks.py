@@ -32,11 +32,7 @@ _BRUSH_SIDE_PX = 2048
 def polygons_of(mask: Mask, target: MaskTarget, tolerance_px: float = TOLERANCE_PX) -> tuple[MaskPolygon, ...]:
     """The outlines of a mask (H, W), the largest first and each followed by its holes: what lies in a hole comes after that.
 
-    Parameters
-    ----------
-    mask : binary mask.
-    target : what it covers.
-    tolerance_px : how far an outline may be off; 0 keeps the mask, but for pieces of one or two pixels.
+    An outline may be off by `tolerance_px`; 0 keeps the mask, but for pieces of one or two pixels.
     """
     contours, hierarchy = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     parents: list[int] = np.asarray(hierarchy).reshape(-1, 4)[:, 3].tolist() if len(contours) else []

@@ -36,13 +36,8 @@ def identify_raters(
 ) -> Persons:
     """Who is who, over all studies: a rater whose answers are in both files is one person, whatever the names in the two files.
 
-    Raises AnnotationError: a name is in both files, and nothing tells whether it is one person; or `names` contradicts the answers.
-
-    Parameters
-    ----------
-    there, here : all answers of both files.
-    names : what the operator says: name there -> name here.
-    where : the other file, for messages.
+    `names` is what the operator says (name there -> name here); `where` names the other file in messages. Raises
+    AnnotationError: a name is in both files, and nothing tells whether it is one person; or `names` contradicts the answers.
     """
     at: dict[tuple[str, str, int], list[KeptAnnotation]] = {}
     for one in here:
@@ -97,15 +92,11 @@ class Joined:
 def join(target: AnnotationStore, files: Sequence[Path], study: str | None, names: Mapping[str, str]) -> Joined:
     """Take the answers of other annotation files in, one after the other and in one transaction.
 
-    Raises AnnotationError: a file is damaged, open in a window, or cannot be read; a study was begun otherwise there; or it is not
-    clear who a rater is. Nothing is changed then.
+    The files, or folders with one, are only read. `study`: only this one; None: all, and what lies outside studies. `names`:
+    what raters of the files are called here, where their names alone do not identify them.
 
-    Parameters
-    ----------
-    target : open for writing.
-    files : annotation files, or folders with one; they are only read.
-    study : only this one; None: all, and what lies outside studies.
-    names : what raters of the files are called here, where their names alone do not identify them.
+    Raises AnnotationError: a file is damaged, open in a window, or cannot be read; a study was begun otherwise there; or it is
+    not clear who a rater is. Nothing is changed then.
     """
     paths = [path / DEFAULT_NAME if path.is_dir() else path for path in files]
     for path in paths:
@@ -276,11 +267,9 @@ _TABLES = ("images", "studies", "annotations", "journal", "origins", "looks", "p
 
 
 def salvage(damaged: Path, target: Path) -> tuple[int, list[str]]:
-    """Copy all rows that can be read.
+    """Copy all rows that can be read; returns how many annotations there are, and a line for each table or record that is lost.
 
     Raises AnnotationError: nothing can be read, or the new file is there already or cannot be written.
-
-    Returns the number of annotations in the new file, and one line for each table or record that is lost.
     """
     if not damaged.is_file():
         raise AnnotationError(f"{damaged}: no such annotation file")

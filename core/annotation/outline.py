@@ -32,13 +32,8 @@ def with_tube(
 ) -> Polygons:
     """The polygons with the tube of a drag: added with its walls on the edges of the picture, erased as it was drawn.
 
-    Parameters
-    ----------
-    polygons : all masks; those of other targets stay.
-    target : which mask.
-    image : RGB (H, W, 3).
-    stroke : where the hand went, (N, 2) px.
-    radius_px : the drawn radius, one for all, or one at each point (N,).
+    `polygons` are all masks, `image` is RGB (H, W, 3), `stroke` is where the hand went (N, 2) in px, and `radius_px` the drawn
+    radius: one for all, or one at each point (N,).
     """
     radius = np.broadcast_to(np.asarray(radius_px, np.float64), (len(stroke),))
     size = image.shape[1], image.shape[0]
@@ -53,11 +48,7 @@ def with_region(
 ) -> Polygons:
     """The polygons with the region around a click: added, or erased, up to edges and changes of colour.
 
-    Parameters
-    ----------
-    polygons, target, image : as for ``with_tube``.
-    point : the click.
-    radius_px : of the circle under the cursor; the region extends up to three radii from the click.
+    `radius_px` is that of the circle under the cursor; the region extends up to three radii from the click.
     """
     mask = fill(polygons, target, (image.shape[1], image.shape[0]))
     return _replaced(polygons, target, _cut(image, mask, point, radius_px, erase=erase))
@@ -108,12 +99,9 @@ def _cut(image: Image, mask: Mask, point: Point, radius_px: float, *, erase: boo
 
 
 class VesselOutline:
-    """The vessel's mask while it is drawn. It begins with a proposal, or empty; every gesture can be undone.
+    """The vessel's mask while it is drawn. It begins with a proposal (H, W), or empty; every gesture can be undone.
 
-    Parameters
-    ----------
-    image : RGB (H, W, 3), best one of the empty bench.
-    proposal : (H, W), such as the mask of ``Pipeline.perceive_single``; None: begin empty.
+    `image` is RGB (H, W, 3), best one of the empty bench.
     """
 
     def __init__(self, image: Image, proposal: Mask | None = None) -> None:

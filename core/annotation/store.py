@@ -69,6 +69,8 @@ ANNOTATION_COLUMNS = (
     "sha256, study, rater, repeat, view, content, check_sum, theta_deg, theta_signed_deg, d_head_px, d_tail_px, crossed,"
     " time_spent_s, changed_utc"
 )
+MEASURED = ("theta_deg", "theta_signed_deg", "d_head_px", "d_tail_px", "crossed")
+"""What is kept of the pose of the lines, by the names of ``Pose`` and of the columns."""
 ENTRY_COLUMNS = "j.number, j.kind, j.base, j.action, j.content, j.check_sum"
 
 
@@ -125,19 +127,9 @@ def stored_from(row: Any) -> StoredAnnotation:
     if not all(isinstance(value, str) for value in (sha256, study, rater, changed)):
         raise TypeError("no text where text should be")
     theta, signed, head, tail, crossed = (None if value is None else float(value) for value in measured)
+    pose = theta, signed, head, tail, None if crossed is None else bool(crossed)
     key = ItemKey(sha256, study, rater, int(repeat))
-    return StoredAnnotation(
-        key=key,
-        view=ImageView(view),
-        content=annotation_from_json(text),
-        theta_deg=theta,
-        theta_signed_deg=signed,
-        d_head_px=head,
-        d_tail_px=tail,
-        crossed=None if crossed is None else bool(crossed),
-        time_spent_s=float(spent),
-        changed_utc=changed,
-    )
+    return StoredAnnotation(key, ImageView(view), annotation_from_json(text), *pose, float(spent), changed)
 
 
 def entry_from(row: Any) -> JournalEntry:
@@ -241,15 +233,9 @@ def image_sha256(path: Path) -> str:
 
 
 class AnnotationStore:
-    """One open annotation file. Its methods may be called from any thread, and each is one transaction.
+    """One open annotation file, which is made unless it exists; methods may be called from any thread, each is one transaction.
 
-    Raises AnnotationError: from every method: file missing, damaged, locked, of another kind or of a newer version, or the disk
-    full.
-
-    Parameters
-    ----------
-    path : the file; it is made unless it exists.
-    read_only : the file must exist then.
+    All of them raise AnnotationError: file missing, damaged, locked, of another kind or of a newer version, or the disk full.
     """
 
     def __init__(self, path: Path, *, read_only: bool = False) -> None:
@@ -320,10 +306,8 @@ class AnnotationStore:
     def study_settings(self, name: str) -> dict[str, Any] | None:
         """The settings that the study was begun with, None when there is no such study."""
         found = self._rows("SELECT settings FROM studies WHERE name = ?", (name,))
-        if not found:
-            return None
         try:
-            settings: dict[str, Any] = json.loads(found[0][0])
+            settings: dict[str, Any] | None = json.loads(found[0][0]) if found else None
         except (ValueError, TypeError):
             raise AnnotationError(
                 f"{self.path}: the settings of study {name!r} are damaged; begin a study of another name"
@@ -352,11 +336,7 @@ class AnnotationStore:
             "check_sum": check_sum(text),
             "robot_vector": _vector_json(measured.robot_vector),
             "vessel_vector": _vector_json(measured.vessel_vector),
-            "theta_deg": pose.theta_deg if pose else None,
-            "theta_signed_deg": pose.theta_signed_deg if pose else None,
-            "d_head_px": pose.d_head_px if pose else None,
-            "d_tail_px": pose.d_tail_px if pose else None,
-            "crossed": int(pose.crossed) if pose else None,
+            **{name: getattr(pose, name) if pose else None for name in MEASURED},
             "state": content.state,
             "suggested_state": pose.state.value if pose else None,
             "cannot_tell": int(content.cannot_tell),

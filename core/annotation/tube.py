@@ -61,13 +61,7 @@ class LumenTube:
 
 
 def drawn_tube(stroke: Points, radius_px: FloatArray) -> LumenTube:
-    """The tube as the hand drew it, with a point every sixth of its least radius.
-
-    Parameters
-    ----------
-    stroke : where the hand went, (N, 2) px.
-    radius_px : the drawn radius (N,) at each of these points.
-    """
+    """The tube as the hand drew it along (N, 2) px with the radii (N,), with a point every sixth of its least radius."""
     along = geometry.arc_length(stroke)
     step = max(float(radius_px.min()) * _STEP, 0.5)
     if along[-1] < step:
@@ -80,12 +74,8 @@ def drawn_tube(stroke: Points, radius_px: FloatArray) -> LumenTube:
 def snapped_tube(image: Image, stroke: Points, radius_px: FloatArray, taken: Mask | None = None) -> LumenTube:
     """The vessel along a drag; beyond the border of the picture where an end of the drag is nearer to it than a radius.
 
-    Parameters
-    ----------
-    image : RGB (H, W, 3).
-    stroke : where the hand went, (N, 2) px, along the middle of the vessel.
-    radius_px : the drawn radius (N,) at each of these points.
-    taken : (H, W), what is vessel already; walls are not looked for in there.
+    `image` is RGB (H, W, 3); `stroke` (N, 2) px leads along the middle of the vessel, with the drawn radius (N,) at each point.
+    Walls are not looked for in what is vessel already, `taken` (H, W).
     """
     tube = drawn_tube(stroke, radius_px)
     if len(tube.middle) < 4:
@@ -190,10 +180,8 @@ def _clearness(strength: FloatArray) -> float:
 def _walls(left: FloatArray, right: FloatArray, steps: FloatArray, slack: float) -> tuple[FloatArray, FloatArray]:
     """The cheapest pair of walls (N,) and (N,), in radii from the line, by dynamic programming.
 
-    Parameters
-    ----------
-    left, right : edge strengths (N, K) at the distances `steps` (K,) on either side of the line.
-    slack : distance from the drawn wall, in radii, that costs as much as an edge of full strength saves.
+    `left` and `right` are edge strengths (N, K) at the distances `steps` (K,); `slack` is the distance from the drawn wall, in
+    radii, that costs as much as an edge of full strength saves.
     """
     count, kinds = left.shape
     cell = steps[1] - steps[0]

@@ -183,12 +183,9 @@ _GAP = 6
 
 
 def sheath_growth(path: Points, first: Image, second: Image) -> float:
-    """By how many px the catheter's sheath covers more of the robot in the second picture than in the first; 0: no difference.
+    """By how many px the catheter's sheath covers more of the robot in the second mean picture than in the first (H, W, 3).
 
-    Parameters
-    ----------
-    path : the robot (N, 2), tail -> head, the same in both pictures.
-    first, second : mean pictures (H, W, 3).
+    0 without a difference. `path` is the robot (N, 2), tail -> head, the same in both.
     """
     one, other = _band(path, first), _band(path, second)
     change = np.abs(one - other).mean(axis=(1, 2))
@@ -555,11 +552,6 @@ def feed_disagreement(
     """A warning when the feed per turn that was seen differs from the configured one; "" where they agree.
 
     Before identification all servos are turned as if their drums were as large as the largest configured one.
-
-    Parameters
-    ----------
-    findings : by id.
-    size : (width, height) of the pictures that were looked at.
     """
     (feed,) = servos.joints[servos.places(JointKind.ADVANCE)]
     found = next((findings.get(one.id) for one in assignments if one.name == feed.name), None)

@@ -184,9 +184,7 @@ def basis_of(config: Config, version: str) -> Basis:
 def changes_since(accepted: Acceptance, config: Config, firmware: Sequence[int] = ()) -> tuple[str, ...]:
     """What an acceptance no longer holds for as the rig is configured, each in a few words.
 
-    Parameters
-    ----------
-    firmware : of the servos, in the order of the joints; empty: they were not asked.
+    `firmware` is that of the servos, in the order of the joints; empty: they were not asked.
     """
     then, now = accepted.basis, basis_of(config, program_version())
     if then.joints != now.joints:

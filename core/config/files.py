@@ -132,16 +132,10 @@ _HEAD = "# LumenPilot's settings: only what differs from the defaults. Every key
 
 
 def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
-    """Write what differs from the defaults, atomically, also when the power goes.
+    """Write what differs from the defaults, atomically, also when the power goes; returns nothing, or where the old file is kept.
 
-    Raises ConfigError: the file cannot be written; the old one is as it was.
-
-    Returns nothing, or one line about where the old file is kept.
-
-    Parameters
-    ----------
-    path : the file, made if it is missing; a link is followed.
-    seen : the text that the file had when the change of `config` began; None: not read.
+    The file is made if it is missing; a link is followed. `seen` is the text that it had when the change of `config` began;
+    None: not read. Raises ConfigError: it cannot be written; the old one is as it was.
     """
     path = Path(os.path.realpath(path))
     try:
@@ -157,12 +151,9 @@ def write_settings(path: Path, config: Config, seen: str | None = None) -> str:
 
 
 def settings_text(old: str, config: Config) -> tuple[str, bool]:
-    """The text of a settings file for `config`, made from its `old` text.
+    """The text of a settings file for `config`, with comments, order and unknown keys as in its `old` text.
 
-    Returns
-    -------
-    text : comments, order and unknown keys as in `old`.
-    is_lossless : False when a value of a known key in `old` is not in `text`.
+    And whether it is lossless: False when a value of a known key in `old` is not in it.
     """
     try:
         document = tomlkit.parse(old)

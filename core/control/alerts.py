@@ -155,24 +155,13 @@ ALERTS: dict[AlertKey, AlertSpec] = {
 _TWIN_LATE = "the twin is behind: close other programs; if it stays, F5 starts it again"
 _TWIN_FAILED = "the twin has failed: F5 starts it again, then acknowledge"
 _IN_THE_TWIN: dict[AlertKey, str] = {
-    Cause.PORT_LOST: _TWIN_FAILED,
-    Cause.SUPPLY_LOST: _TWIN_FAILED,
-    Cause.SERVO_SILENT: _TWIN_FAILED,
-    Cause.BUS_NOISE: _TWIN_FAILED,
-    Cause.TORQUE_ON: _TWIN_FAILED,
-    Cause.VOLTAGE_LOW: _TWIN_FAILED,
-    Cause.VOLTAGE_SAGS: _TWIN_FAILED,
-    Cause.CAMERA_LOST: _TWIN_FAILED,
-    Cause.WRONG_FORMAT: _TWIN_FAILED,
+    **dict.fromkeys((Cause.PORT_LOST, Cause.SUPPLY_LOST, Cause.SERVO_SILENT, Cause.BUS_NOISE, Cause.TORQUE_ON), _TWIN_FAILED),
+    **dict.fromkeys((Cause.VOLTAGE_LOW, Cause.VOLTAGE_SAGS, Cause.CAMERA_LOST, Cause.WRONG_FORMAT), _TWIN_FAILED),
+    **dict.fromkeys((Cause.BUS_SILENT, Cause.CAMERA_SILENT, Cause.FRAMES_LOST, Cause.FRAMES_DROPPED), _TWIN_LATE),
+    **dict.fromkeys((RejectReason.NO_MEASUREMENT, RejectReason.STALE_MEASUREMENT), _TWIN_LATE),
     Cause.CAMERA_MOVED: _TWIN_FAILED,
     Cause.STOP_PRESSED: "acknowledge, switch the servos on, arm again",
     Cause.FRAMES_LOST_LONG: f"{_TWIN_LATE}; then acknowledge",
-    Cause.BUS_SILENT: _TWIN_LATE,
-    Cause.CAMERA_SILENT: _TWIN_LATE,
-    Cause.FRAMES_LOST: _TWIN_LATE,
-    Cause.FRAMES_DROPPED: _TWIN_LATE,
-    RejectReason.NO_MEASUREMENT: _TWIN_LATE,
-    RejectReason.STALE_MEASUREMENT: _TWIN_LATE,
 }
 """What to do where camera and servos are simulated, and have no cable, plug, supply or port."""
 

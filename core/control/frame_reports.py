@@ -186,10 +186,7 @@ _NOTHING_SEEN = frozenset({Reason.BLACK, Reason.WHITE, Reason.UNREADABLE})
 class FrameReports:
     """Makes reports; it keeps the frame before for comparison.
 
-    Parameters
-    ----------
-    view : a picture of the rig's calibration.
-    min_confidence : a pose with less says nothing of where the target lies.
+    `view` is a picture of the rig's calibration; a pose with less than `min_confidence` says nothing of where the target lies.
     """
 
     def __init__(self, config: PursuitConfig, view: Image | None = None, min_confidence: float = 0.0) -> None:

@@ -58,15 +58,10 @@ class RigRecords:
 def readiness_of(
     config: Config, rig: RigFile | None, model: ModelInfo | None, accepted: Acceptance | None, firmware: Sequence[int] = ()
 ) -> Readiness:
-    """Of a LIVE rig.
+    """Of a LIVE rig, as it drives with `config`.
 
-    Parameters
-    ----------
-    config : as it drives.
-    rig : its rig file; None: it has none, so nothing of it was learnt.
-    model : the manifest of the model that perceives; None: it cannot be read, which another check reports.
-    accepted : the acceptance of the rig; None: missing or unreadable.
-    firmware : of the seven servos; empty: they were not asked.
+    None: it has no rig file, so nothing of it was learnt; the manifest of the model cannot be read, which another check
+    reports; the acceptance is missing or unreadable. `firmware` is that of the seven servos; empty: they were not asked.
     """
     found: list[Hindrance] = []
     changed = accepted is not None and is_outdated(accepted, config, firmware)

@@ -111,10 +111,7 @@ class Interrupted(DeviceError):
 class ServoRequests:
     """Carries requests out in a thread of its own. A request that fails posts the driver's message as a problem of the servos.
 
-    Parameters
-    ----------
-    robot : whose servos.
-    post : takes the outcome, from another thread.
+    `post` takes the outcome, from that thread.
     """
 
     def __init__(self, robot: GuardedRobot, post: Callable[[Event], None]) -> None:

@@ -240,13 +240,7 @@ def summarise_looks(
 ) -> dict[str, Any]:
     """The main figures of every family of looks, errors as medians, and their means over the looks.
 
-    Returns ``looks`` (figures by family) and ``mean_over_looks``.
-
-    Parameters
-    ----------
-    scores : of the frames.
-    looks : family of every frame, by its stem.
-    confident_from : as ``summarise`` has it.
+    `looks` is the family of every frame, by its stem. Returns ``looks`` (figures by family) and ``mean_over_looks``.
     """
     rows: dict[str, dict[str, Any]] = {}
     for look in sorted({looks[score.stem] for score in scores}):

@@ -215,7 +215,7 @@ class BenchCalibration:
         self._model, self._prior, self._train, self._held_out, self._others = model, prior, train, held_out, others
         self._config, self._looks = config, looks
         self._done = 0
-        self._on_progress: Progress = _no_progress
+        self._on_progress: Progress = lambda _done, _of: None
 
     @property
     def count(self) -> int:
@@ -349,10 +349,6 @@ class BenchCalibration:
             refused=refused,
             doubtful_share=float(np.mean(doubts)),
         )
-
-
-def _no_progress(_done: int, _of: int) -> None:
-    pass
 
 
 def _confidence(score: FrameScore, calibration: ConfidenceCalibration | None) -> float:

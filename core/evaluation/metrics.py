@@ -222,13 +222,8 @@ def _repeat_statistics(first_deg: Floats, second_deg: Floats, spread: Floats) ->
 def within_subject(measures: Sequence[Sequence[Sequence[float]]], seed: int = 0, group: Group = None) -> dict[str, Any]:
     """The within-subject standard deviation of one measure: the root of the mean variance of a rater's repeats of an image.
 
-    Returns ``n`` images with repeats, ``sd_deg`` (None where n is 0) and ``ci95``, its interval.
-
-    Parameters
-    ----------
-    measures : by image, by rater: the measures of it, in degrees. A single measure says nothing.
-    seed : of the bootstrap interval; whole images are drawn, or whole groups of them.
-    group : of each image, as in ``bootstrap_rows``.
+    `measures` are in degrees by image, by rater; a single one says nothing. Returns ``n`` images with repeats, ``sd_deg`` (None
+    where n is 0) and ``ci95``, its interval, which draws whole images, or whole groups of them (as in ``bootstrap_rows``).
     """
     squares = np.array([sum(float(np.var(own)) * len(own) for own in image if len(own) > 1) for image in measures], np.float64)
     freedom = np.array([sum(len(own) - 1 for own in image if len(own) > 1) for image in measures], np.float64)
@@ -300,14 +295,10 @@ def _table(rows_columns: NDArray[np.int64], size: int) -> NDArray[np.int64]:
 
 
 def table_statistics(tables: NDArray[np.int64]) -> dict[str, Floats]:
-    """Statistics of many confusion tables at once, for the bootstrap.
+    """Statistics of many confusion tables (R, k, k) at once, for the bootstrap: rows manual, columns algorithm, none empty.
 
-    Returns name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages; one that occurs
-    without a hit counts as 0.
-
-    Parameters
-    ----------
-    tables : shape (R, k, k), rows manual, columns algorithm, each with at least one count.
+    Returns name -> shape (R,), NaN where undefined. Classes absent from a table are left out of its macro averages; one that
+    occurs without a hit counts as 0.
     """
     n = tables.sum((1, 2)).astype(np.float64)
     hits = np.diagonal(tables, axis1=1, axis2=2).astype(np.float64)

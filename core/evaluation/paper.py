@@ -155,9 +155,7 @@ def against_paper(metrics: Mapping[str, Any]) -> dict[str, str | None]:
 def choose_images(states: Mapping[str, str], seed: int) -> list[str]:
     """As many images as the paper has, of states B, C and D in the paper's shares (13 : 26 : 5), drawn by `seed`, sorted by name.
 
-    Parameters
-    ----------
-    states : true state by image; one of which the set has too few gives all it has, and the others are not filled up.
+    `states` are the true ones by image; one of which the set has too few gives all it has, and the others are not filled up.
     """
     rng = np.random.default_rng(seed)
     chosen: list[str] = []

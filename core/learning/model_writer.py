@@ -357,10 +357,7 @@ def write_calibration(
 ) -> None:
     """Store a calibration of the confidence in the manifest of a model, atomically; figures measured before are dropped.
 
-    Parameters
-    ----------
-    mirrored : for masks averaged over all orientations of a picture, refined `second_looks` times; None: the same.
-    familiarity : the kinds of pictures that the model knows; None: not known.
+    `mirrored` is for masks averaged over all orientations of a picture, refined `second_looks` times; None: the same.
     """
     changes: dict[str, Any] = {
         "calibration": calibration,

@@ -83,36 +83,28 @@ def read_scene(path: Path, *, pictures: bool = True) -> BenchScene:
 
 
 def _unpacked(file: Any, *, pictures: bool) -> BenchScene:
-    distance = (_grey(file["distance"]).astype(np.float32) - np.float32(127.5)) * np.float32(0.25)
-    ratio = _grey(file["ratio"]).astype(np.float32) * np.float32(0.01)
+    distance = (_decoded(file["distance"]).astype(np.float32) - np.float32(127.5)) * np.float32(0.25)
+    ratio = _decoded(file["ratio"]).astype(np.float32) * np.float32(0.01)
     radius_px = float(file["radius_px"])
     points, lengths = file["points"].astype(np.float64), file["lengths"]
     if ratio.shape != distance.shape or lengths.min() < 2 or points.shape != (lengths.sum(), 2) or not np.isfinite(points).all():
         raise ValueError("the parts do not fit together")
     lines = tuple(np.split(points, np.cumsum(lengths)[:-1]))
-    scene = BenchScene(distance, ratio, lines, radius_px)
     if not pictures or "empty" not in file:
-        return scene
+        return BenchScene(distance, ratio, lines, radius_px)
     shown = range(sum(name.startswith("image") for name in file.files))
-    pairs = tuple((_color(file[f"image{place}"]), _grey(file[f"robot{place}"]) > 127) for place in shown)
-    empty = _color(file["empty"])
+    pairs = tuple((_decoded(file[f"image{place}"], cv2.IMREAD_COLOR_RGB), _decoded(file[f"robot{place}"]) > 127) for place in shown)
+    empty = _decoded(file["empty"], cv2.IMREAD_COLOR_RGB)
     if any(part.shape[:2] != distance.shape for part in (empty, *(part for pair in pairs for part in pair))):
         raise ValueError("the parts do not fit together")
     return BenchScene(distance, ratio, lines, radius_px, pairs, empty)
 
 
-def _grey(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)
+def _decoded(data: NDArray[np.uint8], flags: int = cv2.IMREAD_GRAYSCALE) -> NDArray[np.uint8]:
+    image = cv2.imdecode(data, flags)
     if image is None:
         raise ValueError("a picture cannot be decoded")
     return np.asarray(image, np.uint8)
-
-
-def _color(data: NDArray[np.uint8]) -> Image:
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR)
-    if image is None:
-        raise ValueError("a picture cannot be decoded")
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), np.uint8)
 
 
 def find_scenes(folders: Iterable[Path]) -> list[Path]:

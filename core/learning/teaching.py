@@ -136,10 +136,7 @@ class TeachingFrame:
 class FrameSelection:
     """Keeps diverse pictures of a stream: near-duplicates are skipped, and of too many the most different stay.
 
-    Parameters
-    ----------
-    bench : with an empty picture.
-    count : frames that are wanted in the end; some more are kept, because some will be rejected.
+    The `bench` has an empty picture. Some more than `count` frames are kept, because some will be rejected.
     """
 
     def __init__(self, bench: Bench, count: int) -> None:
@@ -283,10 +280,8 @@ def _specks(robot: Mask) -> Mask:
 def structure_of(image: Image, empty: Image, known: Mask, noise: NDArray[np.float32]) -> tuple[float, float]:
     """How much fine structure of the `empty` picture `image` shows, both (h, w, 3), where it is `known` (h, w).
 
-    `noise` : standard deviation of one picture's pixels, (h, w), grey levels.
-
-    Returns the focus (the median over cells, 1 where both are alike; noise does not count), and the share of cells that are hidden:
-    they show less than ``_HIDDEN`` of it.
+    Returns the focus (the median over cells, 1 where both are alike; `noise` (h, w), one picture's standard deviation in grey
+    levels, does not count), and the share of cells that are hidden: they show less than ``_HIDDEN`` of it.
     """
     seen, there = _fine_structure(image), _fine_structure(empty)
     floor = np.float32(_NOISE_SHARE) * noise / (cv2.cvtColor(empty, cv2.COLOR_RGB2GRAY).astype(np.float32) + np.float32(_SHADE))

@@ -32,13 +32,10 @@ class EdgeProjection:
 
 
 def project_on_edges(graph: VesselGraph, head: Point, half_length: float, vessel: Mask | None) -> list[EdgeProjection]:
-    """The edges that the head may belong to, in the graph's order.
+    """The edges that the head may belong to, in the graph's order and unit; edges beyond a wall are left out, unless all are.
 
-    Parameters
-    ----------
-    graph, head : in the graph's unit; in pixels where there is a mask.
-    half_length : of the piece of centerline that is wanted; a radius below a quarter of it counts as that.
-    vessel : mask (h, w), or None: then walls are ignored. Edges beyond a wall are left out, unless all are.
+    `half_length` of the piece of centerline is wanted; a radius below a quarter of it counts as that. Walls are those of the
+    mask `vessel` (h, w), in px; None: they are ignored.
     """
     plain = []
     for index, edge in enumerate(graph.edges):

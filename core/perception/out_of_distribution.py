@@ -25,12 +25,9 @@ _FLOOR = 1e-3
 
 
 def signature_of(deepest: NDArray[np.float32], vessel: NDArray[np.float32]) -> Signature:
-    """The signature of a picture.
+    """The signature of a picture: of what the encoder's last level gives, (C, h, w), not negative.
 
-    Parameters
-    ----------
-    deepest : what the encoder's last level gives, (C, h, w), not negative.
-    vessel : the vessel's probability (H, W), with H and W the same multiple of h and w.
+    `vessel` is its probability (H, W), with H and W the same multiple of h and w.
     """
     height, width = deepest.shape[1:]
     weight = cv2.resize(vessel, (width, height), interpolation=cv2.INTER_AREA)

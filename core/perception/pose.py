@@ -10,14 +10,9 @@ from core.types import Point, Pose, PoseState, Vector
 
 
 def measure_pose(robot: Vector, vessel: Vector, config: PoseConfig, confidence: float = 1.0) -> Pose:
-    """The robot's pose against the vessel's line, with the state that this one image shows.
+    """The robot's pose against the vessel's line in its direction of travel, with the state that this one image shows.
 
-    Parameters
-    ----------
-    robot : line through the last 40 px, pointing to the head.
-    vessel : line through the centerline beside the head, in the robot's direction of travel.
-    config : thresholds of the states.
-    confidence : 0..1, handed through.
+    `robot` is the line through the last 40 px, pointing to the head; `confidence` is handed through.
     """
     v, r = vessel.direction, robot.direction
     cross, dot = v[0] * r[1] - v[1] * r[0], v[0] * r[0] + v[1] * r[1]
@@ -46,16 +41,10 @@ def signed_distance(point: Point, line: Vector) -> float:
 def classify(
     c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseConfig, current: PoseState | None = None
 ) -> PoseState:
-    """The one state of a pose.
+    """The one state of a pose: signed distances of head and tail to the vessel's line, unsigned angle.
 
-    The paper's four descriptions overlap and leave gaps; tested in the order A, D, B, C every pose has exactly one state.
-
-    Parameters
-    ----------
-    c_head_px, c_tail_px : signed distances of head and tail to the vessel's line.
-    theta_deg : unsigned angle.
-    config : thresholds; the hysteresis acts only with `current`.
-    current : the state in force. It is left only when it is contradicted by more than the hysteresis.
+    The paper's four descriptions overlap and leave gaps; tested in the order A, D, B, C every pose has exactly one state. The
+    state in force, `current`, is left only when it is contradicted by more than the hysteresis.
     """
     d_head, d_tail = abs(c_head_px), abs(c_tail_px)
     band_px = 0.0 if current is None else config.hysteresis_px
@@ -76,12 +65,8 @@ def classify(
 def room_px(c_head_px: float, c_tail_px: float, theta_deg: float, config: PoseConfig, length_px: float) -> float:
     """Least displacement of head and tail across the vessel that gives the pose another state; 0 at a threshold.
 
-    Where it is less than the distances can be measured to, the state is undecided, for a person, too.
-
-    Parameters
-    ----------
-    c_head_px, c_tail_px, theta_deg, config : as ``classify`` has them, without a current state.
-    length_px : from tail to head, by which theta turns as they move.
+    Where it is less than the distances can be measured to, the state is undecided, for a person, too. Theta turns as head and
+    tail move, which are `length_px` apart; other arguments are those of ``classify``.
     """
     d_head, d_tail = abs(c_head_px), abs(c_tail_px)
     aside, allowed = (math.sin(math.radians(min(angle, 90.0))) for angle in (theta_deg, config.theta_allow_deg))

@@ -102,14 +102,10 @@ def _path_candidate(graph: PixelGraph, steps: Steps, turning: float, config: Pat
 
 
 def score(points: Points, length_share: float, config: PathConfig) -> float:
-    """The paper's score of a path: ``w_l * length + w_s * smoothness + w_c * consistency``.
+    """The paper's score of a path (N, 2): ``w_l * length + w_s * smoothness + w_c * consistency``.
 
-    Parameters
-    ----------
-    points : the path (N, 2).
-    length_share : its length against the longest candidate, 0..1; the paper prefers shorter ones, so its weight is negative.
-    config : weights, the step over which directions are taken, and whether a reversal counts as -1 (signed) or, as in the paper,
-        as +1 (absolute).
+    `length_share` is its length against the longest candidate, 0..1; the paper prefers shorter ones, so its weight is negative.
+    A reversal counts as -1 (signed) or, as in the paper, as +1 (absolute).
     """
     # Steps of one pixel only know multiples of 45 degrees; the paper's form takes them as they are.
     line = geometry.resample(points, config.step_px) if config.step_px > 1.0 else points
@@ -321,15 +317,10 @@ the piece: a longer one is in the mask; and its probability: a less likely one i
 
 
 def refine(points: Points, masks: Masks, radius_px: float, smoothing_px: float, extend: bool) -> tuple[Points, float]:
-    """The path through the middle of the robot, and the robot's median radius in px.
+    """The path (N, 2), tail -> head, through the middle of the robot, and the robot's median radius in px.
 
-    Parameters
-    ----------
-    points : pixel path (N, 2), tail -> head.
-    masks : the robot's clean mask and probability.
-    radius_px : rough radius of the robot, which limits the search to the sides.
-    smoothing_px : standard deviation of the smoothing along the path; 0 leaves the pixels as they are.
-    extend : whether both ends are continued along their tangent to the mask's edge.
+    The rough `radius_px` limits the search to the sides; `smoothing_px` is the standard deviation of the smoothing along the
+    path, 0 leaves the pixels as they are. With `extend` both ends are continued along their tangent to the mask's edge.
     """
     if smoothing_px == 0.0:
         return points, radius_px

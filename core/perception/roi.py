@@ -167,11 +167,7 @@ def _sizes(differences: NDArray[np.float32]) -> NDArray[np.float32]:
 def has_changed(before: NDArray[np.float32], now: NDArray[np.float32], window: Window, noise: float = 0.0) -> bool:
     """Whether the picture outside the window has changed; a common change of brightness or colour does not count.
 
-    Parameters
-    ----------
-    before, now : cells (h / 8, w / 8, 3) of both pictures.
-    window : where changes do not count.
-    noise : mean difference of cells, in grey levels, without any change.
+    `before` and `now` are cells (h / 8, w / 8, 3); `noise` is their mean difference, in grey levels, without any change.
     """
     if before.shape != now.shape:
         return True
@@ -252,15 +248,9 @@ class VesselAverage:
         return np.ascontiguousarray(values[rows, columns])
 
     def add(self, vessel: Probability, robot: Probability, cells: NDArray[np.float32], noise: float) -> Probability:
-        """Add a full frame, and return the mean of all that are kept, each where the picture has not changed since.
+        """Add a full frame, and return the mean of all that are kept, each where the picture has not changed since: (h, w), new.
 
-        Returns the vessel's probability (h, w), a new array.
-
-        Parameters
-        ----------
-        vessel, robot : probabilities (h, w), upright.
-        cells : of the picture (h / 8, w / 8, 3), see ``cells_of``.
-        noise : mean difference of cells, in grey levels, without any change.
+        Probabilities (h, w) are upright; `cells` (h / 8, w / 8, 3) and `noise` are as in ``has_changed``.
         """
         height, width = cells.shape[:2]
         share = cv2.resize(np.asarray(robot >= np.float32(0.5), np.float32), (width, height), interpolation=cv2.INTER_AREA)

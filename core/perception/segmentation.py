@@ -51,12 +51,9 @@ class Segmenter:
 
 
 class OrientationAverage(Segmenter):
-    """The mean over a picture and its mirror image, each in some quarter turns (test-time augmentation).
+    """The mean over a picture (h, w, channels) and its mirror image, each in some quarter turns (test-time augmentation).
 
-    Parameters
-    ----------
-    segmenter : takes images (h, w, channels).
-    turns : quarter turns; each asks `segmenter` twice. (0,): the picture and its mirror image.
+    Each of the `turns` asks `segmenter` twice; (0,) is the picture and its mirror image.
     """
 
     def __init__(self, segmenter: Segmenter, turns: Sequence[int] = (0, 1, 2, 3)) -> None:
@@ -173,13 +170,7 @@ MAX_EDGE_SHARE = 0.08
 
 
 def clean(vessel_probability: Probability, robot_probability: Probability, config: PerceptionConfig) -> Masks:
-    """Masks of vessel and robot without specks and pinholes.
-
-    Parameters
-    ----------
-    vessel_probability, robot_probability : shape (h, w), 0..1, at working resolution.
-    config : thresholds (``segmentation``) and limits of area (``cleaning``).
-    """
+    """Masks of vessel and robot without specks and pinholes, from their probabilities (h, w), 0..1, at working resolution."""
     vessel = vessel_probability >= config.segmentation.vessel_threshold
     return Masks(
         vessel=clean_mask(vessel, config.cleaning.min_vessel_area_px, config.cleaning.max_hole_area_px),

@@ -72,14 +72,10 @@ def find_tips(robot: Probability) -> list[Point]:
 
 
 class TipRefinement(Segmenter):
-    """A segmenter that refines the robot's ends in the answer of a first one.
+    """A segmenter that refines the robot's ends in the answer of a `first` one, by the network `near`, which takes ``Planes``.
 
-    Parameters
-    ----------
-    first : segments the whole picture.
-    near : the second network, which takes ``Planes``.
-    passes : how often, up to ``MAX_PASSES``; all but the first pass refine its answer, in windows a bit beside each other, and the
-        mean of all counts.
+    All but the first of up to ``MAX_PASSES`` `passes` refine its answer, in windows a bit beside each other, and the mean of
+    all counts.
     """
 
     def __init__(self, first: Segmenter, near: Segmenter, *, passes: int = 1) -> None:

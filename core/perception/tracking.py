@@ -278,10 +278,7 @@ class StaticArtefacts:
     def remove(self, robot: Mask, image: Image, captured_s: float, window: Window | None = None) -> Mask:
         """The robot's mask (h, w) of the next frame without artefacts; the same object if nothing was removed.
 
-        Parameters
-        ----------
-        robot, image : mask (h, w) and RGB picture (h, w, 3).
-        window : (x, y, width, height) that was segmented; None for all of it.
+        The `window` (x, y, width, height) was segmented; None: all of the picture (h, w, 3).
         """
         self.removed = None
         if self._travel_px == 0.0:

@@ -18,16 +18,10 @@ MIN_LENGTH_PX = 4.0
 
 
 def fit_robot_vector(points: Points, length_px: float, fit: LineFit = "total_least_squares") -> Vector | None:
-    """The line through the last `length_px` of the robot's path, pointing to the head.
+    """The line through the last `length_px` of the robot's path (N, 2), tail -> head; a shorter path is used whole.
 
-    Returns the vector with ``end`` = projection of the head on the line, ``start`` = that of the point `length_px` back; None when
-    the piece is shorter than ``MIN_LENGTH_PX`` or has no direction (it ends where it began).
-
-    Parameters
-    ----------
-    points : robot's centerline (N, 2), tail -> head.
-    length_px : arc length that is used, counted back from the head; a shorter path is used whole.
-    fit : how the line is fitted, see ``fit_line``.
+    ``end`` is the projection of the head on the line, ``start`` that of the point `length_px` back. None when the piece is
+    shorter than ``MIN_LENGTH_PX`` or has no direction (it ends where it began). `fit` is as in ``fit_line``.
     """
     if len(points) < 2:
         return None

@@ -117,13 +117,8 @@ REACH_RADII = 3.0
 def led_on(points: Points, radius_px: float, vessel: Mask) -> Points:
     """A centerline with its last part, which thinning has turned aside, replaced by one that runs between the walls.
 
-    It ends as far out as the skeleton did, or at the image border.
-
-    Parameters
-    ----------
-    points : the centerline (N, 2), the end in question last.
-    radius_px : the lumen's radius at this end.
-    vessel : the vessel's mask (h, w).
+    It ends as far out as the skeleton did, or at the image border. The end in question comes last in the points (N, 2), and has
+    the lumen's `radius_px`.
     """
     limit = np.array([vessel.shape[1] - 1.0, vessel.shape[0] - 1.0])
     kept = points[: len(points) - min(_hook(points, radius_px, limit), 2 * len(points) // 3)]
@@ -181,14 +176,10 @@ class _Line:
 
 
 def build_graph(skeleton: Mask, mask: Mask, config: CleaningConfig, probability: NDArray[np.float32] | None = None) -> VesselGraph:
-    """The vessel graph of a skeleton; empty where that is a mesh of more than ``MAX_CHAINS`` chains.
+    """The vessel graph of a one-pixel skeleton (h, w); empty where that is a mesh of more than ``MAX_CHAINS`` chains.
 
-    Parameters
-    ----------
-    skeleton : one-pixel skeleton of the vessel, shape (h, w).
-    mask : the vessel's mask it came from: radius, centring, and how far the ends reach.
-    config : whether spurs are pruned.
-    probability : what the mask came from (h, w), 0.5 at its edge: walls to a smaller fraction of a pixel, and how soft they are.
+    The vessel's `mask` tells radius and middle, and how far the ends reach; the `probability` that it came from, 0.5 at its
+    edge, tells walls to a smaller fraction of a pixel, and how soft they are.
     """
     traced = pixel_graph.trace(skeleton)
     if len(traced.chains) > MAX_CHAINS:

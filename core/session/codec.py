@@ -419,11 +419,8 @@ def light_tick(tick: Tick) -> Tick:
 def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, with_masks: bool = True) -> Row:
     """One row, without its place in the session (``row``, ``video``, ``pts_ms``, ``dropped_rows``), which the writer adds.
 
-    Parameters
-    ----------
-    drive : None when there is no robot to drive.
-    bus : the newest status of the servo bus, any dataclass of plain values; None where there is no bus.
-    with_masks : also outlines of the masks, and the vessel graph.
+    `drive` and `bus`, the newest status of the servo bus (any dataclass of plain values), are None where there is no such.
+    `with_masks`: also outlines of the masks, and the vessel graph.
     """
     scene, pose = tick.scene, tick.scene.pose
     parts: Row = {name: getattr(scene, name) for name in _SAME}

@@ -110,14 +110,9 @@ def export_mp4(
 ) -> int:
     """Pictures of the rows from `first` to `last` (not included; None: all) as H.264, at the times when they were captured.
 
-    Raises SessionError: no picture at all, or the file cannot be written or is there already.
-
-    Returns the number of pictures written; rows whose picture is lost are left out.
-
-    Parameters
-    ----------
-    draw : burns in what it likes; None: the plain pictures. All pictures take the size of the first one.
-    on_row : called after every row.
+    `draw` burns in what it likes; None: the plain pictures. All take the size of the first one. Returns the number of pictures
+    written; rows whose picture is lost are left out. Raises SessionError: no picture at all, or the file cannot be written or
+    is there already.
     """
     reader.wait()
     written = 0
@@ -141,14 +136,9 @@ def export_mp4(
 
 
 class Movie:
-    """An MP4 that every player takes: yuv420p, even sides, index in front.
+    """An MP4 that every player takes: yuv420p, even sides as of the `first` picture, index in front.
 
-    Parameters
-    ----------
-    path : of the file.
-    first : the first picture, which decides on the size.
-    time_base : all times are multiples of it (s).
-    key_every : every n-th picture can be decoded by itself.
+    All times are multiples of `time_base` (s); every `key_every`-th picture can be decoded by itself.
     """
 
     def __init__(self, path: Path, first: Image, time_base: Fraction = MS, key_every: int = 30) -> None:

@@ -264,14 +264,9 @@ class EncodedFrame:
 
 
 class SessionFiles:
-    """A session folder being written by one thread.
+    """A session folder in `parent` being written by one thread. Raises SessionError: it cannot be made.
 
-    Raises SessionError: the folder cannot be made.
-
-    Parameters
-    ----------
-    parent : where the folder is made.
-    first_s : time of the first frame on the frames' clock; `now_s` is the same clock now, by which it becomes a date.
+    `first_s` is the time of the first frame on the frames' clock; `now_s` is the same clock now, by which it becomes a date.
     """
 
     def __init__(

@@ -79,10 +79,8 @@ _WHITE, _SHADE = Color(r=1.0, g=1.0, b=1.0, a=1.0), Color(r=0.0, g=0.0, b=0.0, a
 class FoxgloveMessages:
     """The channels of one MCAP file or server. A message is made only where a channel has a receiver; ``logged`` counts them.
 
-    Parameters
-    ----------
-    context : of foxglove-sdk, which a file or a server is open on.
-    video : pictures are packets of H.264 in Annex B form; False: JPEG.
+    A file or a server is open on the foxglove-sdk's `context`. `video`: pictures are packets of H.264 in Annex B form; False:
+    JPEG.
     """
 
     def __init__(self, context: Context, *, video: bool) -> None:

@@ -105,13 +105,7 @@ class _OpenVideo:
 
 
 class _Pictures:
-    """The pictures of a session, for one thread at a time.
-
-    Parameters
-    ----------
-    row_of : file and time in it (ms) -> place and number of the row, or None.
-    on_problem : gets a line for each file and each picture that cannot be read, once.
-    """
+    """The pictures of a session, for one thread at a time; `on_problem` gets a line for each that cannot be read, once."""
 
     def __init__(
         self, folder: Path, row_of: Callable[[int, int], tuple[int, int] | None], on_problem: Callable[[str], None]

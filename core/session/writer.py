@@ -599,10 +599,6 @@ class SessionWriter:
         """
         return self._enqueue(lambda: self._recording.write_drive(view), most=_MAX_EVENTS)
 
-    def event(self, kind: EventKind, text: str = "", data: dict[str, Any] | None = None, time_s: float | None = None) -> bool:
-        """Add an event (a note, a target, an alert); modes, faults and acknowledgements are found in the drive views."""
-        return self.add_event(Event(self._clock() if time_s is None else time_s, kind, text, data or {}))
-
     def add_event(self, event: Event) -> bool:
         """False when the recorder has ended or is hopelessly behind."""
         return self._enqueue(lambda: self._recording.write_event(event), most=_MAX_EVENTS)

@@ -39,13 +39,8 @@ _PERIOD_S = 0.02
 class CalibrationBench:
     """Camera feed, servos and STOP of one rig; ``open_bench`` makes one, ``close`` gives all of it back.
 
-    It is the ``ServoBench`` of the procedures in ``servo_identification``.
-
-    Attributes
-    ----------
-    feed : the camera, read all the time.
-    port : the servos' serial port; None when the rig has none.
-    stop : ends whatever moves.
+    It is the ``ServoBench`` of the procedures in ``servo_identification``. ``port`` is None when the rig has no servos;
+    ``stop`` ends whatever moves.
     """
 
     def __init__(

@@ -70,14 +70,11 @@ Say = Callable[[str], object]
 class RigDraft:
     """What is known so far. Each step replaces what it found before; ``rig_file`` puts all of it together.
 
-    The steps that move servos (``identify``, ``identify_one``, ``find_zeros``, ``learn_steering``) need ``search_servos`` before,
-    and are ended by ``bench.stop``. They raise DeviceError or a UserError of ``core.calibration``, one line that says what to do.
+    The steps that move servos (``identify``, ``identify_one``, ``find_zeros``, ``learn_steering``) need ``search_servos``
+    before, and are ended by ``bench.stop``. They raise DeviceError or a UserError of ``core.calibration``, one line that says
+    what to do.
 
-    Parameters
-    ----------
-    bench : open; the caller closes it.
-    config : the configuration to start from, with the rig's camera and servos.
-    known : what was calibrated earlier, and stays where nothing new is found.
+    The `bench` is open, and the caller closes it; what was `known` stays where nothing new is found.
     """
 
     def __init__(

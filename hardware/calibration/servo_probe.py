@@ -177,13 +177,10 @@ def patient(servos: ServosConfig) -> ServosConfig:
 
 @contextmanager
 def armed(robot: ServoRobot, servos: ServosConfig, stop: StopSwitch, basis: ZeroBasis) -> Iterator[None]:
-    """Connect, zero where the servos stand, arm; in the end hold and close.
+    """Connect, zero where the servos stand, arm; in the end hold and close. The zeros of the tendons rest on `basis`.
 
-    A line without an answer is opened again; once it was armed, nothing is.
-
-    `basis`: what the zeros of the tendons rest on.
-
-    Raises ServoError when port or servos are not in order, or STOP came.
+    A line without an answer is opened again; once it was armed, nothing is. Raises ServoError when port or servos are not in
+    order, or STOP came.
     """
     with stop.guarding(robot):
         for attempt in range(_TRIES):

@@ -77,13 +77,10 @@ def find_cameras(load: Load = load_pypylon) -> list[BaslerInfo]:
 
 
 class BaslerSensor:
-    """One Basler camera.
+    """One Basler camera; `load` gives the modules pylon and genicam.
 
-    Parameters
-    ----------
-    config : which one, and how it takes its pictures. Sizes are cut out of the middle of the sensor. What ``config`` does not name
-        stays as the camera's own start-up set has it, binning for example.
-    load : gives the modules pylon and genicam.
+    Sizes are cut out of the middle of the sensor. What `config` does not name stays as the camera's own start-up set has it,
+    binning for example.
     """
 
     def __init__(self, config: CameraConfig, load: Load = load_pypylon) -> None:

@@ -236,13 +236,9 @@ class CaptureClock:
         self._newest_s = float("-inf")
 
     def captured_s(self, arrived_s: float, stamp_s: float | None, now_on_its_clock_s: float | None = None) -> float:
-        """The time of capture.
+        """The monotonic time of capture of a picture that came at `arrived_s`.
 
-        Parameters
-        ----------
-        arrived_s : monotonic, when the picture came.
-        stamp_s : the camera's stamp, in seconds of any clock; None: it has none.
-        now_on_its_clock_s : what that clock showed at the arrival; None: unknown.
+        The camera's stamp is in seconds of any clock, which showed `now_on_its_clock_s` at the arrival; None: not known.
         """
         captured_s = arrived_s
         age_s = now_on_its_clock_s - stamp_s if stamp_s is not None and now_on_its_clock_s is not None else -1.0
@@ -300,11 +296,7 @@ class CameraFeed:
             return self._frames[-1] if self._frames else None
 
     def next_frames(self, count: int, timeout_s: float, alive: Callable[[], object] = lambda: None) -> list[Frame]:
-        """The next `count` pictures that are captured from now on.
-
-        Parameters
-        ----------
-        alive : called while waiting; what it raises ends the wait.
+        """The next `count` pictures that are captured from now on; `alive` is called meanwhile, and what it raises ends the wait.
 
         Raises DeviceError: they do not come in time, or the camera is lost.
         """

@@ -88,10 +88,7 @@ def find_cameras(context: Any = None) -> list[RealSenseInfo]:
 class RealSenseSensor:
     """The colour sensor of one RealSense camera.
 
-    Parameters
-    ----------
-    config : which one, and how it takes its pictures.
-    make_context : the library's list of devices; called at every start, since an old one may not see a new camera.
+    The library's list of devices is made at every start, since an old one may not see a new camera.
     """
 
     def __init__(self, config: CameraConfig, make_context: Callable[[], Any] = rs.context) -> None:

@@ -35,13 +35,7 @@ _QUEUE_FRAMES = 2
 
 
 class WebcamSensor:
-    """A V4L2 camera.
-
-    Parameters
-    ----------
-    config : which one, and how it takes its pictures.
-    open_capture : makes OpenCV's capture object of a device node.
-    """
+    """A V4L2 camera; `open_capture` makes OpenCV's capture object of a device node."""
 
     def __init__(self, config: CameraConfig, open_capture: Callable[..., Any] = cv2.VideoCapture) -> None:
         self._config, self._open_capture = config, open_capture

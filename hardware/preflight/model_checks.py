@@ -110,11 +110,13 @@ def _apart(some: Sequence[NDArray[np.float32]], others: Sequence[NDArray[np.floa
 
 def judge(name: str, info: ModelInfo, engine: str, scene: Scene, truth: Truth, true_masks: tuple[Mask, Mask]) -> Check:
     """What was seen against what is there; `true_masks` are vessel and robot."""
+    from core.evaluation.accuracy import dice
+
     milliseconds = f"first frame in {scene.latency_ms.get('total', 0.0):.0f} ms"
     advice = _advice(info.name) if info.name == SHIPPED else "train it with the twin's frames too, or choose another model"
     if scene.masks is not None:
         seen = (scene.masks.vessel, scene.masks.robot)
-        overlaps = [[_overlap(mask, there) for there in true_masks] for mask in seen]
+        overlaps = [[dice(mask, there) for there in true_masks] for mask in seen]
         if overlaps[0][1] > overlaps[0][0] or overlaps[1][0] > overlaps[1][1]:
             return Check(name, False, f"{info.name} takes the vessel for the robot: its outputs are swapped", advice)
         if info.name != SHIPPED:
@@ -133,12 +135,6 @@ def judge(name: str, info: ModelInfo, engine: str, scene: Scene, truth: Truth, t
     )
     good = scene.pose.state is truth.pose.state and theta_off <= _THETA_DEG and head_off <= _HEAD_PX
     return Check(name, good, detail, "" if good else advice)
-
-
-def _overlap(mask: Mask, there: Mask) -> float:
-    """Dice coefficient."""
-    total = int(mask.sum()) + int(there.sum())
-    return 2.0 * int((mask & there).sum()) / total if total else 0.0
 
 
 def _advice(model: str) -> str:

@@ -19,7 +19,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -212,11 +212,7 @@ def pack_order(order: BusOrder) -> bytes:
         order.retracts,
         order.issued_s,
         0.0 if order.captured_s is None else order.captured_s,
-        command.bend,
-        command.pitch,
-        command.advance_mm_s,
-        command.delivery_mm_s,
-        command.rotation_deg_s,
+        *astuple(command),
     )
 
 

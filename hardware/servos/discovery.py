@@ -72,12 +72,8 @@ def find_servos(
 ) -> FoundServos:
     """Ping all ids, at one speed after the other, until `count` answer; where they never do, those of the speed with the most.
 
-    Parameters
-    ----------
-    say : told what is being tried.
-    check_stop : called in between; may raise to end the search.
-
-    Raises PortError: the port is missing, not permitted, in use, or no serial port; NoAnswer: no servo answers at any speed.
+    `check_stop` is called in between, and may raise. Raises PortError: the port is missing, not permitted, in use, or no serial
+    port; NoAnswer: no servo answers at any speed.
     """
     answered: dict[int, tuple[FoundServo, ...]] = {}
     ask_for_port(port, relaxed=True)  # a bus process of this program may watch servos that hold: it relaxes them

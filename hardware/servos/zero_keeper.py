@@ -35,10 +35,8 @@ _END_S = 2.0
 class ZeroKeeper:
     """What is kept of each joint, and the offers that follow from it. One thread uses it, but for the writing.
 
-    Parameters
-    ----------
-    path : the file; None: in memory only, as in the twin, whose servos are new each time.
-    searched : the zeros that the rig file has, of the last search for slack; they count for tendons where they are newer.
+    Without a `path` it is in memory only, as in the twin, whose servos are new each time. The zeros of the rig file, of the
+    last search for slack, count for tendons where they are newer.
     """
 
     def __init__(self, servos: ServosConfig, path: Path | None, searched: ZeroConfig | None = None) -> None:

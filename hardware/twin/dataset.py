@@ -291,14 +291,9 @@ def write_set(
 ) -> int:
     """Write the set and return its number of frames; existing frames are kept.
 
-    With `remote`, other machines render the frames in place of `workers` processes here; they are written here. `on_progress` gets
-    the number of frames completed since its last call. An interruption (Ctrl-C) loses only unfinished episodes; the same call
-    continues.
-
-    Raises
-    ------
-    SynthError
-        The folder holds a set of another plan, or cannot be written.
+    With `remote`, other machines render the frames in place of `workers` processes here; they are written here. `on_progress`
+    gets the number of frames completed since its last call. An interruption (Ctrl-C) loses only unfinished episodes; the same
+    call continues. Raises SynthError: the folder holds a set of another plan, or cannot be written.
     """
     _prepare(plan)
     try:

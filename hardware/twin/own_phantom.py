@@ -289,14 +289,8 @@ class OwnPhantom:
 def phantom_of_mask(mask: Mask, view: CameraView, name: str, title: str, port_px: Point | None = None) -> OwnPhantom:
     """The phantom of a lumen's mask (h, w) of the size of `view`.
 
-    Parameters
-    ----------
-    port_px : where the robot enters, in pixels of the mask; None: the widest end at the picture's border, or the end nearest to it.
-
-    Raises
-    ------
-    PhantomError
-        No vessel, a gap in it, one end only, or a robot that is wider than the lumen on every way.
+    The robot enters at `port_px`, in pixels of the mask; None: at the widest end at the picture's border, or the end nearest to
+    it. Raises PhantomError: no vessel, a gap in it, one end only, or a robot that is wider than the lumen on every way.
     """
     cleaning = CleaningConfig()
     clean = clean_mask(mask, cleaning.min_vessel_area_px, cleaning.max_hole_area_px)

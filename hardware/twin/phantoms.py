@@ -539,10 +539,7 @@ PHANTOM_NAMES: tuple[str, ...] = tuple(PHANTOM_TITLES)
 def make_phantom(name: str) -> Phantom:
     """The phantom called `name`: one of ``PHANTOM_NAMES``, ``random:<seed>``, or ``bench:<folder>`` of a bench with a phantom.
 
-    Raises
-    ------
-    ValueError
-        When there is no such phantom; the message lists the names.
+    Raises ValueError when there is no such phantom; the message lists the names.
     """
     kind, _, seed = name.partition(":")
     if kind == "bench":

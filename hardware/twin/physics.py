@@ -331,10 +331,8 @@ class LinkChain:
     def step(self) -> None:
         """One time step.
 
-        Raises
-        ------
-        FloatingPointError
-            When the state is no longer finite (never seen); MuJoCo would silently restart from the straight robot.
+        Raises FloatingPointError when the state is no longer finite (never seen); MuJoCo would silently restart from the
+        straight robot.
         """
         mujoco.mj_step(self.model, self.data)
         if any(self.data.warning[kind].number for kind in _FATAL):

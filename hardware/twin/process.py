@@ -83,12 +83,8 @@ def _order(config: Config, insertion_mm: float) -> dict[str, Any]:
 class RemoteTwin:
     """A running twin process as a ``Camera``. ``read`` and ``close`` belong to one thread, ``status`` to any.
 
-    Parameters
-    ----------
-    prestarted : a process from ``start_twin``; a new one is started when it is missing or has ended.
-    waits : False: it is not ready before ``await_start``.
-
-    Raises DeviceError when it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
+    A new process is started where `prestarted`, from ``start_twin``, is missing or has ended. Without `waits` it is not ready
+    before ``await_start``. Raises DeviceError when it cannot be started: an unknown phantom, no memory, no pseudo-terminal.
     """
 
     def __init__(self, config: Config, insertion_mm: float, prestarted: DeviceProcess | None = None, *, waits: bool = True) -> None:

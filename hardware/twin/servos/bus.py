@@ -170,13 +170,7 @@ class SoftServoBus:
 
     @property
     def port(self) -> str:
-        """Path of the serial port; the same after ``vanish`` and ``reappear``.
-
-        Raises
-        ------
-        RuntimeError
-            When the bus has not been started.
-        """
+        """Path of the serial port; the same after ``vanish`` and ``reappear``. Raises RuntimeError when the bus was not started."""
         if self._folder is None:
             raise RuntimeError("start the bus first")
         return str(self._folder / "servos")
@@ -227,7 +221,7 @@ class SoftServoBus:
         with self._lock:
             self._advance()
             for servo in self._servos.values():
-                servo.brown_out(for_s)
+                servo.restart(for_s)
 
     def write_by_other(self, address: int, data: bytes, servo_id: int = BROADCAST) -> None:
         """Another program on the same line writes registers: ``write_by_other(64, bytes(1))`` switches all torque off."""

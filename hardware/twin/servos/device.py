@@ -113,7 +113,8 @@ class ServoMotor:
 
     def step(self, drive: MotorGoal, duration_s: float) -> None:
         """Advance time; motion is limited to 10 s of it."""
-        self._warm(drive, duration_s)
+        end_c = self.ambient_c + _HEAT_C * (self.current_ma(drive) / self.stall_ma) ** 2
+        self.temperature_c += (end_c - self.temperature_c) * -math.expm1(-duration_s / _HEAT_TIME_S)
         strained = drive.torque and abs(self.current_ma(drive)) > _OVERLOAD_SHARE * self.stall_ma
         self._overloaded_s = self._overloaded_s + duration_s if strained else 0.0
         if self.carried_ticks_s:
@@ -221,10 +222,6 @@ class ServoMotor:
         """Whether the current was too high for too long, at which the servo switches off."""
         return self._overloaded_s > _OVERLOAD_S
 
-    def _warm(self, drive: MotorGoal, duration_s: float) -> None:
-        end_c = self.ambient_c + _HEAT_C * (self.current_ma(drive) / self.stall_ma) ** 2
-        self.temperature_c += (end_c - self.temperature_c) * -math.expm1(-duration_s / _HEAT_TIME_S)
-
 
 # Units of the registers.
 _VELOCITY_TICKS_S = 0.229 / 60.0 * TICKS_PER_TURN
@@ -255,7 +252,7 @@ class SoftServo:
     - ``table[name]`` sets any register, as its EEPROM may have come from another program (``"startup"``, ``"shutdown"``,
       ``"secondary_id"``, ``"firmware"``, ``"temperature_limit"``, ``"current_limit"`` ...). ``backup`` stores the backup that bit 1
       of ``startup`` restores.
-    - ``restart``, ``brown_out``: RAM and turns are lost. ``alert``, ``heat``, ``supply_v``.
+    - ``restart``: RAM and turns are lost. ``alert``, ``heat``, ``supply_v``.
     - ``freeze`` blocks the horn; ``motor.load_mnm`` and ``motor.wire`` load it; ``motor.gear_mnm`` is what the gear holds without
       current; ``grind``, ``carry``, ``turn``.
     - ``current_ma`` and ``torque_mnm`` tell what the motor gives at the moment, ``mechanical_ticks`` where the horn really is.
@@ -355,10 +352,6 @@ class SoftServo:
         self._started_s = self._now_s
         self._silent_until_s = self._now_s + silent_s if silent_s > 0.0 else None
         self._refresh()
-
-    def brown_out(self, for_s: float = REBOOT_S) -> None:
-        """The supply dips so far that the servo restarts; it is silent for `for_s`, and answers at its old voltage."""
-        self.restart(for_s)
 
     def backup(self) -> None:
         """Store gains, profile and indirect addresses, as another program may have done (instruction Control Table Backup)."""

@@ -169,7 +169,7 @@ def test_a_full_queue_drops_counts_and_tells(tmp_path: Path, monkeypatch: pytest
         assert entered.wait(10.0)
         taken = [writer.put(tick) for tick in ticks(5, start=1)]
         assert taken == [True, True, False, False, False]
-        assert writer.event(EventKind.NOTE, "events are never dropped for frames")
+        assert writer.add_event(Event(1000.0, EventKind.NOTE, "events are never dropped for frames"))
         assert writer.status().dropped == 3
         go.set()
         wait_for(lambda: writer.status().frames == 3)
@@ -208,11 +208,11 @@ def test_what_is_dropped_after_the_stop_was_asked_is_not_the_sessions(tmp_path: 
 def test_events_of_driving_and_the_mode_at_the_start_are_written(tmp_path: Path) -> None:
     with writer_in(tmp_path) as writer:
         writer.start()
-        writer.event(EventKind.NOTE, "ready", time_s=1000.15)  # before the first frame
+        writer.add_event(Event(1000.15, EventKind.NOTE, "ready"))  # before the first frame
         writer.put(tick_of(0, 1000.0), DriveView(1000.0, Mode.ADVISORY))
         writer.put(tick_of(1, 1000.1), drive_of(1000.1, Mode.ARMED))
         writer.drive(drive_of(1000.1, Mode.ARMED))
-        writer.event(EventKind.TARGET, "10, 20", {"xy": [10.0, 20.0]}, 1000.2)
+        writer.add_event(Event(1000.2, EventKind.TARGET, "10, 20", {"xy": [10.0, 20.0]}))
         writer.stop("enough")
         wait_for(lambda: writer.status().saved is not None)
     session = saved(writer)
@@ -394,8 +394,8 @@ def test_the_last_seconds_are_saved_without_having_recorded(tmp_path: Path) -> N
     with writer_in(tmp_path, replace_config(ring_s=2.0)) as writer:
         for tick in ticks(150):
             writer.put(tick)
-        writer.event(EventKind.NOTE, "old", time_s=1000.1)
-        writer.event(EventKind.NOTE, "new", time_s=1004.5)
+        writer.add_event(Event(1000.1, EventKind.NOTE, "old"))
+        writer.add_event(Event(1004.5, EventKind.NOTE, "new"))
         writer.save_last()
         wait_for(lambda: writer.status().saved is not None)
         assert not writer.status().recording

@@ -118,7 +118,7 @@ def test_stops_are_timed_until_the_axis_stands(servos: SoftServoBus, config: Con
 
 def _power(servos: SoftServoBus, for_s: float) -> None:
     for servo_id in range(1, 8):
-        servos.modify_servo(servo_id, lambda servo: servo.brown_out(for_s))
+        servos.modify_servo(servo_id, lambda servo: servo.restart(for_s))
 
 
 def test_the_e_stop_is_seen_and_nothing_can_be_switched_on_before_the_joints_are_zeroed(

@@ -455,7 +455,7 @@ def test_an_e_stop_is_told_from_a_broken_cable_and_nothing_arms_before_power_is_
     with pytest.raises(NotReady, match="release the E-stop or switch their supply on"):
         armed.arm()
     for joint in CONFIG.joints:
-        servos.modify_servo(joint.id, lambda servo: servo.brown_out(0.0))  # power is back: they start again
+        servos.modify_servo(joint.id, lambda servo: servo.restart(0.0))  # power is back: they start again
     _seen(armed, lambda status: bool(status.servos) and all(isinstance(one, ServoState) for one in status.servos))
     with pytest.raises(NotReady, match="not zeroed"):
         armed.arm()
@@ -520,7 +520,7 @@ def test_after_a_strain_the_tendons_are_let_go_slowly(servos: SoftServoBus, arme
 def test_fault_27_a_servo_restarts(servos: SoftServoBus, armed: ServoRobot, startup: int) -> None:
     """It is silent for 0.3 s, and then has lost its zero, whatever Startup Configuration(60) brings back of its settings."""
     _drive(armed, until=lambda status: servos.positions_mm()[4] > 1.0)
-    servos.modify_servo(6, lambda servo: (servo.backup(), servo.table.__setitem__("startup", startup), servo.brown_out()))
+    servos.modify_servo(6, lambda servo: (servo.backup(), servo.table.__setitem__("startup", startup), servo.restart()))
     status = _drive(armed, until=lambda status: status.latched is not None)
     assert not status.armed
     _seen(armed, lambda status: status.restarts > 0)

@@ -232,7 +232,7 @@ def test_a_restart_brings_back_what_the_startup_configuration_says(startup: int)
     assert _write(servo, 250, 7, 1) == 0  # an indirect datum: in no backup
     _write(servo, 65, 1, 1)
     servo.turn(2 * 4096)
-    servo.brown_out()
+    servo.restart()
     assert servo.is_booting
     _run(servo, 0.4)
     table = servo.table
@@ -265,7 +265,7 @@ def test_old_firmware_lacks_registers(firmware: int, register: int, error: int) 
     assert _write(servo, register, 1, 1) == error
     servo.backup()
     servo.table["startup"] = 3
-    servo.brown_out()
+    servo.restart()
     assert servo.table["torque"] == (firmware >= 45)
 
 
