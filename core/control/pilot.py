@@ -13,7 +13,6 @@ import threading
 import time
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from core.config.models import Config
 from core.config.safety import JointKind, SafetyConfig
@@ -575,21 +574,13 @@ class Pilot:
         )
 
 
-class Turns(Protocol):
-    """What a ``PilotLoop`` turns: a pilot."""
-
-    def tick(self) -> object: ...
-    def report_fault(self, fault: Fault) -> None: ...
-    def close(self) -> None: ...
-
-
 class PilotLoop:
     """Calls ``tick`` of a pilot every 20 ms until closed. When a turn fails the loop ends, and ``failure`` says why.
 
     `asleep_s` tells how long the computer has been asleep since it was started.
     """
 
-    def __init__(self, pilot: Turns, asleep_s: Callable[[], float] = slept_s) -> None:
+    def __init__(self, pilot: Pilot, asleep_s: Callable[[], float] = slept_s) -> None:
         self._pilot, self._asleep_s = pilot, asleep_s
         self._closing = threading.Event()
         self.failure: str | None = None

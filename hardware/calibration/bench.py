@@ -39,7 +39,7 @@ _PERIOD_S = 0.02
 class CalibrationBench:
     """Camera feed, servos and STOP of one rig; ``open_bench`` makes one, ``close`` gives all of it back.
 
-    It is the ``ServoBench`` of the procedures in ``servo_identification``. ``port`` is None when the rig has no servos;
+    The procedures in ``servo_identification`` work with it. ``port`` is None when the rig has no servos;
     ``stop`` ends whatever moves.
     """
 

@@ -8,9 +8,8 @@ configuration.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal, Protocol
 
 from core.calibration.servos import (
     Assignment,
@@ -36,7 +35,8 @@ from core.control.kept_zero import keep, zero_offer
 from core.devices import DeviceError
 from core.messages import message
 from core.types import Command, Point
-from hardware.calibration.servo_probe import ProbeLimits
+from hardware.calibration.bench import CalibrationBench
+from hardware.calibration.servo_probe import ProbeLimits, ServoProbe, SteeredRobot
 from hardware.servos.dynamixel_port import ServoError
 
 _AMPLITUDES_MM = (0.75, 1.5, 3.0)
@@ -53,40 +53,6 @@ _AT_ZERO_MM = 0.1
 Say = Callable[[str], object]
 
 
-class Probe(Protocol):
-    """One servo that can be moved; positions from where it was when the probe was opened."""
-
-    @property
-    def position_mm(self) -> float: ...
-    def move_to(self, target_mm: float) -> None: ...
-    def pause(self, seconds: float) -> None: ...
-    def alive(self) -> None: ...
-
-
-class Steered(Protocol):
-    """The robot with all its servos, zeroed where they stood; bends and holds them while it is looked at."""
-
-    @property
-    def rotation_deg(self) -> float: ...
-    def bend_to(self, command: Command) -> None: ...
-    def pause(self, seconds: float) -> None: ...
-    def alive(self) -> None: ...
-    def ticks(self) -> tuple[int, ...]: ...
-
-
-class ServoBench(Protocol):
-    """What the procedures work with: observes the robot and moves its servos. `alive` is called while it observes.
-
-    ``observe`` raises HeadNotSeen, DeviceError; ``probe`` (one servo) and ``steer`` (all) raise ServoError.
-    """
-
-    def observe(self, alive: Callable[[], None]) -> Look: ...
-    def probe(
-        self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], found: Mapping[int, int] | None = None
-    ) -> AbstractContextManager[Probe]: ...
-    def steer(self, servos: ServosConfig) -> AbstractContextManager[Steered]: ...
-
-
 @dataclass(frozen=True, slots=True)
 class Zeros:
     """How far each tendon was from taut (mm; positive: it was slack), and those that could not be told, with why."""
@@ -95,7 +61,9 @@ class Zeros:
     problems: tuple[str, ...] = ()
 
 
-def wiggle(bench: ServoBench, servos: ServosConfig, found: Mapping[int, int], servo_id: int, amplitude_mm: float = 1.5) -> None:
+def wiggle(
+    bench: CalibrationBench, servos: ServosConfig, found: Mapping[int, int], servo_id: int, amplitude_mm: float = 1.5
+) -> None:
     """Turn one servo a little both ways and back, for the operator to watch."""
     with bench.probe(servos, servo_id, ProbeLimits(-amplitude_mm, amplitude_mm), 1, found) as probe:
         for target_mm in (amplitude_mm, 0.0, -amplitude_mm, 0.0):
@@ -119,7 +87,7 @@ def _or_back(back: Callable[[], None]) -> Iterator[None]:
 
 
 def identify_servo(
-    bench: ServoBench, servos: ServosConfig, found: Mapping[int, int], servo_id: int, say: Say
+    bench: CalibrationBench, servos: ServosConfig, found: Mapping[int, int], servo_id: int, say: Say
 ) -> ServoFinding | None:
     """What one servo does; None when nothing clear was seen. It is turned no further than needed.
 
@@ -156,7 +124,7 @@ def identify_servo(
     return None
 
 
-def _wiggled(bench: ServoBench, probe: Probe, amplitude_mm: float) -> Wiggle:
+def _wiggled(bench: CalibrationBench, probe: ServoProbe, amplitude_mm: float) -> Wiggle:
     """What is seen at rest, so far one way and so far the other; the servo stands where it stood then."""
     rest = _look(bench, probe)
     seen = []
@@ -177,7 +145,7 @@ def identified(servos: ServosConfig, assignments: Sequence[Assignment]) -> Servo
     return ServosConfig.model_validate({**servos.model_dump(), "joints": joints})
 
 
-def find_zeros(bench: ServoBench, servos: ServosConfig, say: Say) -> Zeros:
+def find_zeros(bench: CalibrationBench, servos: ServosConfig, say: Say) -> Zeros:
     """Let each tendon go slack, pull it until the head follows, and leave it where it just became taut.
 
     A tendon that cannot be told is left where it was, and named in ``problems``.
@@ -219,7 +187,7 @@ def _joint(servos: ServosConfig, name: str) -> JointConfig:
     return servos.joints[servos.names.index(name)]
 
 
-def _move(bench: ServoBench, servos: ServosConfig, name: str, way_mm: float) -> None:
+def _move(bench: CalibrationBench, servos: ServosConfig, name: str, way_mm: float) -> None:
     joint = _joint(servos, name)
     limits = ProbeLimits(-_PARK_MM, _PARK_MM)
     with bench.probe(servos, joint.id, limits, joint.sign) as probe:
@@ -227,7 +195,7 @@ def _move(bench: ServoBench, servos: ServosConfig, name: str, way_mm: float) -> 
         probe.pause(_SETTLE_S / 2)
 
 
-def _find_zero(bench: ServoBench, servos: ServosConfig, name: str, then_mm: float) -> float:
+def _find_zero(bench: CalibrationBench, servos: ServosConfig, name: str, then_mm: float) -> float:
     """Where a tendon becomes taut, from where it stands; it is left `then_mm` from there.
 
     Raises NeverTaut, HeadNotSeen, DeviceError: it is where it was.
@@ -257,7 +225,7 @@ def _find_zero(bench: ServoBench, servos: ServosConfig, name: str, then_mm: floa
 
 
 def _steps(
-    bench: ServoBench, probe: Probe, rest: Look, from_mm: float, step_mm: float, ends: Callable[[TautReading], bool]
+    bench: CalibrationBench, probe: ServoProbe, rest: Look, from_mm: float, step_mm: float, ends: Callable[[TautReading], bool]
 ) -> list[TautReading]:
     """Tighten step by step, until one of them ends it or there is no room left."""
     steps: list[TautReading] = []
@@ -269,12 +237,12 @@ def _steps(
     return steps
 
 
-def nudge(bench: ServoBench, servos: ServosConfig, name: str, way_mm: float) -> None:
+def nudge(bench: CalibrationBench, servos: ServosConfig, name: str, way_mm: float) -> None:
     """Tighten one tendon by `way_mm`, 1 mm at most, or let it go (negative); it stays there."""
     _move(bench, servos, name, way_mm)
 
 
-def standing_ticks(bench: ServoBench, servos: ServosConfig) -> tuple[int, ...]:
+def standing_ticks(bench: CalibrationBench, servos: ServosConfig) -> tuple[int, ...]:
     """Position registers of the joints, armed for a moment where they stand; nothing turns. Raises ServoError."""
     with bench.steer(servos.model_copy(update={"pretension_mm": 0.0})) as robot:
         return robot.ticks()
@@ -289,7 +257,7 @@ class LearnedSteering:
     zero_ticks: tuple[int, ...]
 
 
-def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say, kept: ZeroConfig | None = None) -> LearnedSteering:
+def learn_steering(bench: CalibrationBench, servos: ServosConfig, say: Say, kept: ZeroConfig | None = None) -> LearnedSteering:
     """Bend to each side, up and down a little, as far as the head needs to show its way: that pulls each tendon.
 
     The tendons must be taut and without tension where they stand: that becomes zero, and there they are in the end. Without the
@@ -327,7 +295,7 @@ def learn_steering(bench: ServoBench, servos: ServosConfig, say: Say, kept: Zero
     return LearnedSteering(learn(pulls, first.heading, servos.tendons), first.head, ticks)
 
 
-def _bend(robot: Steered, servos: ServosConfig, share: float, angle_deg: float) -> None:
+def _bend(robot: SteeredRobot, servos: ServosConfig, share: float, angle_deg: float) -> None:
     """Bend by a share of the full bend in a direction; a shaft that turns its tendons there is waited for, and turned back."""
     across, up = unit_vector(angle_deg)
     command = Command(bend=share * across, pitch=share * up)
@@ -354,6 +322,6 @@ def _check_at_zero(servos: ServosConfig, kept: ZeroConfig, ticks: tuple[int, ...
             raise DeviceError("tendon {name} does not stand at its kept zero: find the zeros first", name=joint.name)
 
 
-def _look(bench: ServoBench, mover: Probe | Steered) -> Look:
+def _look(bench: CalibrationBench, mover: ServoProbe | SteeredRobot) -> Look:
     mover.pause(_SETTLE_S)
     return bench.observe(mover.alive)

@@ -115,7 +115,7 @@ class LockSteered(_Mover):
 
 
 class LockBench:
-    """A ``ServoBench`` on the twin's clock, which observes with the real network."""
+    """A ``CalibrationBench`` on the twin's clock, which observes with the real network."""
 
     def __init__(self, twin: LockTwin) -> None:
         self._twin, self.stop = twin, StopSwitch()
