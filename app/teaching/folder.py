@@ -217,10 +217,13 @@ class TeachingFolder:
     folder : made when the first picture is taken.
     name : what the bench is called.
     segment : the network that proposes a vessel, and points out a robot in the empty picture; called when it is first needed.
+    on_frame : gets how many of how many frames are done in a job that takes long, and says whether to go on writing a set.
     """
 
-    def __init__(self, folder: Path, name: str, segment: Callable[[], Segment]) -> None:
-        self.folder, self._name = folder, name
+    def __init__(
+        self, folder: Path, name: str, segment: Callable[[], Segment], on_frame: Callable[[int, int], bool] = lambda *_: True
+    ) -> None:
+        self.folder, self._name, self._on_frame = folder, name, on_frame
         self._open_segment = segment
         self._segment: Segment | None = None
         self._lock = FolderLock()
@@ -270,7 +273,8 @@ class TeachingFolder:
                 drawn = read_mask(self.folder / _VESSEL)
                 self._drawn = drawn if drawn.shape == bench.known.shape else None
         if has_vessel:
-            for row in record.frames:
+            for done, row in enumerate(record.frames):
+                self._on_frame(done, len(record.frames))
                 with contextlib.suppress(UserError):  # a picture that was removed or is damaged: the others are kept
                     self._frames.append(self._taken(row.stem, row.kind, row.left_out))
             self._recount()
@@ -434,6 +438,7 @@ class TeachingFolder:
             self._coverage = None
             return
         for place, taken in enumerate(self._frames):
+            self._on_frame(place, len(self._frames))
             frame = teaching.propose(taken.frame.picture, bench)
             if taken.is_corrected:
                 frame = _with_robot(frame, taken.frame.robot)
@@ -522,10 +527,8 @@ class TeachingFolder:
             self._check()
         self._keep(frames=True, model="", used=False)
 
-    def teaching_set(self, on_frame: Callable[[int, int], bool] = lambda _done, _count: True) -> Path:
+    def teaching_set(self) -> Path:
         """Write the frames to learn from, a quarter of them held out, and return their folder.
-
-        `on_frame` gets how many of how many frames the network has completed, and says whether to go on.
 
         Raises
         ------
@@ -539,7 +542,7 @@ class TeachingFolder:
         chosen = teaching.choose(frames, WANTED)
         completed: list[TeachingFrame] = []
         for one in chosen:
-            if not on_frame(len(completed), len(chosen)):
+            if not self._on_frame(len(completed), len(chosen)):
                 raise teaching.TeachingError("stopped before the training began; the frames are kept")
             completed.append(one if one.picture.stem in corrected else self._completed(one))
         chosen = [was if one.reason else now for was, now, one in zip(chosen, completed, self._checked(completed), strict=True)]

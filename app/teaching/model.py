@@ -113,7 +113,7 @@ class TeachingModel(QObject):
     looked = Signal(object)
     proposed = Signal(object)
     trained = Signal(str)
-    _completed = Signal(int, int)
+    _counted = Signal(int, int)
 
     def __init__(
         self,
@@ -126,9 +126,9 @@ class TeachingModel(QObject):
     ) -> None:
         super().__init__(parent)
         self.rig, self._newest, self._known = rig, newest, known
-        self._folder = TeachingFolder(folder, rig, segment)
+        self._folder = TeachingFolder(folder, rig, segment, self._on_frame)
         self.view = TeachingView()
-        self.busy = ""
+        self.busy = self._what = ""
         """The job that the window waits for, in words."""
         self.is_loaded = False
         """What was taken before is read; where it cannot be, it is tried again when the window is opened."""
@@ -155,7 +155,7 @@ class TeachingModel(QObject):
         self._work = Worker("teaching", self, behind=True)
         self._work.done.connect(self._on_done)
         self._work.failed.connect(self._on_failed)
-        self._completed.connect(self._on_completed)
+        self._counted.connect(self._on_counted)
 
     # ---- jobs
 
@@ -220,9 +220,20 @@ class TeachingModel(QObject):
         self._count += 1
         self._then[self._count] = then
         if not quiet:
-            self.busy, self._busy_job = what, self._count
+            self.busy = self._what = what
+            self._busy_job = self._count
             self.changed.emit()
         self._work.submit(self._count, lambda: (job(), self._folder.view()))
+
+    def _on_frame(self, done: int, count: int) -> bool:
+        """From the thread: so many frames of a job are done; whether to go on."""
+        self._counted.emit(done, count)
+        return not self._is_dropped.is_set()
+
+    def _on_counted(self, done: int, count: int) -> None:
+        if self.is_busy:
+            self.busy = tr("{what}: {done} of {count}", what=self._what, done=done, count=count)
+            self.changed.emit()
 
     def _on_done(self, key: object, result: object) -> None:
         assert isinstance(result, tuple)
@@ -327,16 +338,7 @@ class TeachingModel(QObject):
         self.training = TrainingState(TrainingPhase.PREPARING, tr("Writing the frames"), name)
         self._is_dropped.clear()
         start = partial(self._start_training, minutes)
-        self._run(tr("writing the frames"), partial(self._folder.teaching_set, self._on_frame), start)
-
-    def _on_frame(self, done: int, count: int) -> bool:
-        """From the thread: so many frames are completed; whether to go on."""
-        self._completed.emit(done, count)
-        return not self._is_dropped.is_set()
-
-    def _on_completed(self, done: int, count: int) -> None:
-        if self.training.phase is TrainingPhase.PREPARING:
-            self._show(replace(self.training, line=tr("Looks at frame {done} of {count}", done=done, count=count)))
+        self._run(tr("writing the frames"), self._folder.teaching_set, start)
 
     def _start_training(self, minutes: int, folder: object) -> None:
         out = own_models() / self._name

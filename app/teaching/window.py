@@ -308,7 +308,7 @@ class TeachingWindow(QDialog):
             return
         frame = self._newest()
         if frame is None:
-            self.picture.show_text(tr("No live picture: start the rig (F5 in the operator window)"))
+            self.picture.show_text(tr("No live picture of this bench: choose it in the menu Rig or Twin, or start the rig (F5)"))
         elif frame.index != self._shown_index:
             self._shown_index = frame.index
             self.picture.show_image(frame.image)

@@ -329,17 +329,15 @@ def test_too_few_frames_are_said(work: TeachingFolder) -> None:
         work.teaching_set()
 
 
-def test_the_writing_of_the_frames_can_be_stopped(work: TeachingFolder) -> None:
+def test_long_jobs_are_counted_and_the_writing_of_the_frames_can_be_stopped(work: TeachingFolder) -> None:
     drive(work)
-    told: list[tuple[int, int]] = []
-
-    def stop_at_the_third(done: int, count: int) -> bool:
-        told.append((done, count))
-        return done < 2
-
+    work.release()
+    count, told = work.view().used, []
+    again = TeachingFolder(work.folder, "toy", lambda: segment, lambda *counts: told.append(counts) or len(told) < count + 3)
+    again.load()
     with pytest.raises(TeachingError, match="the frames are kept"):
-        work.teaching_set(stop_at_the_third)
-    assert told == [(0, work.view().used), (1, work.view().used), (2, work.view().used)]
+        again.teaching_set()
+    assert told == [(done, count) for done in (*range(count), 0, 1, 2)]
     assert not (work.folder / "set").exists()
 
 
