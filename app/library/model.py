@@ -20,7 +20,6 @@ from PySide6.QtCore import (
     QSortFilterProxyModel,
     Qt,
     Signal,
-    Slot,
 )
 from PySide6.QtGui import QPixmap
 
@@ -113,7 +112,6 @@ class LibraryModel(QAbstractListModel):
         """Sessions whose rows have not been read yet."""
         return self._details.pending
 
-    @Slot()
     def scan(self) -> None:
         self._files.submit("scan", partial(_scan, self.folder, self._cache), once=True)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, QTimer, Slot
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QPainter, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -311,7 +311,6 @@ class LibraryWindow(WindowFrame):
 
     # ---- what is shown
 
-    @Slot()
     def _filter(self) -> None:
         panels = self.panels
         self.sessions.show(panels.search.text(), panels.tags.currentData() or "", panels.order.currentData())
@@ -368,7 +367,6 @@ class LibraryWindow(WindowFrame):
     def _show_title(self) -> None:
         self.setWindowTitle(tr("LumenPilot \N{EM DASH} sessions in {folder}", folder=self._model.folder))
 
-    @Slot(str, bool)
     def show_message(self, message: str, is_fault: bool = False) -> None:
         self.panels.toast.show_message(message, is_fault=is_fault)
 
@@ -396,12 +394,10 @@ class LibraryWindow(WindowFrame):
         if self._chosen is not None:
             self._model.describe(self._chosen, description)
 
-    @Slot()
     def play(self) -> None:
         if (summary := self.summary) is not None:
             self.others.play(summary.folder)
 
-    @Slot()
     def annotate(self) -> None:
         """Pictures evenly over it, in the annotator."""
         if (summary := self.summary) is not None:
@@ -450,7 +446,6 @@ class LibraryWindow(WindowFrame):
         if event.type() == QEvent.Type.ActivationChange and self.isActiveWindow() and self._model.is_scanned:
             self._model.scan()
 
-    @Slot()
     def _on_escape(self) -> None:
         panels = self.panels
         if panels.help.isVisible():

@@ -6,7 +6,7 @@ program, however it ends.
 
 from __future__ import annotations
 
-from PySide6.QtCore import QObject, QProcess, Signal, Slot
+from PySide6.QtCore import QObject, QProcess, Signal
 from PySide6.QtDBus import QDBusConnection, QDBusMessage, QDBusPendingCallWatcher
 
 from app.ui.i18n import tr
@@ -86,17 +86,14 @@ class AwakeInhibitor(QObject):
             self._watcher = None
         QDBusConnection.disconnectFromBus(_CONNECTION)  # the desktop drops what a client that is gone has inhibited
 
-    @Slot(QDBusPendingCallWatcher)
     def _on_answer(self, watcher: QDBusPendingCallWatcher) -> None:
         if watcher.isError():
             self._tell()
 
-    @Slot()
     def _on_no_process(self) -> None:
         if self.is_held:
             self._tell()
 
-    @Slot(int)
     def _on_process_end(self, code: int) -> None:
         process = self.sender()
         if self.is_held and process is self._process:

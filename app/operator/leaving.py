@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal, Slot
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QCheckBox, QMessageBox, QWidget
 
 from app.operator.rig_session import RigSession
@@ -92,7 +92,6 @@ class LeavingQuestion(QObject):
         self.box = box
         box.show()
 
-    @Slot()
     def _on_finished(self) -> None:
         if not is_asked_to_end():  # a second request to end closes the question, too, perhaps before it is asked here
             self._was_asked_to_end = False
@@ -126,7 +125,6 @@ class LeavingQuestion(QObject):
         self._look.start()
         return False
 
-    @Slot()
     def _on_look(self) -> None:
         status, before = self._rig.engine.bus_status(), self._before
         stops, known = (one.fault_counts.get(Cause.STOP_PRESSED, 0) if one is not None else 0 for one in (status, before))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from PySide6.QtCore import QObject, Signal, Slot
+from PySide6.QtCore import QObject, Signal
 
 from app.operator.window import OperatorWindow
 from app.ui.actions import MenuEntry, add_menu
@@ -37,7 +37,6 @@ class LiveMenuController(QObject):
             self._follow(output)
         self._use()
 
-    @Slot()
     def close(self) -> None:
         ending = [*self._ended, *self._outputs.values()]
         for output in ending:
@@ -60,7 +59,6 @@ class LiveMenuController(QObject):
         if output.address or output.problem:  # it was quicker
             self._changed.emit(output)
 
-    @Slot(object)
     def _on_changed(self, output: LiveOutput) -> None:
         kind = next((kind for kind, one in self._outputs.items() if one is output), None)
         if kind is None:  # switched off meanwhile

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -90,7 +90,6 @@ class HeldInput(QObject):
     def _repeat(self) -> None:
         raise NotImplementedError
 
-    @Slot(Qt.ApplicationState)
     def _on_application_state(self, state: Qt.ApplicationState) -> None:
         if state != Qt.ApplicationState.ApplicationActive:
             self.release_all()
@@ -349,7 +348,6 @@ class DriveController(QObject):
         self.jog.detach()
         self.deadman.detach()
 
-    @Slot()
     def _release_all(self) -> None:
         self.jog.release_all()
         self.deadman.release_all()
@@ -373,7 +371,6 @@ class DriveController(QObject):
             pilot.ask(act)
             self._log(act.value)
 
-    @Slot()
     def stop(self) -> None:
         """STOP, before anything else."""
         texts = {
@@ -383,29 +380,24 @@ class DriveController(QObject):
         self._log(texts.get(self._rig.stop(), Act.STOP.value))
         self._release_all()
 
-    @Slot(int)
     def reboot(self, servo_id: int) -> None:
         if (pilot := self._rig.pilot) is not None and pilot.reboot(servo_id):
             self._log(tr("restart servo {servo_id}", servo_id=servo_id))
 
-    @Slot(object)
     def zero(self, request: ZeroRequest) -> None:
         if (pilot := self._rig.pilot) is not None and pilot.zero(request):
             names = dict.fromkeys((*request.positions_mm, *request.kept))
             self._log(tr("zero {what}", what=", ".join(joint_title(name) for name in names)))
 
-    @Slot()
     def torque_off(self) -> None:
         if (pilot := self._rig.pilot) is not None and pilot.torque_off():
             self._log(tr("torque off"))
 
-    @Slot(object)
     def drive(self, jog: Jog) -> None:
         """Move the robot as held keys do; to be repeated."""
         if (pilot := self._rig.pilot) is not None:
             pilot.jog("window", jog)
 
-    @Slot(float)
     def set_speed(self, share: float) -> None:
         """Move at a share of full speed, 0..1, by whatever control; the next rig keeps it."""
         self._speed = share
@@ -417,15 +409,12 @@ class DriveController(QObject):
         text = tr("cleared") if target is None else tr("set to {x:.0f}, {y:.0f} px", x=target[0], y=target[1])
         self._panels.log(LogKind.TARGET, text)
 
-    @Slot(object)
     def press(self, motion: Motion) -> None:
         self.jog.press(("button", motion), motion)
 
-    @Slot(object)
     def release(self, motion: Motion) -> None:
         self.jog.release(("button", motion))
 
-    @Slot(bool)
     def _on_deadman(self, held: bool) -> None:
         if (pilot := self._rig.pilot) is not None:
             pilot.deadman(KEYBOARD, held)
@@ -435,7 +424,6 @@ class DriveController(QObject):
 
     # ---- what the pilot reports
 
-    @Slot()
     def update_view(self) -> None:
         """Show, record and sound what the pilot has reported since the last time."""
         pilot = self._rig.pilot

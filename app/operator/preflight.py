@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtCore import QObject, QTimer, Signal, Slot
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, sentence
@@ -195,7 +195,6 @@ class PreflightModel(QObject):
         """Make the checks soon after a rig's first picture, so that they are ready before arming."""
         self._later.start()
 
-    @Slot()
     def begin(self) -> None:
         """Make the checks; running ones are cancelled."""
         self._cancel()
@@ -247,7 +246,6 @@ class PreflightModel(QObject):
             child.leave()
             child.kill()
 
-    @Slot()
     def _begin_if_needed(self) -> None:
         if self._child is None and self._view() is not None and not self.preflight.is_fresh:
             self.begin()
@@ -266,7 +264,6 @@ class PreflightModel(QObject):
             self._problem = line or tr("they ended with exit code {code}", code=code)
         self.changed.emit()
 
-    @Slot()
     def _on_too_long(self) -> None:
         self._cancel()
         self._problem = tr("no answer within {seconds:.0f} s", seconds=_LONGEST_MS / 1000)

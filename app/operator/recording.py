@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject, QTimer, Signal, Slot
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.ui.actions import plain
@@ -132,7 +132,6 @@ class Recorder(QObject):
             usable.add_event(self._target)
         return usable
 
-    @Slot()
     def toggle(self) -> None:
         """Begin a session with the next picture, or end it; one that has not begun yet is taken back."""
         if self._writer is None:
@@ -150,7 +149,6 @@ class Recorder(QObject):
         if self._writer is not None:
             self._writer.stop(why)
 
-    @Slot()
     def save_last(self) -> None:
         """Make a session of the last seconds, without having recorded."""
         if self._writer is None:
@@ -161,7 +159,6 @@ class Recorder(QObject):
             return
         writer.save_last()
 
-    @Slot()
     def mark(self) -> None:
         """Mark this moment with a numbered note in the session, or in the last seconds; what it was can be said in the player.
 
@@ -243,7 +240,6 @@ class Recorder(QObject):
         for output in outputs:
             output.put(tick, view, bus)
 
-    @Slot()
     def _update(self) -> None:
         before, self._shown = self._shown, self.status
         now = self._shown

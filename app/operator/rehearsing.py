@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-from PySide6.QtCore import QObject, QTimer, Slot
+from PySide6.QtCore import QObject, QTimer
 
 from app.operator.engine_thread import EnginePhase
 from app.operator.preflight import PreflightFinding
@@ -77,7 +77,6 @@ class RehearsalController(QObject):
                 return ("--bench", bench), (Path(bench) / PHANTOM_FILE).stat().st_mtime_ns
         return None
 
-    @Slot()
     def _offer(self) -> None:
         """Show that the target can be rehearsed, if it can."""
         window, self._bench = self._window, self._known_bench()
@@ -88,7 +87,6 @@ class RehearsalController(QObject):
             self._card.hide()
         self._show_lack()
 
-    @Slot()
     def forget(self) -> None:
         """Nothing is known of a target; a rehearsal that goes on is given up."""
         self._end()
@@ -97,7 +95,6 @@ class RehearsalController(QObject):
         self._window.panels.show_rehearsal(None)
         self._offer()
 
-    @Slot()
     def _look_again(self) -> None:
         """A phantom may be made or changed beside the window."""
         if self._known_bench() != self._bench:
@@ -106,7 +103,6 @@ class RehearsalController(QObject):
 
     # ---- a rehearsal
 
-    @Slot()
     def toggle(self) -> None:
         """Begin one, or give the running one up; a result whose card was closed is shown again."""
         if self._child is not None:
@@ -169,7 +165,6 @@ class RehearsalController(QObject):
             child.leave()
             child.kill()  # its own processes end with it
 
-    @Slot()
     def close(self) -> None:
         self._watch.stop()
         self._end()

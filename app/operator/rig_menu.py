@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QTimer, Slot
+from PySide6.QtCore import QObject, QTimer
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QFileDialog, QMenu
 
@@ -116,7 +116,6 @@ class RigMenuController(QObject):
         wizard = self.wizard or self._closing
         return wizard is not None and wizard.model.stop()
 
-    @Slot()
     def close(self) -> None:
         """The program ends: the wizard gives back what it has, and opens no rig again."""
         wizard, self.wizard, self._closing = self.wizard or self._closing, None, None
@@ -128,7 +127,6 @@ class RigMenuController(QObject):
 
     # ---- the menu
 
-    @Slot()
     def update_entries(self) -> None:
         """List the rigs: the wizard or an editor may have made one meanwhile."""
         for action in self._rigs:
@@ -146,7 +144,6 @@ class RigMenuController(QObject):
         self._menu.addAction(action)
         return action
 
-    @Slot()
     def _update_cameras(self) -> None:
         """List the cameras, unless none may be chosen: a search may block the window so long that the robot is disarmed."""
         self._cameras.clear()
@@ -181,7 +178,6 @@ class RigMenuController(QObject):
         """Ask for a picture, video or folder of pictures to look at instead of the rig's camera."""
         ask_path(self._window, tr("Look at pictures instead of the camera's"), Path(), self.choose_source, mode)
 
-    @Slot(object)
     def choose_source(self, path: Path) -> None:
         """Look at a picture, video or folder of pictures; the menu Rig leads back to a rig."""
         if why := self.hindrance():
@@ -213,14 +209,12 @@ class RigMenuController(QObject):
 
     # ---- the insertion port
 
-    @Slot()
     def ask_port(self) -> None:
         """The next click into the picture is where the robot is inserted: that end of it is its tail."""
         if self._rig_path() is not None:
             self._window.ask_for_place(self._set_port)
             self._window.say(tr("Click where the robot is inserted; Esc leaves it as it is"))
 
-    @Slot()
     def forget_port(self) -> None:
         self._keep_port(None, tr("The insertion port is forgotten"))
 
@@ -255,13 +249,11 @@ class RigMenuController(QObject):
 
     # ---- the wizard
 
-    @Slot()
     def new(self) -> None:
         """Make a rig, beginning with what is configured."""
         config = self._rig.config
         self._begin("", config.model_copy(update={"rig": config.rig.model_copy(update={"file": None})}), None)
 
-    @Slot()
     def calibrate(self) -> None:
         """Calibrate the present rig again, or make one of it."""
         config = self._rig.reread_config()  # or the wizard would save the file's old servos
@@ -286,7 +278,6 @@ class RigMenuController(QObject):
         self._rig.lend(_LENT)
         self._request = _WizardRequest(name, config, known, self._rig.orders)
 
-    @Slot(object)
     def _on_phase(self, phase: EnginePhase) -> None:
         request = self._request
         if request is None or phase is EnginePhase.STARTING:
@@ -314,22 +305,18 @@ class RigMenuController(QObject):
         self._window.panels.mode_bar.stop.setEnabled(False)
         wizard.show()
 
-    @Slot(str)
     def _on_saved(self, name: str) -> None:
         self._saved = name
 
-    @Slot(int)
     def _on_finished(self, _result: int) -> None:
         self._closing, self.wizard = self.wizard, None
         self._window.panels.mode_bar.stop.setEnabled(True)
         QTimer.singleShot(_SLOW_MS, self._report_slow)
 
-    @Slot()
     def _report_slow(self) -> None:
         if self._closing is not None:
             self._window.say(tr(_CLOSING), is_fault=True)
 
-    @Slot()
     def _on_closed(self) -> None:
         """Camera and servos are free: the rig is opened again."""
         wizard, self._closing = self._closing, None

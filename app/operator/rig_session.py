@@ -7,7 +7,7 @@ from collections.abc import Callable
 from enum import Enum
 from functools import partial
 
-from PySide6.QtCore import QObject, QTimer, Signal, Slot
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.operator.engine_thread import EngineLike, EnginePhase, EngineStatus, EngineThread
 from app.ui.i18n import mark
@@ -165,7 +165,6 @@ class RigSession(QObject):
         self.engine.announce_engine()
         self._first.start()
 
-    @Slot()
     def restart(self) -> None:
         if not self._is_shut:
             self._leave()
@@ -209,7 +208,6 @@ class RigSession(QObject):
         self.preparing.emit()
         self._set_phase(EnginePhase.STARTING)
 
-    @Slot()
     def _open(self) -> None:
         self._start_engine(partial(self._open_engine, self.config))
 
@@ -218,7 +216,6 @@ class RigSession(QObject):
         self._first.stop()
         self.engine.start_engine(open_engine)
 
-    @Slot(object)
     def _on_status(self, status: EngineStatus) -> None:
         if not self._is_shut and status.phase is not EnginePhase.IDLE:
             self._set_phase(status.phase, status.message)

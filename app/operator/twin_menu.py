@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from pydantic import ValidationError
-from PySide6.QtCore import QObject, Slot
+from PySide6.QtCore import QObject
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QMainWindow, QMenu
 
@@ -87,7 +87,6 @@ class TwinMenuController(QObject):
     def _is_open(self) -> bool:
         return kind_of(self._rig.config.rig) is RigKind.SIM
 
-    @Slot()
     def update_entries(self) -> None:
         """Mark the look in use; nothing can be chosen while another rig is open."""
         for action in self._actions:
@@ -116,7 +115,6 @@ class TwinMenuController(QObject):
         title = tr_text(LOOK_TITLES[family_of(seed)]) if look is None else plain(self._looks[look].text())
         self._say(tr("Look: {title}", title=title), False)
 
-    @Slot(str)
     def _choose_phantom(self, name: str) -> None:
         if why := self._rig.work_in_progress():
             self._say(tr("The phantom stays as it is: {why}", why=why), True)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QAbstractItemView, QAbstractSpinBox, QComboBox, QLineEdit
 
 from app.operator.engine_thread import EnginePhase
@@ -67,7 +67,6 @@ class TickPace(QObject):
         self._check.stop()
         self._later.stop()
 
-    @Slot()
     def on_tick(self) -> None:
         """A tick is due now, or when a thirtieth of a second has passed since the last one was."""
         wait_s = self._due_s - time.monotonic()
@@ -130,7 +129,6 @@ class OperatorWindow(WindowFrame):
         is_live = self.rig.phase is EnginePhase.RUNNING and not self._is_stale
         return self.shown_tick.frame if is_live and self.shown_tick is not None else None
 
-    @Slot(str, bool)
     def say(self, message: str, is_fault: bool = False) -> None:
         """Show a line to the operator, and keep it in the log."""
         self.panels.toast.show_message(message, is_fault=is_fault)
@@ -146,7 +144,6 @@ class OperatorWindow(WindowFrame):
         else:
             super().open_path(path)
 
-    @Slot()
     def show_tour(self) -> None:
         self.tour.begin(operator_stops(self.panels, has_robot=self.rig.config.rig.robot != "none"))
 
@@ -212,7 +209,6 @@ class OperatorWindow(WindowFrame):
         self._snapshots.saved.connect(panels.toast.show_message)
         self._snapshots.failed.connect(partial(panels.toast.show_message, is_fault=True))
 
-    @Slot(object)
     def ask_step(self, step: OperatorStep) -> None:
         """A step that the operator asks for, by key, button or menu."""
         if not self.rig.may_ask(step):
@@ -233,7 +229,6 @@ class OperatorWindow(WindowFrame):
         self.controls.start()
         self.rig.start()
 
-    @Slot()
     def ask_restart(self) -> None:
         """Open the rig again, unless that would break something off; a rig that shows no new picture has nothing to lose."""
         is_live = self.rig.phase is EnginePhase.RUNNING and not self._is_stale
@@ -270,7 +265,6 @@ class OperatorWindow(WindowFrame):
             else:
                 self.panels.show_still(self.last_tick.frame, scene)
 
-    @Slot()
     def _show_kind(self) -> None:
         config, kind = self.rig.config, self.rig.kind
         self._stale_after_s = PLAYBACK_STALE_AFTER_S if kind is RigKind.PLAYBACK else STALE_AFTER_S
@@ -279,14 +273,12 @@ class OperatorWindow(WindowFrame):
         if self._twin is not None:
             self._twin.update_entries()
 
-    @Slot()
     def _on_preparing(self) -> None:
         rig = self.rig
         self.panels.set_config(rig.config)
         self.clear_target()
         self.recorder.open_rig(rig.calibrated(rig.config), rig.kind)
 
-    @Slot(object)
     def _on_phase(self, phase: EnginePhase) -> None:
         panels, rig = self.panels, self.rig
         if phase is EnginePhase.ENDED:
@@ -315,7 +307,6 @@ class OperatorWindow(WindowFrame):
 
     # ---- ticks
 
-    @Slot()
     def _show_newest(self, *, is_last: bool = False) -> None:
         tick = self.rig.engine.ticks.take()
         if tick is None or self._is_shut or not (is_last or self.rig.phase is EnginePhase.RUNNING):
@@ -326,7 +317,6 @@ class OperatorWindow(WindowFrame):
         self.panels.notice.clear()
         self.panels.show_tick(tick, self.max_block_ms)
 
-    @Slot(float)
     def _check_age(self, age_s: float) -> None:
         """A picture that does not change is not live: after half a second nothing of it is shown as true."""
         if self.rig.phase is not EnginePhase.RUNNING:
@@ -347,7 +337,6 @@ class OperatorWindow(WindowFrame):
 
     # ---- the operator
 
-    @Slot(float, float)
     def choose_target(self, x: float, y: float) -> None:
         """The operator's target, in source pixels; or the place that ``ask_for_place`` waits for."""
         self.panels.live.setFocus()
@@ -376,7 +365,6 @@ class OperatorWindow(WindowFrame):
         """The next click into the picture is for `on_place`, in source pixels, and no target; None: it is one again."""
         self._on_place = on_place
 
-    @Slot()
     def clear_target(self) -> None:
         """No target; and a click into the picture is for one again."""
         self._on_place = None
@@ -400,7 +388,6 @@ class OperatorWindow(WindowFrame):
         if not folder.is_dir() or not open_file(folder):
             self.panels.toast.show_message(tr("Snapshots go to {folder}", folder=folder))
 
-    @Slot()
     def _on_escape(self) -> None:
         field = self.focusWidget()
         if isinstance(field, QAbstractSpinBox | QLineEdit | QComboBox | QAbstractItemView):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal, Slot
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.player.course import Course, course_of
 from app.player.replayed import Replayed
@@ -101,7 +101,6 @@ class PlayedSession(QObject):
 
     # ---- what is known
 
-    @Slot()
     def _poll(self) -> None:
         is_all = self._reader.wait(0.0)
         known, shown = len(self._reader), len(self.course)

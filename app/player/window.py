@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt, QTimer, Slot
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
 
@@ -434,7 +434,6 @@ class PlayerWindow(WindowFrame):
 
     # ---- playing
 
-    @Slot()
     def toggle_play(self) -> None:
         """Play or pause; at the end play from the beginning."""
         if self.clock.is_playing:
@@ -454,7 +453,6 @@ class PlayerWindow(WindowFrame):
         if was_playing and self._shown is not None:
             self._show(self._shown)  # while it plays, texts are renewed only now and then
 
-    @Slot()
     def _on_turn(self) -> None:
         goes_on = self.clock.advance(self.course, self.course.duration_s)
         if self.clock.skipped_s > 0.0:
@@ -464,7 +462,6 @@ class PlayerWindow(WindowFrame):
         if not goes_on:
             self.pause()
 
-    @Slot(float)
     def seek(self, time_s: float) -> None:
         if len(self.course):
             self.clock.seek(min(time_s, self.course.duration_s))
@@ -479,7 +476,6 @@ class PlayerWindow(WindowFrame):
             self._request(place)
             self._show_position()
 
-    @Slot(int)
     def step(self, step: int) -> None:
         self.pause()
         self.go(max(0, self._requested) + step)
@@ -487,7 +483,6 @@ class PlayerWindow(WindowFrame):
     def skip(self, seconds: float) -> None:
         self.seek(max(0.0, self.clock.position_s + seconds))
 
-    @Slot(int)
     def jump(self, step: int) -> None:
         """To the next (1) or previous (-1) of the chosen kind, paused."""
         self.pause()
@@ -498,7 +493,6 @@ class PlayerWindow(WindowFrame):
         kind = tr(self.jump_kind.value).lower()
         self.show_message(tr("No {kind} after this frame", kind=kind) if step > 0 else tr("No {kind} before this frame", kind=kind))
 
-    @Slot(object)
     def set_jump_kind(self, kind: JumpKind) -> None:
         self.jump_kind = kind
         self.panels.bar.show_kind(kind)
@@ -508,7 +502,6 @@ class PlayerWindow(WindowFrame):
         self.set_jump_kind(kinds[(kinds.index(self.jump_kind) + 1) % len(kinds)])
         self.show_message(tr("N and P: {kind}", kind=tr(self.jump_kind.value).lower()))
 
-    @Slot(float)
     def set_speed(self, speed: float) -> None:
         self.clock.speed = speed
         self.panels.bar.show_speed(speed)
@@ -574,7 +567,6 @@ class PlayerWindow(WindowFrame):
         here = self.clock.position_s
         self.select((self.selection[0] if self.selection is not None and self.selection[0] < here else 0.0, here))
 
-    @Slot()
     def export_clip(self) -> None:
         """The selection, or the whole session, as a video with overlays in the pictures' folder; playing goes on."""
         if not len(self.course):
@@ -588,7 +580,6 @@ class PlayerWindow(WindowFrame):
         paths = (self._pictures / f"{name}{'' if k == 1 else f'_{k}'}.mp4" for k in count(1))
         self._export(next(path for path in paths if not path.exists()), *rows)
 
-    @Slot()
     def save_snapshot(self) -> None:
         """The picture that is shown, plain, with overlays, and its values."""
         tick = self._shown.tick if self._shown is not None else None
@@ -687,7 +678,6 @@ class PlayerWindow(WindowFrame):
 
     # ---- notes
 
-    @Slot()
     def begin_note(self) -> None:
         """Write a note at this time, or go on with one that is being written."""
         self.pause()
@@ -723,7 +713,6 @@ class PlayerWindow(WindowFrame):
 
     # ---- the window
 
-    @Slot(str, bool)
     def show_message(self, message: str, is_fault: bool = False) -> None:
         self.panels.toast.show_message(message, is_fault=is_fault)
 
@@ -736,7 +725,6 @@ class PlayerWindow(WindowFrame):
         self.panels.pages.setCurrentWidget(self.panels.events)
         self.panels.events.setFocus()
 
-    @Slot()
     def _on_escape(self) -> None:
         panels = self.panels
         if panels.help.isVisible():

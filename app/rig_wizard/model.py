@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 
-from PySide6.QtCore import QObject, Signal, Slot
+from PySide6.QtCore import QObject, Signal
 
 from app.ui.i18n import tr
 from app.ui.workers import Worker
@@ -117,7 +117,6 @@ class RigWizardModel(QObject):
             lost |= dict.fromkeys(("steering", "zero", "assumed"))
         return self._known.model_copy(update=lost)
 
-    @Slot()
     def stop(self) -> bool:
         """STOP: reaches the servos at once, from any thread. False: no step is running that could move them."""
         bench = self.bench  # read once: the thread may be closing it

@@ -1,4 +1,4 @@
-"""What the pages of the rig wizard share: the camera picture with shapes over it, the page base, and small controls."""
+"""What guided procedures share: the dialog, the page base, the camera picture with shapes over it, and small controls."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QDialog,
     QHBoxLayout,
     QHeaderView,
     QLabel,
+    QListWidget,
+    QListWidgetItem,
     QPushButton,
     QSizePolicy,
+    QStackedWidget,
     QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
@@ -24,10 +28,14 @@ from PySide6.QtWidgets import (
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
+from app.widgets.basics import Card, StillWheel, column, line, takes_enter
+from app.widgets.messages import QuestionStrip
+from app.widgets.mode_bar import StopButton
 from core.types import Image, Point
 
 if TYPE_CHECKING:
     from app.rig_wizard.model import RigWizardModel
+    from app.teaching.model import TeachingModel
     from hardware.calibration.rig_draft import RigDraft
 
 _ARROW_HEAD_PX = 11.0
@@ -311,6 +319,113 @@ class JobFocus:
                 one.setFocus()
                 return
         self._dialog.setFocus()
+
+
+_FRAME = QSize(16, 56)
+"""Room that the desktop needs for title bar and borders."""
+_STEP_LINE_PX = 30
+
+
+class StepDialog(QDialog):
+    """A list of steps, the page of one of them with what stands at its right, and a line or a question at the foot."""
+
+    model: RigWizardModel | TeachingModel
+    page: StepPage
+
+    def __init__(self, title: str, size: QSize, parent: QWidget | None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        theme.set_sheet(self, theme.FORM_SHEET)
+        self.resize(size.boundedTo(self.screen().availableGeometry().size() - _FRAME))
+        self.steps, self.stack, self.stop_button = QListWidget(), QStackedWidget(), StopButton()
+        self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
+        self.line, self.question = note(""), QuestionStrip()
+        self.question.closed.connect(self._on_answered)
+        self._behind_question: list[QWidget] = [self.line]
+        self._job: JobFocus | None = None
+
+    def lay_out(self, pages: Sequence[StepPage], right: QWidget, steps_px: int, controls_px: int, *buttons: QPushButton) -> None:
+        """`buttons` stand before those that lead back and on."""
+        self.steps.setFixedWidth(steps_px)
+        self.steps.setAccessibleName(tr("Steps"))
+        self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
+        for page in pages:
+            item = QListWidgetItem(tr(page.name))
+            item.setSizeHint(QSize(steps_px - 8, _STEP_LINE_PX))
+            self.steps.addItem(item)
+            self.stack.addWidget(page)
+        self.stack.setFixedWidth(controls_px)
+        foot = line(self.stop_button, (self.line, 1), (self.question, 1))
+        for part in (*buttons, self.back_button, self.next_button):
+            foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
+        for message in (self.line, self.question):
+            message.setMinimumHeight(44)
+        self.question.hide()
+        self.setLayout(column((line(self.steps, Card("", self.stack), (right, 1)), 1), foot, margins=(14, 12, 14, 12)))
+        StillWheel(self)
+
+    @property
+    def message(self) -> str:
+        return self.line.text()
+
+    def next(self) -> None:
+        raise NotImplementedError
+
+    def back(self) -> None:
+        raise NotImplementedError
+
+    def _show_page(self) -> None:
+        """Show on page, steps and buttons what is known now."""
+        raise NotImplementedError
+
+    def _has_failed(self) -> bool:
+        """Whether the job that has ended failed or was stopped."""
+        return False
+
+    def follow_theme(self) -> None:
+        self._refresh()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if not takes_enter(self, event):
+            super().keyPressEvent(event)
+
+    def ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
+        """Ask in place of the line before something is lost: `answer` names the button that does `action`."""
+        self._show_question(True)
+        self.question.ask(question, answer, action)
+
+    def _on_answered(self) -> None:
+        self._show_question(False)
+        self.setFocus()
+
+    def _show_question(self, on: bool) -> None:
+        self.question.setVisible(on)
+        for part in self._behind_question:
+            part.setVisible(not on)
+
+    def say(self, text: str, is_fault: bool = False) -> None:
+        if is_fault:
+            self.question.cancel()  # the fault must be seen
+        theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
+        self.line.setText(tr_text(text))
+        self.line.setAccessibleName(text)
+
+    def _refresh(self) -> None:
+        busy = self.model.busy
+        begun = JobFocus(self, self.page) if busy and self._job is None else None
+        self._show_page()
+        if begun is not None:
+            self._job = begun
+            begun.has_begun(self.stop_button)
+        elif not busy and self._job is not None:
+            self._job.end(self.page, self.next_button, is_failed=self._has_failed())
+            self._job = None
+        if busy:
+            work = tr_text(busy)
+            self.say(f"{work[0].upper()}{work[1:]} ...")
+        elif self.message.endswith(" ..."):
+            self.say("")
 
 
 def set_main_button(which: QPushButton, is_main: bool) -> None:

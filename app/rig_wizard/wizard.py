@@ -4,33 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QPointF, QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QPointF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QIcon, QKeyEvent, QPainter, QPen, QPixmap, QPolygonF
-from PySide6.QtWidgets import (
-    QAbstractSpinBox,
-    QComboBox,
-    QDialog,
-    QFrame,
-    QLineEdit,
-    QListWidget,
-    QListWidgetItem,
-    QPlainTextEdit,
-    QStackedWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QAbstractSpinBox, QComboBox, QFrame, QLineEdit, QPlainTextEdit, QWidget
 
 from app.operator.stop_keys import StopKeys
 from app.rig_wizard.camera_pages import CameraPage, ScalePage
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import JobFocus, WizardPage, WizardPicture, button, note, set_main_button
+from app.rig_wizard.pages_base import StepDialog, WizardPage, WizardPicture, button, set_main_button
 from app.rig_wizard.servo_pages import DrumsPage, IdentifyPage, PortPage, SteeringPage, ZeroPage
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import calibration_lines, rig_line
 from app.ui.window_base import is_asked_to_end
-from app.widgets.basics import Card, StillWheel, column, line, takes_enter
-from app.widgets.messages import QuestionStrip
-from app.widgets.mode_bar import StopButton
 from core.config.rig_file import RigFile, RigFileError, write_rig
 
 
@@ -71,17 +57,14 @@ class SummaryPage(WizardPage):
 
 
 _SIZE = QSize(1240, 660)
-_FRAME = QSize(16, 56)
-"""Room that the desktop needs for title bar and borders."""
-_STEPS_PX, _CONTROLS_PX = 190, 450
-_STEP_LINE_PX, _SIGN_PX = 30, 16
+_STEPS_PX, _CONTROLS_PX, _SIGN_PX = 190, 450, 16
 _TICK = QPolygonF([QPointF(2.5, 8.5), QPointF(6.5, 12.5), QPointF(13.5, 4.0)])
 _PICTURE_EVERY_MS = 50
 _FIELDS = (QAbstractSpinBox, QLineEdit, QComboBox)
 """Esc leaves one of these fields first, then the dialog."""
 
 
-class RigWizard(QDialog):
+class RigWizard(StepDialog):
     """Makes or calibrates a rig. ``saved`` carries its name.
 
     Next leads through the pages in their order, and is called Skip on a page whose step was not done. Space is STOP, except in a
@@ -94,19 +77,18 @@ class RigWizard(QDialog):
     """
 
     saved = Signal(str)
+    model: RigWizardModel
+    page: WizardPage
 
     def __init__(self, model: RigWizardModel, rig_name: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(tr("Calibrate {name}", name=rig_name) if rig_name else tr("New rig"), _SIZE, parent)
         self.model = model
         model.setParent(self)
-        self.setWindowTitle(tr("Calibrate {name}", name=rig_name) if rig_name else tr("New rig"))
         self.setModal(True)
-        theme.set_sheet(self, theme.FORM_SHEET)
-        self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.picture = WizardPicture()
         self.picture.show_text(tr("No camera yet"))
         self.camera_page = CameraPage(model, self.picture, rig_name)
-        self.camera_page.ask = self._ask
+        self.camera_page.ask = self.ask
         self.scale_page = ScalePage(model, self.picture)
         self.port_page = PortPage(model, self.picture)
         self.drums_page = DrumsPage(model, self.picture)
@@ -124,36 +106,22 @@ class RigWizard(QDialog):
             self.steering_page,
             self.summary_page,
         )
-        self.steps = QListWidget()
-        self.stack = QStackedWidget()
-        self.stop_button = StopButton()
-        self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
         self.cancel_button = button(tr("Cancel"), self.ask_to_leave)
-        self.line = note("")
-        self.question = QuestionStrip()
-        self.question.closed.connect(self._on_answered)
-        self._lay_out()
-        StillWheel(self)
+        self._behind_question.append(self.cancel_button)  # the question has its own Cancel, which returns to the wizard
+        self.steps.setIconSize(QSize(_SIGN_PX, _SIGN_PX))
+        self.lay_out(self.pages, self.picture, _STEPS_PX, _CONTROLS_PX, self.cancel_button)
         self.stop_button.asked.connect(model.stop)
         self._stop_keys = StopKeys(self, lambda: model.is_busy, model.stop)  # servos are open only while a job runs
-        model.message.connect(self._show_message)
-        model.failed.connect(lambda line: self._show_message(line, is_fault=True))
+        model.message.connect(self.say)
+        model.failed.connect(lambda line: self.say(line, is_fault=True))
         model.changed.connect(self._refresh)
-        self.picture.clicked.connect(self._on_picture_clicked)
+        self.picture.clicked.connect(self._on_clicked)
         self._timer = QTimer(self, interval=_PICTURE_EVERY_MS)
         self._timer.timeout.connect(self._update_picture)
         self._timer.start()
         self._shown_frame: object = None
-        self._job: JobFocus | None = None
+        self.page = self.camera_page
         self._go(0)
-
-    @property
-    def page(self) -> WizardPage:
-        return self.pages[self.stack.currentIndex()]
-
-    @property
-    def message(self) -> str:
-        return self.line.text()
 
     def next(self) -> None:
         """The next page; on the last one: save."""
@@ -172,7 +140,7 @@ class RigWizard(QDialog):
         if draft is None or not draft.has_news:
             self.reject()
         elif not self.question.text:
-            self._ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
+            self.ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
 
     def done(self, result: int) -> None:
         """The dialog closes: nothing moves any more, camera and port become free."""
@@ -181,14 +149,11 @@ class RigWizard(QDialog):
         self.model.close()
         super().done(result)
 
-    def follow_theme(self) -> None:
-        self._refresh()
-
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             if not event.isAutoRepeat():
                 self._on_escape()
-        elif not takes_enter(self, event):
+        else:
             super().keyPressEvent(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
@@ -207,58 +172,23 @@ class RigWizard(QDialog):
         else:
             self.ask_to_leave()
 
-    @Slot()
-    def _on_answered(self) -> None:
-        self._show_question(False)
-        self.setFocus()
-
-    def _ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
-        self._show_question(True)
-        self.question.ask(question, answer, action)
-
-    def _show_question(self, on: bool) -> None:
-        """In place of the line and of Cancel: the question has its own Cancel, which returns to the wizard."""
-        self.question.setVisible(on)
-        for part in (self.line, self.cancel_button):
-            part.setVisible(not on)
-
-    def _lay_out(self) -> None:
-        self.steps.setFixedWidth(_STEPS_PX)
-        self.steps.setAccessibleName(tr("Steps"))
-        self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
-        self.steps.setIconSize(QSize(_SIGN_PX, _SIGN_PX))
-        for page in self.pages:
-            item = QListWidgetItem(tr(page.name))
-            item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
-            self.steps.addItem(item)
-            self.stack.addWidget(page)
-        self.stack.setFixedWidth(_CONTROLS_PX)
-        middle = line(self.steps, Card("", self.stack), (self.picture, 1))
-        foot = line(self.stop_button, (self.line, 1), (self.question, 1))
-        for part in (self.cancel_button, self.back_button, self.next_button):
-            foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
-        for message in (self.line, self.question):
-            message.setMinimumHeight(44)
-        self.question.hide()
-        self.setLayout(column((middle, 1), foot, margins=(14, 12, 14, 12)))
-
     def _go(self, index: int) -> None:
         self.page.leave()
         self.question.cancel()
-        self._show_message("")  # the message was about the page before
+        self.say("")  # the message was about the page before
         self.stack.setCurrentIndex(index)
+        self.page = self.pages[index]
         self.page.enter()
         self._refresh()
 
-    @Slot(float, float)
-    def _on_picture_clicked(self, x: float, y: float) -> None:
+    def _on_clicked(self, x: float, y: float) -> None:
         self.page.click(x, y)
 
-    @Slot()
-    def _refresh(self) -> None:
+    def _has_failed(self) -> bool:
+        return self.model.is_failed
+
+    def _show_page(self) -> None:
         busy, page = self.model.is_busy, self.page
-        begun = JobFocus(self, page) if busy and self._job is None else None
         page.refresh()
         for row, other in enumerate(self.pages):
             item = self.steps.item(row)
@@ -274,19 +204,8 @@ class RigWizard(QDialog):
         self.next_button.setEnabled(page.may_leave and not busy and (not is_last or self.model.draft is not None))
         self.back_button.setEnabled(self.stack.currentIndex() > 0 and not busy)
         set_main_button(self.next_button, is_last or page.is_done)
-        if begun is not None:
-            self._job = begun
-            begun.has_begun(self.stop_button)
-        elif not busy and self._job is not None:
-            self._job.end(page, self.next_button, is_failed=self.model.is_failed)
-            self._job = None
         if page.main is not None:
             set_main_button(page.main, not page.is_done)
-        if busy:
-            work = tr_text(self.model.busy)
-            self._show_message(f"{work[0].upper()}{work[1:]} ...")
-        elif self.message.endswith(" ..."):
-            self._show_message("")
         self._update_picture(is_forced=True)
 
     def _sign(self, is_done: bool, *, is_here: bool) -> QIcon:
@@ -307,14 +226,6 @@ class RigWizard(QDialog):
             painter.drawEllipse(QPointF(_SIGN_PX / 2, _SIGN_PX / 2), 4.0, 4.0)
         painter.end()
         return QIcon(pixmap)
-
-    @Slot(str)
-    def _show_message(self, text: str, is_fault: bool = False) -> None:
-        if is_fault:
-            self.question.cancel()  # the fault must be seen
-        theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
-        self.line.setText(tr_text(text))
-        self.line.setAccessibleName(text)
 
     def _update_picture(self, is_forced: bool = False) -> None:
         """Show the newest picture, or that of the page."""
@@ -341,8 +252,8 @@ class RigWizard(QDialog):
                 return
             path = write_rig(rig)
         except RigFileError as error:
-            self._show_message(str(error), is_fault=True)
+            self.say(str(error), is_fault=True)
             return
-        self._show_message(tr("Saved: {path}", path=path))
+        self.say(tr("Saved: {path}", path=path))
         self.saved.emit(rig.name)
         self.accept()

@@ -9,7 +9,7 @@ import contextlib
 from collections.abc import Callable
 from functools import partial
 
-from PySide6.QtCore import QObject, QTimer, Slot
+from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QApplication
 
 from app.operator.engine_thread import EnginePhase
@@ -79,7 +79,6 @@ class SettingsController(QObject):
         for problem in self._file.problems:
             self._window.say(tr_text(problem), is_fault=True)
 
-    @Slot()
     def open(self) -> None:
         if self.dialog is None:
             draft = SettingsDraft(self._saved)
@@ -95,7 +94,6 @@ class SettingsController(QObject):
         self.dialog.raise_()
         self.dialog.activateWindow()
 
-    @Slot()
     def close(self) -> None:
         """The window closes: nothing that was not saved is kept."""
         self._timer.stop()
@@ -104,7 +102,6 @@ class SettingsController(QObject):
         self._stills.stop(finish=False)
         self._stills.wait()
 
-    @Slot(str)
     def choose_language(self, code: str) -> None:
         """Keep another language of the windows, for the next start of the program."""
         config = with_value(self._saved.model_dump(mode="json"), "window.language", code)
@@ -118,7 +115,6 @@ class SettingsController(QObject):
 
     # ---- trying out
 
-    @Slot(object)
     def _on_drafted(self, config: Config) -> None:
         if not self._why_locked():
             self._try_out(config)
@@ -160,11 +156,9 @@ class SettingsController(QObject):
             target = tick.scene.to_source(tick.scene.route.target) if tick.scene.route is not None else None
             self._stills.submit("still", partial(self._perceive_again, tick.frame, target, perception))
 
-    @Slot(object, object)
     def _on_still(self, _key: object, scene: object) -> None:
         self._window.show_still(scene if isinstance(scene, Scene) and self.is_trying else None)
 
-    @Slot(object)
     def _on_phase(self, phase: EnginePhase) -> None:
         """What is being tried out applies to a rig that was opened again, too."""
         if phase is EnginePhase.RUNNING and self._drafted is not None:
@@ -178,7 +172,6 @@ class SettingsController(QObject):
 
     # ---- saving
 
-    @Slot(bool)
     def _save(self, restart: bool) -> None:
         dialog = self.dialog
         config = dialog.draft.config if dialog is not None else None
@@ -226,7 +219,6 @@ class SettingsController(QObject):
             return read_again(config, self._saved)
         return config
 
-    @Slot(int)
     def _on_finished(self, _result: int) -> None:
         self.dialog = None
         self._put_back()
@@ -243,7 +235,6 @@ class SettingsController(QObject):
             return tr("A session is being recorded: settings can be changed when it has ended")
         return ""
 
-    @Slot()
     def _update(self) -> None:
         why = self._why_locked()
         if self.dialog is not None:

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from PySide6.QtCore import QSize, Qt, QTimer, Slot
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QShortcut
-from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QStackedWidget, QWidget
+from PySide6.QtCore import QSize, QTimer
+from PySide6.QtGui import QCloseEvent, QShortcut
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from app.annotator.canvas import AnnotationCanvas
 from app.annotator.outline_editor import VesselOutlineEditor
 from app.operator.manual_drive import JogKeys
-from app.rig_wizard.pages_base import JobFocus, button, note
+from app.rig_wizard.pages_base import StepDialog, button
 from app.teaching.folder import TeachingStep
 from app.teaching.model import NewestFrame, TeachingModel
 from app.teaching.pages import (
@@ -27,21 +27,14 @@ from app.teaching.pages import (
     show_main,
 )
 from app.training.dialog import BeforeAfter
-from app.ui import theme
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, next_step, who_drives
 from app.widgets.alerts import AlertStrip
-from app.widgets.basics import Card, StillWheel, column, line, takes_enter
-from app.widgets.messages import QuestionStrip
-from app.widgets.mode_bar import StopButton
 from core.control.drive_view import DriveNews
 from core.control.motion import Jog
 
 _SIZE = QSize(1440, 800)
-_FRAME = QSize(16, 56)
-"""Room that the desktop needs for title bar and borders."""
 _STEPS_PX, _CONTROLS_PX = 156, 352
-_STEP_LINE_PX = 30
 _PICTURE_EVERY_MS = 50
 _ASKED = OperatorStep.SERVOS_ON, OperatorStep.ACKNOWLEDGE
 """What moving the robot may ask for."""
@@ -60,7 +53,7 @@ class TeachingDriver:
     can_move: Callable[[], bool]
 
 
-class TeachingWindow(QDialog):
+class TeachingWindow(StepDialog):
     """Shows a teaching. It is not modal; closing it hides it, and everything goes on from there.
 
     Parameters
@@ -71,6 +64,9 @@ class TeachingWindow(QDialog):
     use : puts a model of this name, with its bench, into force; returns why it cannot be done now, or "".
     """
 
+    model: TeachingModel
+    page: TeachingPage
+
     def __init__(
         self,
         model: TeachingModel,
@@ -79,15 +75,11 @@ class TeachingWindow(QDialog):
         use: Callable[[str], str],
         parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__(tr("Teach this bench: {name}", name=model.rig), _SIZE, parent)
         self.model, self._newest, self._driver, self._use = model, newest, driver, use
         self._keys: JogKeys | None = None
         self._shown_index = -1
-        self._job: JobFocus | None = None
-        self.setWindowTitle(tr("Teach this bench: {name}", name=model.rig))
         self.setModal(False)
-        theme.set_sheet(self, theme.FORM_SHEET)
-        self.resize(_SIZE.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.picture = BenchPicture()
         self.picture.show_text(tr("No live picture"))
         self.alerts = AlertStrip(self.picture)
@@ -105,55 +97,22 @@ class TeachingWindow(QDialog):
             self.frames_page,
             self.train_page,
         )
-        self.steps, self.stack, self.right = QListWidget(), QStackedWidget(), QStackedWidget()
-        self.stop_button = StopButton()
+        self.right = QStackedWidget()
+        for page in self.pages:
+            page.edited.connect(self._refresh)
+            if self.right.indexOf(page.right) < 0:
+                self.right.addWidget(page.right)
         self.stop_button.asked.connect(driver.stop)
         for step in _ASKED:
             QShortcut(step.value.key, self, partial(driver.ask, step))
-        self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
         self.over_button = button(tr("Start &over"), self._ask_to_start_over, tr("Forget what was taken of this bench"))
         self.close_button = button(tr("&Close"), self.close, tr("What was taken is kept; the menu Model opens it again"))
-        self.line = note("")
-        self.question = QuestionStrip()
-        self.question.closed.connect(lambda: self._show_question(False))
-        self._lay_out()
-        StillWheel(self)
-        self._page: TeachingPage = self.empty_page
+        self.lay_out(self.pages, self.right, _STEPS_PX, _CONTROLS_PX, self.over_button, self.close_button)
+        self.page = self.empty_page
         model.changed.connect(self._refresh)
         model.said.connect(self.say)
         self._timer = QTimer(self, interval=_PICTURE_EVERY_MS)
         self._timer.timeout.connect(self._update_picture)
-
-    @property
-    def page(self) -> TeachingPage:
-        return self._page
-
-    @property
-    def message(self) -> str:
-        return self.line.text()
-
-    def _lay_out(self) -> None:
-        self.steps.setFixedWidth(_STEPS_PX)
-        self.steps.setAccessibleName(tr("Steps"))
-        self.steps.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.steps.setSelectionMode(QListWidget.SelectionMode.NoSelection)
-        for number, page in enumerate(self.pages, 1):
-            item = QListWidgetItem(f"{number}  {tr(page.name)}")
-            item.setSizeHint(QSize(_STEPS_PX - 8, _STEP_LINE_PX))
-            self.steps.addItem(item)
-            self.stack.addWidget(page)
-            page.edited.connect(self._refresh)
-            if self.right.indexOf(page.right) < 0:
-                self.right.addWidget(page.right)
-        self.stack.setFixedWidth(_CONTROLS_PX)
-        middle = line(self.steps, Card("", self.stack), (self.right, 1))
-        foot = line(self.stop_button, (self.line, 1), (self.question, 1))
-        for part in (self.over_button, self.close_button, self.back_button, self.next_button):
-            foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
-        for message in (self.line, self.question):
-            message.setMinimumHeight(44)
-        self.question.hide()
-        self.setLayout(column((middle, 1), foot, margins=(14, 12, 14, 12)))
 
     # ---- opening and closing
 
@@ -178,28 +137,24 @@ class TeachingWindow(QDialog):
 
     def reject(self) -> None:
         """Escape drops what is being drawn, and else closes the window."""
-        if not self._page.cancel():
+        if not self.page.cancel():
             self.close()
 
     def _leave(self) -> None:
         self._timer.stop()
-        self._page.leave()
+        self.page.leave()
         self._set_keys(False)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not takes_enter(self, event):
-            super().keyPressEvent(event)
 
     # ---- steps
 
     def next(self) -> None:
         """Keep what was done, and go on; on the last page: use the model."""
-        if self.model.is_busy or not self._page.may_leave:
+        if self.model.is_busy or not self.page.may_leave:
             return
-        if self._page is self.train_page:
+        if self.page is self.train_page:
             self.use_model()
         else:
-            self._page.next(TeachingStep(self._page.step + 1))
+            self.page.next(TeachingStep(self.page.step + 1))
 
     def use_model(self) -> None:
         """Put the model that was trained into force, with its bench."""
@@ -210,11 +165,11 @@ class TeachingWindow(QDialog):
 
     def back(self) -> None:
         """To the step before; nothing is lost."""
-        if not self.model.is_busy and self._page.step > 0:
-            self.model.go(TeachingStep(self._page.step - 1))
+        if not self.model.is_busy and self.page.step > 0:
+            self.model.go(TeachingStep(self.page.step - 1))
 
     def _enter(self, page: TeachingPage) -> None:
-        self._page = page
+        self.page = page
         self.stack.setCurrentWidget(page)
         self.right.setCurrentWidget(page.right)
         self.say("")
@@ -237,53 +192,38 @@ class TeachingWindow(QDialog):
             self._keys = None
 
     def _ask_to_start_over(self) -> None:
-        self._show_question(True)
-        self.question.ask(tr("Forget pictures, vessel and frames of this bench?"), tr("Forget"), self.model.start_over)
-
-    def _show_question(self, on: bool) -> None:
-        self.question.setVisible(on)
-        self.line.setVisible(not on)
+        self.ask(tr("Forget pictures, vessel and frames of this bench?"), tr("Forget"), self.model.start_over)
 
     # ---- what is shown
 
-    @Slot()
     def _refresh(self) -> None:
         if not self.isVisible():
             return
+        step = self.model.view.step
+        if not self.model.is_busy and self.page.step is not step:
+            self.page.leave()
+            self._enter(self.pages[step])
+        else:
+            super()._refresh()
+
+    def _show_page(self) -> None:
         model, view = self.model, self.model.view
-        begun = JobFocus(self, self._page) if model.is_busy and self._job is None else None
-        if not model.is_busy and self._page.step is not view.step:
-            self._page.leave()
-            self._enter(self.pages[view.step])
-            return
-        self._page.refresh()
+        self.page.refresh()
         for row, page in enumerate(self.pages):
             item = self.steps.item(row)
             font = item.font()
-            font.setBold(page is self._page)
+            font.setBold(page is self.page)
             item.setFont(font)
-            done = "\N{CHECK MARK}" if page.step < view.step or (page is self._page and page.is_done) else str(row + 1)
+            done = "\N{CHECK MARK}" if page.step < view.step or (page is self.page and page.is_done) else str(row + 1)
             item.setText(f"{done}  {tr(page.name)}")
-        is_last = self._page is self.train_page
+        is_last = self.page is self.train_page
         self.next_button.setText(tr("&Use it") if is_last else tr("&Next"))
-        self.next_button.setEnabled(self._page.may_leave and not model.is_busy and not (is_last and model.is_training))
-        self.back_button.setEnabled(self._page.step > 0 and not model.is_busy and not model.is_training)
+        self.next_button.setEnabled(self.page.may_leave and not model.is_busy and not (is_last and model.is_training))
+        self.back_button.setEnabled(self.page.step > 0 and not model.is_busy and not model.is_training)
         self.over_button.setEnabled(not model.is_busy and not model.is_training)
         self.close_button.setText(tr("&Close, go on training") if model.is_training else tr("&Close"))
-        show_main(self._page, self.next_button)
-        if begun is not None:
-            self._job = begun
-            begun.has_begun(self.stop_button)
-        elif not model.is_busy and self._job is not None:
-            self._job.end(self._page, self.next_button)
-            self._job = None
-        if model.is_busy:
-            work = tr_text(model.busy)
-            self.say(f"{work[0].upper()}{work[1:]} ...")
-        elif self.message.endswith(" ..."):
-            self.say("")
+        show_main(self.page, self.next_button)
 
-    @Slot(object)
     def show_news(self, news: DriveNews) -> None:
         """Show over the live picture who moves the robot, and why it does not move, or was stopped."""
         if self.isVisible():
@@ -293,18 +233,8 @@ class TeachingWindow(QDialog):
             self.alerts.show_view(news.view)
             self.alerts.show_alerts(news.alerts)
 
-    @Slot(str, bool)
-    def say(self, text: str, is_fault: bool = False) -> None:
-        theme.set_sheet(self.line, "color: @FAULT;" if is_fault else "color: @TEXT;")
-        self.line.setText(tr_text(text))
-        self.line.setAccessibleName(text)
-
-    def follow_theme(self) -> None:
-        self._refresh()
-
-    @Slot()
     def _update_picture(self) -> None:
-        if not self._page.is_live:
+        if not self.page.is_live:
             return
         frame = self._newest()
         if frame is None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Slot
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QAbstractButton, QLabel, QMainWindow
 
@@ -54,7 +54,6 @@ class GuiLatencyMonitor(QObject):
         """Longest block of the last ``window_s`` seconds."""
         return max((late for _, late in self._late), default=0.0)
 
-    @Slot()
     def _beat(self) -> None:
         now = time.monotonic()
         if self._last_s is not None:
@@ -135,7 +134,6 @@ class WindowFrame(QMainWindow):
 
     # ---- keys
 
-    @Slot()
     def _on_escape(self) -> None:
         """Back by one step: a window says which; the last step is out of full screen."""
         if self.isFullScreen():
@@ -166,7 +164,6 @@ class WindowFrame(QMainWindow):
         else:
             event.ignore()
 
-    @Slot()
     def shut_down(self) -> None:
         """Stop everything, hide at once, then wait for what must be finished; only once."""
         if self._is_shut:

@@ -21,7 +21,7 @@ from functools import cache, partial
 from typing import IO, Any, Generic, TypeVar
 
 import shiboken6
-from PySide6.QtCore import QObject, Qt, Signal, Slot
+from PySide6.QtCore import QObject, Qt, Signal
 
 from core.program import ROOT
 from core.system import lower_priority
@@ -53,7 +53,6 @@ class _CallbackQueue(QObject):
         with self._lock:
             self._is_open = False
 
-    @Slot(object)
     def _run(self, callback: Callable[[], None]) -> None:
         callback()
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from PySide6.QtCore import QCoreApplication, QObject, QPointF, QProcess, QRectF, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QCoreApplication, QObject, QPointF, QProcess, QRectF, Qt, QTimer, Signal
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent, QColor, QFont, QMouseEvent, QPainter, QPainterPath
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -225,7 +225,6 @@ class AlertStrip(QWidget):
         self._entries.clear()
         self._show()
 
-    @Slot()
     def _expire(self) -> None:
         now = self._clock()
         over = [k for k, entry in self._entries.items() if now - entry.last_s >= BRIEF_S.get(entry.alert.spec.priority, LINGER_S)]
@@ -277,7 +276,6 @@ class AlertStrip(QWidget):
             self.show()
             self.raise_()
 
-    @Slot(object)
     def _dismiss(self, key: AlertKey) -> None:
         self._entries.pop(key, None)
         self._show()
@@ -342,7 +340,6 @@ class AlertSounds(QObject):
             self._next = name
             self._cut()
 
-    @Slot()
     def close(self) -> None:
         """Stop the sound; waits for its process half a second at most."""
         self._next = None
@@ -366,13 +363,11 @@ class AlertSounds(QObject):
             self._cut_short = True
             self._process.kill()
 
-    @Slot(int, QProcess.ExitStatus)
     def _on_finished(self, code: int, status: QProcess.ExitStatus) -> None:
         failed = not self._cut_short and (code != 0 or status != QProcess.ExitStatus.NormalExit)
         error = bytes(self._process.readAllStandardError().data()).decode(errors="replace")
         self._go_on("gave up" if failed else None, " ".join(error.split())[:200] or f"exit code {code}")
 
-    @Slot(QProcess.ProcessError)
     def _on_error(self, error: QProcess.ProcessError) -> None:
         # a process that never started does not finish either
         if error == QProcess.ProcessError.FailedToStart:

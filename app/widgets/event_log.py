@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from enum import Enum
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt, Slot
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter
 from PySide6.QtWidgets import (
     QListWidget,
@@ -113,15 +113,12 @@ class EventLog(QWidget):
         self._filter.setCurrentIndex(self._filter.findData(kind))
         self._on_filter()
 
-    @Slot()
     def copy_all(self) -> None:
         QGuiApplication.clipboard().setText("\n".join(self.lines))
 
-    @Slot()
     def _on_filter(self) -> None:
         self._view.show_kind(self._filter.currentData())
 
-    @Slot(QPoint)
     def _open_menu(self, place: QPoint) -> None:
         menu = QMenu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from PySide6.QtCore import Qt, QTimer, Signal, Slot
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QFrame, QLabel, QProgressBar, QPushButton, QSizePolicy, QWidget
 
@@ -360,12 +360,10 @@ class QuestionStrip(QWidget):
         self._timer.start()
         self._no.setFocus()
 
-    @Slot()
     def cancel(self) -> None:
         if self._text:
             self._close()
 
-    @Slot()
     def _on_yes(self) -> None:
         action = self._action
         self._close()

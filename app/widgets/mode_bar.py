@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from html import escape
 
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal, Slot
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QAbstractTextDocumentLayout,
     QColor,
@@ -102,14 +102,12 @@ class StepButton(_BarButton):
         self.setToolTip(f"{tr(step.value.meaning)}  ({step.value.key})" + ("" if granted else f"\n\n{why}"))
         self.update()
 
-    @Slot()
     def _on_pressed(self) -> None:
         now, (before, at_s) = self._clock(), self._pressed
         self._counts = self.step is before or now - at_s >= DOUBLE_PRESS_S
         if self._counts:
             self._pressed = (self.step, now)
 
-    @Slot()
     def _on_clicked(self) -> None:
         step = self._pressed[0]
         if self._counts and step is not None:

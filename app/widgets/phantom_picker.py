@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal, Slot
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QSpinBox, QWidget
 
@@ -67,7 +67,6 @@ class PhantomPicker(QWidget):
             MenuEntry(tr("Another ran&dom phantom"), self.roll, ("R",)),
         )
 
-    @Slot()
     def open_list(self) -> None:
         """The list of phantoms by keyboard: the arrows move, Enter chooses, Escape closes."""
         if not self.isEnabled():
@@ -79,7 +78,6 @@ class PhantomPicker(QWidget):
         """Drop a seed that was typed and not confirmed."""
         self._seed.abandon()
 
-    @Slot()
     def roll(self) -> None:
         """The random phantom of the next seed; nothing while a rig without phantoms is open."""
         if not self.isEnabled():
@@ -90,7 +88,6 @@ class PhantomPicker(QWidget):
             self._combo.setCurrentIndex(self._combo.findData(_RANDOM))
         self._on_choice()
 
-    @Slot()
     def _on_choice(self) -> None:
         self._enable_seed()
         self.chosen.emit(self.name)
@@ -144,7 +141,6 @@ class _SeedBox(QSpinBox):
         super().focusInEvent(event)
         self.selectAll()
 
-    @Slot(int)
     def _on_value(self, value: int) -> None:
         if value != self._last:
             self._last = value

@@ -12,7 +12,7 @@ from enum import Enum, IntEnum
 from functools import partial
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt, Signal, Slot
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QHideEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -682,7 +682,6 @@ class ServoTable(QWidget):
         is_known = status is not None and bool(status.servos) and all(isinstance(one, ServoState) for one in status.servos)
         return is_known and status is not None and not status.armed and not all(status.zeroed)
 
-    @Slot()
     def open_zeros(self) -> None:
         """The dialog in which the operator says where the joints are."""
         if self.zeros is not None:
@@ -696,7 +695,6 @@ class ServoTable(QWidget):
         dialog.finished.connect(self._on_zeros_closed)
         dialog.show()
 
-    @Slot()
     def _on_zeros_closed(self) -> None:
         if self.zeros is not None:
             self.zeros.deleteLater()
@@ -714,7 +712,6 @@ class ServoTable(QWidget):
         self._strip.setCurrentIndex(1)
         self.question.ask(question, answer, action)
 
-    @Slot()
     def _on_answered(self) -> None:
         focus = self.focusWidget()
         had_focus = focus is not None and self.question.isAncestorOf(focus)

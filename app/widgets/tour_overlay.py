@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QPainter, QPainterPath, QRegion
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QLabel, QTabWidget, QWidget
 
@@ -70,7 +70,6 @@ class TourOverlay(QObject):
         self._timer.start()
         self._show_stop(0)
 
-    @Slot()
     def forward(self) -> None:
         """The next stop; after the last one it is over."""
         if self.place + 1 < len(self._stops):
@@ -78,11 +77,9 @@ class TourOverlay(QObject):
         else:
             self.end()
 
-    @Slot()
     def back(self) -> None:
         self._show_stop(max(0, self.place - 1))
 
-    @Slot()
     def end(self) -> None:
         if not self.is_running:
             return
@@ -127,7 +124,6 @@ class TourOverlay(QObject):
             part.raise_()
         self.card.forward.setFocus()
 
-    @Slot()
     def _follow(self) -> None:
         """Light and card keep up with the window's parts, which may move at any time."""
         if not self.is_running:

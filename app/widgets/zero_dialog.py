@@ -8,7 +8,7 @@ from datetime import datetime
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSize, Qt, Signal, Slot
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDoubleSpinBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QWidget
 
@@ -178,13 +178,11 @@ class _FeedRow(QWidget):
             self._known = key
             self.box.setChecked(known.position_mm is None and known.holds is not None)
 
-    @Slot()
     def _on_edited(self) -> None:
         if self.number.hasFocus():
             self.box.setChecked(True)
         self._on_changed()
 
-    @Slot()
     def _on_changed(self) -> None:
         self.changed.emit()
 
@@ -305,18 +303,15 @@ class ZeroDialog(QDialog):
         if not takes_enter(self, event):
             super().keyPressEvent(event)
 
-    @Slot()
     def _update_buttons(self) -> None:
         if self._joints:
             request = self.request
             self.set_button.setEnabled(bool(request.positions_mm or request.kept))
 
-    @Slot()
     def _on_search(self) -> None:
         self.close()
         self.search_asked.emit()
 
-    @Slot()
     def _on_set(self) -> None:
         request = self.request
         self.close()
