@@ -94,70 +94,49 @@ class AnnotationBar(QWidget):
 
     def __init__(self, *, blind: bool, tools: Sequence[Tool] = tuple(Tool)) -> None:
         super().__init__()
-        row = line(spacing=5)
-        self._has_algorithm = not blind and any(not tool.is_mask for tool in tools)
-        self._tools: dict[Tool, _Chip] = {}
+        has_lines = any(not tool.is_mask for tool in tools)
+        self._has_algorithm = not blind and has_lines
+        self._tools = {tool: _Chip(tool.value.key, tool.value.label, tool.value.role, tool.value.label) for tool in tools}
         group = QButtonGroup(self)
-        for tool in tools:
-            key, label = tool.value.key, tr(tool.value.label)
-            chip = _Chip(key, label, tool.value.role, label)
+        for tool, chip in self._tools.items():
             chip.clicked.connect(lambda _on=False, which=tool: self.tool_chosen.emit(which))
             group.addButton(chip)
-            row.addWidget(chip)
-            self._tools[tool] = chip
-        row.addStretch(1)
-        self._switches: dict[str, _Chip] = {}
-        for key, label, colour, meaning in _SWITCHES:
-            if key == "H" and not self._has_algorithm:
-                continue
-            chip = _Chip(key, tr(label), colour, tr(meaning))
+        self._switches = {key: _Chip(key, *texts) for key, *texts in _SWITCHES if key != "H" or self._has_algorithm}
+        for key, chip in self._switches.items():
             chip.setChecked(key in "LK")
             for signal in (self.switched, self.shown):
                 chip.toggled.connect(lambda on, which=key, signal=signal: signal.emit(which, on))
-            row.addWidget(chip)
-            self._switches[key] = chip
-        answers = line(spacing=5)
         self._answers: dict[Answer, _Chip] = {}
-        for answer in Answer if any(not tool.is_mask for tool in tools) else ():
-            key = answer.value.key
-            role = f"STATE_{key}" if answer.value.state is not None else "TEXT"
-            chip = _Chip(key, tr(answer.value.label), role, tr(answer.value.meaning))
+        for answer in Answer if has_lines else ():
+            key, role = answer.value.key, f"STATE_{answer.value.key}" if answer.value.state is not None else "TEXT"
+            chip = self._answers[answer] = _Chip(key, answer.value.label, role, answer.value.meaning)
             chip.clicked.connect(lambda _on=False, which=answer: self.answered.emit(which))
-            answers.addWidget(chip)
-            self._answers[answer] = chip
-        answers.addStretch(1)
-        modes = line(spacing=5)
-        self._modes: dict[MaskMode, _Chip] = {}
+        self.modes: dict[MaskMode, _Chip] = {}
         for mode in MaskMode:
-            if mode is MaskMode.POINTS:
-                continue
-            chip = _Chip(mode.value.key, tr(mode.value.label), "ORANGE", tr(mode.value.meaning))
-            chip.clicked.connect(lambda on, which=mode: self.mode_chosen.emit(which if on else MaskMode.POINTS))
-            modes.addWidget(chip)
-            self._modes[mode] = chip
+            if mode is not MaskMode.POINTS:
+                chip = self.modes[mode] = _Chip(mode.value.key, mode.value.label, "ORANGE", mode.value.meaning)
+                chip.clicked.connect(lambda on, which=mode: self.mode_chosen.emit(which if on else MaskMode.POINTS))
         self._hint = QLabel(wordWrap=True)
         self._hint.setObjectName("card_note")
         self._hint.setMinimumWidth(10)
         self._hint.setFixedHeight(_HINT_HEIGHT)
+        rows = [line(*self._tools.values(), None, *self._switches.values(), spacing=5)]
+        rows += [line(*self._answers.values(), None, spacing=5)] if has_lines else []
+        modes = line(*self.modes.values(), spacing=5)
         modes.addSpacing(7)
         modes.addWidget(self._hint, 1)
-        self.setLayout(column(row, answers, modes, spacing=5) if self._answers else column(row, modes, spacing=5))
+        self.setLayout(column(*rows, modes, spacing=5))
         self.show_tool(next(iter(tools)), MaskMode.POINTS)
 
     @property
     def hint(self) -> str:
         return self._hint.text()
 
-    @property
-    def mode_shown(self) -> MaskMode:
-        """Whose chip is on."""
-        return next((mode for mode, chip in self._modes.items() if chip.isChecked()), MaskMode.POINTS)
-
     def show_tool(self, tool: Tool, mode: MaskMode) -> None:
         """The chosen tool and mode, and how it is used."""
         if tool in self._tools:
             self._tools[tool].setChecked(True)
-        for which, chip in self._modes.items():
+        for which, chip in self.modes.items():
             chip.setChecked(which is mode)
             chip.setVisible(tool.is_mask)
             chip.role = tool.value.role
@@ -206,12 +185,12 @@ class _Chip(Painted, QAbstractButton):
         self._key, self.role = key, role
         self._is_next = False
         self.setCheckable(True)
-        self.setText(label)
+        self.setText(tr(label))
         self.setFixedHeight(30)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setToolTip(tr("{meaning}  (key {key})", meaning=meaning, key=key))
-        self.setAccessibleName(label)
+        self.setToolTip(tr("{meaning}  (key {key})", meaning=tr(meaning), key=key))
+        self.setAccessibleName(tr(label))
 
     def show_enter(self, on: bool) -> None:
         """Whether the Enter key does this now."""
@@ -256,14 +235,10 @@ class AnnotationHeader(QWidget):
         self._title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._who = QLabel(who)
         theme.set_sheet(self._who, "color: @TEXT_DIM; font-size: 13px;")
-        self._saved = QLabel()
-        self._saved.setAccessibleName(tr("State of the file"))
-        self.setLayout(line((self._title, 1), self._who, self._saved, spacing=18, margins=(4, 2, 4, 0)))
+        self.saved = QLabel()
+        self.saved.setAccessibleName(tr("State of the file"))
+        self.setLayout(line((self._title, 1), self._who, self.saved, spacing=18, margins=(4, 2, 4, 0)))
         self.show_saved(True)
-
-    @property
-    def saved_text(self) -> str:
-        return self._saved.text()
 
     def show_title(self, text: str) -> None:
         self._title.setText(text)
@@ -278,9 +253,9 @@ class AnnotationHeader(QWidget):
         self._show(one if count == 1 else more, "FAULT", why)
 
     def _show(self, text: str, role: str, tip: str) -> None:
-        self._saved.setText(text)
-        self._saved.setToolTip(tip)
-        theme.set_sheet(self._saved, f"color: @{role}; font-size: 13px; font-weight: 600;")
+        self.saved.setText(text)
+        self.saved.setToolTip(tip)
+        theme.set_sheet(self.saved, f"color: @{role}; font-size: 13px; font-weight: 600;")
 
 
 _ROW = 30
@@ -475,21 +450,17 @@ class QueueList(QWidget):
         name_list(self._filter, tr("Which images are listed"))
         self._filter.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._filter.currentIndexChanged.connect(lambda _index: self._show_rows())
-        self._progress, self._bar = QLabel(), QProgressBar(textVisible=False)
-        self._progress.setFont(theme.semi_bold(14))
+        self.progress, self._bar = QLabel(), QProgressBar(textVisible=False)
+        self.progress.setFont(theme.semi_bold(14))
         self._bar.setFixedHeight(6)
         self._bar.setAccessibleName(tr("Progress"))
         theme.set_sheet(self._bar, _BAR_STYLE)
-        self.setLayout(column(self._progress, self._bar, self._filter, (self._view, 1), spacing=6))
-
-    @property
-    def progress_text(self) -> str:
-        return self._progress.text()
+        self.setLayout(column(self.progress, self._bar, self._filter, (self._view, 1), spacing=6))
 
     def show_progress(self, finished: int, count: int) -> None:
         left = count - finished
         done = tr("{finished} of {count} done", finished=finished, count=count)
-        self._progress.setText(done + tr(", {left} left", left=left) if left else done)
+        self.progress.setText(done + tr(", {left} left", left=left) if left else done)
         self._bar.setRange(0, max(count, 1))
         self._bar.setValue(finished)
 

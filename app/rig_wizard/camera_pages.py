@@ -84,13 +84,12 @@ class CameraPage(WizardPage):
         form.addWidget(self.name_edit, 0, 1)
         form.addLayout(size, 1, 1)
         form.addWidget(self.cameras, 2, 1)
-        self.column.addLayout(form)
+        self.add(form)
         self.main = self.open_button = button(tr("&Open the camera"), self._open)
         self.search_button = button(tr("&Search again"), self.search, tr("Look for cameras and ports once more"))
         self.add_row(self.open_button, self.search_button, stretched=self.open_button, fill=True)
         self.problem = note("")
-        self.column.addWidget(self.problem)
-        self.column.addStretch(1)
+        self.add(self.problem, None)
 
     @property
     def rig_name(self) -> str:
@@ -223,8 +222,7 @@ class ScalePage(WizardPage):
         self.add_row(self.take_button, self.solve_button, self.restart_button, stretched=self.take_button)
         self.add_row(self.count)
         self.add_row(QLabel(tr("Known length")), self.length, self.clicks_button)
-        self.column.addWidget(self.result)
-        self.column.addStretch(1)
+        self.add(self.result, None)
 
     @property
     def is_done(self) -> bool:

@@ -28,7 +28,7 @@ from PySide6.QtWidgets import (
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.widgets.basics import Card, StillWheel, column, line, takes_enter
+from app.widgets.basics import Card, Part, StillWheel, add_parts, column, line, takes_enter
 from app.widgets.messages import QuestionStrip
 from app.widgets.mode_bar import StopButton
 from core.types import Image, Point
@@ -186,7 +186,7 @@ _HEAD_PX = 28
 
 
 class StepPage(QWidget):
-    """A step of a guided procedure. ``name`` stands in the list of steps; the page adds its controls to ``column``."""
+    """A step of a guided procedure. ``name`` stands in the list of steps; the page adds its controls."""
 
     name = ""
     hint = ""
@@ -200,9 +200,11 @@ class StepPage(QWidget):
         self.column.setSpacing(theme.GAP)
         title = QLabel(tr(self.name))
         title.setFont(theme.semi_bold(18))
-        self.column.addWidget(title)
-        if self.hint:
-            self.column.addWidget(note(tr(self.hint)))
+        self.add(title, note(tr(self.hint)))
+
+    def add(self, *parts: Part) -> None:
+        """Below what is there; see ``column`` of the widgets."""
+        add_parts(self.column, *parts)
 
     @property
     def is_done(self) -> bool:
@@ -254,10 +256,7 @@ class WizardPage(StepPage):
     def add_row(self, *parts: QWidget, stretched: QWidget | None = None, fill: bool = False) -> None:
         """Widgets side by side; without `fill` they stand at the left."""
         row = QHBoxLayout()
-        for part in parts:
-            row.addWidget(part, 1 if part is stretched else 0)
-        if not fill:
-            row.addStretch(1)
+        add_parts(row, *((part, 1) if part is stretched else part for part in parts), *([] if fill else [None]))
         self.column.addLayout(row)
 
     def run_step(self, what: str, step: Callable[[RigDraft], object]) -> None:

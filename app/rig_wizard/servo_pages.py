@@ -86,9 +86,8 @@ class PortPage(WizardPage):
         self.main = self.search_button = button(tr("&Search"), self._search)
         self.add_row(QLabel(tr("Port")), self.ports, self.search_button, stretched=self.ports, fill=True)
         self.servos = table((tr("ID"), tr("Model")), (), tr("Servos found"), fitted=False)
-        self.column.addWidget(self.servos, 1)
         self.result = note("")
-        self.column.addWidget(self.result)
+        self.add((self.servos, 1), self.result)
 
     @property
     def is_done(self) -> bool:
@@ -174,10 +173,8 @@ class DrumsPage(WizardPage):
             self._cells.append(cells)
             for place, cell in enumerate(cells):
                 grid.addWidget(cell, len(self.ways), place)
-        self.column.addLayout(grid)
         self.result = note("")
-        self.column.addWidget(self.result)
-        self.column.addStretch(1)
+        self.add(grid, self.result, None)
 
     def _field(self, per_mm: float) -> QDoubleSpinBox:
         field = QDoubleSpinBox(decimals=3)
@@ -261,7 +258,7 @@ class IdentifyPage(WizardPage):
         for place, width in ((1, _ID_PX), (2, _DIRECTION_PX)):
             self.rows.horizontalHeader().setSectionResizeMode(place, QHeaderView.ResizeMode.Fixed)
             self.rows.setColumnWidth(place, width)
-        self.column.addWidget(self.rows)
+        self.add(self.rows)
         self.main = self.auto_button = button(tr("&Find automatically"), self._identify)
         tip = tr("Turn the servo of the chosen row both ways by 1.5 mm")
         self.wiggle_button = button(tr("&Wiggle the chosen"), self._wiggle, tip)
@@ -270,8 +267,7 @@ class IdentifyPage(WizardPage):
         self.add_row(self.auto_button, fill=True)
         self.add_row(self.wiggle_button, self.swap_button, self.right_button, fill=True)
         self.result = note("")
-        self.column.addWidget(self.result)
-        self.column.addStretch(1)
+        self.add(self.result, None)
         self._shown: tuple[Assignment, ...] | None = None
         self._known_ids: tuple[int, ...] = ()
         self._known_draft: RigDraft | None = None
@@ -424,13 +420,11 @@ class ZeroPage(WizardPage):
         self.pretension.valueChanged.connect(self._set_pretension)
         self.rows = table((tr("Tendon"), tr("Was slack by")), (), tr("Slack of the tendons"))
         self._tendons: tuple[JointConfig, ...] = ()
-        self.column.addWidget(self.find_button)
-        self.column.addWidget(self.rows)
+        self.add(self.find_button, self.rows)
         self.add_row(self.tendon, self.tighten, self.loosen)
         self.add_row(QLabel(tr("Pretension")), self.pretension)
         self.result = note("")
-        self.column.addWidget(self.result)
-        self.column.addStretch(1)
+        self.add(self.result, None)
 
     @property
     def is_done(self) -> bool:
@@ -487,9 +481,7 @@ class SteeringPage(WizardPage):
         headings = (tr("Tendon"), tr("Direction of the head"), tr("Way per mm of wire"))
         self.rows = table(headings, (), tr("Steering directions"))
         self.result = note("")
-        for widget in (self.learn_button, self.rows, self.result):
-            self.column.addWidget(widget)
-        self.column.addStretch(1)
+        self.add(self.learn_button, self.rows, self.result, None)
 
     @property
     def is_done(self) -> bool:

@@ -33,7 +33,7 @@ class SummaryPage(WizardPage):
         self.text.setFrameShape(QFrame.Shape.NoFrame)
         self.text.setAccessibleName(tr("The rig as it will be saved"))
         self.text.setTabChangesFocus(True)
-        self.column.addWidget(self.text, 1)
+        self.add((self.text, 1))
 
     def rig(self) -> RigFile | None:
         """The rig; None before a camera is open. Raises RigFileError."""

@@ -226,19 +226,11 @@ class EmptyPage(TeachingPage):
         self.thumb.setAccessibleName(tr("The empty picture that was taken"))
         theme.set_sheet(self.thumb, "background: @WINDOW; color: @TEXT_FAINT; border: 1px solid @LINE; border-radius: 6px;")
         self.found = _lines(84)
-        self.column.addWidget(self.take)
-        self.column.addWidget(self.thumb, 0, Qt.AlignmentFlag.AlignLeft)
-        self.column.addWidget(self.found)
-        self.column.addStretch(1)
-        self.column.addWidget(
-            note(
-                tr(
-                    "The robot cannot be taken out? Lay it in {count} different places and take each: the empty bench is computed.",
-                    count=PLACES,
-                )
-            )
+        cannot = tr(
+            "The robot cannot be taken out? Lay it in {count} different places and take each: the empty bench is computed.",
+            count=PLACES,
         )
-        self.column.addWidget(self.place)
+        self.add(self.take, line(self.thumb, None), self.found, None, note(cannot), self.place)
 
     @property
     def is_done(self) -> bool:
@@ -301,10 +293,8 @@ class VesselPage(TeachingPage):
         self.again = button(tr("Propose &again"), model.propose_vessel, tip)
         self.words = _lines(60)
         for mode in (MaskMode.REGION, MaskMode.TUBE, MaskMode.BRUSH):
-            self.column.addWidget(note(f"<b>{tr(mode.value.label)}</b> ({mode.value.key}): {tr(_MODE_TEXT[mode])}"))
-        self.column.addLayout(line(self.undo, self.again))
-        self.column.addWidget(self.words)
-        self.column.addStretch(1)
+            self.add(note(f"<b>{tr(mode.value.label)}</b> ({mode.value.key}): {tr(_MODE_TEXT[mode])}"))
+        self.add(line(self.undo, self.again), self.words, None)
         editor.changed.connect(self.edited)
         model.proposed.connect(self._on_proposed)
 
@@ -421,13 +411,8 @@ class MovePage(TeachingPage):
             thumb.setFixedSize(116, 87)
             thumb.setScaledContents(True)
             theme.set_sheet(thumb, "background: @WINDOW; border-radius: 4px;")
-        strip = line(*self._thumbs, spacing=6)
-        strip.addStretch(1)
-        for part in (self.said, self.places, self.bends, self.frames, self.lacks):
-            self.column.addWidget(part)
-        self.column.addStretch(1)
-        self.column.addLayout(strip)
-        self.column.addWidget(self.pause, 0, Qt.AlignmentFlag.AlignLeft)
+        strip = line(*self._thumbs, None, spacing=6)
+        self.add(self.said, self.places, self.bends, self.frames, self.lacks, None, strip, line(self.pause, None))
         self._shown: tuple[str, ...] = ()
         model.looked.connect(self._on_looked)
 
@@ -521,9 +506,7 @@ class FramesPage(TeachingPage):
         self.undo = button(tr("&Undo"), self._on_undo)
         self.why = note("")
         self.why.setFixedHeight(40)
-        self.column.addWidget(self.list, 1)
-        self.column.addWidget(self.why)
-        self.column.addLayout(line(self.out, self.undo))
+        self.add((self.list, 1), self.why, line(self.out, self.undo))
         canvas.edited.connect(self._on_edited)
 
     def enter(self) -> None:
@@ -672,9 +655,8 @@ class TrainPage(TeachingPage):
         name_label, minutes_label = QLabel(tr("New model")), QLabel(tr("for"))
         name_label.setBuddy(self.model_name)
         minutes_label.setBuddy(self.minutes)
-        self.column.addLayout(line(name_label, (self.model_name, 1)))
-        self.column.addLayout(line((self.start, 1), minutes_label, self.minutes, (self.stop, 1)))
-        self.column.addLayout(column(self.bar, self.words, (self.table, 1)))
+        self.add(line(name_label, (self.model_name, 1)), line((self.start, 1), minutes_label, self.minutes, (self.stop, 1)))
+        self.add(column(self.bar, self.words, (self.table, 1)))
 
     @property
     def is_done(self) -> bool:

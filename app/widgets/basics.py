@@ -34,8 +34,8 @@ _TOP_PX = 4  # margin above the panels of a window
 # ---- layouts
 
 
-Part = QWidget | QLayout | tuple[QWidget | QLayout, int]
-"""A part of a layout, with its stretch."""
+Part = QWidget | QLayout | tuple[QWidget | QLayout, int] | None
+"""A part of a layout, with its stretch; None: empty room that takes what is left."""
 Margins = tuple[int, int, int, int]
 _NO_MARGINS = (0, 0, 0, 0)
 
@@ -54,13 +54,20 @@ Box = TypeVar("Box", bound=QBoxLayout)
 def _fill(layout: Box, parts: Sequence[Part], spacing: int, margins: Margins) -> Box:
     layout.setContentsMargins(*margins)
     layout.setSpacing(spacing)
+    add_parts(layout, *parts)
+    return layout
+
+
+def add_parts(layout: QBoxLayout, *parts: Part) -> None:
     for part in parts:
+        if part is None:
+            layout.addStretch(1)
+            continue
         item, stretch = part if isinstance(part, tuple) else (part, 0)
         if isinstance(item, QWidget):
             layout.addWidget(item, stretch)
         else:
             layout.addLayout(item, stretch)
-    return layout
 
 
 def row(*widgets: QWidget) -> QWidget:
@@ -127,10 +134,7 @@ class Card(QFrame):
         self.setObjectName("card")
         parts: list[Part] = [(content, 1)]
         if title:
-            head = line(card_title(title), spacing=8)
-            head.addStretch(1)
-            head.addWidget(card_note(note) if isinstance(note, str) else note)
-            parts.insert(0, head)
+            parts.insert(0, line(card_title(title), None, card_note(note) if isinstance(note, str) else note, spacing=8))
         self.setLayout(column(*parts, spacing=4, margins=(12, 7, 12, 9)))
 
 

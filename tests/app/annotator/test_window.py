@@ -445,10 +445,10 @@ def test_a_record_that_is_damaged_comes_back_from_its_journal(make: MakeRater) -
 
 def test_progress_and_status(rater: Rater) -> None:
     queue = rater.window.panels.queue
-    assert queue.progress_text == "0 of 3 done, 3 left"
+    assert queue.progress.text() == "0 of 3 done, 3 left"
     rater.qtbot.waitUntil(lambda: not queue._model.index(2).data(Qt.ItemDataRole.DecorationRole).isNull(), timeout=30_000)
     rater.press(Key.Key_X, Key.Key_N)
-    assert queue.progress_text == "1 of 3 done, 2 left"
+    assert queue.progress.text() == "1 of 3 done, 2 left"
     rater.press(Key.Key_N, Key.Key_U)
     assert rater.model.index == 1, "the next without an answer, around the end"
     rater.press(Key.Key_X, Key.Key_End, Key.Key_X, Key.Key_N)
@@ -597,9 +597,9 @@ def test_a_mode_with_a_line_tool_means_the_vessels_mask(rater: Rater) -> None:
     assert rater.canvas.tool is Tool.VESSEL_MASK and rater.canvas.mask_mode is MaskMode.TUBE
     assert rater.window.panels.bar.hint.startswith("Drag along the middle")
     rater.press(Key.Key_R)
-    assert rater.window.panels.bar.mode_shown is MaskMode.REGION
+    assert rater.window.panels.bar.modes[MaskMode.REGION].isChecked()
     rater.press(Key.Key_Escape)
-    assert rater.window.panels.bar.mode_shown is MaskMode.POINTS
+    assert not rater.window.panels.bar.modes[MaskMode.REGION].isChecked()
     assert "click the outline" in rater.window.panels.bar.hint
 
 
@@ -666,10 +666,10 @@ def test_an_edit_that_cannot_be_written_is_shouted_and_written_later(rater: Rate
     whole = store.save
     monkeypatch.setattr(store, "save", lambda *_: (_ for _ in ()).throw(AnnotationError("the disk is full")))
     rater.click(*ROBOT)
-    rater.qtbot.waitUntil(lambda: "NOT SAVED: 3 edits" in rater.window.panels.header.saved_text)
+    rater.qtbot.waitUntil(lambda: "NOT SAVED: 3 edits" in rater.window.panels.header.saved.text())
     monkeypatch.setattr(store, "save", whole)
     rater.press(Key.Key_X)
-    rater.qtbot.waitUntil(lambda: rater.window.panels.header.saved_text.endswith("saved"))
+    rater.qtbot.waitUntil(lambda: rater.window.panels.header.saved.text().endswith("saved"))
     (one,) = rater.kept()
     assert one.content.cannot_tell
     with AnnotationStore(rater.store_path, read_only=True) as kept:
@@ -686,7 +686,7 @@ def test_closing_asks_about_edits_that_the_disk_did_not_take(
     monkeypatch.setattr(rater.window, "_may_lose", lambda: asked.append(rater.model.unsaved) or answer)
     if last != "only one":
         rater.press(Key.Key_A)
-        rater.qtbot.waitUntil(lambda: "NOT SAVED: 1 edit" in rater.window.panels.header.saved_text)
+        rater.qtbot.waitUntil(lambda: "NOT SAVED: 1 edit" in rater.window.panels.header.saved.text())
     if last == "note":
         rater.press(Key.Key_F2)
         QTest.keyClicks(rater.window.panels.note, "glare")
