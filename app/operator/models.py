@@ -53,19 +53,13 @@ def installed_models() -> list[InstalledModel]:
 def figures_line(info: ModelInfo) -> str:
     """Dice of vessel and robot, on what; and whether it was taught what its confidence means."""
     figures: dict[str, Any] = info.figures
-    parts = []
+    parts = [tr("not measured")]
     if "vessel_dice" in figures and "robot_dice" in figures:
-        parts.append(
-            tr("Dice vessel {vessel}, robot {robot}", vessel=_figure(figures, "vessel_dice"), robot=_figure(figures, "robot_dice"))
-        )
-        what = (
-            tr("held-out pictures")
-            if figures.get("held_out")
-            else tr("pictures of {name}", name=figures.get("set", tr("a test set")))
-        )
-        parts[0] += tr(" on {count} {what}", count=figures.get("frames", "?"), what=what)
-    else:
-        parts.append(tr("not measured"))
+        vessel, robot = _figure(figures, "vessel_dice"), _figure(figures, "robot_dice")
+        of_set = tr("pictures of {name}", name=figures.get("set", tr("a test set")))
+        what = tr("held-out pictures") if figures.get("held_out") else of_set
+        on = tr(" on {count} {what}", count=figures.get("frames", "?"), what=what)
+        parts = [tr("Dice vessel {vessel}, robot {robot}", vessel=vessel, robot=robot) + on]
     if "state_agreement" in figures:
         parts.append(tr("state {share:.0f} %", share=100 * figures["state_agreement"]))
     if info.calibration is None:
@@ -115,8 +109,7 @@ class ModelMenu(QObject):
         self._current, self._hindrance, self._cost = current, hindrance, cost
         entries = [MenuEntry(tr("Teach this &bench..."), teach), MenuEntry(tr("&Train on my annotations..."), train)]
         self._below = add_menu(window, tr("&Model"), entries)[0]
-        menu = self._below.associatedObjects()
-        self._menu = next(one for one in menu if isinstance(one, QMenu))
+        self._menu = next(one for one in self._below.associatedObjects() if isinstance(one, QMenu))
         self._menu.setToolTipsVisible(True)
         self._actions: list[QAction] = []
         self._group = QActionGroup(self)
@@ -137,8 +130,7 @@ class ModelMenu(QObject):
         current = self._current()
         for model in installed_models():
             self._add(model, model.name == current or str(model.folder) == current)
-        separator = self._menu.insertSeparator(self._below)
-        self._actions.append(separator)
+        self._actions.append(self._menu.insertSeparator(self._below))
 
     def _add(self, model: InstalledModel, is_current: bool) -> None:
         own = tr(", own") if model.is_own else ""

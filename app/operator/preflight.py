@@ -216,23 +216,15 @@ class PreflightModel(QObject):
         now = self.preflight
         if now.is_fresh and not now.is_running and not now.against:
             return True
+        line = tr("Not armed yet: the checks before driving take some seconds, then arm again")
         if now.against:
             first = now.against[0]
             more = tr(" (+{count} more)", count=len(now.against) - 1) if len(now.against) > 1 else ""
-            self.asked.emit(
-                tr(
-                    "Not armed. {what} What to do: {fix}{more}",
-                    what=sentence(f"{tr_text(first.name)}: {tr_text(first.detail)}"),
-                    fix=tr_text(first.fix),
-                    more=more,
-                )
-            )
-            if not now.is_fresh and not now.is_running:
-                self.begin()
-        else:
-            if not now.is_running:
-                self.begin()
-            self.asked.emit(tr("Not armed yet: the checks before driving take some seconds, then arm again"))
+            what, fix = sentence(f"{tr_text(first.name)}: {tr_text(first.detail)}"), tr_text(first.fix)
+            line = tr("Not armed. {what} What to do: {fix}{more}", what=what, fix=fix, more=more)
+        if not now.is_fresh and not now.is_running:
+            self.begin()
+        self.asked.emit(line)
         return False
 
     def close(self) -> None:

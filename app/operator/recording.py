@@ -159,15 +159,11 @@ class Recorder(QObject):
             return
         writer.save_last()
 
-    def mark(self) -> None:
-        """Mark this moment with a numbered note in the session, or in the last seconds; what it was can be said in the player.
+    def note(self, text: str = "") -> str:
+        """Note `text` at this moment in the session, or in the last seconds; returns why it cannot be kept, "" when it is.
 
-        Nothing is typed here: the operator stays at the controls, and Space stays STOP.
+        Without a text it is a numbered mark; what it was can be said in the player: the operator stays at the controls.
         """
-        self.note("")
-
-    def note(self, text: str) -> str:
-        """Note `text` at this moment, or a numbered mark when it is empty. Returns why it cannot be kept, "" when it is."""
         writer = self._usable(self._writer) if self._writer is not None else None
         status = self.status
         is_recorded = status.recording or status.armed
@@ -203,18 +199,18 @@ class Recorder(QObject):
             x, y = self._target.data["xy"]
             self.keep_target((x, y))
 
+    @property
+    def _receivers(self) -> tuple[SessionWriter | LiveOutput, ...]:
+        return self._outputs if self._writer is None else (self._writer, *self._outputs)
+
     def _keep(self, event: Event) -> None:
-        if self._writer is not None:
-            self._writer.add_event(event)
-        for output in self._outputs:
-            output.add_event(event)
+        for receiver in self._receivers:
+            receiver.add_event(event)
 
     def keep_drive(self, view: DriveView) -> None:
         """Keep that mode or faults have changed, also when there are no pictures."""
-        if self._writer is not None:
-            self._writer.drive(view)
-        for output in self._outputs:
-            output.drive(view)
+        for receiver in self._receivers:
+            receiver.drive(view)
 
     def keep_rig_stop(self, message: str) -> None:
         """Keep that the rig stopped by itself, and why: from here on no pilot reports it."""
@@ -233,12 +229,10 @@ class Recorder(QObject):
 
     def _put(self, tick: Tick) -> None:
         """A tick, in the engine's thread."""
-        writer, outputs, pilot = self._writer, self._outputs, self._engine.pilot
+        pilot = self._engine.pilot
         view, bus = pilot.view if pilot is not None else None, self._engine.bus_status()
-        if writer is not None:
-            writer.put(tick, view, bus)
-        for output in outputs:
-            output.put(tick, view, bus)
+        for receiver in self._receivers:
+            receiver.put(tick, view, bus)
 
     def _update(self) -> None:
         before, self._shown = self._shown, self.status

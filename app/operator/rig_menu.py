@@ -156,23 +156,16 @@ class RigMenuController(QObject):
     # ---- choosing
 
     def choose(self, name: str, _checked: bool = False) -> None:
-        if why := self.hindrance():
-            self._refuse(why)
-            return
-        try:
+        def chosen(config: Config) -> Config:
             path, rig = find_rig(name)
-        except RigFileError as error:
-            self._refuse(str(error))
-            return
-        self._rig.use_config(with_rig(self._rig.config, rig, path))
+            return with_rig(config, rig, path)
+
+        self._use(chosen)
         self.update_entries()
 
     def choose_camera(self, camera: FoundCamera) -> None:
         """Another camera in the present rig; what was calibrated with the old one does not hold good for it."""
-        if why := self.hindrance():
-            self._refuse(why)
-            return
-        self._rig.use_config(with_camera(self._rig.config, camera))
+        self._use(lambda config: with_camera(config, camera))
 
     def ask_source(self, mode: QFileDialog.FileMode) -> None:
         """Ask for a picture, video or folder of pictures to look at instead of the rig's camera."""
@@ -180,13 +173,19 @@ class RigMenuController(QObject):
 
     def choose_source(self, path: Path) -> None:
         """Look at a picture, video or folder of pictures; the menu Rig leads back to a rig."""
+        self._use(lambda config: with_source(config, path))
+
+    def _use(self, changed: Callable[[Config], Config]) -> None:
+        """Open the rig of the changed configuration, or say why not."""
         if why := self.hindrance():
             self._refuse(why)
             return
         try:
-            self._rig.use_config(with_source(self._rig.config, path))
+            config = changed(self._rig.config)
         except UserError as error:
             self._refuse(str(error))
+        else:
+            self._rig.use_config(config)
 
     def hindrance(self) -> str:
         """Why neither rig nor camera may be taken away now; "" when they may."""

@@ -138,18 +138,13 @@ class RigSession(QObject):
         before = self.pilot
         if before is not None:
             before.stop()
-        is_opening, is_lent = self.engine.stop_opening(), self.stop_borrowers()
+        is_opening, moved = self.engine.stop_opening(), [stop() for stop in self._borrowers]
         pilot = self.pilot
         if pilot is not None and pilot is not before:  # opened between the questions
             pilot.stop()
-        if before is not None or pilot is not None or is_lent:
+        if before is not None or pilot is not None or any(moved):
             return StopOutcome.SERVOS
         return StopOutcome.OPENING if is_opening else StopOutcome.NOTHING
-
-    def stop_borrowers(self) -> bool:
-        """STOP to what borrows the rig; False when nothing of it moves. From any thread."""
-        moved = [stop() for stop in self._borrowers]
-        return any(moved)
 
     def halt(self) -> None:
         """End all driving and let go of the controls: the rig is about to be closed."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import platformdirs
 from PySide6.QtCore import QObject, QSettings, Qt, QTimer, Signal
@@ -71,8 +71,7 @@ class WindowServices(QObject):
     def __init__(self, window: OperatorWindow, state: Path, watch: CrashWatch | None = None) -> None:
         super().__init__(window)
         self._window, self._state = window, state
-        offers = window.panels.offers
-        self._offers = offers
+        offers = self._offers = window.panels.offers
         self.after = AfterSession(offers, window.others, parent=self)
         self.descriptions = DescriptionController(window, window.recorder)
         self.recovery = RecoveryController(
@@ -221,11 +220,8 @@ class WindowServices(QObject):
         )
 
     def _use_model(self, name: str) -> None:
-        config = self._window.rig.config
-        segmentation = config.perception.segmentation.model_copy(update={"model": name})
-        perception = config.perception.model_copy(update={"segmentation": segmentation})
         self._window.say(tr("Model {name} from now on, until the program ends", name=name), False)
-        self._window.rig.use_config(config.model_copy(update={"perception": perception}))
+        self._window.rig.use_config(_with_model(self._window.rig.config, name))
 
     def train(self) -> None:
         """The training that is there already, or a new one on a chosen annotation file."""
@@ -312,10 +308,8 @@ class WindowServices(QObject):
             except RigFileError as error:
                 return str(error)
         self._taught = self._bench_name(config)
-        segmentation = config.perception.segmentation.model_copy(update={"model": name})
-        perception = config.perception.model_copy(update={"segmentation": segmentation, "bench": str(bench)})
         self._window.say(tr("Model {name} and its bench from now on; the menu Model has the one before", name=name), False)
-        rig.use_config(config.model_copy(update={"perception": perception}))
+        rig.use_config(_with_model(config, name, bench=str(bench)))
         return ""
 
     def _without_other_bench(self, config: Config) -> Config:
@@ -377,15 +371,10 @@ class WindowServices(QObject):
         self._window.say(tr("Another unforeseen error: the servos were stopped again"), True)
 
     def _show_crash(self, crash: Crash) -> None:
-        where = (
-            tr("The report is {report}", report=crash.report) if crash.report is not None else tr("The report could not be written")
-        )
-        box = QMessageBox(
-            QMessageBox.Icon.Critical,
-            tr("Unforeseen error"),
-            tr("The program met an error: {what}", what=crash.what),
-            parent=self._window,
-        )
+        report = tr("The report is {report}", report=crash.report)
+        where = report if crash.report is not None else tr("The report could not be written")
+        text = tr("The program met an error: {what}", what=crash.what)
+        box = QMessageBox(QMessageBox.Icon.Critical, tr("Unforeseen error"), text, parent=self._window)
         box.setInformativeText(
             tr(
                 "{stopped}. A recording that ran was ended and is whole.\n\n{where}.\n\nBest close the program "
@@ -410,9 +399,14 @@ class WindowServices(QObject):
         report = crash.report
         assert report is not None
         show = OfferButton(tr("Show the report"), partial(open_file, report), str(report))
-        self._offers.offer(
-            Offer(_CRASH, text, tr("{what}. The report: {report}", what=crash.what, report=report), (show,), is_fault=True)
-        )
+        detail = tr("{what}. The report: {report}", what=crash.what, report=report)
+        self._offers.offer(Offer(_CRASH, text, detail, (show,), is_fault=True))
+
+
+def _with_model(config: Config, name: str, **perception: Any) -> Config:
+    segmentation = config.perception.segmentation.model_copy(update={"model": name})
+    perceived = config.perception.model_copy(update={"segmentation": segmentation, **perception})
+    return config.model_copy(update={"perception": perceived})
 
 
 _TEACHABLE = frozenset({Reason.UNLIKE_TRAINING, Reason.BENCH_MOVED, Reason.OTHER_BENCH})

@@ -158,7 +158,7 @@ class OperatorWindow(WindowFrame):
                 None,
                 MenuEntry(tr("&Record, or end the recording"), recorder.toggle, ("F9", "Shift+F9")),
                 MenuEntry(tr("Save the &last seconds"), recorder.save_last, ("F10", "Shift+F10")),
-                MenuEntry(tr("&Mark this moment"), recorder.mark, ("M", "Shift+M")),
+                MenuEntry(tr("&Mark this moment"), recorder.note, ("M", "Shift+M")),
             ]
         )
         performance = MenuEntry(tr("Performance fi&gures"), self.panels.toggle_performance, checked=False)

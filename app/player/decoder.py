@@ -52,27 +52,20 @@ class FrameDecoder(QObject):
         self._place, self._step, self._requests = -1, 0, 0
         self._kept: OrderedDict[int, Decoded] = OrderedDict()
         self._kept_bytes = 0
-        self._worker = Worker("decode", self, latest_only=True)
-        self._worker.done.connect(self._on_done)
-        self._worker.failed.connect(lambda _key, line: self.failed.emit(line))
+        self.worker = Worker("decode", self, latest_only=True)
+        self.worker.done.connect(self._on_done)
+        self.worker.failed.connect(lambda _key, line: self.failed.emit(line))
 
     def request(self, place: int, step: int = 1) -> None:
         """The row to be shown; `step` is how far apart the following ones will be, 0: none is decoded ahead."""
         self._place, self._step = place, step
         self._requests += 1
         replayed = self.replayed
-        self._worker.submit((self._requests, 0), lambda: self._with_replay(self._decode(place), replayed))
+        self.worker.submit((self._requests, 0), lambda: self._with_replay(self._decode(place), replayed))
 
     def request_again(self) -> None:
         if self._place >= 0:
             self.request(self._place, self._step)
-
-    def stop(self) -> None:
-        """Ask the thread to end; returns at once."""
-        self._worker.stop(finish=False)
-
-    def wait(self, within_ms: float) -> bool:
-        return self._worker.wait(within_ms)
 
     def _on_done(self, key: tuple[int, int], found: Decoded) -> None:
         """Show the row, then decode those ahead one by one, until the next request.
@@ -85,7 +78,7 @@ class FrameDecoder(QObject):
             self.decoded.emit(found)
         ahead = self._place + (count + 1) * self._step
         if request == self._requests and self._step and count < self._ahead_count(found) and 0 <= ahead < len(self._reader):
-            self._worker.submit((request, count + 1), lambda: self._decode(ahead))
+            self.worker.submit((request, count + 1), lambda: self._decode(ahead))
 
     def _with_replay(self, shown: Decoded, replayed: Replayed | None) -> Decoded:
         if replayed is None or shown.row is None:

@@ -762,9 +762,9 @@ class PlayerWindow(WindowFrame):
 
     def _finish(self) -> Sequence[str]:
         """End the threads; notes and snapshots are finished."""
-        self._decoder.stop()
+        self._decoder.worker.stop(finish=False)
         has_saved = self.session.shut_down()
-        if not (self._decoder.wait(_STOP_WITHIN_MS) and has_saved):
+        if not (self._decoder.worker.wait(_STOP_WITHIN_MS) and has_saved):
             return ["the disk did not answer in time; leaving without it"]
         self._reader.close()
         return ()

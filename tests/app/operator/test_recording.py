@@ -139,7 +139,7 @@ def test_notes_and_marks_go_to_live_outputs_too(remembering: OperatorWindow) -> 
     output = Mock()
     remembering.recorder.use_outputs([output])
     assert remembering.recorder.note("trial 3") == ""
-    remembering.recorder.mark()
+    remembering.recorder.note()
     assert [call.args[0].text for call in output.add_event.call_args_list] == ["trial 3", "mark 1"]
 
 

@@ -100,7 +100,7 @@ def open_player(qtbot: QtBot, tmp_path: Path) -> Iterator[Open]:
     yield opened
     for window in windows:
         window.close()
-        assert window._decoder.wait(0)
+        assert window._decoder.worker.wait(0)
 
 
 @pytest.fixture
