@@ -104,7 +104,7 @@ class OperatorPanels(ScenePanels):
         self.set_limits(config.perception)
         known = _calibration_of(config)
         self.live.set_scale(scaled(config, known).policy.pursuit.pixels_per_mm)  # for the head prediction, which may be rough
-        self.servos.set_safety(config.safety)
+        self.servos.safety = config.safety
         self.jog.set_speeds(config.hand, config.servos)
         self._servo_config = config.servos
         self._scale = known.scale if known is not None else None
@@ -113,7 +113,7 @@ class OperatorPanels(ScenePanels):
 
     def show_still(self, frame: Frame, scene: Scene) -> None:
         """Another scene of the last frame of a closed rig; nothing of it is added to trends."""
-        self.notice.clear()
+        self.notice.hide()
         self.live.show_frame(frame, scene)
         self.badge.show_scene(scene)
         self.gauge.show_pose(scene.pose)

@@ -314,7 +314,7 @@ class OperatorWindow(WindowFrame):
         self._pace.on_shown()
         self._is_stale = False
         self.shown_tick = self.last_tick = tick
-        self.panels.notice.clear()
+        self.panels.notice.hide()
         self.panels.show_tick(tick, self.max_block_ms)
 
     def _check_age(self, age_s: float) -> None:
@@ -414,7 +414,7 @@ class OperatorWindow(WindowFrame):
         self.rig.halt()
         self.controls.detach()
         self._pace.stop()
-        self.panels.notice.clear()
+        self.panels.notice.hide()
 
     def _finish(self) -> Sequence[str]:
         """End the thread, finish writing; a rig that is being opened is waited for."""

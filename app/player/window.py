@@ -224,7 +224,7 @@ class PlayerPanels(ScenePanels):
         """Everything as it was recorded; `target` in source pixels."""
         scene = tick.scene
         renew_text = self._renews_text(scene, asked=renew_text)
-        self.notice.clear()
+        self.notice.hide()
         self.live.show_frame(tick.frame, scene, tick.advice)
         self.live.show_target(target)
         self.badge.show_scene(scene, tick.advice, renew_text=renew_text)
@@ -758,7 +758,7 @@ class PlayerWindow(WindowFrame):
             command.leave()  # an export ends by itself
         self._turn.stop()
         self.session.stop_polling()
-        self.panels.notice.clear()
+        self.panels.notice.hide()
 
     def _finish(self) -> Sequence[str]:
         """End the threads; notes and snapshots are finished."""

@@ -21,20 +21,10 @@ from PySide6.QtWidgets import (
 
 from app.rig_wizard.board_print import print_board
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import (
-    Cross,
-    MeasuredLine,
-    Shape,
-    WizardPage,
-    WizardPicture,
-    button,
-    enable,
-    note,
-    set_main_button,
-    set_note,
-)
+from app.rig_wizard.pages_base import Cross, MeasuredLine, Shape, WizardPage, WizardPicture, note, set_note
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
+from app.widgets.basics import button, enable, set_main_button
 from core.calibration.camera import BoardSpec, BoardView
 from core.config.models import CameraConfig, Config
 from core.config.rig_file import check_rig_name, rig_path

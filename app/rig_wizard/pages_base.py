@@ -28,7 +28,7 @@ from PySide6.QtWidgets import (
 
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.widgets.basics import Card, Part, StillWheel, add_parts, column, line, takes_enter
+from app.widgets.basics import Card, Part, StillWheel, add_parts, button, column, line, takes_enter
 from app.widgets.messages import QuestionStrip
 from app.widgets.mode_bar import StopButton
 from core.types import Image, Point
@@ -266,11 +266,6 @@ class WizardPage(StepPage):
             self.model.run(what, lambda: step(draft))
 
 
-def enable(on: bool, *controls: QWidget) -> None:
-    for control in controls:
-        control.setEnabled(on)
-
-
 def note(text: str) -> QLabel:
     label = QLabel(text, wordWrap=True)
     theme.set_sheet(label, "color: @TEXT_DIM;")
@@ -282,13 +277,6 @@ def set_note(label: QLabel, text: str) -> None:
     """Another text for a note, with the height that it needs: a table beside it would take that otherwise."""
     label.setText(tr_text(text))
     label.setMinimumHeight(label.heightForWidth(_TEXT_PX) if text else 0)
-
-
-def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
-    made = QPushButton(text, autoDefault=False)
-    made.setToolTip(tip)
-    made.clicked.connect(lambda _checked=False: slot())
-    return made
 
 
 class JobFocus:
@@ -425,15 +413,6 @@ class StepDialog(QDialog):
             self.say(f"{work[0].upper()}{work[1:]} ...")
         elif self.message.endswith(" ..."):
             self.say("")
-
-
-def set_main_button(which: QPushButton, is_main: bool) -> None:
-    """Whether a button is the next step, and stands out."""
-    name = "main_button" if is_main else ""
-    if which.objectName() != name:
-        which.setObjectName(name)
-        which.style().unpolish(which)
-        which.style().polish(which)
 
 
 def table(headings: Sequence[str], first_column: Sequence[str], name: str, *, fitted: bool = True, row_px: int = 0) -> QTableWidget:

@@ -9,21 +9,10 @@ from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QWidget
 
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import (
-    Arrow,
-    Shape,
-    WizardPage,
-    WizardPicture,
-    button,
-    enable,
-    note,
-    set_cell,
-    set_note,
-    set_rows,
-    table,
-)
+from app.rig_wizard.pages_base import Arrow, Shape, WizardPage, WizardPicture, note, set_cell, set_note, set_rows, table
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import friction_note
+from app.widgets.basics import button, enable
 from app.widgets.painting import NONE
 from core.calibration.servos import Assignment, alike
 from core.config.calibration import DrumsConfig

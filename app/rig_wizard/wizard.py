@@ -11,12 +11,13 @@ from PySide6.QtWidgets import QAbstractSpinBox, QComboBox, QFrame, QLineEdit, QP
 from app.operator.stop_keys import StopKeys
 from app.rig_wizard.camera_pages import CameraPage, ScalePage
 from app.rig_wizard.model import RigWizardModel
-from app.rig_wizard.pages_base import StepDialog, WizardPage, WizardPicture, button, set_main_button
+from app.rig_wizard.pages_base import StepDialog, WizardPage, WizardPicture
 from app.rig_wizard.servo_pages import DrumsPage, IdentifyPage, PortPage, SteeringPage, ZeroPage
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import calibration_lines, rig_line
 from app.ui.window_base import is_asked_to_end
+from app.widgets.basics import button, set_main_button
 from core.config.rig_file import RigFile, RigFileError, write_rig
 
 

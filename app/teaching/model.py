@@ -15,7 +15,7 @@ import platformdirs
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.teaching.folder import ENOUGH_BENDS, LookKind, TakenLook, TeachingFolder, TeachingStep, TeachingView
-from app.training.model import TrainingPhase, TrainingState, name_problem, with_record
+from app.training.model import TrainingPhase, TrainingState, free_name, name_problem, with_record
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import sentence
 from app.ui.workers import ChildProcess, Worker, command_of
@@ -49,13 +49,9 @@ def teaching_folder(rig: str) -> Path:
     return Path(platformdirs.user_data_dir("LumenPilot")) / "teaching" / name
 
 
-def free_name(rig: str) -> str:
-    """A name for a model that no model has."""
-    stem = re.sub(r"[^A-Za-z0-9-]+", "_", rig).strip("_-")[:30] or "bench"
-    number = 1
-    while name_problem(name := f"{stem}_{number}"):
-        number += 1
-    return name
+def name_for(rig: str) -> str:
+    """A name for a model of a rig's bench, that no model has."""
+    return free_name(re.sub(r"[^A-Za-z0-9-]+", "_", rig).strip("_-")[:30] or "bench")
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,11 +158,6 @@ class TeachingModel(QObject):
     @property
     def is_busy(self) -> bool:
         return bool(self.busy)
-
-    @property
-    def has_jobs(self) -> bool:
-        """Whether a job runs or waits, for which the window need not wait."""
-        return bool(self._then)
 
     @property
     def is_training(self) -> bool:

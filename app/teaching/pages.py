@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from app.annotator.canvas import AnnotationCanvas
 from app.annotator.editing import MaskMode, Tool
 from app.annotator.outline_editor import VesselOutlineEditor
-from app.rig_wizard.pages_base import StepPage, WizardPicture, button, enable, note, set_main_button
+from app.rig_wizard.pages_base import StepPage, WizardPicture, note
 from app.teaching.folder import (
     ENOUGH_BENDS,
     ENOUGH_FRAMES,
@@ -36,13 +36,13 @@ from app.teaching.folder import (
     TeachingView,
     middle_of,
 )
-from app.teaching.model import MINUTES, TeachingModel, free_name, look_line
+from app.teaching.model import MINUTES, TeachingModel, look_line, name_for
 from app.training.dialog import BeforeAfter
 from app.training.model import TrainingPhase, TrainingState
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.palette import ON_PICTURE
-from app.widgets.basics import column, line
+from app.widgets.basics import button, column, enable, line, set_main_button
 from app.widgets.image_canvas import halvings
 from core.annotation.masks import fill, polygons_of
 from core.annotation.model import Annotation, History, MaskTarget, Readout
@@ -635,7 +635,7 @@ class TrainPage(TeachingPage):
     def __init__(self, model: TeachingModel, pictures: BeforeAfter) -> None:
         super().__init__(model, pictures)
         self._pictures = pictures
-        self.model_name, self.minutes = QLineEdit(free_name(model.rig)), QSpinBox()
+        self.model_name, self.minutes = QLineEdit(name_for(model.rig)), QSpinBox()
         self.model_name.setMaxLength(40)
         self.model_name.setAccessibleName(tr("Name of the new model"))
         self.minutes.setRange(1, 120)
@@ -667,7 +667,7 @@ class TrainPage(TeachingPage):
         enable(not state.is_busy and not self.model.is_busy, self.start, self.model_name, self.minutes)
         self.stop.setEnabled(state.phase in (TrainingPhase.PREPARING, TrainingPhase.RUNNING))
         if state.phase is TrainingPhase.DONE and self.model_name.text() == state.name:
-            self.model_name.setText(free_name(self.model.rig))
+            self.model_name.setText(name_for(self.model.rig))
         is_known = state.phase is TrainingPhase.RUNNING or not state.is_busy
         self.bar.setRange(0, 1000 if is_known else 0)
         done = self.model.time_share if state.is_busy else float(state.phase is TrainingPhase.DONE)

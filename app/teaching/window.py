@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from app.annotator.canvas import AnnotationCanvas
 from app.annotator.outline_editor import VesselOutlineEditor
 from app.operator.manual_drive import JogKeys
-from app.rig_wizard.pages_base import StepDialog, button
+from app.rig_wizard.pages_base import StepDialog
 from app.teaching.folder import TeachingStep
 from app.teaching.model import NewestFrame, TeachingModel
 from app.teaching.pages import (
@@ -30,6 +30,7 @@ from app.training.dialog import BeforeAfter
 from app.ui.i18n import tr, tr_text
 from app.ui.texts import OperatorStep, next_step, who_drives
 from app.widgets.alerts import AlertStrip
+from app.widgets.basics import button
 from core.control.drive_view import DriveNews
 from core.control.motion import Jog
 

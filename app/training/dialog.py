@@ -15,18 +15,16 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QProgressBar,
-    QPushButton,
     QSizePolicy,
     QSpinBox,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.operator.models import installed_models
-from app.training.model import STEPS, Collect, TrainingJob, TrainingPhase, TrainingRequest, TrainingState, name_problem
+from app.training.model import STEPS, Collect, TrainingJob, TrainingPhase, TrainingRequest, TrainingState, free_name, name_problem
 from app.ui import theme
 from app.ui.i18n import tr, tr_text
-from app.widgets.basics import Card, column, line, takes_enter
+from app.widgets.basics import Card, button, card_title, column, line, takes_enter
 
 
 class TrainingCurves(QWidget):
@@ -130,23 +128,11 @@ class BeforeAfter(QWidget):
         self._right = _Picture(tr("After"), tr("shown when it has learnt"))
         self._title = QLabel()
         self._title.setObjectName("card_note")
-        self._next = QPushButton(tr("&Next picture"), autoDefault=False)
-        self._next.clicked.connect(self._on_next)
-        head = QHBoxLayout()
-        head.addWidget(self._title, 1)
-        head.addWidget(self._next)
-        pictures = QHBoxLayout()
-        for word, picture in ((tr("Before"), self._left), (tr("After"), self._right)):
-            column = QVBoxLayout()
-            label = QLabel(word)
-            label.setObjectName("card_title")
-            column.addWidget(label)
-            column.addWidget(picture, 1)
-            pictures.addLayout(column, 1)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addLayout(pictures, 1)
-        whole.addLayout(head)
+        self._next = button(tr("&Next picture"), self._on_next)
+        left = column(card_title(tr("Before")), (self._left, 1), spacing=6)
+        right = column(card_title(tr("After")), (self._right, 1), spacing=6)
+        foot = line((self._title, 1), self._next, spacing=6)
+        self.setLayout(column((line((left, 1), (right, 1), spacing=6), 1), foot, spacing=6))
         self._show()
 
     def show_pictures(self, before: tuple[str, ...], after: tuple[str, ...]) -> None:
@@ -195,8 +181,8 @@ class TrainingDialog(QDialog):
         self.resize(_SIZE)
         theme.set_sheet(self, theme.FORM_SHEET)
         self.name, self.init, self.steps = QLineEdit(), QComboBox(), QSpinBox()
-        self.start, self.stop = QPushButton(tr("&Train")), QPushButton(tr("&Stop, keep what was learnt"))
-        self.hide_button = QPushButton(tr("&Close"))
+        self.start, self.stop = button(tr("&Train"), self._on_start), button(tr("&Stop, keep what was learnt"), self.job.stop)
+        self.hide_button = button(tr("&Close"), self.close)
         self.curves, self.pictures = TrainingCurves(), BeforeAfter()
         self._bar, self._line = QProgressBar(), QLabel()
         self._line.setWordWrap(True)
@@ -204,11 +190,7 @@ class TrainingDialog(QDialog):
         self._bar.setTextVisible(False)
         self._bar.setFixedHeight(8)
         self.start.setObjectName("main_button")
-        for button, slot in ((self.start, self._on_start), (self.stop, self.job.stop), (self.hide_button, self.close)):
-            button.setAutoDefault(False)
-            button.clicked.connect(slot)
-        heading = QLabel()
-        heading.setObjectName("card_title")
+        heading = card_title("")
         from_where, room = tr("Masks from {source}", source=source), _SIZE.width() - 48
         heading.setText(QFontMetrics(theme.semi_bold(12)).elidedText(from_where, Qt.TextElideMode.ElideMiddle, room))
         heading.setToolTip(source)
@@ -222,7 +204,7 @@ class TrainingDialog(QDialog):
 
     def _form(self) -> QHBoxLayout:
         self.name.setMaxLength(40)
-        self.name.setText(_free_name())
+        self.name.setText(free_name("own"))
         for model in installed_models():
             if not model.problem:
                 self.init.addItem(tr("{name} (own)", name=model.name) if model.is_own else model.name, model.name)
@@ -283,7 +265,7 @@ class TrainingDialog(QDialog):
             after = state.held_out[-1].pictures if len(state.held_out) > 1 else ()
             self.pictures.show_pictures(state.held_out[0].pictures, after)
         if state.phase is TrainingPhase.DONE and name_problem(self.name.text()):
-            self.name.setText(_free_name())
+            self.name.setText(free_name("own"))
 
 
 def _words(state: TrainingState) -> str:
@@ -310,11 +292,3 @@ def _words(state: TrainingState) -> str:
         robot=robot,
         line=tr_text(state.line),
     )
-
-
-def _free_name() -> str:
-    """A name that no model has."""
-    number = 1
-    while name_problem(name := f"own_{number}"):
-        number += 1
-    return name

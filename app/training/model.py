@@ -103,6 +103,14 @@ def name_problem(name: str) -> str:
     return ""
 
 
+def free_name(stem: str) -> str:
+    """A name that begins so, and that no model has."""
+    number = 1
+    while name_problem(name := f"{stem}_{number}"):
+        number += 1
+    return name
+
+
 class TrainingJob(QObject):
     """One training at a time. ``changed`` carries the ``TrainingState``; ``installed`` the name of the new model.
 

@@ -118,6 +118,27 @@ def text_button(text: str, action: Callable[[], object], tool_tip: str = "", nam
     return button
 
 
+def button(text: str, slot: Callable[[], object], tip: str = "") -> QPushButton:
+    made = QPushButton(text, autoDefault=False)
+    made.setToolTip(tip)
+    made.clicked.connect(lambda _checked=False: slot())
+    return made
+
+
+def set_main_button(which: QPushButton, is_main: bool) -> None:
+    """Whether a button is the next step, and stands out."""
+    name = "main_button" if is_main else ""
+    if which.objectName() != name:
+        which.setObjectName(name)
+        which.style().unpolish(which)
+        which.style().polish(which)
+
+
+def enable(on: bool, *controls: QWidget) -> None:
+    for control in controls:
+        control.setEnabled(on)
+
+
 def page_tabs() -> QTabWidget:
     pages = QTabWidget(documentMode=True)
     pages.setAccessibleName(tr("Pages"))

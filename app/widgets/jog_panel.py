@@ -268,10 +268,6 @@ class JogPanel(QWidget):
         for motion, cap in self._caps.items():
             cap.advise(motion in advised)
 
-    @property
-    def advised(self) -> frozenset[Motion]:
-        return frozenset(motion for motion, cap in self._caps.items() if cap.is_advised)
-
     def show_status(self, status: RobotStatus | None) -> None:
         """How the head is bent, as the tendons are pulled, and how far in the robot is; None: not known."""
         self._status = status

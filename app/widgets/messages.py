@@ -125,9 +125,6 @@ class Notice(QFrame):
         self.show()
         self.raise_()
 
-    def clear(self) -> None:
-        self.hide()
-
     def _place(self) -> None:
         """In the largest font of the detail with which all of it has room."""
         room, rows = self._parent.rect(), self.layout()
@@ -229,9 +226,6 @@ class OfferStrip(QFrame):
         """It is no longer true."""
         if self._offers.pop(key, None) is not None:
             self._show()
-
-    def has(self, key: str) -> bool:
-        return key in self._offers
 
     def _show(self) -> None:
         before, self._shown = self._shown, next(iter(self._offers.values()), None)

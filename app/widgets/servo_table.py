@@ -184,18 +184,12 @@ def _known(joint: JointConfig, state: ServoState, zeroed: bool, armed: bool, ser
         current = Cell(NONE, tip=tr("this drive cannot limit its force"))
     elif state.current_ma is None or limit.current_ma is None or limit.strain_ma is None:
         duty = 100.0 * limit.units / PWM_FULL
-        current = Cell(
-            NONE,
-            tip=_of_joint(
-                joint, tr("the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)", force=limit.force_n, duty=duty)
-            ),
-        )
+        most = tr("the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)", force=limit.force_n, duty=duty)
+        current = Cell(NONE, tip=_of_joint(joint, most))
     else:
         strain = Tone.BAD if abs(state.current_ma) > limit.strain_ma else Tone.PLAIN
-        tip = _of_joint(
-            joint, tr("the servo gives {force:.0f} N at most ({most:.0f} mA)", force=limit.force_n, most=limit.current_ma)
-        )
-        current = _signed(number(state.current_ma, 0), strain, tip)
+        most = tr("the servo gives {force:.0f} N at most ({most:.0f} mA)", force=limit.force_n, most=limit.current_ma)
+        current = _signed(number(state.current_ma, 0), strain, _of_joint(joint, most))
     return (
         Cell(_name(joint), max(Tone.PLAIN, heat, volts, error.tone)),
         _position(joint, state),
@@ -582,7 +576,7 @@ class ServoTable(QWidget):
 
     def __init__(self, safety: SafetyConfig | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
-        self._safety = safety or SafetyConfig()
+        self.safety = safety or SafetyConfig()
         self._clock = clock
         self._pace = Pace(_SHOW_EVERY_S, clock)
         self._servos = ServosConfig()
@@ -591,10 +585,10 @@ class ServoTable(QWidget):
         self._status: BusStatus | None = None
         self.zeros: ZeroDialog | None = None
         """While it is open."""
-        self.table = ServoView(servo_rows(None, self._servos, self._safety))
+        self.table = ServoView(servo_rows(None, self._servos, self.safety))
         self._balance = TendonBalance()
-        self._bus = QLabel()
-        self._bus.setFixedHeight(16)
+        self.bus = QLabel()
+        self.bus.setFixedHeight(16)
         self.question = QuestionStrip()  # where a request is confirmed
         self.question.closed.connect(self._on_answered)
         self._restart_button = text_button(tr("Restart servo\N{HORIZONTAL ELLIPSIS}"), lambda: None)
@@ -604,8 +598,7 @@ class ServoTable(QWidget):
         self._zero_button = text_button(tr("Zero\N{HORIZONTAL ELLIPSIS}"), self.open_zeros)
         self._off_button = text_button(tr("Torque off\N{HORIZONTAL ELLIPSIS}"), self._ask_torque_off)
         self._asked_by: QWidget = self._zero_button
-        buttons = line(self._restart_button, self._zero_button, self._off_button, spacing=6)
-        buttons.addStretch(1)
+        buttons = line(self._restart_button, self._zero_button, self._off_button, None, spacing=6)
         for button in (self._restart_button, self._zero_button, self._off_button):
             button.setStyleSheet(BUTTON_STYLE)
         strip = QWidget()
@@ -613,13 +606,9 @@ class ServoTable(QWidget):
         self._strip = QStackedLayout(strip)
         self._strip.addWidget(holder(buttons))
         self._strip.addWidget(self.question)
-        self.setLayout(column((self.table, 1), self._balance, self._bus, strip, spacing=2))
+        self.setLayout(column((self.table, 1), self._balance, self.bus, strip, spacing=2))
         self.setAccessibleName(tr("Servos"))
         self._show(None, None)
-
-    @property
-    def bus_text(self) -> str:
-        return self._bus.text()
 
     def show_status(self, status: BusStatus | None, servos: ServosConfig, now_s: float | None = None) -> None:
         """The newest status of the bus, None without one; a status that is older than a second is shown as silence.
@@ -634,22 +623,18 @@ class ServoTable(QWidget):
             self._kind = kind
             self._show(status, silence_s if is_silent else None)
 
-    def set_safety(self, safety: SafetyConfig) -> None:
-        """Where warnings begin, for another rig."""
-        self._safety = safety
-
     def _show(self, status: BusStatus | None, silence_s: float | None) -> None:
         believed = self._status = status if silence_s is None else None
         if self.zeros is not None:
             self.zeros.show_joints(joint_zeros(believed, self._servos))
-        self.table.show_rows(servo_rows(believed, self._servos, self._safety))
+        self.table.show_rows(servo_rows(believed, self._servos, self.safety))
         self._balance.show_pairs(pair_balances(believed, self._servos))
         said = bus_line(status, silence_s)
-        if said.text != self._bus.text():
-            self._bus.setText(said.text)
-            self._bus.setToolTip(said.tip)
+        if said.text != self.bus.text():
+            self.bus.setText(said.text)
+            self.bus.setToolTip(said.tip)
             role = "TEXT_DIM" if said.tone is Tone.PLAIN else TONE_ROLE[said.tone]
-            theme.set_sheet(self._bus, f"color: @{role}; font-size: 12px;")
+            theme.set_sheet(self.bus, f"color: @{role}; font-size: 12px;")
         armed, reachable = believed is not None and believed.armed, believed is not None
         if (armed, reachable) != (self._armed, self._reachable) or status is None:
             self._armed, self._reachable = armed, reachable

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDoubleSpinBox, QGridLayout, QHBoxLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDoubleSpinBox, QGridLayout, QLabel, QWidget
 
 from app.ui import theme
 from app.ui.i18n import mark, tr
 from app.ui.texts import joint_title
-from app.widgets.basics import StillWheel, column, takes_enter
+from app.widgets.basics import StillWheel, button, column, line, set_main_button, takes_enter
 from core.config.safety import JointConfig, JointKind, JointName, ServosConfig, kind_of_name
 from core.control.kept_zero import ZeroOffer, ZeroRequest
 from hardware.servos.registers import ServoState
@@ -151,13 +151,10 @@ class _FeedRow(QWidget):
         self.number.setAccessibleName(tr("Position of {joint}", joint=joint_title(joint.name)))
         self.number.setValue(self.number.minimum())
         self.box.setAccessibleName(tr("Set the position of {joint}", joint=joint_title(joint.name)))
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.box)
-        layout.addWidget(self.number, 1)
+        self.setLayout(line(self.box, (self.number, 1), spacing=6))
         self._known: tuple[bool, ...] | None = None
         self._shown_mm: float | None = None
-        self.box.toggled.connect(self._on_changed)
+        self.box.toggled.connect(lambda _on: self.changed.emit())
         self.number.valueChanged.connect(self._on_edited)
 
     @property
@@ -181,9 +178,6 @@ class _FeedRow(QWidget):
     def _on_edited(self) -> None:
         if self.number.hasFocus():
             self.box.setChecked(True)
-        self._on_changed()
-
-    def _on_changed(self) -> None:
         self.changed.emit()
 
 
@@ -223,30 +217,18 @@ class ZeroDialog(QDialog):
                 rows.addWidget(part, place, column_number)
         self._hint = QLabel(wordWrap=True)
         theme.set_sheet(self._hint, "color: @TEXT_DIM;")
-        self.search_button = QPushButton(tr("&Search for slack..."))
-        self.search_button.setToolTip(tr("The rig wizard pulls each wire until the head follows (page Zero and pretension)"))
-        self.off_button = QPushButton(tr("&Torque off"))
-        self.off_button.setToolTip(tr("Let all motors go; the wires spring back"))
-        self.set_button = QPushButton(tr("S&et"))
-        self.leave_button = QPushButton(tr("Cancel"))
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.search_button)
-        buttons.addWidget(self.off_button)
-        buttons.addStretch(1)
-        for button in (self.search_button, self.off_button, self.set_button, self.leave_button):
-            button.setAutoDefault(False)
-        buttons.addWidget(self.set_button)
-        buttons.addWidget(self.leave_button)
+        search_tip = tr("The rig wizard pulls each wire until the head follows (page Zero and pretension)")
+        self.search_button = button(tr("&Search for slack..."), self._on_search, search_tip)
+        off_tip = tr("Let all motors go; the wires spring back")
+        self.off_button = button(tr("&Torque off"), self.torque_off_asked.emit, off_tip)
+        self.set_button, self.leave_button = button(tr("S&et"), self._on_set), button(tr("Cancel"), self.close)
+        buttons = line(self.search_button, self.off_button, None, self.set_button, self.leave_button, spacing=12)
         self.setLayout(column(self._hint, rows, buttons, spacing=12, margins=(18, 14, 18, 14)))
         StillWheel(self)
         for box in self._tendons.values():
             box.currentIndexChanged.connect(self._update_buttons)
         for feed in self._feeds.values():
             feed.changed.connect(self._update_buttons)
-        self.search_button.clicked.connect(self._on_search)
-        self.off_button.clicked.connect(self.torque_off_asked)
-        self.set_button.clicked.connect(self._on_set)
-        self.leave_button.clicked.connect(self.close)
         self._joints: tuple[JointZero, ...] = ()
         self.show_joints(joint_zeros(None, servos))
 
@@ -291,11 +273,8 @@ class ZeroDialog(QDialog):
                 "A kept zero holds as long as the wire was not hung in again. Say how far robot and catheter are in: measure it."
             )
         )
-        self.search_button.setObjectName("main_button" if needs_search else "")
-        self.set_button.setObjectName("" if needs_search else "main_button")
-        for button in (self.search_button, self.set_button):
-            button.style().unpolish(button)
-            button.style().polish(button)
+        set_main_button(self.search_button, needs_search)
+        set_main_button(self.set_button, not needs_search)
         self.off_button.setEnabled(any(one.holds for one in self._joints))
         self._update_buttons()
 

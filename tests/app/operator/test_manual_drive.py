@@ -230,14 +230,14 @@ def test_nothing_says_who_drives_once_the_rig_is_over(
     engine.pilot.view = drive_view(mode=Mode.AUTONOMOUS, permitted=Source.PROGRAM, deadman=True)
     panels = window.panels
     until(qtbot, lambda: panels.mode.who == "the program drives" and panels.mode_bar.deadman.is_lit)
-    until(qtbot, lambda: "20.0 ms" in panels.servos.bus_text)
+    until(qtbot, lambda: "20.0 ms" in panels.servos.bus.text())
     try:
         end(window, engine)
         until(qtbot, lambda: (panels.mode.who, panels.mode_bar.text) == says)
         assert panels.mode.mode is Mode.ADVISORY
         assert not any(part.isEnabled() for part in (panels.mode_bar.main, panels.mode_bar.second, panels.mode_bar.deadman))
         assert not panels.mode_bar.deadman.is_lit
-        assert panels.servos.bus_text.startswith("no servo bus")
+        assert panels.servos.bus.text().startswith("no servo bus")
         assert window.controls.view is None
     finally:
         may_open.set()

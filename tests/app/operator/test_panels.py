@@ -41,7 +41,7 @@ def test_positions_of_a_twin_that_waits_for_the_computer_are_known_ones(qtbot: Q
     qtbot.addWidget(panels)
     panels.show_drive(DriveView(100.2), bus())
     assert "inserted 20 mm" in panels.jog._readout.text
-    assert "nothing heard" not in panels.servos.bus_text
+    assert "nothing heard" not in panels.servos.bus.text()
     panels.show_drive(DriveView(103.0), bus())
     assert "inserted 20 mm" not in panels.jog._readout.text
-    assert "nothing heard from the servo bus for 3 s" in panels.servos.bus_text
+    assert "nothing heard from the servo bus for 3 s" in panels.servos.bus.text()

@@ -59,7 +59,7 @@ class BenchHand:
 
     def wait(self) -> None:
         """Until no job runs."""
-        self._qtbot.waitUntil(lambda: not self.model.is_busy and not self.model.has_jobs, timeout=LONG_MS)
+        self._qtbot.waitUntil(lambda: not self.model.is_busy and not self.model._then, timeout=LONG_MS)
 
     def click(self, button: QAbstractButton) -> None:
         """Click a button that can be clicked, and wait for what it does."""

@@ -19,7 +19,7 @@ def test_notice_shows_title_detail_and_a_way_out(own: Own, qtbot: QtBot) -> None
     with qtbot.waitSignal(notice.restart):
         qtbot.mouseClick(notice._button, Qt.MouseButton.LeftButton)
     assert room.rect().contains(notice.geometry())
-    notice.clear()
+    notice.hide()
     assert not notice.isVisible()
 
 

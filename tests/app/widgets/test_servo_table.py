@@ -170,7 +170,7 @@ def test_an_old_status_is_silence_not_news(table: ServoTable, clock: Clock) -> N
     table.show_status(bus(), SERVOS)
     clock.now_s += 3.0
     table.show_status(bus(), SERVOS)
-    assert table.bus_text == "!! nothing heard from the servo bus for 3 s"
+    assert table.bus.text() == "!! nothing heard from the servo bus for 3 s"
     assert table.table.cell(0, Column.POSITION).text == DASH
 
 
