@@ -116,21 +116,17 @@ class AnnotationBar(QWidget):
             if mode is not MaskMode.POINTS:
                 chip = self.modes[mode] = _Chip(mode.value.key, mode.value.label, "ORANGE", mode.value.meaning)
                 chip.clicked.connect(lambda on, which=mode: self.mode_chosen.emit(which if on else MaskMode.POINTS))
-        self._hint = QLabel(wordWrap=True)
-        self._hint.setObjectName("card_note")
-        self._hint.setMinimumWidth(10)
-        self._hint.setFixedHeight(_HINT_HEIGHT)
+        self.hint = QLabel(wordWrap=True)
+        self.hint.setObjectName("card_note")
+        self.hint.setMinimumWidth(10)
+        self.hint.setFixedHeight(_HINT_HEIGHT)
         rows = [line(*self._tools.values(), None, *self._switches.values(), spacing=5)]
         rows += [line(*self._answers.values(), None, spacing=5)] if has_lines else []
         modes = line(*self.modes.values(), spacing=5)
         modes.addSpacing(7)
-        modes.addWidget(self._hint, 1)
+        modes.addWidget(self.hint, 1)
         self.setLayout(column(*rows, modes, spacing=5))
         self.show_tool(next(iter(tools)), MaskMode.POINTS)
-
-    @property
-    def hint(self) -> str:
-        return self._hint.text()
 
     def show_tool(self, tool: Tool, mode: MaskMode) -> None:
         """The chosen tool and mode, and how it is used."""
@@ -141,11 +137,7 @@ class AnnotationBar(QWidget):
             chip.setVisible(tool.is_mask)
             chip.role = tool.value.role
         hint = tr(mode.value.hint) if mode is not MaskMode.POINTS else tool.value.hint
-        self._hint.setText(hint if self._has_algorithm else hint.partition(" · G ")[0])
-
-    def show_hint(self, text: str) -> None:
-        """What comes next, instead of how the tool is used."""
-        self._hint.setText(text)
+        self.hint.setText(hint if self._has_algorithm else hint.partition(" · G ")[0])
 
     def show_answer(self, annotation: Annotation, readout: Readout) -> None:
         """The answer that is given, and with an arrow the one that Enter would take."""
@@ -444,6 +436,7 @@ class QueueList(QWidget):
         self._view.setAccessibleName(tr("Images"))
         self._view.activated.connect(lambda index: self.chosen.emit(index.row()))
         self._view.clicked.connect(lambda index: self.chosen.emit(index.row()))
+        self.setFocusProxy(self._view)
         self._filter = QComboBox()
         for kind in Filter:
             self._filter.addItem(tr(kind.value), kind)
@@ -475,9 +468,6 @@ class QueueList(QWidget):
         index = self._model.index(row)
         self._view.setCurrentIndex(index)
         self._view.scrollTo(index)
-
-    def focus_list(self) -> None:
-        self._view.setFocus()
 
 
 _HEIGHT = 232

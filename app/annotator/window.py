@@ -83,7 +83,7 @@ def add_annotator_menus(window: AnnotatorWindow) -> None:
             MenuEntry(tr("Next &without an answer"), window.go_open, ("U",)),
             MenuEntry(tr("&First"), partial(window.open, 0), ("Home",)),
             MenuEntry(tr("&Last"), partial(window.open, len(window.model.items) - 1), ("End",)),
-            MenuEntry(tr("Lis&t of images"), panels.queue.focus_list, ("F6",)),
+            MenuEntry(tr("Lis&t of images"), panels.queue.setFocus, ("F6",)),
         ],
     )
     for action in (*drawing, *go[:2], *view[:2], *view[4:8]):
@@ -382,11 +382,10 @@ class AnnotatorWindow(WindowFrame):
             self._show_annotation()
         readout = self.model.shown_readout(annotation)
         if annotation.state is None and readout.pose is not None:
-            self.panels.bar.show_hint(
-                tr("Enter takes {state}, as the lines say \N{MIDDLE DOT} or A B C D, X, O", state=readout.pose.state)
-            )
+            takes = tr("Enter takes {state}, as the lines say \N{MIDDLE DOT} or A B C D, X, O", state=readout.pose.state)
+            self.panels.bar.hint.setText(takes)
         elif annotation.state is None and readout.is_hidden:
-            self.panels.bar.show_hint(tr("Now the state as you see it: A B C D, X or O"))
+            self.panels.bar.hint.setText(tr("Now the state as you see it: A B C D, X or O"))
 
     def _on_ended(self) -> None:
         """Enter with both lines drawn takes the state that they say, where the rater may see it; once more goes on."""

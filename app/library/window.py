@@ -92,7 +92,9 @@ class SessionDelegate(QStyledItemDelegate):
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         draw_box(painter, room, 8, theme.RAISED if is_chosen else theme.PANEL, theme.SKY if is_chosen else theme.LINE)
         place = QRectF(room.left() + 4, room.top() + 3, *_PICTURE_PX)
-        _paint_picture(painter, place, picture)
+        draw_box(painter, place, 4, theme.ON_PICTURE.INK)
+        if isinstance(picture, QPixmap):
+            draw_fitted(painter, place, picture)
         text = QRectF(place.right() + 14, room.top() + 8, room.right() - place.right() - 28, 20)
         _paint_head(painter, text, summary)
         about = summary.description.line
@@ -101,12 +103,6 @@ class SessionDelegate(QStyledItemDelegate):
         _paint_states(painter, text.translated(0, 46), summary)
         _paint_last(painter, text.translated(0, 68), summary)
         painter.restore()
-
-
-def _paint_picture(painter: QPainter, place: QRectF, picture: object) -> None:
-    draw_box(painter, place, 4, theme.ON_PICTURE.INK)
-    if isinstance(picture, QPixmap):
-        draw_fitted(painter, place, picture)
 
 
 def _paint_head(painter: QPainter, room: QRectF, summary: SessionSummary) -> None:
@@ -201,8 +197,7 @@ class LibraryPanels(QWidget):
         self.export.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         buttons = line((self.play, 1), (self.annotate, 1), (self.export, 1), spacing=8)
         self.card = Card(tr("Session"), column(self.picture, self.facts, buttons, self.form, spacing=10))
-        right = column(self.card)
-        right.addStretch(1)
+        right = column(self.card, None)
         head = line((self.search, 1), self.tags, self.order, self.count, spacing=8)
         left = holder(column(head, (self.list, 1), spacing=8))
         self.columns = Columns(left, side(right, *_SIDE_PX), _SHARE)
@@ -264,9 +259,8 @@ class LibraryWindow(WindowFrame):
 
     def _add_menus(self) -> None:
         exports = [MenuEntry(tr("Export as .{ending}...", ending=name), partial(self.export, name)) for name in EXPORTERS.names]
-        self.add_file_menu(
-            [MenuEntry(tr("&Open a folder..."), self.choose_folder, ("Ctrl+O",)), MenuEntry(tr("&Reload"), self.reload, ("F5",))]
-        )
+        open_folder = MenuEntry(tr("&Open a folder..."), self.choose_folder, ("Ctrl+O",))
+        self.add_file_menu([open_folder, MenuEntry(tr("&Reload"), self._model.scan, ("F5",))])
         self.add_view_menu([MenuEntry(tr("&Search"), self._begin_search, ("Ctrl+F", "/"))])
         entries = [
             MenuEntry(tr("&Play"), self.play, ("P",), hint="Enter"),
@@ -274,7 +268,7 @@ class LibraryWindow(WindowFrame):
             None,
             *exports,
             None,
-            MenuEntry(tr("&Describe"), self.begin_description, ("D",)),
+            MenuEntry(tr("&Describe"), self.panels.form.fields["operator"].setFocus, ("D",)),
             MenuEntry(tr("Show its &folder"), self.show_folder),
             MenuEntry(tr("&Recover a copy"), self.recover),
         ]
@@ -380,15 +374,9 @@ class LibraryWindow(WindowFrame):
         self._model.open_folder(folder)
         self._show_title()
 
-    def reload(self) -> None:
-        self._model.scan()
-
     def _begin_search(self) -> None:
         self.panels.search.setFocus()
         self.panels.search.selectAll()
-
-    def begin_description(self) -> None:
-        self.panels.form.fields["operator"].setFocus()
 
     def _describe(self, description: Description) -> None:
         if self._chosen is not None:

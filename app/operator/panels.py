@@ -65,7 +65,7 @@ class OperatorPanels(ScenePanels):
         self.offers.lifted.connect(self.toast.lift)
         self.rehearsal = RehearsalCard(self.live, (self.alerts, self.offers))
         self.offers.lifted.connect(self.rehearsal.place)
-        self.live.set_covers(self.alerts, self.offers, self.rehearsal)
+        self.live.covers = (self.alerts, self.offers, self.rehearsal)
         self.trends = TrendPlot(config.perception.pose)
         self.performance = PerformancePanel()
         self.jog = JogPanel(config.servos)

@@ -196,7 +196,7 @@ class RehearsalController(QObject):
         return (finding.detail, finding.fix) if finding is not None and self.result is None else None
 
     def _show_lack(self) -> None:
-        self._window.panels.mode_bar.show_rehearsal(self._lack())
+        self._window.panels.mode_bar.set_against(OperatorStep.HAND_OVER, self._lack())
 
     def _may_ask(self, step: OperatorStep) -> bool:
         lack = self._lack() if step is OperatorStep.HAND_OVER else None

@@ -196,7 +196,7 @@ class WindowServices(QObject):
     def _show_checks(self) -> None:
         """The bar and the list of checks say the same; the computer stays awake while real servos follow."""
         self.awake.hold(must_stay_awake(self._window.rig.kind, self._window.controls.view))
-        self._window.panels.mode_bar.show_checks(self.preflight.preflight.step)
+        self._window.panels.mode_bar.set_against(OperatorStep.ARM, self.preflight.preflight.step)
 
     def _on_not_armed(self, line: str) -> None:
         self._window.say(line, True)

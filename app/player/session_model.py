@@ -72,8 +72,8 @@ class PlayedSession(QObject):
         self._losses: list[str] | None = None
         self._problems: list[str] | None = None
         self._is_empty = False
-        self._poll_timer = QTimer(self, interval=_POLL_MS)
-        self._poll_timer.timeout.connect(self._poll)
+        self.poll_timer = QTimer(self, interval=_POLL_MS)
+        self.poll_timer.timeout.connect(self._poll)
         self._files = Worker("player work", self)
         self._measured = Worker("angles by hand", self, behind=True)
         self._measured.done.connect(self._on_done)
@@ -93,11 +93,8 @@ class PlayedSession(QObject):
         self._measured.submit("by hand", partial(angles_by_hand, reader.folder))
         if replay is not None:
             self._files.submit("replay", lambda: Replayed(replay, name_of(reader.folder)))
-        self._poll_timer.start()
+        self.poll_timer.start()
         self._poll()
-
-    def stop_polling(self) -> None:
-        self._poll_timer.stop()
 
     # ---- what is known
 

@@ -757,7 +757,7 @@ class PlayerWindow(WindowFrame):
         for command in self.findChildren(OfferedCommand):
             command.leave()  # an export ends by itself
         self._turn.stop()
-        self.session.stop_polling()
+        self.session.poll_timer.stop()
         self.panels.notice.hide()
 
     def _finish(self) -> Sequence[str]:

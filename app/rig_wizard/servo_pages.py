@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QHeaderView, QLabel, QWidget
@@ -248,7 +249,8 @@ class IdentifyPage(WizardPage):
             self.rows.horizontalHeader().setSectionResizeMode(place, QHeaderView.ResizeMode.Fixed)
             self.rows.setColumnWidth(place, width)
         self.add(self.rows)
-        self.main = self.auto_button = button(tr("&Find automatically"), self._identify)
+        identify = partial(self.run_step, tr("telling the servos apart"), lambda draft: draft.identify())
+        self.main = self.auto_button = button(tr("&Find automatically"), identify)
         tip = tr("Turn the servo of the chosen row both ways by 1.5 mm")
         self.wiggle_button = button(tr("&Wiggle the chosen"), self._wiggle, tip)
         self.swap_button = button(tr("Swap &up and down"), self._swap, tr("One camera cannot tell them apart"))
@@ -333,9 +335,6 @@ class IdentifyPage(WizardPage):
             self._signs[row].setCurrentIndex(self._signs[row].findData(joint.sign))
             set_cell(self.rows, row, 3, "")
 
-    def _identify(self) -> None:
-        self.run_step(tr("telling the servos apart"), RigDraft.identify)
-
     def _wiggle(self) -> None:
         row = self.rows.currentRow()
         if self.draft is not None and row >= 0:
@@ -398,7 +397,8 @@ class ZeroPage(WizardPage):
 
     def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
         super().__init__(model, picture)
-        self.main = self.find_button = button(tr("&Find automatically"), self._find)
+        find = partial(self.run_step, tr("looking where the wires are taut"), lambda draft: draft.find_zeros())
+        self.main = self.find_button = button(tr("&Find automatically"), find)
         self.tendon = QComboBox()
         self.tendon.setAccessibleName(tr("Tendon to set by eye"))
         self.tighten = button(tr("&Tighten {step:g} mm", step=_NUDGE_MM), lambda: self._nudge(_NUDGE_MM))
@@ -443,9 +443,6 @@ class ZeroPage(WizardPage):
         else:
             set_note(self.result, "\n".join(tr_text(problem) for problem in zeros.problems) if zeros is not None else "")
 
-    def _find(self) -> None:
-        self.run_step(tr("looking where the wires are taut"), RigDraft.find_zeros)
-
     def _nudge(self, way_mm: float) -> None:
         joint = self._tendons[self.tendon.currentIndex()]
         self.run_step(tr("moving {joint}", joint=joint_text(joint)), lambda draft: draft.nudge(joint.name, way_mm))
@@ -466,7 +463,8 @@ class SteeringPage(WizardPage):
 
     def __init__(self, model: RigWizardModel, picture: WizardPicture) -> None:
         super().__init__(model, picture)
-        self.main = self.learn_button = button(tr("&Learn"), self._learn)
+        learn = partial(self.run_step, tr("learning the steering"), lambda draft: draft.learn_steering())
+        self.main = self.learn_button = button(tr("&Learn"), learn)
         headings = (tr("Tendon"), tr("Direction of the head"), tr("Way per mm of wire"))
         self.rows = table(headings, (), tr("Steering directions"))
         self.result = note("")
@@ -522,6 +520,3 @@ class SteeringPage(WizardPage):
             end = head[0] + _ARROW_PX * math.cos(angle), head[1] + _ARROW_PX * math.sin(angle)
             arrows.append(Arrow(head, end, ", ".join(name for name, _ in tendons)))
         return arrows
-
-    def _learn(self) -> None:
-        self.run_step(tr("learning the steering"), RigDraft.learn_steering)

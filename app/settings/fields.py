@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QGridLayout,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QMenu,
@@ -28,7 +27,7 @@ from app.settings.draft import as_text
 from app.ui import theme
 from app.ui.i18n import mark, tr, tr_text
 from app.ui.opening import ask_path
-from app.widgets.basics import QuietCombo
+from app.widgets.basics import QuietCombo, line
 from core.config.models import RESOURCES
 from core.config.rig_file import rigs_folder
 from core.config.schema import Effect, FieldKind, Setting
@@ -125,11 +124,11 @@ class SettingField(QFrame):
         self._default = default
         self._state: tuple[object, ...] = ()
         self.setObjectName("setting")
-        self._name, self._error = QLabel(tr(setting.title)), QLabel()
+        self._name, self.error = QLabel(tr(setting.title)), QLabel()
         self._name.setObjectName("setting_name")
         self._name.setWordWrap(True)
-        self._error.setObjectName("setting_error")
-        self._error.setWordWrap(True)
+        self.error.setObjectName("setting_error")
+        self.error.setWordWrap(True)
         self.editor = self._make_editor()
         self.slider = self._make_slider()
         self.browse_button = BrowseButton(setting.key, tr(setting.title)) if setting.key in WANTED else None
@@ -145,15 +144,6 @@ class SettingField(QFrame):
             return tr("on") if self._default else tr("off")
         text = as_text(self._default)
         return _with_unit(text, tr_text(self.setting.unit)) if text else tr(_UNSET)
-
-    @property
-    def error_text(self) -> str:
-        return self._error.text()
-
-    @property
-    def is_marked(self) -> bool:
-        """Whether it is marked as different from the default."""
-        return bool(self.property("changed"))
 
     def show_state(self, entry: str, value: Any, *, is_changed: bool, error: str) -> None:
         """Show the text of the field, the last allowed value, and what is wrong with the text."""
@@ -175,8 +165,8 @@ class SettingField(QFrame):
             with QSignalBlocker(self.slider):
                 self.slider.setValue(self._place_of(float(value)))
         error = error.replace(" °", "°")
-        self._error.setText(f"\N{WARNING SIGN}  {error}" if error else "")
-        self._error.setVisible(bool(error))
+        self.error.setText(f"\N{WARNING SIGN}  {error}" if error else "")
+        self.error.setVisible(bool(error))
         self.reset_button.setEnabled(is_changed)
         self._name.setText(f"\N{BLACK CIRCLE} {tr(self.setting.title)}" if is_changed else tr(self.setting.title))
         self.editor.setAccessibleDescription(f"{error}. {self._note()}" if error else self._note())
@@ -276,9 +266,7 @@ class SettingField(QFrame):
         grid.setVerticalSpacing(2)
         grid.addWidget(self._name, 0, 0)
         if setting.kind is FieldKind.TEXT:
-            row = QHBoxLayout()
-            row.setSpacing(8)
-            row.addWidget(self.editor, 1)
+            row = line((self.editor, 1), spacing=8)
             if self.browse_button is not None:
                 row.addWidget(self.browse_button)
                 self.browse_button.chosen.connect(lambda path: self.edited.emit(setting.key, path))
@@ -293,12 +281,10 @@ class SettingField(QFrame):
                 grid.addWidget(unit, 0, 2)
             grid.addWidget(self.slider if self.slider is not None else QWidget(), 0, 3)
         grid.addWidget(self.reset_button, 0, 4)
-        line = 1
-        for label in (self._error, meaning, note):
-            if label is self._error or label.text():
-                grid.addWidget(label, line, 1, 1, 4)
-                line += 1
-        self._error.hide()
+        labels = (label for label in (self.error, meaning, note) if label is self.error or label.text())
+        for place, label in enumerate(labels, 1):
+            grid.addWidget(label, place, 1, 1, 4)
+        self.error.hide()
         grid.setColumnStretch(3, 1)
 
     def _note(self) -> str:

@@ -120,11 +120,6 @@ _SHOW_EVERY_S = 0.2
 _IDLE = frozenset({RejectReason.NO_COMMAND, RejectReason.NOT_ARMED})  # nothing was asked for, so nothing was refused
 
 
-def rejected_commands(status: BusStatus) -> int:
-    """How many commands were refused as a whole."""
-    return sum(count for reason, count in status.rejections.items() if reason not in _IDLE)
-
-
 @dataclass(frozen=True, slots=True)
 class GateEvent:
     """Something that the gate limited or rejected: what it is a repetition of, in words, and how often."""
@@ -308,7 +303,7 @@ class CommandPanel(QWidget):
 def _heading(status: BusStatus | None) -> str:
     if status is None:
         return tr("Gate: no servo bus")
-    rejected = rejected_commands(status)
+    rejected = sum(count for reason, count in status.rejections.items() if reason not in _IDLE)
     if not status.clamp_count and not rejected:
         return tr("Gate: nothing limited or rejected yet")
     return tr("Gate: {clamped} goals limited, {rejected} commands rejected", clamped=status.clamp_count, rejected=rejected)

@@ -113,16 +113,13 @@ class EventLog(QWidget):
         self._filter.setCurrentIndex(self._filter.findData(kind))
         self._on_filter()
 
-    def copy_all(self) -> None:
-        QGuiApplication.clipboard().setText("\n".join(self.lines))
-
     def _on_filter(self) -> None:
         self._view.show_kind(self._filter.currentData())
 
     def _open_menu(self, place: QPoint) -> None:
         menu = QMenu(self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.addAction(tr("Copy all"), self.copy_all)
+        menu.addAction(tr("Copy all"), lambda: QGuiApplication.clipboard().setText("\n".join(self.lines)))
         menu.popup(self._view.viewport().mapToGlobal(place))
 
 

@@ -254,11 +254,8 @@ class LiveView(QWidget):
         self._loupe = HeadLoupe(self, self._marks)
         self._loupe.clicked.connect(self._on_place)
         self._loupe_pace = Pace(_LOUPE_EVERY_S)
-        self._covers: tuple[QWidget, ...] = ()
-
-    def set_covers(self, *widgets: QWidget) -> None:
+        self.covers: tuple[QWidget, ...] = ()
         """Widgets that lie over the picture at times; the loupe keeps clear of them."""
-        self._covers = widgets
 
     def set_scale(self, pixels_per_mm: float) -> None:
         self._pixels_per_mm = pixels_per_mm
@@ -402,7 +399,7 @@ class LiveView(QWidget):
             return
         x, y = scene.to_source(scene.path.head)
         at = self._box.mapViewToScene(QPointF(x + 0.5, y + 0.5))
-        covers = [QRectF(cover.geometry()) for cover in self._covers if cover.isVisible()]
+        covers = [QRectF(cover.geometry()) for cover in self.covers if cover.isVisible()]
         self._loupe.show_head(image, scene, QPointF(self._view.mapFromScene(at)), self._to_view(), covers)
 
     def _on_place(self, x: float, y: float) -> None:

@@ -431,13 +431,9 @@ class ModeBar(PaintedWidget):
         self._show_step(step)
         self.update()
 
-    def show_checks(self, checks: tuple[str, str] | None) -> None:
-        """What the checks before driving say against arming, and what to do; None: nothing. It is shown with the next view."""
-        self._against[OperatorStep.ARM] = checks
-
-    def show_rehearsal(self, lack: tuple[str, str] | None) -> None:
-        """What a missing rehearsal says against the hand-over, and what to do; None: nothing. It is shown with the next view."""
-        self._against[OperatorStep.HAND_OVER] = lack
+    def set_against(self, step: OperatorStep, what: tuple[str, str] | None) -> None:
+        """What checks or a missing rehearsal say against a step, and what to do; None: nothing. It is shown with the next view."""
+        self._against[step] = what
 
     def _checked(self, step: NextStep) -> NextStep:
         """A step that the checks would refuse says so, as their list does."""

@@ -55,7 +55,7 @@ def test_there_is_no_mask_without_a_picture(editor: VesselOutlineEditor) -> None
 
 def test_one_drag_outlines_a_vessel_across_the_picture(editor: VesselOutlineEditor, qtbot: QtBot) -> None:
     editor.show_image(picture())
-    assert editor.canvas.mask_mode is MaskMode.TUBE and editor.bar.hint.startswith("Drag along the middle")
+    assert editor.canvas.mask_mode is MaskMode.TUBE and editor.bar.hint.text().startswith("Drag along the middle")
     editor.canvas.editor.radius_px = 14.0
     with qtbot.waitSignal(editor.changed):
         drag(editor, (4.0, 114.0), (315.0, 116.0))

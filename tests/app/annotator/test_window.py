@@ -595,12 +595,12 @@ def test_the_wheel_is_the_circles_size_and_with_ctrl_the_zoom(vessel_rater: Rate
 def test_a_mode_with_a_line_tool_means_the_vessels_mask(rater: Rater) -> None:
     rater.press(Key.Key_Y)
     assert rater.canvas.tool is Tool.VESSEL_MASK and rater.canvas.mask_mode is MaskMode.TUBE
-    assert rater.window.panels.bar.hint.startswith("Drag along the middle")
+    assert rater.window.panels.bar.hint.text().startswith("Drag along the middle")
     rater.press(Key.Key_R)
     assert rater.window.panels.bar.modes[MaskMode.REGION].isChecked()
     rater.press(Key.Key_Escape)
     assert not rater.window.panels.bar.modes[MaskMode.REGION].isChecked()
-    assert "click the outline" in rater.window.panels.bar.hint
+    assert "click the outline" in rater.window.panels.bar.hint.text()
 
 
 @pytest.fixture

@@ -161,7 +161,7 @@ def test_a_session_that_is_being_recorded_is_listed_and_read_when_it_has_ended(
     (summary,) = window._model.summaries
     assert (summary.is_recording, summary.problem, window._model.pending) == (True, "", 0)
     assert writer.close()
-    window.reload()
+    window._model.scan()
     all_read(window, qtbot)
     assert not read_manifest(summary.folder).recovered
 

@@ -125,7 +125,7 @@ def test_good_checks_do_not_say_ready_while_arming_would_be_refused(
     assert shown.arm.toolTip() == says_
     bar = ModeBar()
     qtbot.addWidget(bar)
-    bar.show_checks(model.preflight.step)
+    bar.set_against(OperatorStep.ARM, model.preflight.step)
     bar.show_view(bench.view)
     assert bar.text.startswith(says_)
     assert model.may_ask(OperatorStep.ARM), "the supervisor refuses it, with its reason"
@@ -147,7 +147,7 @@ def test_the_bar_does_not_offer_arming_that_the_checks_would_refuse(qtbot: QtBot
     qtbot.addWidget(bar)
 
     def shown(model: PreflightModel) -> str:
-        bar.show_checks(model.preflight.step)
+        bar.set_against(OperatorStep.ARM, model.preflight.step)
         bar.show_view(bench.view)
         return bar.text
 

@@ -59,7 +59,7 @@ def test_every_section_has_its_page_with_every_setting(dialog: SettingsDialog) -
 
 def test_a_field_shows_unit_default_range_and_meaning(dialog: SettingsDialog) -> None:
     shown = field(dialog, D_ALLOW)
-    texts = " ".join(label.text() for label in shown.findChildren(type(shown._error))).replace("\N{NO-BREAK SPACE}", " ")
+    texts = " ".join(label.text() for label in shown.findChildren(type(shown.error))).replace("\N{NO-BREAK SPACE}", " ")
     for words in ("Allowed distance", "px", "Default 6 px", "above 0 and at most 200 px", "Distance of head and tail"):
         assert words in texts
     assert shown.editor.accessibleName() == "Allowed distance, px"
@@ -70,17 +70,17 @@ def test_typing_is_checked_at_once_and_marked(dialog: SettingsDialog) -> None:
     seen = drafts(dialog)
     shown = type_into(dialog, D_ALLOW, "9")
     assert seen[-1].perception.pose.d_allow_px == 9.0
-    assert shown.is_marked
+    assert shown.property("changed")
     assert dialog.save.isEnabled()
     assert "picture shows it already" in dialog.status.text()
     type_into(dialog, D_ALLOW, "900")
-    assert shown.error_text.endswith("must be above 0 and at most 200 px")
+    assert shown.error.text().endswith("must be above 0 and at most 200 px")
     assert not dialog.save.isEnabled()
     assert D_ALLOW in dialog.status.text()
     assert seen[-1].perception.pose.d_allow_px == 90.0, "the last one that was allowed"
     shown.reset_button.click()
-    assert not shown.is_marked
-    assert shown.error_text == ""
+    assert not shown.property("changed")
+    assert shown.error.text() == ""
     assert seen[-1] == load_config()
 
 
