@@ -326,9 +326,9 @@ class StepDialog(QDialog):
         self.resize(size.boundedTo(self.screen().availableGeometry().size() - _FRAME))
         self.steps, self.stack, self.stop_button = QListWidget(), QStackedWidget(), StopButton()
         self.back_button, self.next_button = button(tr("&Back"), self.back), button(tr("&Next"), self.next)
-        self.line, self.question = note(""), QuestionStrip()
-        self.question.closed.connect(self._on_answered)
-        self._behind_question: list[QWidget] = [self.line]
+        self.line = note("")
+        self.question = QuestionStrip(self.line)
+        self.question.closed.connect(self.setFocus)
         self._job: JobFocus | None = None
 
     def lay_out(self, pages: Sequence[StepPage], right: QWidget, steps_px: int, controls_px: int, *buttons: QPushButton) -> None:
@@ -348,7 +348,6 @@ class StepDialog(QDialog):
             foot.addWidget(part, 0, Qt.AlignmentFlag.AlignBottom)
         for message in (self.line, self.question):
             message.setMinimumHeight(44)
-        self.question.hide()
         self.setLayout(column((line(self.steps, Card("", self.stack), (right, 1)), 1), foot, margins=(14, 12, 14, 12)))
         StillWheel(self)
 
@@ -376,20 +375,6 @@ class StepDialog(QDialog):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if not takes_enter(self, event):
             super().keyPressEvent(event)
-
-    def ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
-        """Ask in place of the line before something is lost: `answer` names the button that does `action`."""
-        self._show_question(True)
-        self.question.ask(question, answer, action)
-
-    def _on_answered(self) -> None:
-        self._show_question(False)
-        self.setFocus()
-
-    def _show_question(self, on: bool) -> None:
-        self.question.setVisible(on)
-        for part in self._behind_question:
-            part.setVisible(not on)
 
     def say(self, text: str, is_fault: bool = False) -> None:
         if is_fault:

@@ -89,7 +89,7 @@ class RigWizard(StepDialog):
         self.picture = WizardPicture()
         self.picture.show_text(tr("No camera yet"))
         self.camera_page = CameraPage(model, self.picture, rig_name)
-        self.camera_page.ask = self.ask
+        self.camera_page.ask = self.question.ask
         self.scale_page = ScalePage(model, self.picture)
         self.port_page = PortPage(model, self.picture)
         self.drums_page = DrumsPage(model, self.picture)
@@ -108,7 +108,7 @@ class RigWizard(StepDialog):
             self.summary_page,
         )
         self.cancel_button = button(tr("Cancel"), self.ask_to_leave)
-        self._behind_question.append(self.cancel_button)  # the question has its own Cancel, which returns to the wizard
+        self.question.instead_of = (self.line, self.cancel_button)  # the question has its own Cancel, which returns to the wizard
         self.steps.setIconSize(QSize(_SIGN_PX, _SIGN_PX))
         self.lay_out(self.pages, self.picture, _STEPS_PX, _CONTROLS_PX, self.cancel_button)
         self.stop_button.asked.connect(model.stop)
@@ -141,7 +141,7 @@ class RigWizard(StepDialog):
         if draft is None or not draft.has_news:
             self.reject()
         elif not self.question.text:
-            self.ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
+            self.question.ask(tr("Leave without saving what was found?"), tr("Leave"), self.reject)
 
     def done(self, result: int) -> None:
         """The dialog closes: nothing moves any more, camera and port become free."""

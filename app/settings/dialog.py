@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QPoint, QSize, Qt, QTimer, Signal
@@ -217,9 +217,9 @@ class SettingsDialog(QDialog):
         self.tree = QTreeWidget()
         self.page = SettingPage(draft)
         self.status, self.notice = QLabel(), QLabel()
-        self.question = QuestionStrip()
-        """Of leaving or resetting, in place of the state of the settings."""
         self.reset_all, self.cancel = QPushButton(tr("Reset all")), QPushButton(tr("Cancel"))
+        self.question = QuestionStrip(self.status, self.reset_all, self.cancel)
+        """Of leaving or resetting; it has a Cancel of its own, which keeps the dialog open."""
         self.save, self.save_and_restart = QPushButton(tr("Save")), QPushButton(tr("Save, and start the rig again"))
         self._items: dict[str, QTreeWidgetItem] = {}
         self._search_soon = QTimer(self, singleShot=True, interval=_SEARCH_AFTER_MS)
@@ -307,7 +307,7 @@ class SettingsDialog(QDialog):
         self._changed()
 
     def _ask_reset_all(self) -> None:
-        self._ask(tr("Put all settings back to their defaults?"), tr("Reset all"), self._reset_everything)
+        self.question.ask(tr("Put all settings back to their defaults?"), tr("Reset all"), self._reset_everything)
 
     def _reset_everything(self) -> None:
         self.draft.load(self.draft.default)
@@ -405,7 +405,7 @@ class SettingsDialog(QDialog):
         if not self.draft.is_dirty:
             self.reject()
         elif not self.question.text:
-            self._ask(tr("Leave without saving the changes?"), tr("Leave"), self.reject)
+            self.question.ask(tr("Leave without saving the changes?"), tr("Leave"), self.reject)
 
     def _on_escape(self) -> None:
         """Back by one step: a question, the search, the dialog."""
@@ -416,16 +416,6 @@ class SettingsDialog(QDialog):
         else:
             self.ask_to_leave()
 
-    def _ask(self, question: str, answer: str, action: Callable[[], None]) -> None:
-        self._show_question(True)
-        self.question.ask(question, answer, action)
-
-    def _show_question(self, on: bool) -> None:
-        """In place of the state and of Cancel: the question has a Cancel of its own, which keeps the dialog open."""
-        self.question.setVisible(on)
-        for part in (self.status, self.reset_all, self.cancel):
-            part.setVisible(not on)
-
     # ---- places
 
     def _wire(self) -> None:
@@ -435,7 +425,6 @@ class SettingsDialog(QDialog):
         self.page.edited.connect(self._on_edited)
         self.page.reset_asked.connect(self._on_reset)
         self.status.linkActivated.connect(self.go_to)
-        self.question.closed.connect(lambda: self._show_question(False))
         self.reset_all.clicked.connect(lambda _on=False: self._ask_reset_all())
         self.cancel.clicked.connect(lambda _on=False: self.reject())
         self.save.clicked.connect(lambda _on=False: self.save_asked.emit(False))
@@ -479,7 +468,6 @@ class SettingsDialog(QDialog):
         self.splitter.setChildrenCollapsible(False)
         self.splitter.setStretchFactor(1, 1)
         self.splitter.setSizes([_TREE_PX, _SIZE[0] - _TREE_PX])
-        self.question.hide()
         self.save.setObjectName("main_button")
         buttons = self.reset_all, self.cancel, self.save, self.save_and_restart
         bottom = line((self.status, 1), (self.question, 1), *buttons, spacing=8)

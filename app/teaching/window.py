@@ -193,7 +193,7 @@ class TeachingWindow(StepDialog):
             self._keys = None
 
     def _ask_to_start_over(self) -> None:
-        self.ask(tr("Forget pictures, vessel and frames of this bench?"), tr("Forget"), self.model.start_over)
+        self.question.ask(tr("Forget pictures, vessel and frames of this bench?"), tr("Forget"), self.model.start_over)
 
     # ---- what is shown
 

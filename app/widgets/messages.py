@@ -319,13 +319,15 @@ BUTTON_STYLE = "padding: 0 9px; min-height: 20px; font-size: 12px;"
 class QuestionStrip(QWidget):
     """One line with a question, the answer that does it, and Cancel, in the place where it was raised. It closes itself after 20 s.
 
-    ``closed`` comes after either answer. What is asked for is done by the callback given to ``ask``.
+    ``closed`` comes after either answer. What is asked for is done by the callback given to ``ask``. While a question is open it
+    stands in the place of the widgets `instead_of`; without any the owner shows and hides it.
     """
 
     closed = Signal()
 
-    def __init__(self) -> None:
+    def __init__(self, *instead_of: QWidget) -> None:
         super().__init__()
+        self.instead_of = instead_of
         self._action: Callable[[], None] | None = None
         self._text = ""
         self._question = QLabel()
@@ -340,6 +342,8 @@ class QuestionStrip(QWidget):
         self._timer.timeout.connect(self.cancel)
         self.setLayout(line((self._question, 1), self._yes, self._no, spacing=6))
         self.setAccessibleName(tr("Question"))
+        if instead_of:
+            self.hide()
 
     @property
     def text(self) -> str:
@@ -350,6 +354,7 @@ class QuestionStrip(QWidget):
         self._action, self._text = action, question
         self._yes.setText(answer)
         self.setAccessibleDescription(question)
+        self._swap(True)
         self._fit()
         self._timer.start()
         self._no.setFocus()
@@ -367,7 +372,13 @@ class QuestionStrip(QWidget):
     def _close(self) -> None:
         self._action, self._text = None, ""
         self._timer.stop()
+        self._swap(False)
         self.closed.emit()
+
+    def _swap(self, is_open: bool) -> None:
+        for part in self.instead_of:
+            self.setVisible(is_open)
+            part.setVisible(not is_open)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
