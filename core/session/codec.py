@@ -419,8 +419,8 @@ def light_tick(tick: Tick) -> Tick:
 def row_of(tick: Tick, drive: DriveView | None, *, bus: Any = None, with_masks: bool = True) -> Row:
     """One row, without its place in the session (``row``, ``video``, ``pts_ms``, ``dropped_rows``), which the writer adds.
 
-    `drive` and `bus`, the newest status of the servo bus (any dataclass of plain values), are None where there is no such.
-    `with_masks`: also outlines of the masks, and the vessel graph.
+    `bus` is the newest status of the servo bus, any dataclass of plain values; None: there is no bus, as no robot without
+    `drive`. `with_masks`: also outlines of the masks, and the vessel graph.
     """
     scene, pose = tick.scene, tick.scene.pose
     parts: Row = {name: getattr(scene, name) for name in _SAME}

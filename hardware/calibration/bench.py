@@ -39,8 +39,8 @@ _PERIOD_S = 0.02
 class CalibrationBench:
     """Camera feed, servos and STOP of one rig; ``open_bench`` makes one, ``close`` gives all of it back.
 
-    The procedures in ``servo_identification`` work with it. ``port`` is None when the rig has no servos;
-    ``stop`` ends whatever moves.
+    The procedures in ``servo_identification`` work with it. ``port``: None when the rig has no servos; ``stop`` ends whatever
+    moves.
     """
 
     def __init__(
