@@ -72,5 +72,5 @@ def test_a_late_report_of_decoding_ahead_displaces_no_request(
         gate.release(100)
         qtbot.waitUntil(lambda: shown == [5, other, 5])
         qtbot.waitUntil(lambda: set(range(5, 12)) <= set(frames._kept))
-        frames.stop()
-        assert frames.wait(5000)
+        frames.worker.stop(finish=False)
+        assert frames.worker.wait(5000)
