@@ -689,6 +689,11 @@ target: 目标点                               route: 路线                   
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
+        <source>Enter takes {state}, as the lines say · or A B C D, X, O</source>
+        <translation>回车采用线所示的 {state} · 或按 A B C D、X、O</translation>
+    </message>
+    <message>
+        <location filename="../../app/annotator/window.py"/>
         <source>Algorithm: θ {theta:.1f}°, state {state}, confidence {confidence:.2f}. G takes it over</source>
         <translation>算法：θ {theta:.1f}°，状态 {state}，置信度 {confidence:.2f}。按 G 采用</translation>
     </message>
@@ -921,11 +926,6 @@ target: 目标点                               route: 路线                   
         <location filename="../../app/annotator/window.py"/>
         <source>All {count} images have an answer</source>
         <translation>全部 {count} 幅图像都有答案</translation>
-    </message>
-    <message>
-        <location filename="../../app/annotator/window.py"/>
-        <source>Enter takes {state}, as the lines say · or A B C D, X, O</source>
-        <translation>回车采用线所示的 {state} · 或按 A B C D、X、O</translation>
     </message>
     <message>
         <location filename="../../app/annotator/window.py"/>
@@ -1169,6 +1169,11 @@ target: 目标点                               route: 路线                   
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
+        <source>&amp;Open a folder...</source>
+        <translation>打开文件夹(&amp;O)...</translation>
+    </message>
+    <message>
+        <location filename="../../app/library/window.py"/>
         <source>&amp;Session</source>
         <translation>会话(&amp;S)</translation>
     </message>
@@ -1256,11 +1261,6 @@ target: 目标点                               route: 路线                   
         <location filename="../../app/library/window.py"/>
         <source>Export {name}</source>
         <translation>导出 {name}</translation>
-    </message>
-    <message>
-        <location filename="../../app/library/window.py"/>
-        <source>&amp;Open a folder...</source>
-        <translation>打开文件夹(&amp;O)...</translation>
     </message>
     <message>
         <location filename="../../app/library/window.py"/>
@@ -1433,6 +1433,16 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/models.py"/>
+        <source>not measured</source>
+        <translation>未测量</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/models.py"/>
+        <source>pictures of {name}</source>
+        <translation>张 {name} 图像</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/models.py"/>
         <source> on {count} {what}</source>
         <translation>（{count} {what}）</translation>
     </message>
@@ -1443,23 +1453,8 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/models.py"/>
-        <source>Dice vessel {vessel}, robot {robot}</source>
-        <translation>Dice 血管 {vessel}，机器人 {robot}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/models.py"/>
         <source>held-out pictures</source>
         <translation>张留出图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/models.py"/>
-        <source>pictures of {name}</source>
-        <translation>张 {name} 图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/models.py"/>
-        <source>not measured</source>
-        <translation>未测量</translation>
     </message>
     <message>
         <location filename="../../app/operator/models.py"/>
@@ -1480,6 +1475,11 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/models.py"/>
         <source>Use {name}</source>
         <translation>使用 {name}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/models.py"/>
+        <source>Dice vessel {vessel}, robot {robot}</source>
+        <translation>Dice 血管 {vessel}，机器人 {robot}</translation>
     </message>
     <message>
         <location filename="../../app/operator/models.py"/>
@@ -1638,6 +1638,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/preflight.py"/>
+        <source>Not armed yet: the checks before driving take some seconds, then arm again</source>
+        <translation>暂未待命：驾驶前检查需几秒，之后请再次进入待命</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
         <source>no answer within {seconds:.0f} s</source>
         <translation>{seconds:.0f} 秒内无应答</translation>
     </message>
@@ -1688,6 +1693,11 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/preflight.py"/>
+        <source>Not armed. {what} What to do: {fix}{more}</source>
+        <translation>未待命。{what}处理：{fix}{more}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/preflight.py"/>
         <source>Not ready: 1 of {whole} checks stands against driving</source>
         <translation>未就绪：{whole} 项检查中有 1 项不允许驾驶</translation>
     </message>
@@ -1725,16 +1735,6 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/preflight.py"/>
         <source> (+{count} more)</source>
         <translation> （另有 {count} 项）</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/preflight.py"/>
-        <source>Not armed. {what} What to do: {fix}{more}</source>
-        <translation>未待命。{what}处理：{fix}{more}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/preflight.py"/>
-        <source>Not armed yet: the checks before driving take some seconds, then arm again</source>
-        <translation>暂未待命：驾驶前检查需几秒，之后请再次进入待命</translation>
     </message>
     <message>
         <location filename="../../app/operator/preflight.py"/>
@@ -2428,6 +2428,21 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
+        <source>The report is {report}</source>
+        <translation>报告位于 {report}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>The program met an error: {what}</source>
+        <translation>程序遇到错误：{what}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
+        <source>{what}. The report: {report}</source>
+        <translation>{what}。报告：{report}</translation>
+    </message>
+    <message>
+        <location filename="../../app/operator/services.py"/>
         <source>A recorded session</source>
         <translation>已录制的会话</translation>
     </message>
@@ -2483,11 +2498,6 @@ Torque off now: the wires spring back at once.</source>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
-        <source>The report is {report}</source>
-        <translation>报告位于 {report}</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/services.py"/>
         <source>The report could not be written</source>
         <translation>报告无法写入</translation>
     </message>
@@ -2495,11 +2505,6 @@ Torque off now: the wires spring back at once.</source>
         <location filename="../../app/operator/services.py"/>
         <source>Unforeseen error</source>
         <translation>意外错误</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/services.py"/>
-        <source>The program met an error: {what}</source>
-        <translation>程序遇到错误：{what}</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -2598,11 +2603,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/operator/services.py"/>
         <source>The model does not know such pictures</source>
         <translation>模型不认识这类图像</translation>
-    </message>
-    <message>
-        <location filename="../../app/operator/services.py"/>
-        <source>{what}. The report: {report}</source>
-        <translation>{what}。报告：{report}</translation>
     </message>
     <message>
         <location filename="../../app/operator/services.py"/>
@@ -3870,6 +3870,16 @@ Best close the program and start it again. Space is still STOP.</source>
         <translation>相机图像</translation>
     </message>
     <message>
+        <location filename="../../app/rig_wizard/pages_base.py"/>
+        <source>Steps</source>
+        <translation>步骤</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/pages_base.py"/>
+        <source>&amp;Back</source>
+        <translation>上一项(&amp;B)</translation>
+    </message>
+    <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>One camera cannot tell up from down. Choose {joint}, wiggle it and look from the side: does the head rise when the wire is pulled? Without an answer the order of their ids counts, and the rig file says that it is assumed.</source>
         <translation>一台相机分不清上下。选择“{joint}”，摆动它并从侧面观察：拉丝时头端是否上抬？若不回答，则按 id 的顺序，装置文件会注明是假定的。</translation>
@@ -4051,6 +4061,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
+        <source>telling the servos apart</source>
+        <translation>正在区分舵机</translation>
+    </message>
+    <message>
+        <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>&amp;Find automatically</source>
         <translation>自动寻找(&amp;F)</translation>
     </message>
@@ -4101,13 +4116,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>telling the servos apart</source>
-        <translation>正在区分舵机</translation>
+        <source>swapped by hand</source>
+        <translation>手动交换</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>swapped by hand</source>
-        <translation>手动交换</translation>
+        <source>looking where the wires are taut</source>
+        <translation>正在寻找驱动丝的绷直位置</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4141,13 +4156,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>looking where the wires are taut</source>
-        <translation>正在寻找驱动丝的绷直位置</translation>
+        <source>moving {joint}</source>
+        <translation>正在移动{joint}</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>moving {joint}</source>
-        <translation>正在移动{joint}</translation>
+        <source>learning the steering</source>
+        <translation>正在学习转向</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4178,11 +4193,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
         <source>Directions in the picture: 0° to the right, 90° down.</source>
         <translation>图像中的方向：0° 向右，90° 向下。</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/servo_pages.py"/>
-        <source>learning the steering</source>
-        <translation>正在学习转向</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/servo_pages.py"/>
@@ -4296,11 +4306,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/rig_wizard/wizard.py"/>
-        <source>Steps</source>
-        <translation>步骤</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/wizard.py"/>
         <source>Saved: {path}</source>
         <translation>已保存：{path}</translation>
     </message>
@@ -4318,11 +4323,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/rig_wizard/wizard.py"/>
         <source>New rig</source>
         <translation>新建装置</translation>
-    </message>
-    <message>
-        <location filename="../../app/rig_wizard/wizard.py"/>
-        <source>&amp;Back</source>
-        <translation>上一项(&amp;B)</translation>
     </message>
     <message>
         <location filename="../../app/rig_wizard/wizard.py"/>
@@ -4666,8 +4666,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
-        <source>Seen already: move on, or bend the head</source>
-        <translation>已见过：请继续移动，或弯曲头端</translation>
+        <source>No robot is seen in the vessel: push it in</source>
+        <translation>血管中未见机器人：请将其推入</translation>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
@@ -4716,6 +4716,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
+        <source>{what}: {done} of {count}</source>
+        <translation>{what}：第 {done} 项，共 {count} 项</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
         <source>taking pictures, keep still</source>
         <translation>正在拍摄，请保持不动</translation>
     </message>
@@ -4733,6 +4738,16 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/teaching/model.py"/>
         <source>writing the frames</source>
         <translation>正在写入各帧</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Seen already: go on to the orange branch</source>
+        <translation>此处已看过：请前往橙色分支</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Seen already: move on, or bend the head</source>
+        <translation>已见过：请继续移动，或弯曲头端</translation>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
@@ -4776,8 +4791,18 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
+        <source>Learns the bench</source>
+        <translation>正在学习台架</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
         <source>Training failed: {why}</source>
         <translation>训练失败：{why}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
+        <source>Has learnt; is judged on the frames that are held out</source>
+        <translation>已学完；正用留出的帧评判</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -4891,6 +4916,16 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
+        <source>Live</source>
+        <translation>实时</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
+        <source>The robot cannot be taken out? Lay it in {count} different places and take each: the empty bench is computed.</source>
+        <translation>机器人无法取出？请把它放在 {count} 个不同位置并逐一拍摄：空台架由此计算。</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/pages.py"/>
         <source>Take &amp;place {number} of {count}</source>
         <translation>取位置 {number} / {count}(&amp;P)</translation>
     </message>
@@ -4936,8 +4971,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
-        <source>{count} frames to learn from; a quarter of them is held out, to judge by.</source>
-        <translation>{count} 帧用于学习；其中四分之一留出，用于评判。</translation>
+        <source>{count} of {all} frames are learnt from; a quarter of them is held out, to judge by.</source>
+        <translation>{all} 帧中有 {count} 帧用于学习；其中四分之一留出，用于评判。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -4971,8 +5006,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
-        <source>The present model sees a robot near ({x:.0f}, {y:.0f}), outlined in the picture. If it is one, draw it back and take the picture again; if not, go on.</source>
-        <translation>当前模型在 ({x:.0f}, {y:.0f}) 附近看到机器人，已在图中勾出。如果确是机器人，请将其退回并重新拍摄；如果不是，请继续。</translation>
+        <source>The present model sees a robot near ({x:.0f}, {y:.0f}), outlined above. If it is one, draw it back and take the picture again; if not, go on.</source>
+        <translation>当前模型在 ({x:.0f}, {y:.0f}) 附近看到机器人，已在上方勾出。如果确是机器人，请将其退回并重新拍摄；如果不是，请继续。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -5071,18 +5106,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
-        <source>Step {step} of {steps}{left}</source>
-        <translation>第 {step} 步，共 {steps} 步{left}</translation>
+        <source>{what}, about {minutes:.0f} min left</source>
+        <translation>{what}，约剩 {minutes:.0f} 分钟</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
         <source>Model {name} is there.{more}</source>
         <translation>模型 {name} 已就绪。{more}</translation>
-    </message>
-    <message>
-        <location filename="../../app/teaching/pages.py"/>
-        <source>The robot cannot be taken out? Lay it in {count} different places and take each: the empty bench is computed.</source>
-        <translation>机器人无法取出？请把它放在 {count} 个不同位置并逐一拍摄：空台架由此计算。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -5093,11 +5123,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/teaching/pages.py"/>
         <source>&amp;Take it again</source>
         <translation>重新拍摄(&amp;T)</translation>
-    </message>
-    <message>
-        <location filename="../../app/teaching/pages.py"/>
-        <source>Live</source>
-        <translation>实时</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -5128,11 +5153,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/teaching/pages.py"/>
         <source>for</source>
         <translation>训练</translation>
-    </message>
-    <message>
-        <location filename="../../app/teaching/pages.py"/>
-        <source>, about {minutes:.0f} min left</source>
-        <translation>，约剩 {minutes:.0f} 分钟</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
@@ -5246,8 +5266,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/window.py"/>
-        <source>No live picture: start the rig (F5 in the operator window)</source>
-        <translation>没有实时图像：请启动装置（操作窗口中按 F5）</translation>
+        <source>Live: {who}{key}</source>
+        <translation>实时：{who}{key}</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/window.py"/>
+        <source>No live picture of this bench: choose it in the menu Rig or Twin, or start the rig (F5)</source>
+        <translation>没有此台架的实时图像：请在“装置”或“数字孪生”菜单中选择它，或启动装置 (F5)</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -5283,6 +5308,26 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training/dialog.py"/>
         <source>Left: the loss, which training makes small. Right: Dice, the agreement of what is found with what was drawn by hand, 1 at best. What counts are the held-out pictures: when they get no better any more, it has learnt enough.</source>
         <translation>左：损失，训练使其变小。右：Dice，即检出与手绘的一致程度，最好为 1。以留出图像为准：不再变好时，就学够了。</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/dialog.py"/>
+        <source>Before</source>
+        <translation>之前</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/dialog.py"/>
+        <source>shown when the training has begun</source>
+        <translation>训练开始后显示</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/dialog.py"/>
+        <source>After</source>
+        <translation>之后</translation>
+    </message>
+    <message>
+        <location filename="../../app/training/dialog.py"/>
+        <source>shown when it has learnt</source>
+        <translation>学完后显示</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -5338,21 +5383,6 @@ Best close the program and start it again. Space is still STOP.</source>
         <location filename="../../app/training/dialog.py"/>
         <source>step</source>
         <translation>步</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
-        <source>shown when the training has begun</source>
-        <translation>训练开始后显示</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
-        <source>Before</source>
-        <translation>之前</translation>
-    </message>
-    <message>
-        <location filename="../../app/training/dialog.py"/>
-        <source>After</source>
-        <translation>之后</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>
@@ -7623,6 +7653,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
+        <source>the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)</source>
+        <translation>舵机最多给出 {force:.0f} N（占空比 {duty:.0f} %）</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/servo_table.py"/>
+        <source>the servo gives {force:.0f} N at most ({most:.0f} mA)</source>
+        <translation>舵机最多给出 {force:.0f} N（{most:.0f} mA）</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/servo_table.py"/>
         <source>warning from {warm:g} °C, limit {hot:g} °C</source>
         <translation>{warm:g} °C 起警告，上限 {hot:g} °C</translation>
     </message>
@@ -7723,11 +7763,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/servo_table.py"/>
-        <source>the servo gives {force:.0f} N at most ({most:.0f} mA)</source>
-        <translation>舵机最多给出 {force:.0f} N（{most:.0f} mA）</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
         <source>its zero must be confirmed or set before arming: Zero...</source>
         <translation>就绪前须确认或设置其零点：设零…</translation>
     </message>
@@ -7765,11 +7800,6 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/servo_table.py"/>
         <source>error {number}</source>
         <translation>错误 {number}</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/servo_table.py"/>
-        <source>the servo gives {force:.0f} N at most ({duty:.0f} % of its duty)</source>
-        <translation>舵机最多给出 {force:.0f} N（占空比 {duty:.0f} %）</translation>
     </message>
     <message>
         <location filename="../../app/widgets/shortcut_page.py"/>
@@ -7998,6 +8028,16 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>The rig wizard pulls each wire until the head follows (page Zero and pretension)</source>
+        <translation>装置向导拉动每根拉线，直到头端跟随（“零点与预紧”页）</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>Let all motors go; the wires spring back</source>
+        <translation>放开所有电机；拉线会回弹</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
         <source>its servo does not answer</source>
         <translation>其舵机不应答</translation>
     </message>
@@ -8048,23 +8088,8 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
     </message>
     <message>
         <location filename="../../app/widgets/zero_dialog.py"/>
-        <source>The rig wizard pulls each wire until the head follows (page Zero and pretension)</source>
-        <translation>装置向导拉动每根拉线，直到头端跟随（“零点与预紧”页）</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/zero_dialog.py"/>
         <source>&amp;Torque off</source>
         <translation>断开扭矩(&amp;T)</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/zero_dialog.py"/>
-        <source>Let all motors go; the wires spring back</source>
-        <translation>放开所有电机；拉线会回弹</translation>
-    </message>
-    <message>
-        <location filename="../../app/widgets/zero_dialog.py"/>
-        <source>S&amp;et</source>
-        <translation>设置(&amp;E)</translation>
     </message>
     <message>
         <location filename="../../app/widgets/zero_dialog.py"/>
@@ -8090,6 +8115,11 @@ It is no emergency stop: that is the power cut, by hand, beside the robot</sourc
         <location filename="../../app/widgets/zero_dialog.py"/>
         <source>its servo holds: the torque must be off for a wire to be slack</source>
         <translation>其舵机在保持：只有断开扭矩，拉线才会松弛</translation>
+    </message>
+    <message>
+        <location filename="../../app/widgets/zero_dialog.py"/>
+        <source>S&amp;et</source>
+        <translation>设置(&amp;E)</translation>
     </message>
     <message>
         <location filename="../../app/widgets/zero_dialog.py"/>
