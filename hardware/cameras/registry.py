@@ -11,10 +11,9 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from core.config.models import CAMERAS, CameraConfig
 from core.devices import Camera, DeviceError
@@ -64,14 +63,11 @@ def _need_realsense() -> None:
         raise DeviceError("RealSense cameras need the package pyrealsense2: {command}", command=how_to_install(_LIBREALSENSE))
 
 
-def _made_by(driver: str, name: str, need: Callable[[], None] = lambda: None) -> Callable[[Any], Camera]:
-    """Makes a camera by `name` of a driver in this folder, which is imported when one is made."""
+def _realsense_live(config: CameraConfig) -> Camera:
+    _need_realsense()
+    from hardware.cameras.realsense import realsense_camera
 
-    def make(settings: Any) -> Camera:
-        need()
-        return getattr(import_module(f"hardware.cameras.{driver}"), name)(settings)  # type: ignore[no-any-return]
-
-    return make
+    return realsense_camera(config)
 
 
 def _find_realsense() -> Sequence[FoundCamera]:
@@ -122,6 +118,12 @@ def _check_realsense(config: CameraConfig) -> Check:
     return Check("camera", True, camera.describe())
 
 
+def _webcam_live(config: CameraConfig) -> Camera:
+    from hardware.cameras.webcam import webcam_camera
+
+    return webcam_camera(config)
+
+
 def _find_webcams() -> Sequence[FoundCamera]:
     return [FoundCamera("webcam", f"{device.title} ({device.path})", device=device.path) for device in sysfs.video_devices()]
 
@@ -146,6 +148,12 @@ def _check_webcam(config: CameraConfig) -> Check:
             "camera", False, message("no permission for {node}", node=node), "sudo usermod -aG video $USER, then log in again"
         )
     return Check("camera", True, note)
+
+
+def _basler_live(config: CameraConfig) -> Camera:
+    from hardware.cameras.basler import basler_camera
+
+    return basler_camera(config)
 
 
 _PYPYLON = "pypylon"
@@ -190,15 +198,25 @@ def _check_basler(config: CameraConfig) -> Check:
     return Check("camera", False, message("no Basler camera"), fix)
 
 
+def _video_file(source: Path) -> Camera:
+    from hardware.cameras.files import VideoFile
+
+    return VideoFile(source)
+
+
+def _image_folder(source: Path) -> Camera:
+    from hardware.cameras.files import ImageFolder
+
+    return ImageFolder(source)
+
+
 CAMERA_KINDS: dict[str, CameraKind] = {
     "twin": CameraKind("bench twin"),  # opened by the rig, together with its robot
-    "realsense": CameraKind(
-        "RealSense", _made_by("realsense", "realsense_camera", _need_realsense), None, _find_realsense, _check_realsense
-    ),
-    "webcam": CameraKind("webcam", _made_by("webcam", "webcam_camera"), None, _find_webcams, _check_webcam),
-    "basler": CameraKind("Basler", _made_by("basler", "basler_camera"), None, _find_basler, _check_basler),
-    "video_file": CameraKind("video", recorded=_made_by("files", "VideoFile")),
-    "image_folder": CameraKind("pictures", recorded=_made_by("files", "ImageFolder")),
+    "realsense": CameraKind("RealSense", _realsense_live, None, _find_realsense, _check_realsense),
+    "webcam": CameraKind("webcam", _webcam_live, None, _find_webcams, _check_webcam),
+    "basler": CameraKind("Basler", _basler_live, None, _find_basler, _check_basler),
+    "video_file": CameraKind("video", recorded=_video_file),
+    "image_folder": CameraKind("pictures", recorded=_image_folder),
 }
 
 
