@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
 
 from core import geometry
 from core.session.manifest import REHEARSAL, Event
@@ -102,7 +102,11 @@ class RehearsalResult(_Part):
     sharp: tuple[SharpBranch, ...] = ()
     speed_mm_s: float
     recommended_speed_mm_s: float | None = None
-    based_on: dict[str, float | str] = Field({}, description="pictures perceived, share without an answer, and whose robot")
+    based_on: dict[str, float | str] = Field(
+        {},
+        validation_alias=AliasChoices("based_on", "assumed"),
+        description="pictures perceived, share without an answer, and whose robot",
+    )
 
 
 def rehearsal_of(event: Event) -> RehearsalResult | None:

@@ -53,6 +53,8 @@ _PICTURE_S, _PICTURE_MM_S = 0.1, 10.0
 """Time between the pictures, and speed."""
 _LOOKS = 5
 """At one place, until perception is sure."""
+_RESTS_MM = 0.05
+"""A head that moves by less between two frames is seen in any of the pictures of its place."""
 _LINE_PX = 40.0
 """Length of the robot's end over which an error of the head fades out."""
 _HEADING_PX = 10.0
@@ -73,7 +75,7 @@ class SeenHeads:
 
     Attributes
     ----------
-    heads_mm : true heads (N, 2), on the board; several pictures may have the same.
+    heads_mm : true heads (N, 2), on the board; several pictures may have the same, and the first is what a head that passes shows.
     errors_mm : of the perceived ones, along the robot and to its right (N, 2); NaN: no answer.
     confidence : (N,).
     """
@@ -88,9 +90,9 @@ class SeenHeads:
 
     @property
     def missing(self) -> float:
-        """Share of the pictures without an answer, mean over the places."""
-        place = np.unique(self.heads_mm, axis=0, return_inverse=True)[1].ravel()
-        return float((np.bincount(place, np.isnan(self.errors_mm[:, 0])) / np.bincount(place)).mean())
+        """Share of the places without an answer in their first picture; others were taken only where that was not sure."""
+        first = np.unique(self.heads_mm, axis=0, return_index=True)[1]
+        return float(np.isnan(self.errors_mm[first, 0]).mean())
 
 
 def seen_heads(config: Config, target: Target, wander: float) -> SeenHeads:
@@ -181,6 +183,7 @@ class Rehearsal(Trial):
         self._graph = true_graph(self._world.phantom, view, self._scale)
         self._masks_shown = _vessel_masks(self._world, self._scale)
         self._error_px: float | None = None
+        self._last_mm: Point = (math.inf, math.inf)
         self._fed: list[FedMoment] = []
 
     def run(self) -> Row:
@@ -199,7 +202,8 @@ class Rehearsal(Trial):
         px_per_mm = world.view.pixels_per_mm(head_mm) * self._scale
         path = visible_path(with_caps(world.physics.robot_points_mm(), radius_mm), world.view, self._scale)
         away = np.linalg.norm(seen.heads_mm - head_mm, axis=1)
-        picture = int(self._rng.choice(np.flatnonzero(away == away.min())))
+        pictures, rests = np.flatnonzero(away == away.min()), math.dist(head_mm, self._last_mm) < _RESTS_MM
+        picture, self._last_mm = int(self._rng.choice(pictures) if rests else pictures[0]), head_mm
         error_mm, confidence, self._error_px = seen.errors_mm[picture], float(seen.confidence[picture]), None
         if path is None or np.isnan(error_mm[0]):
             return replace(scene, refusal=Refusal(Reason.LOW_CONFIDENCE))
