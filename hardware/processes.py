@@ -197,7 +197,10 @@ class DeviceProcess:
 
 
 class ParentLink:
-    """The child's ends of what ``DeviceProcess`` shares with it: ``pipe``, ``socket`` and the memory, from its command line."""
+    """The child's ends of what ``DeviceProcess`` shares with it: ``pipe``, ``socket`` and the memory.
+
+    `arguments` of the command line: file descriptors of memory, pipe and socket, and the parent's process id.
+    """
 
     def __init__(self, arguments: Sequence[str]) -> None:
         self._memory_fd, self.pipe, socket_fd, self._parent = map(int, arguments)

@@ -143,7 +143,7 @@ def working_scale(size: tuple[int, int], working_size_px: int) -> tuple[float, f
 def measure_lines(annotation: Annotation, size: tuple[int, int], config: PerceptionConfig) -> Readout:
     """Vectors, angle, distances and state of the drawn lines: the same fit, on the same lengths, as perception makes.
 
-    `size` is the image's (width, height).
+    The annotation's lines are in source pixels; `size` is the image's (width, height).
     """
     scale = np.array(working_scale(size, config.working_size_px))
 

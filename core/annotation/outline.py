@@ -32,8 +32,8 @@ def with_tube(
 ) -> Polygons:
     """The polygons with the tube of a drag: added with its walls on the edges of the picture, erased as it was drawn.
 
-    `polygons` are all masks, `image` is RGB (H, W, 3), `stroke` is where the hand went (N, 2) in px, and `radius_px` the drawn
-    radius: one for all, or one at each point (N,).
+    `polygons` are all masks; those of other targets stay. `image` is RGB (H, W, 3), `stroke` is where the hand went (N, 2) in px,
+    and `radius_px` the drawn radius: one for all, or one at each point (N,).
     """
     radius = np.broadcast_to(np.asarray(radius_px, np.float64), (len(stroke),))
     size = image.shape[1], image.shape[0]

@@ -233,7 +233,7 @@ def image_sha256(path: Path) -> str:
 
 
 class AnnotationStore:
-    """One open annotation file, which is made unless it exists; methods may be called from any thread, each is one transaction.
+    """One open annotation file, made unless it exists or `read_only`. Any thread may call its methods; each is one transaction.
 
     All of them raise AnnotationError: file missing, damaged, locked, of another kind or of a newer version, or the disk full.
     """

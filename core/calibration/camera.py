@@ -90,9 +90,10 @@ def undistorted(image: Image, places: NDArray[np.int16], shares: NDArray[np.uint
 
 
 def fit_lens(views: Sequence[BoardView], size: tuple[int, int]) -> LensConfig:
-    """The lens that makes all boards flat, by least squares; the views' points should reach far into the picture's corners.
+    """The lens that makes all boards flat, by least squares; `size` is (width, height) of the pictures.
 
-    Raises LensError: too few points, or no lens explains them.
+    All views are of one camera, and their points should reach far into the picture's corners. Raises LensError: too few points,
+    or no lens explains them.
     """
     count = sum(len(view.pixels) for view in views)
     if not views or count < _MIN_POINTS:

@@ -552,6 +552,7 @@ def feed_disagreement(
     """A warning when the feed per turn that was seen differs from the configured one; "" where they agree.
 
     Before identification all servos are turned as if their drums were as large as the largest configured one.
+    `findings` are by id, and `size` is (width, height) of the pictures that were looked at.
     """
     (feed,) = servos.joints[servos.places(JointKind.ADVANCE)]
     found = next((findings.get(one.id) for one in assignments if one.name == feed.name), None)

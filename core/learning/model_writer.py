@@ -358,6 +358,7 @@ def write_calibration(
     """Store a calibration of the confidence in the manifest of a model, atomically; figures measured before are dropped.
 
     `mirrored` is for masks averaged over all orientations of a picture, refined `second_looks` times; None: the same.
+    `familiarity`, the kinds of pictures that the model knows, None: not known.
     """
     changes: dict[str, Any] = {
         "calibration": calibration,

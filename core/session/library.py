@@ -167,7 +167,10 @@ class Cached:
 
 
 class SummaryCache:
-    """Summaries by the sessions' folders, in one SQLite file (None: in the user's cache folder); without it all is read again."""
+    """Summaries by the sessions' folders, in one SQLite file; None: in the user's cache folder.
+
+    Never raises: without it all is read again.
+    """
 
     def __init__(self, path: Path | None = None) -> None:
         self._path = path or Path(platformdirs.user_cache_dir("LumenPilot")) / f"library_{_FORMAT}.sqlite"

@@ -72,14 +72,14 @@ class CalibrationBench:
     def probe(
         self, servos: ServosConfig, servo_id: int, limits: ProbeLimits, sign: Literal[-1, 1], found: Mapping[int, int] | None = None
     ) -> Iterator[ServoProbe]:
-        """One servo, zeroed where it stands, armed."""
+        """One servo, zeroed where it stands, armed. Raises ServoError."""
         config = probe_config(servos, servo_id, limits, sign, found)
         with ServoProbe.opened(config, self.config.safety, limits, self.stop, self._backups, self._clock) as probe:
             yield probe
 
     @contextmanager
     def steer(self, servos: ServosConfig) -> Iterator[SteeredRobot]:
-        """All of them, zeroed where they stand, armed."""
+        """All of them, zeroed where they stand, armed. Raises ServoError."""
         with SteeredRobot.opened(servos, self.config.safety, self.stop, self._backups, self._clock) as robot:
             yield robot
 
