@@ -541,12 +541,17 @@ class TeachingFolder:
         corrected = {taken.stem for taken in self._frames if taken.is_corrected}
         chosen = teaching.choose(frames, WANTED)
         completed: list[TeachingFrame] = []
-        for one in chosen:
+
+        def go_on() -> None:
             if not self._on_frame(len(completed), len(chosen)):
                 raise teaching.TeachingError("stopped before the training began; the frames are kept")
+
+        for one in chosen:
+            go_on()
             completed.append(one if one.picture.stem in corrected else self._completed(one))
         chosen = [was if one.reason else now for was, now, one in zip(chosen, completed, self._checked(completed), strict=True)]
         teaching.write_teaching_set(self.folder / _SET, self._bench, chosen, [one for one in frames if one.reason], len(frames))
+        go_on()
         return self.folder / _SET
 
     def _completed(self, frame: TeachingFrame) -> TeachingFrame:

@@ -400,6 +400,7 @@ class TeachingModel(QObject):
     def close(self) -> None:
         """The program ends; a running training ends by itself and keeps what it learnt."""
         self._is_closed = True
+        self._is_dropped.set()
         self._poll.stop()
         self._watch.stop()
         self._pace.stop()
