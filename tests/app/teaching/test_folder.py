@@ -339,6 +339,7 @@ def test_long_jobs_are_counted_and_the_writing_of_the_frames_can_be_stopped(work
         again.teaching_set()
     assert told == [(done, count) for done in (*range(count), 0, 1, 2)]
     assert not (work.folder / "set").exists()
+    again.release()
     late = TeachingFolder(work.folder, "toy", lambda: segment, lambda done, count: done < count)
     late.load()
     with pytest.raises(TeachingError, match="the frames are kept"):
