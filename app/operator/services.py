@@ -276,7 +276,7 @@ class WindowServices(QObject):
             model = TeachingModel(teaching_folder(bench), bench, newest, partial(_open_proposals, config.perception), known=known)
             model.trained.connect(self._on_taught)
             driver = TeachingDriver(controls.drive, controls.stop, window.ask_step, lambda: controls.can_move)
-            self.teaching = TeachingWindow(model, newest, driver, self._use_taught, window)
+            self.teaching = TeachingWindow(model, newest, driver, self._use_taught, self._is_used, window)
             controls.reported.connect(self.teaching.show_news)
             model.setParent(self.teaching)
         self.teaching.open()
@@ -311,6 +311,11 @@ class WindowServices(QObject):
         self._window.say(tr("Model {name} and its bench from now on; the menu Model has the one before", name=name), False)
         rig.use_config(_with_model(config, name, bench=str(bench)))
         return ""
+
+    def _is_used(self, name: str) -> bool:
+        """Whether a taught model is in force, with its bench."""
+        perception = self._window.rig.config.perception
+        return (perception.segmentation.model, perception.bench) == (name, str(own_models() / name / BENCH))
 
     def _without_other_bench(self, config: Config) -> Config:
         """A taught bench is that of one rig, or of one phantom and look of the twin: another one is opened without it."""

@@ -153,7 +153,6 @@ class TeachingView:
     share: float = 0.0
     bends: int = 0
     model: str = ""
-    is_used: bool = False
 
     @property
     def used(self) -> int:
@@ -193,9 +192,9 @@ class _FrameRow(BaseModel):
 
 
 class _Record(BaseModel):
-    """``teaching.json``."""
+    """``teaching.json``; older ones say besides whether the model was used."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="ignore", frozen=True)
 
     format: int = Field(FORMAT, ge=1)
     step: TeachingStep = TeachingStep.EMPTY
@@ -204,7 +203,6 @@ class _Record(BaseModel):
     frames: tuple[_FrameRow, ...] = ()
     next_stem: int = Field(0, ge=0)
     model: str = ""
-    used: bool = False
 
 
 class TeachingFolder:
@@ -321,7 +319,6 @@ class TeachingFolder:
             coverage.share if coverage is not None else 0.0,
             sum(taken.kind is LookKind.BEND and taken.is_used for taken in self._frames),
             record.model,
-            record.used,
         )
 
     def go(self, step: TeachingStep) -> None:
@@ -330,10 +327,7 @@ class TeachingFolder:
 
     def keep_model(self, name: str) -> None:
         """Keep that a model of this name was trained from these frames."""
-        self._keep(model=name, used=False)
-
-    def keep_used(self) -> None:
-        self._keep(used=True)
+        self._keep(model=name)
 
     # ---- the empty bench
 
@@ -387,7 +381,7 @@ class TeachingFolder:
         self._bench = bench
         if self._drawn is not None and self._drawn.shape != bench.known.shape:
             self._drawn = None
-        self._keep(computed=is_computed, robot_like=(), model="", used=False)
+        self._keep(computed=is_computed, robot_like=(), model="")
         self._propose_again()
 
     def _look_for_robot(self, empty: Image) -> tuple[tuple[tuple[int, int], ...], ...]:
@@ -414,7 +408,7 @@ class TeachingFolder:
             bench = with_vessel(self._bench, vessel)
             write_bench(bench, self.folder / _BENCH)
             self._bench = bench
-            self._keep(model="", used=False)
+            self._keep(model="")
             self._propose_again()
         self._drawn = None
         try:
@@ -481,7 +475,7 @@ class TeachingFolder:
         self._frames.append(TakenFrame(frame, kind, thumb_of(frame)))
         self._blurred.append(_blurred(frame.robot))
         coverage.add(frame.robot)
-        self._keep(frames=True, next_stem=self._record.next_stem + 1, model="", used=False)
+        self._keep(frames=True, next_stem=self._record.next_stem + 1, model="")
         return TakenLook(kind)
 
     def _kind_of(self, robot: Mask) -> LookKind:
@@ -507,7 +501,7 @@ class TeachingFolder:
     def leave_out(self, stem: str, on: bool) -> None:
         """Leave a frame out, or take it in again."""
         self._replace(stem, is_left_out=on)
-        self._keep(frames=True, model="", used=False)
+        self._keep(frames=True, model="")
 
     def correct(self, stem: str, robot: Mask | None) -> None:
         """Another mask (h, w) for the robot in a frame: it is certain there, and no check rejects it; None: that by difference."""
@@ -525,7 +519,7 @@ class TeachingFolder:
                 raise _not_written(path, error) from None
             self._frames[place] = self._taken(stem, taken.kind, taken.is_left_out)
             self._check()
-        self._keep(frames=True, model="", used=False)
+        self._keep(frames=True, model="")
 
     def teaching_set(self) -> Path:
         """Write the frames to learn from, a quarter of them held out, and return their folder.

@@ -199,9 +199,6 @@ class TeachingModel(QObject):
         """Another mask for the robot in a frame; None: that by difference again."""
         self._run("", partial(self._folder.correct, stem, robot), quiet=True)
 
-    def keep_used(self) -> None:
-        self._run("", self._folder.keep_used, quiet=True)
-
     def _run(
         self, what: str, job: Callable[[], object], then: Callable[[object], None] | None = None, *, quiet: bool = False
     ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -632,9 +634,9 @@ class TrainPage(TeachingPage):
     hint = mark("It trains beside the window, which may be closed meanwhile. The present model stays, and can be chosen again.")
     step = TeachingStep.TRAIN
 
-    def __init__(self, model: TeachingModel, pictures: BeforeAfter) -> None:
+    def __init__(self, model: TeachingModel, pictures: BeforeAfter, in_use: Callable[[str], bool]) -> None:
         super().__init__(model, pictures)
-        self._pictures = pictures
+        self._pictures, self._in_use = pictures, in_use
         self.model_name, self.minutes = QLineEdit(name_for(model.rig)), QSpinBox()
         self.model_name.setMaxLength(40)
         self.model_name.setAccessibleName(tr("Name of the new model"))
@@ -662,6 +664,11 @@ class TrainPage(TeachingPage):
     def is_done(self) -> bool:
         return bool(self.view.model)
 
+    @property
+    def may_leave(self) -> bool:
+        """Whether a model is there that is not in use now: another one may have been chosen since."""
+        return self.view.may_leave and not self._in_use(self.view.model)
+
     def refresh(self) -> None:
         state = self.model.training
         enable(not state.is_busy and not self.model.is_busy, self.start, self.model_name, self.minutes)
@@ -685,7 +692,7 @@ class TrainPage(TeachingPage):
         if state.line:
             return tr_text(state.line)
         if self.view.model:
-            used = tr(" It is in use.") if self.view.is_used else tr(" Use it puts it into force, with this bench.")
+            used = tr(" It is in use.") if self._in_use(self.view.model) else tr(" Use it puts it into force, with this bench.")
             return tr("Model {name} is there.{more}", name=self.view.model, more=used)
         counts = {"count": min(WANTED, self.view.used), "all": self.view.used}
         return tr("{count} of {all} frames are learnt from; a quarter of them is held out, to judge by.", **counts)

@@ -63,6 +63,7 @@ class TeachingWindow(StepDialog):
     newest : the live picture.
     driver : keys that move the robot while it is to be moved.
     use : puts a model of this name, with its bench, into force; returns why it cannot be done now, or "".
+    in_use : whether a model of this name is in force, with its bench.
     """
 
     model: TeachingModel
@@ -74,6 +75,7 @@ class TeachingWindow(StepDialog):
         newest: NewestFrame,
         driver: TeachingDriver,
         use: Callable[[str], str],
+        in_use: Callable[[str], bool],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(tr("Teach this bench: {name}", name=model.rig), _SIZE, parent)
@@ -90,7 +92,7 @@ class TeachingWindow(StepDialog):
         self.vessel_page = VesselPage(model, vessel_editor)
         self.move_page = MovePage(model, self.picture)
         self.frames_page = FramesPage(model, robot_canvas)
-        self.train_page = TrainPage(model, self.before_after)
+        self.train_page = TrainPage(model, self.before_after, in_use)
         self.pages: tuple[TeachingPage, ...] = (
             self.empty_page,
             self.vessel_page,
@@ -150,7 +152,7 @@ class TeachingWindow(StepDialog):
 
     def next(self) -> None:
         """Keep what was done, and go on; on the last page: use the model."""
-        if self.model.is_busy or not self.page.may_leave:
+        if not self._may_go_on:
             return
         if self.page is self.train_page:
             self.use_model()
@@ -162,7 +164,7 @@ class TeachingWindow(StepDialog):
         if why := self._use(self.model.view.model):
             self.say(tr("Not used: {why}", why=tr_text(why)), is_fault=True)
         else:
-            self.model.keep_used()
+            self._refresh()
 
     def back(self) -> None:
         """To the step before; nothing is lost."""
@@ -219,7 +221,7 @@ class TeachingWindow(StepDialog):
             item.setText(f"{done}  {tr(page.name)}")
         is_last = self.page is self.train_page
         self.next_button.setText(tr("&Use it") if is_last else tr("&Next"))
-        self.next_button.setEnabled(self.page.may_leave and not model.is_busy and not (is_last and model.is_training))
+        self.next_button.setEnabled(self._may_go_on)
         self.back_button.setEnabled(self.page.step > 0 and not model.is_busy and not model.is_training)
         self.over_button.setEnabled(not model.is_busy and not model.is_training)
         self.close_button.setText(tr("&Close, go on training") if model.is_training else tr("&Close"))
@@ -234,7 +236,14 @@ class TeachingWindow(StepDialog):
             self.alerts.show_view(news.view)
             self.alerts.show_alerts(news.alerts)
 
+    @property
+    def _may_go_on(self) -> bool:
+        model = self.model
+        return self.page.may_leave and not model.is_busy and not (self.page is self.train_page and model.is_training)
+
     def _update_picture(self) -> None:
+        if self.page is self.train_page and self.next_button.isEnabled() is not self._may_go_on:
+            self._refresh()  # another model was chosen in the operator window, or this one again
         if not self.page.is_live:
             return
         frame = self._newest()

@@ -39,17 +39,19 @@ class BenchHand:
         self.events = 0
         self.refusal = ""
         self.used: list[str] = []
+        self.in_use = ""
         self._qtbot, self.feed = qtbot, feed
         self.model = TeachingModel(folder, "toy", feed, lambda: segment)
         self.model._watch.setInterval(10)
         self.asked: list[OperatorStep] = []
         driver = TeachingDriver(lambda _jog: None, lambda: None, self.asked.append, lambda: False)
-        self.window = TeachingWindow(self.model, feed, driver, self._use)
+        self.window = TeachingWindow(self.model, feed, driver, self._use, lambda name: name == self.in_use)
         qtbot.addWidget(self.window)
 
     def _use(self, name: str) -> str:
         if not self.refusal:
             self.used.append(name)
+            self.in_use = name
         return self.refusal
 
     def open(self) -> None:

@@ -138,11 +138,14 @@ def test_the_whole_way_to_a_model_in_use(open_hand: OpenHand, monkeypatch: pytes
     hand.refusal = "the program is armed"
     hand.click(window.next_button)
     assert window.message == "Not used: the program is armed"
-    assert not hand.model.view.is_used
     hand.refusal = ""
     hand.click(window.next_button)
     assert hand.used == [hand.model.view.model]
-    assert hand.model.view.is_used
+    assert "It is in use." in page.words.text()
+    assert not window.next_button.isEnabled()
+    hand.in_use = "default"
+    qtbot.waitUntil(window.next_button.isEnabled, timeout=LONG_MS)
+    assert "Use it puts it into force" in page.words.text()
     assert hand.events == 8, "one of them in vain"
 
 
