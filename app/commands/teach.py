@@ -60,6 +60,8 @@ _MOST_STEPS = 700
 """More steps learn the few frames by heart."""
 _LEAST_S = 45.0
 """A shorter training does not learn a bench."""
+_MOST_RESERVED = 0.4
+"""Of the time left, for writing and calibrating the model: where these take longer, they end later than asked for."""
 _FEW_STEPS = 80
 """Fewer steps than this are reported: the machine is too slow for the time given."""
 _EXAMPLES = 6
@@ -305,10 +307,11 @@ def _train(made: TeachingSet, out: Path, init: str, clock: _Clock) -> tuple[Teac
         prior = read_model_info(model_folder("default"))
     config = PerceptionConfig()
     calibration = BenchCalibration(network, prior, made.train, made.held_out, remembered[:_OTHERS], config)
-    reserved_s = calibration.count_s(begin, _EXPORT_PICTURES)
+    counted_s = calibration.count_s(begin, _EXPORT_PICTURES)
+    reserved_s = min(counted_s, _MOST_RESERVED * clock.left_s)
     left_s = clock.left_s - reserved_s
     if left_s < _LEAST_S:
-        needed = (clock.elapsed_s + reserved_s + _LEAST_S) / 60
+        needed = (clock.elapsed_s + min(counted_s + _LEAST_S, _LEAST_S / (1 - _MOST_RESERVED))) / 60
         left = f"{max(0.0, left_s):.0f} s would be left for the training"
         raise UserError(f"too short a time: {left}; give it {math.ceil(needed)} minutes or more")
     samples = _shown_as_often(made.train, remembered)

@@ -154,7 +154,7 @@ def test_an_interrupted_training_keeps_frames_and_network_and_goes_on(
         begin(task, samples, init, **more)
 
     def run_until_asked(self: trainer.Trainer, task: trainer.FrameTraining, plan: TrainingPlan) -> int:
-        assert plan.seconds is not None
+        assert plan.seconds is not None and plan.seconds > 60.0, "however long writing and calibrating would take"
         save_model(task.network, self.out, training={}, figures={})
         self.interrupt.asked = True
         return 3
@@ -162,7 +162,7 @@ def test_an_interrupted_training_keeps_frames_and_network_and_goes_on(
     monkeypatch.setattr(trainer.FrameTraining, "__init__", record)
     monkeypatch.setattr(trainer.Trainer, "run", run_until_asked)
     monkeypatch.setattr("app.commands.teach._twin_frames", lambda folder: folder)
-    monkeypatch.setattr("core.evaluation.bench_calibration.BenchCalibration.count_s", lambda *_: 1.0)
+    monkeypatch.setattr("core.evaluation.bench_calibration.BenchCalibration.count_s", lambda *_: 6000.0)
     out = tmp_path / "own"
     save_model(DualUNet(UNetShape((4, 4, 8, 8, 8), (4, 4, 4, 4), 1, 2)), out, training={"mine": True}, figures={})
     code, output, errors = _teach(place, out, "--frames", 10)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -79,6 +80,14 @@ def test_between_right_and_wrong_an_answer_is_right_by_a_share_but_in_the_figure
     shown = model._result(calibrating._Answers(scores, (), ()), None, None)
     assert (shown.answered, shown.right) == (6, 2)
     assert shown.calibration_error == pytest.approx(0.8 - 2 / 6), "right answers are 2 of 6, whatever is in between"
+
+
+def test_its_time_is_that_of_most_pictures_and_not_of_one_that_was_held_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    info = ModelInfo(name="drawn", shape={"fold": 1}, stride=16, weights_sha256="0" * 64, onnx_sha256="0" * 64)
+    model = calibrating.BenchCalibration(tmp_path, info, [], [toy_sample(tmp_path)], [], PerceptionConfig())
+    monkeypatch.setattr(calibrating, "open_pipeline", lambda *_, **_options: SimpleNamespace(perceive_single=lambda _frame: None))
+    monkeypatch.setattr(calibrating, "perf_counter", iter([0.0, 13.0, 14.0, 15.0, 16.0, 17.0]).__next__)
+    assert model.count_s("default", 80.0) == pytest.approx(80.0 + 6.0 + 0.12 * (model.count - 6))
 
 
 def test_answers_move_the_offset_first_and_the_weights_when_there_are_many() -> None:
