@@ -211,7 +211,7 @@ class EmptyPage(TeachingPage):
 
     name = mark("Empty bench")
     hint = mark(
-        "Draw the robot back until none of it is in the vessel: by hand, or hold Down with the servos on (F3); at the end of its "
+        "Draw the robot back until none of it is in the picture: by hand, or hold Down with the servos on (F3); at the end of its "
         "way let go, and hold it again. Take your hands out of the picture. From here on camera and phantom stay where they are."
     )
     step = TeachingStep.EMPTY

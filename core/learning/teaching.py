@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from core.bench.bench import Bench, read_bench, write_bench
+from core.bench.bench import BESIDE_PX, Bench, reachable, read_bench, write_bench
 from core.bench.difference import combined, disagreement, distance_to_empty, robot_by_difference, without_rim
 from core.bench.registration import lab_of, register
 from core.config.section import first_problem
@@ -73,8 +73,11 @@ _LEAST_AREA_PX = 120
 """Of a robot: 40 px of length, which its direction needs, 3 px wide."""
 _ENTRY_SHARE, _BORDER_PX = 0.6, 6
 """Where so many frames have the robot, all must have it: within this distance from the border it enters there."""
+_INNER = np.s_[_BORDER_PX:-_BORDER_PX, _BORDER_PX:-_BORDER_PX]
 _ENTRY_REACH_PX = 12
 """Distance from there within which a robot's mask must begin."""
+_WAY_PX, _WAY_RIM_PX = 15, 6
+"""Half the width of the robot's way from the picture's border, and by how much what is not known there begins before its end."""
 _LEAST_FOCUS = 0.3
 """Fine structure of a frame against the empty picture's."""
 _MOST_DOUBT = 0.6
@@ -365,11 +368,35 @@ def _entry_of(frames: Sequence[TeachingFrame]) -> Mask | None:
     """Where the robot's tail is: at the picture's border, or else somewhere where nearly all frames have the robot."""
     occupied = np.mean([_widened(frame.robot, 3) for frame in frames], axis=0)
     inner = np.zeros(occupied.shape, bool)
-    inner[_BORDER_PX:-_BORDER_PX, _BORDER_PX:-_BORDER_PX] = True
+    inner[_INNER] = True
     for place in ((occupied >= _ENTRY_SHARE) & ~inner, occupied >= _ENTRY_SHARE):
         if place.any():
             return _widened(place, _ENTRY_REACH_PX)
     return None
+
+
+def without_hidden_way(bench: Bench, frames: Sequence[TeachingFrame]) -> Bench:
+    """The bench, not known on the robot's way from the picture's border to where the frames begin to show it beside the vessel.
+
+    A robot that cannot be drawn out of the picture lies there in the empty picture, too, and never differs from it.
+    """
+    if bench.vessel is None or not frames:
+        return bench
+    apart = cv2.distanceTransform((~bench.vessel).view(np.uint8), cv2.DIST_L2, 5)
+    count, labels = cv2.connectedComponents((reachable(bench.vessel) & (apart > BESIDE_PX + 1)).view(np.uint8))
+    common = np.mean([_widened(frame.robot, 3) for frame in frames], axis=0) >= _ENTRY_SHARE
+    y, x = np.indices(common.shape, np.float32)
+    known = bench.known.copy()
+    for label in range(1, count):
+        way = labels == label
+        shown = common & way
+        if not shown.any() or shown[_INNER].sum() < shown.sum():
+            continue
+        nearest = np.argwhere(common & _widened(shown, 3 * _WAY_PX))[:, ::-1].astype(np.float32)
+        along_x, along_y, at_x, at_y = cv2.fitLine(nearest, cv2.DIST_L2, 0, 0.01, 0.01).ravel().tolist()
+        across = np.abs((x - at_x) * along_y - (y - at_y) * along_x)
+        known &= ~(way & (across <= _WAY_PX) & (apart > apart[shown].max() - _WAY_RIM_PX))
+    return replace(bench, known=known)
 
 
 def _width_px(mask: Mask) -> float:
@@ -470,12 +497,14 @@ def write_teaching_set(
 ) -> TeachingSet:
     """Write frames and bench as ``train --data`` reads them, rejected frames in a folder of their own; an older set is replaced.
 
-    A network that was trained on other frames is removed: it may have learnt from those that are held out now.
+    A network that was trained on other frames is removed: it may have learnt from those that are held out now. What the empty
+    picture may hide of the robot is not known of the bench that is written, and doubtful (``without_hidden_way``).
 
     Raises TeachingError: the folder is something else, or cannot be written.
     """
     if folder.exists() and not is_teaching_set(folder) and (not folder.is_dir() or any(folder.iterdir())):
         raise TeachingError(f"{folder}: exists and holds no frames of a bench; choose another --out")
+    bench = without_hidden_way(bench, chosen)
     try:
         if (folder / _NETWORK).exists() and not _is_split_as(folder, chosen):
             shutil.rmtree(folder / _NETWORK)
@@ -487,7 +516,8 @@ def write_teaching_set(
             for frame in frames:
                 stem = frame.picture.stem
                 write_png(place / "images" / f"{stem}.png", frame.picture.image)
-                for name, mask in (("vessel", frame.vessel), ("robot", frame.robot), ("doubtful", frame.doubtful)):
+                doubtful = frame.doubtful | (~bench.known & ~frame.robot)
+                for name, mask in (("vessel", frame.vessel), ("robot", frame.robot), ("doubtful", doubtful)):
                     write_mask(place / "masks" / f"{stem}_{name}.png", mask)
         write_bench(bench, folder / "bench")
         rows = [

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.bench.bench import Bench, bench_from_pictures
+from core.bench.bench import Bench, bench_from_pictures, read_bench
 from core.devices import UserError
 from core.evaluation.accuracy import dice
 from core.learning import teaching
@@ -311,3 +311,22 @@ def test_specks_are_left_out_and_not_trained_on(bench: Bench, frames: list[Teach
     frame = propose(replace(frames[6].picture, image=image), bench)
     assert not frame.robot[branch[1], branch[0]]
     assert dice(frame.robot, frames[6].robot) > 0.98
+
+
+@pytest.mark.parametrize("begins_px", [0, 40])
+def test_what_the_empty_picture_may_hide_of_a_robot_that_is_not_drawn_out_of_it_is_not_learnt_as_bench(
+    begins_px: int, bench: Bench, frames: list[TeachingFrame], tmp_path: Path
+) -> None:
+    x = np.arange(SIZE[0])
+    end = cv2.circle(np.zeros(SIZE[::-1], np.uint8), (100, 120), 13, 1, -1) > 0
+    ported = replace(bench, vessel=toy_vessel() & (x >= 100) | end)
+    shown = [replace(frame, robot=frame.robot & (x >= begins_px)) for frame in frames]
+    made = write_teaching_set(tmp_path / "set", ported, choose(shown, 12), [], 16)
+    hidden = ~read_bench(made.bench).known
+    doubtful = made.train[0].load_doubtful(SIZE[::-1])
+    if not begins_px:
+        assert not hidden.any()
+        return
+    assert (hidden & toy_robot(0, 0.5))[:, :35].sum() > 0.95 * toy_robot(0, 0.5)[:, :35].sum()
+    assert (doubtful & hidden)[:, :35].sum() == hidden[:, :35].sum()
+    assert not hidden[:, 50:].any() and not hidden[:95].any() and not hidden[145:].any()
