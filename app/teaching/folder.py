@@ -63,7 +63,10 @@ _CHECK_FROM, _CHECK_WITH = 5, 12
 """Frames, at least and at most, with which another one is compared before it is taken."""
 _THUMB_WIDTH_PX = 152
 _STATE, _BENCH, _VESSEL, _SET = "teaching.json", "bench", "vessel.png", "set"
-_OURS = ("empty", "places", "frames", "corrected")
+_MASKS = "masks"
+_PLANES = "vessel", "robot", "doubtful", "differs"
+"""Masks of a frame, bits of one picture in the folder ``masks``: they need not be made again while the bench is the same."""
+_OURS = ("empty", "places", "frames", "corrected", _MASKS)
 
 
 class TeachingStep(IntEnum):
@@ -282,12 +285,40 @@ class TeachingFolder:
         """A frame from its files, with its mask by difference or as it was corrected."""
         assert self._bench is not None
         picture = TeachingPicture(stem, stem, read_image(self.folder / "frames" / f"{stem}.png"))
-        frame = teaching.propose(picture, self._bench)
+        frame = self._proposed(picture)
         corrected = self.folder / "corrected" / f"{stem}.png"
         is_corrected = corrected.is_file()
         if is_corrected:
             frame = _with_robot(frame, read_mask(corrected))
         return TakenFrame(frame, kind, thumb_of(frame), is_left_out, is_corrected)
+
+    def _proposed(self, picture: TeachingPicture) -> TeachingFrame:
+        """The frame with its masks by difference: those that were kept, or new ones, which are kept if usable."""
+        assert self._bench is not None
+        with contextlib.suppress(UserError):  # not kept, or damaged
+            bits = read_image(self.folder / _MASKS / f"{picture.stem}.png")[..., 0]
+            if bits.shape == self._bench.known.shape:
+                vessel, robot, doubtful, differs = (np.asarray(bits >> place & 1 > 0) for place in range(len(_PLANES)))
+                return TeachingFrame(picture, vessel, robot, doubtful, differs=differs)
+        frame = teaching.propose(picture, self._bench)
+        if not frame.reason:
+            self._keep_masks(frame)
+        return frame
+
+    def _keep_masks(self, frame: TeachingFrame) -> None:
+        planes = [getattr(frame, name).astype(np.uint8) << place for place, name in enumerate(_PLANES)]
+        self._write(_MASKS, frame.picture.stem, png(np.bitwise_or.reduce(planes)))
+
+    def _change_bench(self, bench: Bench) -> None:
+        """Write another bench, for which no mask was made."""
+        self._make_folder()
+        if (self.folder / _MASKS).is_dir():
+            try:
+                shutil.rmtree(self.folder / _MASKS)
+            except OSError as error:
+                raise _not_written(self.folder / _MASKS, error) from None
+        write_bench(bench, self.folder / _BENCH)
+        self._bench = bench
 
     def start_over(self) -> None:
         """Remove all that was taken. A model that was trained stays."""
@@ -376,9 +407,7 @@ class TeachingFolder:
         before = self._bench
         if before is not None and before.vessel is not None and before.vessel.shape == bench.known.shape:
             bench = with_vessel(bench, before.vessel)
-        self._make_folder()
-        write_bench(bench, self.folder / _BENCH)
-        self._bench = bench
+        self._change_bench(bench)
         if self._drawn is not None and self._drawn.shape != bench.known.shape:
             self._drawn = None
         self._keep(computed=is_computed, robot_like=(), model="")
@@ -405,9 +434,7 @@ class TeachingFolder:
         """The vessel as it was drawn, (h, w). Raises BenchError where it cannot be one."""
         assert self._bench is not None
         if self._bench.vessel is None or not np.array_equal(self._bench.vessel, vessel):
-            bench = with_vessel(self._bench, vessel)
-            write_bench(bench, self.folder / _BENCH)
-            self._bench = bench
+            self._change_bench(with_vessel(self._bench, vessel))
             self._keep(model="")
             self._propose_again()
         self._drawn = None
@@ -433,7 +460,7 @@ class TeachingFolder:
             return
         for place, taken in enumerate(self._frames):
             self._on_frame(place, len(self._frames))
-            frame = teaching.propose(taken.frame.picture, bench)
+            frame = self._proposed(taken.frame.picture)
             if taken.is_corrected:
                 frame = _with_robot(frame, taken.frame.robot)
             self._frames[place] = replace(taken, frame=frame, thumb=thumb_of(frame))
@@ -472,6 +499,7 @@ class TeachingFolder:
             if reason:
                 return TakenLook(LookKind.REJECTED, reason)
         self._write("frames", stem, png(image))
+        self._keep_masks(frame)
         self._frames.append(TakenFrame(frame, kind, thumb_of(frame)))
         self._blurred.append(_blurred(frame.robot))
         coverage.add(frame.robot)
