@@ -4871,8 +4871,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
-        <source>Draw the robot back until none of it is in the vessel: by hand, or hold Down with the servos on (F3); at the end of its way let go, and hold it again. Take your hands out of the picture. From here on camera and phantom stay where they are.</source>
-        <translation>把机器人退回,直到血管内完全看不到它:用手,或在舵机通电后(F3)按住向下键;到达行程末端时松开,再按住。把手移出画面。从此时起相机和模型保持不动。</translation>
+        <source>Draw the robot back until none of it is in the picture: by hand, or hold Down with the servos on (F3); at the end of its way let go, and hold it again. Take your hands out of the picture. From here on camera and phantom stay where they are.</source>
+        <translation>将机器人退回，直到图像中完全看不到它：用手，或在舵机开启时 (F3) 按住 Down 键；到行程终点时松开，再次按住。请将双手移出画面。从此刻起相机和体模不要移动。</translation>
     </message>
     <message>
         <location filename="../../app/teaching/pages.py"/>
