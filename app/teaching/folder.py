@@ -38,7 +38,7 @@ WANTED = 24
 ENOUGH_FRAMES, ENOUGH_BENDS = 16, 4
 """With so many frames, and so many of them that show a bend at a place where the robot had been, nothing more is asked for."""
 MOST_FRAMES, _MOST_LIKE = 120, 40
-"""More frames are not taken; from the second number on only those that show a new place. The most diverse are learnt from."""
+"""More frames are not taken; from the second number on, with enough bends, only new places. The most diverse are learnt from."""
 PLACES = 3
 """Places of the robot from which an empty picture is computed."""
 _NEW_CELLS = 2
@@ -512,7 +512,8 @@ class TeachingFolder:
         assert coverage is not None
         if not self._frames or coverage.new_cells(robot) >= _NEW_CELLS:
             return LookKind.PLACE
-        if len(self._frames) >= _MOST_LIKE:
+        bends = sum(taken.kind is LookKind.BEND and taken.is_used for taken in self._frames)
+        if len(self._frames) >= _MOST_LIKE and bends >= ENOUGH_BENDS:
             return LookKind.SEEN
         cells, area = coverage.cells_under(robot), int(robot.sum())
         others = [taken.frame.robot for taken in self._frames]

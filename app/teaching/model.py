@@ -16,9 +16,9 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.teaching.folder import ENOUGH_BENDS, LookKind, TakenLook, TeachingFolder, TeachingStep, TeachingView
 from app.training.model import TrainingPhase, TrainingState, free_name, name_problem, with_record
-from app.ui.i18n import tr, tr_text
+from app.ui.i18n import mark, tr, tr_text
 from app.ui.texts import sentence
-from app.ui.workers import ChildProcess, Worker, command_of
+from app.ui.workers import ChildProcess, QueuedCallback, Worker, command_of
 from core.config.calibration import CalibrationConfig
 from core.learning.teaching import Segment
 from core.perception.model_file import BENCH, own_models
@@ -38,6 +38,7 @@ _TIME_EVERY_MS = 2000
 _END_WITHIN_MS = 5000
 _INTERRUPTED = 130
 """Exit code of ``teach`` that was stopped."""
+_STOPPED = mark("Stopped. Frames and what was learnt are kept: Train goes on from there")
 
 NewestFrame = Callable[[], Frame | None]
 """The newest frame of the live picture; None where it is not live."""
@@ -109,7 +110,6 @@ class TeachingModel(QObject):
     looked = Signal(object)
     proposed = Signal(object)
     trained = Signal(str)
-    _counted = Signal(int, int)
 
     def __init__(
         self,
@@ -122,7 +122,14 @@ class TeachingModel(QObject):
     ) -> None:
         super().__init__(parent)
         self.rig, self._newest, self._known = rig, newest, known
-        self._folder = TeachingFolder(folder, rig, segment, self._on_frame)
+        callback, dropped = QueuedCallback(self), threading.Event()
+
+        def on_frame(done: int, count: int) -> bool:
+            callback.send(lambda it: it._on_counted(done, count))
+            return not dropped.is_set()
+
+        self._is_dropped = dropped
+        self._folder = TeachingFolder(folder, rig, segment, on_frame)
         self.view = TeachingView()
         self.busy = self._what = ""
         """The job that the window waits for, in words."""
@@ -140,7 +147,6 @@ class TeachingModel(QObject):
         self._child: ChildProcess | None = None
         self._name = ""
         self._is_stopping = False
-        self._is_dropped = threading.Event()
         self._began_s = self._given_s = 0.0
         self._poll = QTimer(self, interval=_POLL_MS)
         self._poll.timeout.connect(self._collect)
@@ -151,7 +157,6 @@ class TeachingModel(QObject):
         self._work = Worker("teaching", self, behind=True)
         self._work.done.connect(self._on_done)
         self._work.failed.connect(self._on_failed)
-        self._counted.connect(self._on_counted)
 
     # ---- jobs
 
@@ -213,11 +218,6 @@ class TeachingModel(QObject):
             self.changed.emit()
         self._work.submit(self._count, lambda: (job(), self._folder.view()))
 
-    def _on_frame(self, done: int, count: int) -> bool:
-        """From the thread: so many frames of a job are done; whether to go on."""
-        self._counted.emit(done, count)
-        return not self._is_dropped.is_set()
-
     def _on_counted(self, done: int, count: int) -> None:
         if self.is_busy:
             self.busy = tr("{what}: {done} of {count}", what=self._what, done=done, count=count)
@@ -244,14 +244,17 @@ class TeachingModel(QObject):
         return then
 
     def _on_failed(self, key: object, line: str) -> None:
+        is_stopped = False
         if key == "look":
             self._is_looking = False
             self._watch.stop()  # a full disk is not reported eight times a second
         else:
             self._ended_job(key)
-            if self.training.phase is TrainingPhase.PREPARING and key == self._busy_job:
-                self.training = TrainingState(TrainingPhase.FAILED, tr("Not started: {why}", why=tr_text(line)), self._name)
-        self.said.emit(tr_text(line), True)
+            if self.training.phase in (TrainingPhase.PREPARING, TrainingPhase.STOPPING) and key == self._busy_job:
+                is_stopped = self._is_dropped.is_set()
+                why = tr(_STOPPED) if is_stopped else tr("Not started: {why}", why=tr_text(line))
+                self.training = TrainingState(TrainingPhase.FAILED, why, self._name)
+        self.said.emit(tr_text(line), not is_stopped)
         self.changed.emit()
 
     # ---- the live picture
@@ -290,7 +293,9 @@ class TeachingModel(QObject):
         elif self._waited_ms >= _SILENT_MS:
             self._poll.stop()
             self.busy = ""
-            self.said.emit(tr("The picture is not live: check the camera, or start the rig again (F5)"), True)
+            self.said.emit(
+                tr("The picture is not live: check the camera, or start the rig again (F5 in the operator window)"), True
+            )
             self.changed.emit()
 
     def watch(self, on: bool) -> None:
@@ -329,6 +334,9 @@ class TeachingModel(QObject):
         self._run(tr("writing the frames"), self._folder.teaching_set, start)
 
     def _start_training(self, minutes: int, folder: object) -> None:
+        if self._is_dropped.is_set():  # stopped when the last frame was written
+            self._show(TrainingState(TrainingPhase.FAILED, tr(_STOPPED), self._name))
+            return
         out = own_models() / self._name
         options = ("--out", str(out), "--minutes", str(minutes), "--json", "--progress-json")
         child = ChildProcess(command_of("teach", str(folder), *options), self)
@@ -352,10 +360,11 @@ class TeachingModel(QObject):
     def stop_training(self) -> None:
         """End it soon; frames and what was learnt are kept, and it can go on later."""
         self._is_dropped.set()
-        if self._child is not None and self.training.phase is TrainingPhase.RUNNING:
-            self._is_stopping = True
+        if self.training.phase in (TrainingPhase.PREPARING, TrainingPhase.RUNNING):
             self._show(replace(self.training, phase=TrainingPhase.STOPPING, line=tr("Stopping; what was learnt is kept")))
-            self._child.ask_to_end()
+            if self._child is not None:
+                self._is_stopping = True
+                self._child.ask_to_end()
 
     def _show(self, state: TrainingState) -> None:
         self.training = state
@@ -365,7 +374,7 @@ class TeachingModel(QObject):
         if (result := taught_result(record)) is not None:
             self.result = result
         elif (state := with_record(self.training, record)) is not None:
-            self._show(replace(state, line=tr("Learns the bench")))
+            self._show(replace(state, line=tr("Learns the bench") if state.phase is TrainingPhase.RUNNING else state.line))
         elif record.get("what") == "calibration" and self.training.phase is TrainingPhase.RUNNING:
             self._show(replace(self.training, line=tr("Has learnt; is judged on the frames that are held out")))
 
@@ -377,8 +386,7 @@ class TeachingModel(QObject):
             self._run("", partial(self._keep_model, self._name), self._on_kept, quiet=True)
             self.trained.emit(self._name)
         elif code == _INTERRUPTED or self._is_stopping:
-            why = tr("Stopped. Frames and what was learnt are kept: Train goes on from there")
-            self._show(replace(self.training, phase=TrainingPhase.FAILED, line=why, left_s=None))
+            self._show(replace(self.training, phase=TrainingPhase.FAILED, line=tr(_STOPPED), left_s=None))
         else:
             signalled = tr("it was ended by signal {number}", number=-code)
             why = tr_text(line) or (signalled if code < 0 else tr("exit code {code}", code=code))

@@ -230,8 +230,8 @@ class TeachingWindow(StepDialog):
     def show_news(self, news: DriveNews) -> None:
         """Show over the live picture who moves the robot, and why it does not move, or was stopped."""
         if self.isVisible():
-            step, who = next_step(news.view).step, who_drives(news.view)
-            key = f" ({step.value.key})" if step in _ASKED else ""
+            following, who = next_step(news.view), who_drives(news.view)
+            key = f" ({following.step.value.key})" if following.granted and following.step in _ASKED else ""
             self.picture.show_caption(tr("Live: {who}{key}", who=who, key=key))
             self.alerts.show_view(news.view)
             self.alerts.show_alerts(news.alerts)
@@ -248,7 +248,9 @@ class TeachingWindow(StepDialog):
             return
         frame = self._newest()
         if frame is None:
-            self.picture.show_text(tr("No live picture of this bench: choose it in the menu Rig or Twin, or start the rig (F5)"))
+            self.picture.show_text(
+                tr("No live picture of this bench: choose it in the menu Rig or Twin, or start the rig (F5 in the operator window)")
+            )
         elif frame.index != self._shown_index:
             self._shown_index = frame.index
             self.picture.show_image(frame.image)

@@ -4661,6 +4661,11 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
+        <source>Stopped. Frames and what was learnt are kept: Train goes on from there</source>
+        <translation>已停止。各帧和已学内容均保留：“训练”从此处继续</translation>
+    </message>
+    <message>
+        <location filename="../../app/teaching/model.py"/>
         <source>The robot does not move</source>
         <translation>机器人没有移动</translation>
     </message>
@@ -4761,11 +4766,6 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
-        <source>Stopped. Frames and what was learnt are kept: Train goes on from there</source>
-        <translation>已停止。各帧和已学内容均保留：“训练”从此处继续</translation>
-    </message>
-    <message>
-        <location filename="../../app/teaching/model.py"/>
         <source>it was ended by signal {number}</source>
         <translation>被信号 {number} 终止</translation>
     </message>
@@ -4781,8 +4781,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
-        <source>The picture is not live: check the camera, or start the rig again (F5)</source>
-        <translation>图像不是实时的：请检查相机，或重新启动装置 (F5)</translation>
+        <source>The picture is not live: check the camera, or start the rig again (F5 in the operator window)</source>
+        <translation>图像不是实时的：请检查相机，或重新启动装置（操作窗口中按 F5）</translation>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
@@ -4791,13 +4791,13 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
-        <source>Learns the bench</source>
-        <translation>正在学习台架</translation>
+        <source>Training failed: {why}</source>
+        <translation>训练失败：{why}</translation>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
-        <source>Training failed: {why}</source>
-        <translation>训练失败：{why}</translation>
+        <source>Learns the bench</source>
+        <translation>正在学习台架</translation>
     </message>
     <message>
         <location filename="../../app/teaching/model.py"/>
@@ -5271,8 +5271,8 @@ Best close the program and start it again. Space is still STOP.</source>
     </message>
     <message>
         <location filename="../../app/teaching/window.py"/>
-        <source>No live picture of this bench: choose it in the menu Rig or Twin, or start the rig (F5)</source>
-        <translation>没有此台架的实时图像：请在“装置”或“数字孪生”菜单中选择它，或启动装置 (F5)</translation>
+        <source>No live picture of this bench: choose it in the menu Rig or Twin, or start the rig (F5 in the operator window)</source>
+        <translation>没有此台架的实时图像：请在“装置”或“数字孪生”菜单中选择它，或启动装置（操作窗口中按 F5）</translation>
     </message>
     <message>
         <location filename="../../app/training/dialog.py"/>

@@ -382,6 +382,22 @@ def test_a_training_is_stopped_and_goes_on_while_the_window_is_closed(
     assert hand.model.training.line.startswith("Stopped")
 
 
+def test_stop_while_the_frames_are_written_starts_no_training(
+    open_hand: OpenHand, driven: Path, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    """Also after the last frame, when the report that all is written waits for the window."""
+    stands_for_teach(monkeypatch, "import time; time.sleep(60)")
+    hand = open_hand(driven, TeachingStep.TRAIN)
+    for writes in (hand.model._folder.teaching_set, lambda: driven):
+        monkeypatch.setattr(hand.model._folder, "teaching_set", writes)
+        hand.model.train("mine", 5)
+        hand.model.stop_training()
+        assert hand.model.training.phase is TrainingPhase.STOPPING
+        qtbot.waitUntil(lambda: not hand.model.is_training, timeout=LONG_MS)
+        assert hand.model.training.phase is TrainingPhase.FAILED and hand.model.training.line.startswith("Stopped")
+        assert hand.model._child is None
+
+
 # ---- input events
 
 
