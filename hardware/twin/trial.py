@@ -260,7 +260,9 @@ class Trial:
 
     def _watch_direction(self, scene: Scene) -> None:
         """Count when the robot seems to go the other way, which would end autonomy: it is wired right, so each is a false alarm."""
-        head = head_seen(scene, self._plan.config.policy.pursuit.pixels_per_mm)
+        config, pose = self._plan.config, scene.pose
+        is_sure = pose is not None and pose.confidence >= config.safety.min_confidence  # as for the pilot
+        head = head_seen(scene, config.policy.pursuit.pixels_per_mm) if is_sure else None
         self._direction = self._direction.observe(head) if head is not None else self._direction
         before, self._wrong_way = self._wrong_way, bool(self._direction.faults())
         self._log.direction_alarms += self._wrong_way and not before

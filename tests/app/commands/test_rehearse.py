@@ -27,7 +27,7 @@ TARGET = "430,400"
 """In the tree's lowest branch."""
 
 
-SEEN = SeenHeads(np.zeros((4, 2)), np.array([(0.1, 0.0), (0.0, 0.1), (np.nan, np.nan), (0.0, 0.0)]), np.ones(4))
+SEEN = SeenHeads(np.arange(8.0).reshape(4, 2), np.array([(0.1, 0.0), (0.0, 0.1), (np.nan, np.nan), (0.0, 0.0)]), np.ones(4))
 
 
 @pytest.fixture(autouse=True)
