@@ -205,9 +205,9 @@ def _against_arming(state: SupervisorState, now_s: float, safety: SafetyConfig) 
         reasons.append(Hindrance.ALREADY_ARMED)
     if state.latched is not None:
         reasons.append(Hindrance.UNACKNOWLEDGED)
-    active = [fault.cause for fault in state.active if fault.holds]
-    reasons += active
-    areas = {cause.area for cause in active}
+    active = [fault for fault in state.active if fault.holds]
+    reasons += _reasons(state, active)
+    areas = {fault.cause.area for fault in active}
     if Area.CAMERA not in areas and now_s - state.camera_unwell_s < safety.healthy_s:
         reasons.append(Hindrance.CAMERA_SETTLING)
     if Area.PERCEPTION not in areas and now_s - state.perception_unwell_s < safety.healthy_s:
@@ -215,6 +215,12 @@ def _against_arming(state: SupervisorState, now_s: float, safety: SafetyConfig) 
     if state.health.servo_problems is None:
         reasons.append(Hindrance.SERVOS_UNCHECKED)
     return (*reasons, *state.against_program)
+
+
+def _reasons(state: SupervisorState, active: Collection[Fault]) -> list[Hindrance | Cause]:
+    """The active faults as reasons against a request; a pose is not lost, but waited for, before perception said anything."""
+    is_first = state.health.frames.newest is None
+    return [Hindrance.PERCEPTION_SETTLING if is_first and one.cause is Cause.POSE_LOST else one.cause for one in active]
 
 
 def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfig) -> tuple[Hindrance | Cause, ...]:
@@ -227,7 +233,7 @@ def _against_hand_over(state: SupervisorState, now_s: float, safety: SafetyConfi
         reasons.append(Hindrance.ALREADY_AUTONOMOUS)
     if state.health.servo_problems is None:
         reasons.append(Hindrance.SERVOS_UNCHECKED)
-    reasons += [fault.cause for fault in state.active if fault.holds and fault.cause.area is not Area.OPERATOR]
+    reasons += _reasons(state, [fault for fault in state.active if fault.holds and fault.cause.area is not Area.OPERATOR])
     if state.health.frames.route is RouteState.NONE:
         reasons.append(Hindrance.NO_TARGET)
     if state.health.frames.route is RouteState.BEHIND:

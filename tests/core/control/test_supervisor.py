@@ -384,6 +384,15 @@ def test_a_refusal_to_arm_names_all_reasons_at_once() -> None:
     assert decision.mode is V
 
 
+def test_before_the_first_result_of_perception_a_pose_is_waited_for_and_not_lost() -> None:
+    bench = Bench()
+    bench.raw([FrameArrived(0.0)], 0.0)
+    reasons = hindrances(bench.state, 0.0, SAFETY)
+    assert all(Hindrance.PERCEPTION_SETTLING in those and Cause.POSE_LOST not in those for those in reasons)
+    bench.raw([FrameReport(0, 0.0, refusal=Reason.NO_ROBOT)], 0.0625)
+    assert all(Cause.POSE_LOST in those for those in hindrances(bench.state, 0.0625, SAFETY))
+
+
 def test_arming_needs_a_whole_second_of_healthy_camera_and_perception() -> None:
     bench = Bench()
     bench.tick(ModelReport(True), ServoCheckReport())
