@@ -65,7 +65,7 @@ _THUMB_WIDTH_PX = 152
 _STATE, _BENCH, _VESSEL, _SET = "teaching.json", "bench", "vessel.png", "set"
 _MASKS = "masks"
 _PLANES = "vessel", "robot", "doubtful", "differs"
-"""Masks of a frame, bits of one picture in the folder ``masks``: they need not be made again while the bench is the same."""
+"""Masks of a frame, bits of one picture in ``masks/METHOD``: they need not be made again while bench and method are the same."""
 _OURS = ("empty", "places", "frames", "corrected", _MASKS)
 
 
@@ -296,7 +296,7 @@ class TeachingFolder:
         """The frame with its masks by difference: those that were kept, or new ones, which are kept if usable."""
         assert self._bench is not None
         with contextlib.suppress(UserError):  # not kept, or damaged
-            bits = read_image(self.folder / _MASKS / f"{picture.stem}.png")[..., 0]
+            bits = read_image(self.folder / _masks() / f"{picture.stem}.png")[..., 0]
             if bits.shape == self._bench.known.shape:
                 vessel, robot, doubtful, differs = (np.asarray(bits >> place & 1 > 0) for place in range(len(_PLANES)))
                 return TeachingFrame(picture, vessel, robot, doubtful, differs=differs)
@@ -307,7 +307,7 @@ class TeachingFolder:
 
     def _keep_masks(self, frame: TeachingFrame) -> None:
         planes = [getattr(frame, name).astype(np.uint8) << place for place, name in enumerate(_PLANES)]
-        self._write(_MASKS, frame.picture.stem, png(np.bitwise_or.reduce(planes)))
+        self._write(_masks(), frame.picture.stem, png(np.bitwise_or.reduce(planes)))
 
     def _change_bench(self, bench: Bench) -> None:
         """Write another bench, for which no mask was made."""
@@ -658,6 +658,10 @@ class TeachingFolder:
         except OSError as error:
             raise _not_written(self.folder / _STATE, error) from None
         self._record = record
+
+
+def _masks() -> str:
+    return f"{_MASKS}/{teaching.METHOD}"
 
 
 def _not_written(path: Path, error: OSError) -> BenchError:

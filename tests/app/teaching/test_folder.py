@@ -184,20 +184,23 @@ def test_everything_is_there_again_after_the_window_was_closed(work: TeachingFol
     assert again.share == pytest.approx(work.view().share)
 
 
-def test_masks_are_made_again_only_for_another_bench_or_where_they_are_damaged(
+def test_masks_are_made_again_only_for_another_bench_or_method_or_where_they_are_damaged(
     work: TeachingFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive(work)
     before, made, propose = work.view().frames, list[str](), teaching.propose
     monkeypatch.setattr(teaching, "propose", lambda picture, *more: made.append(picture.stem) or propose(picture, *more))
-    (tmp_path / "teaching" / "masks" / "0001.png").write_bytes(b"no picture")
+    (tmp_path / "teaching" / "masks" / "1" / "0001.png").write_bytes(b"no picture")
     work = reopened(work, tmp_path)
     assert made == ["0001"]
     for taken, again in zip(before, work.view().frames, strict=True):
         for name in ("vessel", "robot", "doubtful", "differs"):
             assert np.array_equal(getattr(taken.frame, name), getattr(again.frame, name))
+    monkeypatch.setattr(teaching, "METHOD", 2)
+    work = reopened(work, tmp_path)
+    assert len(made) == 1 + len(before), "made by another method"
     work.add_empty(empties(seed=80))
-    assert len(made) == 1 + len(before)
+    assert len(made) == 1 + 2 * len(before)
 
 
 def test_a_robot_that_is_seen_in_the_empty_picture_is_still_pointed_out_in_the_next_run(tmp_path: Path) -> None:
