@@ -139,8 +139,10 @@ class TeachingWindow(StepDialog):
         event.accept()  # QDialog's own asks reject() first, and stays open
 
     def reject(self) -> None:
-        """Escape drops what is being drawn, and else closes the window."""
-        if not self.page.cancel():
+        """Escape leaves the question, drops what is being drawn, and else closes the window."""
+        if self.question.text:
+            self.question.cancel()
+        elif not self.page.cancel():
             self.close()
 
     def _leave(self) -> None:
@@ -173,6 +175,7 @@ class TeachingWindow(StepDialog):
 
     def _enter(self, page: TeachingPage) -> None:
         self.page = page
+        self.question.cancel()
         self.stack.setCurrentWidget(page)
         self.right.setCurrentWidget(page.right)
         self.say("")
