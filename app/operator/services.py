@@ -158,6 +158,7 @@ class WindowServices(QObject):
             self.training.end()
         if self.teaching is not None:
             self.teaching.end()
+            self.teaching.model.wait()
 
     # ---- sessions
 

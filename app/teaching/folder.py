@@ -218,7 +218,8 @@ class TeachingFolder:
     folder : made when the first picture is taken.
     name : what the bench is called.
     segment : the network that proposes a vessel, and points out a robot in the empty picture; called when it is first needed.
-    on_frame : gets how many of how many frames are done in a job that takes long, and says whether to go on writing a set.
+    on_frame : gets how many of how many frames are done in a job that takes long, and says whether to go on reading frames,
+        or writing a set.
     """
 
     def __init__(
@@ -275,7 +276,7 @@ class TeachingFolder:
                 self._drawn = drawn if drawn.shape == bench.known.shape else None
         if has_vessel:
             for done, row in enumerate(record.frames):
-                self._on_frame(done, len(record.frames))
+                self._go_on(done, len(record.frames))
                 with contextlib.suppress(UserError):  # a picture that was removed or is damaged: the others are kept
                     self._frames.append(self._taken(row.stem, row.kind, row.left_out))
             self._recount()
@@ -564,18 +565,17 @@ class TeachingFolder:
         corrected = {taken.stem for taken in self._frames if taken.is_corrected}
         chosen = teaching.choose(frames, WANTED)
         completed: list[TeachingFrame] = []
-
-        def go_on() -> None:
-            if not self._on_frame(len(completed), len(chosen)):
-                raise teaching.TeachingError("stopped before the training began; the frames are kept")
-
         for one in chosen:
-            go_on()
+            self._go_on(len(completed), len(chosen))
             completed.append(one if one.picture.stem in corrected else self._completed(one))
         chosen = [was if one.reason else now for was, now, one in zip(chosen, completed, self._checked(completed), strict=True)]
         teaching.write_teaching_set(self.folder / _SET, self._bench, chosen, [one for one in frames if one.reason], len(frames))
-        go_on()
+        self._go_on(len(chosen), len(chosen))
         return self.folder / _SET
+
+    def _go_on(self, done: int, count: int) -> None:
+        if not self._on_frame(done, count):
+            raise teaching.TeachingError("stopped before the training began; the frames are kept")
 
     def _completed(self, frame: TeachingFrame) -> TeachingFrame:
         """The frame with what the network adds to its mask; while the robot moves there is no time for that."""

@@ -213,6 +213,7 @@ class TeachingModel(QObject):
         self._count += 1
         self._then[self._count] = then
         if not quiet:
+            self._is_dropped.clear()
             self.busy = self._what = what
             self._busy_job = self._count
             self.changed.emit()
@@ -329,7 +330,6 @@ class TeachingModel(QObject):
             return
         self._name, self.result = name, None
         self.training = TrainingState(TrainingPhase.PREPARING, tr("Writing the frames"), name)
-        self._is_dropped.clear()
         start = partial(self._start_training, minutes)
         self._run(tr("writing the frames"), self._folder.teaching_set, start)
 
@@ -403,7 +403,11 @@ class TeachingModel(QObject):
     # ---- the end
 
     def close(self) -> None:
-        """The program ends; a running training ends by itself and keeps what it learnt."""
+        """End it beside the window: reading stops, writing does not, and then others may have the folder.
+
+        A running training ends by itself and keeps what it learnt.
+        """
+        self._run("", self._folder.release, quiet=True)
         self._is_closed = True
         self._is_dropped.set()
         self._poll.stop()
@@ -413,8 +417,10 @@ class TeachingModel(QObject):
             self._child.leave()
             self._child.ask_to_end()
         self._work.stop(finish=True)
-        if self._work.wait(_END_WITHIN_MS):
-            self._folder.release()
+
+    def wait(self) -> bool:
+        """Whether all is written once it is closed, for the end of the program."""
+        return self._work.wait(_END_WITHIN_MS)
 
 
 def look_line(look: TakenLook, view: TeachingView) -> str:

@@ -90,3 +90,4 @@ class BenchHand:
 
     def end(self) -> None:
         self.window.end()
+        assert self.model.wait()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -175,6 +176,11 @@ def test_back_and_on_lose_nothing_and_starting_over_is_asked_first(open_hand: Op
         hand.click(button)
         assert window.page is page
     assert len(hand.model.view.frames) == count
+    for _ in range(2):
+        hand.click(window.over_button)
+        QTest.keyClick(window.question._no, Qt.Key.Key_Escape)
+        assert window.isVisible()
+        assert not window.question.text
     hand.click(window.over_button)
     assert window.question.text == "Forget pictures, vessel and frames of this bench?"
     window.question._yes.click()
@@ -195,6 +201,21 @@ def test_another_program_that_has_the_folder_is_named_and_nothing_is_lost(open_h
     hand.end()
     other.open()
     assert len(other.model.view.frames) == count
+
+
+def test_a_bench_that_is_left_while_its_frames_are_read_is_left_at_once_and_keeps_them(
+    open_hand: OpenHand, driven: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hand = open_hand(driven)
+    count, folder, may_go_on, read = len(hand.model.view.frames), hand.model._folder, threading.Event(), list[str]()
+    taken = folder._taken
+    monkeypatch.setattr(folder, "_taken", lambda stem, *more: (may_go_on.wait() and read.append(stem)) or taken(stem, *more))
+    hand.model.load()
+    hand.window.end()
+    may_go_on.set()
+    assert hand.model.wait()
+    assert len(read) <= 1
+    assert len(open_hand().model.view.frames) == count
 
 
 # ---- the pages
