@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,6 +86,8 @@ class WindowServices(QObject):
         )
         self.training: TrainingDialog | None = None
         self.teaching: TeachingWindow | None = None
+        self._left: list[Callable[[], bool]] = []
+        """Of teachings of other benches: what waits until all is written."""
         self._taught = ""
         self._unfamiliar_s = 0
         self._was_offered: set[str] = set()
@@ -158,7 +161,9 @@ class WindowServices(QObject):
             self.training.end()
         if self.teaching is not None:
             self.teaching.end()
-            self.teaching.model.wait()
+            self._left.append(self.teaching.model.wait)
+        for wait in self._left:
+            wait()
 
     # ---- sessions
 
@@ -267,6 +272,7 @@ class WindowServices(QObject):
                 self.teaching.say(tr("Another bench is in use; this one is being trained: wait for it, or stop it"), is_fault=True)
                 return
             self.teaching.end()
+            self._left.append(self.teaching.model.wait)
             self.teaching.deleteLater()
             self.teaching = None
         if self.teaching is None:

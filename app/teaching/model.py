@@ -207,8 +207,14 @@ class TeachingModel(QObject):
     def _run(
         self, what: str, job: Callable[[], object], then: Callable[[object], None] | None = None, *, quiet: bool = False
     ) -> None:
-        """Do a job in the thread, then show what there is. While another one runs it is ignored, but a `quiet` one waits."""
+        """Do a job in the thread, then show what there is. While another one runs it is ignored, but a `quiet` one waits.
+
+        Where what was taken before could not be read, that is tried again instead: a new record would replace it.
+        """
         if self._is_closed or (self.is_busy and not quiet):
+            return
+        if not (self.is_loaded or quiet or then == self._on_loaded):
+            self.load()
             return
         self._count += 1
         self._then[self._count] = then

@@ -203,6 +203,14 @@ def test_another_program_that_has_the_folder_is_named_and_nothing_is_lost(open_h
     assert len(other.model.view.frames) == count
 
 
+def test_what_was_not_read_is_read_before_anything_is_taken(open_hand: OpenHand, driven: Path) -> None:
+    hand = open_hand(driven)
+    count, other = len(hand.model.view.frames), open_hand()
+    hand.end()
+    other.click(other.window.empty_page.take)
+    assert len(other.model.view.frames) == count > 0
+
+
 def test_a_bench_that_is_left_while_its_frames_are_read_is_left_at_once_and_keeps_them(
     open_hand: OpenHand, driven: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
